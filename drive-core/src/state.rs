@@ -1,0 +1,64 @@
+//! The states of the drive.
+
+use core::fmt;
+
+use crate::{Fault, Mode};
+
+/// What the drive is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Outputs off.
+    Off,
+    /// Outputs off, offsets of the current sensors being measured.
+    Calibrating,
+    /// Low sides on, to charge the bootstrap capacitors of the high-side gate drives.
+    Precharge,
+    /// Current on the direct axis only, until the flux stands.
+    Magnetising,
+    /// Regulating torque.
+    Torque,
+    /// Regulating speed.
+    Speed,
+    /// Regulating position.
+    Position,
+    /// Identifying the motor.
+    Commissioning,
+    /// Taking the torque to zero, then off.
+    Stopping,
+    /// Outputs off until the fault is cleared.
+    Fault(Fault),
+}
+
+impl State {
+    /// The state in which a drive started in `mode` runs.
+    pub const fn of_mode(mode: Mode) -> Self {
+        match mode {
+            Mode::Torque => Self::Torque,
+            Mode::Speed => Self::Speed,
+            Mode::Position => Self::Position,
+            Mode::Commissioning => Self::Commissioning,
+        }
+    }
+
+    /// Whether the current loop is closed.
+    pub const fn regulates(self) -> bool {
+        !matches!(self, Self::Off | Self::Calibrating | Self::Precharge | Self::Fault(_))
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Off => "off",
+            Self::Calibrating => "calibrating",
+            Self::Precharge => "precharging",
+            Self::Magnetising => "magnetising",
+            Self::Torque => "regulating torque",
+            Self::Speed => "regulating speed",
+            Self::Position => "regulating position",
+            Self::Commissioning => "commissioning",
+            Self::Stopping => "stopping",
+            Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),
+        })
+    }
+}

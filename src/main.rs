@@ -1,0 +1,4 @@
+//! Firmware of the drive.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+#[cfg(not(target_os = "none"))]
+fn main() {}
