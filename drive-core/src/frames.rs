@@ -165,10 +165,7 @@ impl AlphaBeta {
     }
 
     fn seen_from(self, axis: UnitVector) -> (f32, f32) {
-        (
-            axis.cos * self.alpha + axis.sin * self.beta,
-            axis.cos * self.beta - axis.sin * self.alpha,
-        )
+        (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
     }
 }
 
@@ -212,8 +209,9 @@ mod tests {
 
     #[test]
     fn the_injection_axis_is_the_bisector_of_dm_and_qm() {
-        let theta = Angle::from_degrees(73.0).unit_vector();
-        let i = AlphaBeta::along(theta, 1.0).to_dm_qm(theta.eighth_behind());
+        let theta = Angle::from_degrees(73.0);
+        let i = AlphaBeta::along(theta.unit_vector(), 1.0)
+            .to_dm_qm((theta - Angle::EIGHTH).unit_vector());
         assert!((i.dm - i.qm).abs() < 2e-5 && (i.dm - 0.707_106_8).abs() < 2e-5);
     }
 

@@ -61,7 +61,7 @@ impl Hardware {
 
 /// What the timer is to do during the period from `(k + 1) T` to `(k + 2) T`.
 ///
-/// The counter runs up and down between 0 and [`TimerSettings::top`](crate::settings::TimerSettings)
+/// The counter runs up and down between 0 and [`Inverter::top`](crate::settings::Inverter::top)
 /// and the high side of a leg is on while it is below the compare value; the period starts at the
 /// top, so that 0 means low side on throughout and `top` means high side on throughout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,8 +113,11 @@ pub enum Command<'a> {
     Position(f32),
     /// Reference of the direct-axis (magnetising) current, A peak.
     Magnetising(f32),
+    /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
+    /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
+    TurnInjection(f32),
     /// Replace all settings. Only while off or in fault.
-    Configure(&'a crate::settings::Coefficients),
+    Configure(&'a crate::Coefficients),
 }
 
 /// How a command was taken.

@@ -1,27 +1,57 @@
-//! Field-oriented control of a three-phase induction motor without a position sensor.
+//! Field-oriented control of a three-phase induction motor without a position sensor, down to zero
+//! speed, by a 600 Hz voltage injected on the quadrature axis.
 //!
-//! One data path: converter codes become a [`Sample`], [`Drive::step`] turns it into a [`Compare`],
-//! the timer takes that over one period later.
+//! The whole drive is one type, [`Drive`], and the whole control one function, [`Drive::step`]:
+//! converter codes go in as a [`Sample`], timer values come out as a [`Compare`]. The same code runs
+//! in the control interrupt of the firmware and against the simulated motor on a host, and gives the
+//! same bits on both: angles are integers, sine and cosine come from one integer table, no function
+//! of a maths library is called in the step, and no multiplication is fused with an addition.
+//!
+//! Inside, one direction only:
+//!
+//! ```text
+//! sensing -> frames -> filters -> flux angle -> current loop -> injection -> dead time -> modulation
+//! ```
+//!
+//! Each block is a small pair of coefficients (made from settings in SI units, outside the
+//! interrupt) and state, with one step function. Equation, table, figure and section numbers are
+//! those of R. A. N. Barroso, "Controle de torque sensorless de um motor de indução com injeção de
+//! sinal de alta frequência no eixo de quadratura", UFC, 2017.
+//!
+//! # Conventions
+//!
+//! * Amplitude-invariant Clarke transformation: currents and voltages are peak phase values.
+//! * `phi` is the angle of the rotor flux, `theta = phi + 90°` the injection axis; electrical.
+//! * A speed inside is a `step`: electrical turns per control period of 1/6000 s.
+//! * The machine is the T-equivalent circuit: r_s, r_r, L_m and the two leakages.
+//! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]
 
 pub mod angle;
+pub mod dead_time;
+pub mod demodulator;
+mod drive;
 pub mod fault;
+pub mod filters;
 pub mod frames;
+pub mod indirect;
+pub mod injection;
 pub mod io;
+pub mod modulation;
+pub mod pi;
+pub mod plausibility;
+pub mod position;
+pub mod sensing;
 pub mod settings;
+pub mod sos;
 pub mod state;
+pub mod tracker;
+pub mod tuning;
 
 pub use angle::{Angle, UnitVector};
+pub use drive::{Drive, Telemetry};
 pub use fault::Fault;
 pub use frames::{Abc, AlphaBeta, DmQm, Dq};
 pub use io::{Command, Compare, Hardware, Mode, Refused, Sample, Taken};
+pub use settings::{Coefficients, Settings};
 pub use state::State;
-
-/// Placeholder while the blocks are written.
-pub struct Drive;
-impl Drive {
-    /// One period.
-    pub fn step(&mut self, _sample: &Sample) -> Compare {
-        Compare::OFF
-    }
-}

@@ -1,0 +1,492 @@
+//! The whole drive: one step per PWM period.
+
+use crate::angle::{Angle, UnitVector};
+use crate::demodulator::DemodulatorState;
+use crate::fault::Fault;
+use crate::filters::{LPF, LpfState, lpf_lag_samples};
+use crate::frames::{AlphaBeta, Dq};
+use crate::indirect::{FluxAngle, IndirectState};
+use crate::injection::{Carrier, CarrierPeriod};
+use crate::io::{Command, Compare, Hardware, Mode, Refused, Sample, Taken};
+use crate::pi::{DqPiState, ReferenceState};
+use crate::plausibility::{CarrierWatch, PredictionState};
+use crate::position::PositionState;
+use crate::sensing::{Measured, SensingState};
+use crate::settings::{AngleSource, Coefficients, LARGEST_POSITION};
+use crate::state::State;
+use crate::tracker::TrackerState;
+
+/// The drive: coefficients, state, and the references it was given.
+///
+/// ```
+/// use drive_core::{Command, Drive, Mode, Sample, State, settings::Settings};
+///
+/// let mut drive = Drive::new(Settings::default().build()?);
+/// drive.command(Command::Start(Mode::Torque))?;
+/// // Codes of zero current and 311 V.
+/// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, ..Sample::default() };
+/// let compare = drive.step(&sample);
+/// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
+/// assert_eq!(drive.state(), State::Calibrating);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Drive {
+    c: Coefficients,
+    state: State,
+    mode: Mode,
+    /// Control periods spent in this state.
+    elapsed: u32,
+    references: References,
+    sensing: SensingState,
+    control: ControlState,
+    telemetry: Telemetry,
+}
+
+/// What was asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct References {
+    current: Dq,
+    turns: f32,
+    /// Injection axis seen from the flux, as an angle and a unit vector.
+    injection_turn: Angle,
+    injection_axis: UnitVector,
+}
+
+impl Default for References {
+    fn default() -> Self {
+        Self {
+            current: Dq::ZERO,
+            turns: 0.0,
+            injection_turn: Angle::QUARTER,
+            injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
+        }
+    }
+}
+
+/// Everything that moves while the drive regulates; fresh at every start.
+#[derive(Clone, Copy, Debug, Default)]
+struct ControlState {
+    low_pass: LpfState,
+    indirect: IndirectState,
+    tracker: TrackerState,
+    demodulator: DemodulatorState,
+    carrier: Carrier,
+    reference: [ReferenceState; 2],
+    current_loop: DqPiState,
+    position: PositionState,
+    carrier_watch: CarrierWatch,
+    prediction: PredictionState,
+    /// Mean electrical speed of the rotor as the injection sees it, turns per period.
+    rotor_step: f32,
+}
+
+/// What the drive saw and did in the last step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Telemetry {
+    /// Estimated rotor-flux angle at the sample.
+    pub phi: Angle,
+    /// How fast it turns, electrical turns per period.
+    pub flux_step: f32,
+    /// Electrical speed of the rotor, turns per period.
+    pub rotor_step: f32,
+    /// Filtered current reference, A.
+    pub reference: Dq,
+    /// Filtered current in the estimated flux frame, A.
+    pub current: Dq,
+    /// Wanted voltage without the carrier, V.
+    pub voltage: Dq,
+    /// Current difference of the demodulation, A.
+    pub delta_i: f32,
+    /// Dc-link voltage, V.
+    pub dc_link: f32,
+    /// Position in mechanical turns from the start.
+    pub turns: f32,
+}
+
+impl Drive {
+    /// A drive that is off.
+    pub fn new(coefficients: Coefficients) -> Self {
+        Self {
+            c: coefficients,
+            state: State::Off,
+            mode: Mode::Torque,
+            elapsed: 0,
+            references: References::default(),
+            sensing: SensingState::default(),
+            control: ControlState::default(),
+            telemetry: Telemetry::default(),
+        }
+    }
+
+    /// What it is doing.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// What it saw and did in the last step.
+    pub fn telemetry(&self) -> &Telemetry {
+        &self.telemetry
+    }
+
+    /// One PWM period: from the sample of instant `k T` to the compare values of the period that
+    /// begins at `(k + 1) T`.
+    ///
+    /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
+    /// with the outputs off in the same step.
+    pub fn step(&mut self, sample: &Sample) -> Compare {
+        if matches!(self.state, State::Off | State::Fault(_)) {
+            return Compare::OFF;
+        }
+        let measured = self.c.sensing.step(&self.sensing, sample);
+        let result = match self.protect(sample, &measured) {
+            Some(fault) => Err(fault),
+            None => match self.state {
+                State::Calibrating => self.calibrate(sample),
+                State::Precharge => Ok(self.precharge(sample)),
+                _ => self.regulate(sample, &measured),
+            },
+        };
+        self.elapsed = self.elapsed.saturating_add(1);
+        result.unwrap_or_else(|fault| {
+            self.enter(State::Fault(fault));
+            Compare::OFF
+        })
+    }
+
+    /// What must hold in every period with the outputs on or about to be.
+    fn protect(&self, sample: &Sample, measured: &Measured) -> Option<Fault> {
+        let p = &self.c.protection;
+        if sample.hardware != Hardware::NONE {
+            return Some(of_hardware(sample.hardware));
+        }
+        if let Some(fault) = self.c.sensing.check(sample) {
+            return Some(fault);
+        }
+        let i = measured.phases;
+        if i.a.abs() > p.trip_a {
+            Some(Fault::OverCurrentA)
+        } else if i.b.abs() > p.trip_a {
+            Some(Fault::OverCurrentB)
+        } else if i.c.abs() > p.trip_a {
+            Some(Fault::OverCurrentC)
+        } else if measured.dc_link > p.dc_over {
+            Some(Fault::DcLinkOverVoltage)
+        } else if measured.dc_link < p.dc_under {
+            Some(Fault::DcLinkUnderVoltage)
+        } else {
+            None
+        }
+    }
+
+    fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
+        if self.c.sensing.calibrate(&mut self.sensing, sample)?.is_some() {
+            self.enter(State::Precharge);
+        }
+        Ok(Compare::OFF)
+    }
+
+    fn precharge(&mut self, sample: &Sample) -> Compare {
+        if self.elapsed >= self.c.sequence.precharge {
+            self.control = ControlState::default();
+            // The flux is going to be built up along phase a: phi = 0, the injection 90° ahead.
+            self.control.tracker.angle = Angle::QUARTER;
+            self.c.position.start(&mut self.control.position, sample.encoder);
+            self.enter(State::Magnetising);
+        }
+        Compare::LOW_SIDES_ON
+    }
+
+    /// Regulates the current. This is the control law, top to bottom.
+    fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
+        let wanted = self.reference(sample);
+        let (c, r, s) = (&self.c, &self.references, &mut self.control);
+        let reference = Dq {
+            d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
+            q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
+        };
+        let filtered = LPF.step_alpha_beta(&mut s.low_pass, measured.current);
+
+        // Flux angle at the sample. The current is seen from where the flux was when the filtered
+        // current flowed; the voltage is put where the flux will be when it acts.
+        let flux = match c.source {
+            AngleSource::Encoder => {
+                c.indirect.angle(&mut s.indirect, sample.encoder).map_err(|_| Fault::Encoder)?
+            }
+            AngleSource::Injection => {
+                FluxAngle { phi: s.tracker.angle - Angle::QUARTER, step: s.tracker.step }
+            }
+        };
+        let lag = lpf_lag_samples(flux.step * core::f32::consts::TAU) + c.current_lag;
+        let seen = (flux.phi - Angle::within_turn(flux.step * lag)).unit_vector();
+        let applied = (flux.phi + Angle::within_turn(flux.step * VOLTAGE_LEAD)).unit_vector();
+
+        // Current loop.
+        let current = filtered.to_dq(seen);
+        let voltage = c.current_loop.step(&mut s.current_loop, reference - current);
+
+        // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
+        let carrier =
+            if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
+        let axis = applied.turned_by(r.injection_axis);
+        let total = voltage.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.voltage);
+
+        // Dead time: the sign of the current that is going to flow decides.
+        let expected =
+            current.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.mean_current);
+        let compensation = c.dead_time.step(expected.to_abc(), measured.dc_link);
+        let modulated = c.modulator.step(total, compensation, measured.dc_link);
+        s.current_loop.realised((modulated.realised - total).to_dq(applied));
+
+        // Angles for the next sample.
+        c.indirect.update(&mut s.indirect, current);
+        let theta = flux.phi + r.injection_turn;
+        let mut delta_i = 0.0;
+        if c.demodulate {
+            let back = Angle::within_turn(flux.step * c.demodulation_lag);
+            let dm_axis = (theta - Angle::EIGHTH - back).unit_vector();
+            delta_i = c.demodulator.step(&mut s.demodulator, measured.current, dm_axis);
+        }
+        let rotor_step = match c.source {
+            AngleSource::Encoder => s.indirect.rotor_step,
+            // The flux is held still until it stands.
+            AngleSource::Injection if self.state == State::Magnetising => 0.0,
+            AngleSource::Injection => {
+                let error = c.injection_reference.at(reference.q) - delta_i;
+                if !c.tracker.step(&mut s.tracker, error) {
+                    return Err(self.not_finite().unwrap_or(Fault::LostAngle));
+                }
+                s.rotor_step +=
+                    ROTOR_SMOOTHING * (s.tracker.step - s.indirect.slip_step - s.rotor_step);
+                s.rotor_step
+            }
+        };
+
+        self.telemetry = Telemetry {
+            phi: flux.phi,
+            flux_step: flux.step,
+            rotor_step,
+            reference,
+            current,
+            voltage,
+            delta_i,
+            dc_link: measured.dc_link,
+            turns: c.position.turns(&s.position, sample.encoder),
+        };
+
+        // What was computed must make sense before it is put out.
+        let sum = voltage.d + voltage.q + current.d + current.q + delta_i + flux.step + rotor_step;
+        if !sum.is_finite() {
+            return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
+        }
+        if rotor_step.abs() > c.protection.rotor_step {
+            return Err(Fault::OverSpeed);
+        }
+        if c.inject {
+            let axis = theta.unit_vector();
+            let amplitude = c.injection.current_amplitude;
+            if let Some(fault) = s.carrier_watch.step(measured, carrier, axis, amplitude) {
+                return Err(fault);
+            }
+        }
+        let realised = modulated.realised;
+        if let Some(fault) =
+            c.prediction.step(&mut s.prediction, measured.current, realised, flux.step)
+        {
+            return Err(fault);
+        }
+
+        if self.state == State::Off {
+            return Ok(Compare::OFF); // stopped
+        }
+        let [a, b, c] = modulated.compare;
+        Ok(Compare { a, b, c, enabled: true })
+    }
+
+    /// The current to regulate in this state, A; moves on to the next state where it is time.
+    fn reference(&mut self, sample: &Sample) -> Dq {
+        let r = &mut self.references;
+        let i_q = match self.state {
+            State::Magnetising => {
+                if self.elapsed >= self.c.sequence.magnetise {
+                    self.enter(State::of_mode(self.mode));
+                }
+                0.0
+            }
+            State::Position => {
+                let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
+                r.current.q = i_q;
+                i_q
+            }
+            State::Stopping => {
+                let ramp = self.c.sequence.stop_ramp;
+                r.current.q = if r.current.q > ramp {
+                    r.current.q - ramp
+                } else if r.current.q < -ramp {
+                    r.current.q + ramp
+                } else {
+                    self.state = State::Off;
+                    0.0
+                };
+                self.references.current.q
+            }
+            _ => r.current.q,
+        };
+        Dq { d: self.references.current.d, q: i_q }
+    }
+
+    /// Which of settings, references and state is to blame when a result is not finite.
+    fn not_finite(&self) -> Option<Fault> {
+        let r = &self.references;
+        if !self.c.is_finite() {
+            Some(Fault::NonFiniteSettings)
+        } else if !(r.current.is_finite() && r.turns.is_finite()) {
+            Some(Fault::NonFiniteCommand)
+        } else if !(self.control.tracker.step.is_finite()) {
+            Some(Fault::NonFiniteState)
+        } else {
+            None
+        }
+    }
+
+    fn enter(&mut self, state: State) {
+        self.state = state;
+        self.elapsed = 0;
+    }
+
+    /// Takes a command; not from within [`step`](Self::step), but between two steps.
+    ///
+    /// References are taken from the start command on, and a start sets them to zero: what was asked
+    /// for in an earlier run moves nothing.
+    ///
+    /// # Errors
+    /// Why it was refused; nothing has changed then.
+    pub fn command(&mut self, command: Command) -> Result<Taken, Refused> {
+        match command {
+            Command::Start(mode) => self.start(mode),
+            Command::Stop => {
+                match self.state {
+                    State::Off | State::Fault(_) | State::Stopping => {}
+                    State::Calibrating | State::Precharge => self.enter(State::Off),
+                    _ => self.enter(State::Stopping),
+                }
+                Ok(Taken::AsGiven)
+            }
+            Command::Clear => {
+                if let State::Fault(_) = self.state {
+                    self.enter(State::Off);
+                }
+                Ok(Taken::AsGiven)
+            }
+            Command::Torque(i_q) => {
+                self.takes_references(Mode::Torque, i_q)?;
+                let i_d = self.references.current.d;
+                let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
+                let taken = limited(i_q, largest);
+                self.references.current.q = taken;
+                Ok(as_taken(i_q, taken))
+            }
+            Command::Position(turns) => {
+                self.takes_references(Mode::Position, turns)?;
+                let taken = limited(turns, LARGEST_POSITION);
+                self.references.turns = taken;
+                Ok(as_taken(turns, taken))
+            }
+            Command::Magnetising(i_d) => {
+                self.takes_references(self.mode, i_d)?;
+                let i_q = self.references.current.q;
+                let min = 0.2 * self.c.sequence.i_d;
+                let max = libm::sqrtf(self.c.protection.current_squared - i_q * i_q);
+                if i_d < min {
+                    return Err(Refused::OutOfRange { min, max });
+                }
+                let taken = limited(i_d, max);
+                self.references.current.d = taken;
+                Ok(as_taken(i_d, taken))
+            }
+            Command::TurnInjection(degrees) => {
+                self.takes_references(self.mode, degrees)?;
+                if self.c.source != AngleSource::Encoder {
+                    return Err(Refused::NeedsEncoder);
+                }
+                let turn = Angle::QUARTER + Angle::from_degrees(degrees);
+                self.references.injection_turn = turn;
+                self.references.injection_axis = turn.unit_vector();
+                Ok(Taken::AsGiven)
+            }
+            Command::Configure(coefficients) => match self.state {
+                State::Off | State::Fault(_) => {
+                    self.c = *coefficients;
+                    self.sensing = SensingState::default();
+                    Ok(Taken::AsGiven)
+                }
+                state => Err(Refused::State(state)),
+            },
+        }
+    }
+
+    fn start(&mut self, mode: Mode) -> Result<Taken, Refused> {
+        match (self.state, mode) {
+            (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
+            (State::Off, Mode::Speed | Mode::Commissioning) => {
+                return Err(Refused::ModeNotAvailable(mode));
+            }
+            (State::Off, Mode::Position) if self.c.source != AngleSource::Encoder => {
+                return Err(Refused::NeedsEncoder);
+            }
+            (State::Off, _) => {}
+            (state, _) => return Err(Refused::State(state)),
+        }
+        self.mode = mode;
+        self.references =
+            References { current: Dq::new(self.c.sequence.i_d, 0.0), ..References::default() };
+        self.sensing = SensingState::default();
+        self.enter(State::Calibrating);
+        Ok(Taken::AsGiven)
+    }
+
+    /// Whether a reference for `mode` can be taken now.
+    fn takes_references(&self, mode: Mode, value: f32) -> Result<(), Refused> {
+        match self.state {
+            State::Fault(fault) => Err(Refused::Fault(fault)),
+            State::Off | State::Stopping => Err(Refused::State(self.state)),
+            _ if self.mode != mode => Err(Refused::State(State::of_mode(self.mode))),
+            _ if !value.is_finite() => Err(Refused::NotFinite),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Periods from the sample to the middle of the period in which its voltage acts.
+const VOLTAGE_LEAD: f32 = 1.5;
+/// Share of the newest value in the mean speed of the rotor: 5 ms.
+const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
+
+fn limited(value: f32, largest: f32) -> f32 {
+    if value > largest {
+        largest
+    } else if value < -largest {
+        -largest
+    } else {
+        value
+    }
+}
+
+fn as_taken(asked: f32, taken: f32) -> Taken {
+    if asked == taken { Taken::AsGiven } else { Taken::Limited(taken) }
+}
+
+/// The most telling of the events: what switched off first comes first.
+fn of_hardware(events: Hardware) -> Fault {
+    if events.has(Hardware::BREAK) {
+        Fault::Break
+    } else if events.has(Hardware::ANALOG_WATCHDOG) {
+        Fault::AnalogWatchdog
+    } else if events.has(Hardware::CLOCK_FAILURE) {
+        Fault::ClockFailure
+    } else if events.has(Hardware::DEADLINE_MISS) {
+        Fault::DeadlineMiss
+    } else {
+        Fault::ConverterOverrun
+    }
+}

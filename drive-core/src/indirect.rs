@@ -1,0 +1,146 @@
+//! Indirect rotor-flux angle from the encoder, Eq. 2.10:
+//! `phi = theta_r + (1 / T_sec) ∫ i_q / i_d dt`.
+//!
+//! `i_d` is the magnetising current, which follows the current on the direct axis with the rotor
+//! time constant `T_sec = L_r / r_r`; the two are the same once the flux stands, which is where the
+//! printed form holds.
+
+use core::f32::consts::TAU;
+
+use crate::angle::Angle;
+use crate::frames::Dq;
+
+/// Coefficients of the encoder and the slip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Indirect {
+    /// Electrical angle of one count in units of 2^-32 turn. Rounding it is a relative error of the
+    /// speed below 1e-6 (10 000 counts), which the orientation takes as that much slip.
+    bits_per_count: u32,
+    /// T / T_sec.
+    rate: f32,
+    /// Least magnetising current that is divided by, A.
+    least: f32,
+    /// Share of the newest step in the mean speed.
+    smoothing: f32,
+    /// Most counts the rotor can turn in a period.
+    most_counts: i32,
+}
+
+/// State of the indirect angle.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct IndirectState {
+    last_count: Option<u32>,
+    slip: Angle,
+    /// Slip, electrical turns per period.
+    pub slip_step: f32,
+    magnetising: f32,
+    /// Mean electrical speed of the rotor, turns per period.
+    pub rotor_step: f32,
+}
+
+/// A flux angle and how fast it turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FluxAngle {
+    /// At the present sample.
+    pub phi: Angle,
+    /// Electrical turns per period.
+    pub step: f32,
+}
+
+/// The encoder moved further than the rotor can turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Jump;
+
+/// Time constant of the mean speed, s.
+const SPEED_FILTER_S: f32 = 5e-3;
+
+impl Indirect {
+    /// `counts` of the encoder per mechanical turn, pole pairs, rotor time constant and period in
+    /// s, the nominal magnetising current in A and the highest speed, mechanical turns per s.
+    pub fn new(
+        counts: u32,
+        pole_pairs: u8,
+        t_sec: f32,
+        period_s: f32,
+        nominal_a: f32,
+        highest: f32,
+    ) -> Self {
+        let bits = (u64::from(pole_pairs) << 32) as f64 / f64::from(counts);
+        Self {
+            bits_per_count: libm::round(bits) as u32,
+            rate: period_s / t_sec,
+            least: 0.2 * nominal_a,
+            smoothing: period_s / SPEED_FILTER_S,
+            most_counts: 2 + (highest * period_s * counts as f32) as i32,
+        }
+    }
+
+    /// The flux angle at the present sample from the encoder's counter.
+    ///
+    /// # Errors
+    /// [`Jump`] when the counter moved further than the rotor can turn in a period.
+    pub fn angle(&self, state: &mut IndirectState, count: u32) -> Result<FluxAngle, Jump> {
+        let moved = count.wrapping_sub(state.last_count.unwrap_or(count)) as i32;
+        if moved > self.most_counts || moved < -self.most_counts {
+            return Err(Jump);
+        }
+        state.last_count = Some(count);
+        let moved = Angle::from_bits(moved.wrapping_mul(self.bits_per_count as i32)).to_turns();
+        state.rotor_step += self.smoothing * (moved - state.rotor_step);
+        let rotor = Angle::from_bits(count.wrapping_mul(self.bits_per_count) as i32);
+        Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_step + state.slip_step })
+    }
+
+    /// Integrates the slip over one period with the current in the flux frame, A.
+    pub fn update(&self, state: &mut IndirectState, current: Dq) {
+        state.magnetising += self.rate * (current.d - state.magnetising);
+        let divisor = if state.magnetising > self.least { state.magnetising } else { self.least };
+        state.slip_step = self.rate * (1.0 / TAU) * current.q / divisor;
+        state.slip += Angle::within_turn(state.slip_step);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn indirect() -> Indirect {
+        Indirect::new(10_000, 2, 0.186, 1.0 / 6000.0, 0.7, 60.0)
+    }
+
+    #[test]
+    fn a_turn_of_the_rotor_is_two_electrical_turns() {
+        let ind = indirect();
+        let mut state = IndirectState::default();
+        for count in 0..=2500 {
+            ind.angle(&mut state, count).unwrap();
+        }
+        let quarter = ind.angle(&mut state, 2500).unwrap();
+        // 2500 counts are a quarter turn, half an electrical turn; rounding of one count is 1e-10.
+        assert!((quarter.phi.to_turns().abs() - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn slip_integrates_the_ratio_of_the_currents() {
+        let ind = indirect();
+        let mut state = IndirectState::default();
+        // flux built up for 10 time constants, then i_q = 2 i_d for 0.1 s
+        for _ in 0..12_000 {
+            ind.update(&mut state, Dq::new(0.7, 0.0));
+        }
+        for _ in 0..600 {
+            ind.update(&mut state, Dq::new(0.7, 1.4));
+        }
+        let phi = ind.angle(&mut state, 0).unwrap().phi.to_radians();
+        assert!((phi - 0.1 * 2.0 / 0.186).abs() < 1e-3, "{phi}");
+    }
+
+    #[test]
+    fn a_jump_is_refused_and_a_wrap_is_none() {
+        let ind = indirect();
+        let mut state = IndirectState::default();
+        ind.angle(&mut state, u32::MAX - 3).unwrap();
+        ind.angle(&mut state, 3).unwrap();
+        assert_eq!(ind.angle(&mut state, 5000), Err(Jump));
+    }
+}

@@ -1,0 +1,79 @@
+//! The PII controller of Eq. 3.7 / 3.44 that turns the injection axis until `delta_i` is at its
+//! reference.
+//!
+//! `u[k+1] = 2 u[k] - u[k-1] + k_s (e[k] - z_s e[k-1])`, written as two accumulators: the step per
+//! period, and the angle, which wraps. Two integrators follow a flux that turns at constant speed
+//! without a steady error.
+
+use core::f32::consts::TAU;
+
+use crate::angle::Angle;
+
+/// Coefficients of the tracker.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracker {
+    /// Gain, turns per period and ampere.
+    gain: f32,
+    /// Zero.
+    zero: f32,
+    /// Largest step per period, turns.
+    limit: f32,
+}
+
+/// State of the tracker.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrackerState {
+    /// The tracked angle at the present sample.
+    pub angle: Angle,
+    /// Turns per period.
+    pub step: f32,
+    error: f32,
+}
+
+impl Tracker {
+    /// `k_s` in rad/A and `z_s` as in Eq. 3.44; `limit` is the largest speed, turns per period,
+    /// below 1/2.
+    pub fn new(k_s: f32, z_s: f32, limit: f32) -> Self {
+        Self { gain: k_s / TAU, zero: z_s, limit }
+    }
+
+    /// Moves on by one period with the error `reference - delta_i`, A. False when the speed has
+    /// reached its limit (or is not a number): the angle is lost.
+    pub fn step(&self, state: &mut TrackerState, error: f32) -> bool {
+        let step = state.step + self.gain * (error - self.zero * state.error);
+        state.error = error;
+        state.step = step;
+        state.angle += Angle::within_turn(step);
+        step < self.limit && step > -self.limit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn follows_equation_3_44() {
+        let (k_s, z_s) = (0.132_546, 0.9);
+        let tracker = Tracker::new(k_s as f32, z_s as f32, 0.1);
+        let mut state = TrackerState::default();
+        let (mut u, mut last, mut e1) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 0..200 {
+            let e = 0.01 * f64::from(k % 7) - 0.02;
+            assert!(tracker.step(&mut state, e as f32));
+            let next = 2.0 * u - last + k_s * (e - z_s * e1);
+            (last, u, e1) = (u, next, e);
+        }
+        let turns = u / core::f64::consts::TAU;
+        let difference = f64::from(state.angle.to_turns()) - (turns - turns.round());
+        assert!(difference.abs() < 1e-5, "{difference}");
+    }
+
+    #[test]
+    fn says_when_it_runs_away() {
+        let tracker = Tracker::new(0.13, 0.9, 0.01);
+        let mut state = TrackerState::default();
+        assert!((0..100_000).any(|_| !tracker.step(&mut state, 1.0)));
+        assert!(!tracker.step(&mut TrackerState::default(), f32::NAN));
+    }
+}
