@@ -174,3 +174,41 @@ fn minimum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     }
     if f_a < f_b { (a, f_a) } else { (b, f_b) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filters::LPF;
+    use crate::tuning::{FirstOrder, pi_response};
+
+    /// The closed form against a bisection over the gain, where the peak binds and where the phase
+    /// margin does.
+    #[test]
+    fn gain_limit_agrees_with_a_search() {
+        let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
+        let open_loop = |w: f64| {
+            pi_response(1.0, 0.9538, w) * plant.response(w) * LPF.response(w) * Complex::unit(-w)
+        };
+        for (phase_margin_deg, ms) in
+            [(45.0, 2.2), (55.0, 2.2), (50.0, 5.0), (20.0, 1.5), (1.0, 50.0)]
+        {
+            let holds = |gain: f64| {
+                let m = scan(&|w| open_loop(w) * gain, 1, 1.0 / 6000.0).expect("crosses");
+                m.stable && m.phase_margin_deg >= phase_margin_deg && m.ms <= ms
+            };
+            let (mut low, mut high) = (20.0, 120.0);
+            assert!(holds(low) && !holds(high));
+            for _ in 0..30 {
+                let middle = 0.5 * (low + high);
+                if holds(middle) {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let closed = gain_limit(&open_loop, phase_margin_deg, ms);
+            println!("{phase_margin_deg}°, {ms}: {closed:.6} by search {low:.6}");
+            assert!((closed / low - 1.0).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! The drive on a resistive-inductive load: sequence, protections, commands. How it drives a motor
+//! is tested with the simulator.
+
+use super::*;
+use crate::frames::Abc;
+
+use crate::io::{Command, Refused, Taken};
+use crate::settings::{CurrentPlant, Settings};
+use proptest::prelude::*;
+
+/// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
+struct Load {
+    current: AlphaBeta,
+    pending: Compare,
+    v_dc: f32,
+}
+
+impl Load {
+    fn new() -> Self {
+        Self { current: AlphaBeta::ZERO, pending: Compare::OFF, v_dc: 311.0 }
+    }
+
+    fn sample(&self) -> Sample {
+        let i = self.current.to_abc();
+        Sample {
+            current_a: ((i.a + 4.472_713_4) / 0.002_212) as u16,
+            current_b: ((i.b + 4.496_623_8) / 0.002_231_4) as u16,
+            dc_link: (self.v_dc / 0.11) as u16,
+            ..Sample::default()
+        }
+    }
+
+    fn advance(&mut self, compare: Compare) {
+        let p = self.pending;
+        let duty = |c: u16| f32::from(c) / 14_167.0 * self.v_dc;
+        let v = Abc::new(duty(p.a), duty(p.b), duty(p.c)).to_alpha_beta();
+        self.current = self.current * 0.980_053 + v * 0.003_205_2;
+        self.pending = compare;
+    }
+}
+
+fn settings() -> Settings {
+    let mut settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
+    // The load has no dead time.
+    settings.inverter.compensate = false;
+    settings
+}
+
+fn drive() -> Drive {
+    Drive::new(settings().build().unwrap())
+}
+
+/// Steps until the drive is in `state`; false when it is not after three seconds.
+fn run_to(drive: &mut Drive, load: &mut Load, state: State) -> bool {
+    for _ in 0..18_000 {
+        if drive.state() == state {
+            return true;
+        }
+        let compare = drive.step(&load.sample());
+        load.advance(compare);
+    }
+    false
+}
+
+fn running() -> (Drive, Load) {
+    let (mut drive, mut load) = (drive(), Load::new());
+    drive.command(Command::Start(Mode::Torque)).unwrap();
+    assert!(run_to(&mut drive, &mut load, State::Torque));
+    (drive, load)
+}
+
+#[test]
+fn start_goes_through_its_states_and_stop_ramps_to_off() {
+    let (mut drive, mut load) = (drive(), Load::new());
+    assert_eq!(drive.step(&load.sample()), Compare::OFF);
+    drive.command(Command::Start(Mode::Torque)).unwrap();
+
+    let mut seen = vec![];
+    let mut low_sides = 0;
+    for _ in 0..10_000 {
+        if seen.last() != Some(&drive.state()) {
+            seen.push(drive.state());
+        }
+        let compare = drive.step(&load.sample());
+        match drive.state() {
+            State::Calibrating => assert_eq!(compare, Compare::OFF),
+            State::Precharge => low_sides += u32::from(compare == Compare::LOW_SIDES_ON),
+            _ => {}
+        }
+        load.advance(compare);
+    }
+    let all = [State::Calibrating, State::Precharge, State::Magnetising, State::Torque];
+    assert_eq!(seen, all);
+    assert!((58..=61).contains(&low_sides), "10 ms of low sides: {low_sides} periods");
+
+    // Two settled references: the loop has no steady error but the converter's step.
+    for (i_q, expected) in [(2.0, 2.0), (-1.0, -1.0)] {
+        drive.command(Command::Torque(i_q)).unwrap();
+        for _ in 0..1200 {
+            let compare = drive.step(&load.sample());
+            load.advance(compare);
+        }
+        let t = drive.telemetry();
+        assert!((t.current.q - expected).abs() < 0.01 && (t.current.d - 0.7).abs() < 0.01);
+    }
+
+    drive.command(Command::Stop).unwrap();
+    let before = drive.telemetry().reference.q;
+    assert!(run_to(&mut drive, &mut load, State::Off));
+    assert_eq!(drive.step(&load.sample()), Compare::OFF);
+    // Ramped, not dropped: 1 A at 30 A/s.
+    assert!(before < -0.9);
+}
+
+#[test]
+fn every_protection_switches_off_in_the_same_step() {
+    type Change = fn(&mut Sample);
+    let cases: [(Change, Fault); 14] = [
+        (|s| s.current_a = 4050, Fault::OverCurrentA),
+        (|s| s.current_b = 4050, Fault::OverCurrentB),
+        (|s| (s.current_a, s.current_b) = (3200, 3300), Fault::OverCurrentC),
+        (|s| s.current_a = 4095, Fault::SensorSaturatedA),
+        (|s| s.current_b = 0, Fault::SensorSaturatedB),
+        (|s| s.dc_link = 3700, Fault::DcLinkOverVoltage),
+        (|s| s.dc_link = 1000, Fault::DcLinkUnderVoltage),
+        (|s| s.heat_sink = 4095, Fault::OverTemperature),
+        (|s| s.encoder = 1_000_000, Fault::Encoder),
+        (|s| s.hardware = Hardware::BREAK, Fault::Break),
+        (|s| s.hardware = Hardware::ANALOG_WATCHDOG, Fault::AnalogWatchdog),
+        (|s| s.hardware = Hardware::DEADLINE_MISS, Fault::DeadlineMiss),
+        (|s| s.hardware = Hardware::CONVERTER_OVERRUN, Fault::ConverterOverrun),
+        (|s| s.hardware = Hardware::CLOCK_FAILURE, Fault::ClockFailure),
+    ];
+    for (change, fault) in cases {
+        let (mut drive, mut load) = running();
+        let mut sample = load.sample();
+        change(&mut sample);
+        assert_eq!(drive.step(&sample), Compare::OFF, "{fault}");
+        assert_eq!(drive.state(), State::Fault(fault));
+        // It stays latched, names itself, and a clear and a start bring the drive back.
+        assert_eq!(drive.step(&load.sample()), Compare::OFF);
+        assert_eq!(drive.command(Command::Start(Mode::Torque)), Err(Refused::Fault(fault)));
+        drive.command(Command::Clear).unwrap();
+        load = Load::new();
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque), "after {fault}");
+    }
+}
+
+#[test]
+fn over_speed_trips() {
+    let (mut drive, mut load) = running();
+    let mut sample = load.sample();
+    for _ in 0..3000 {
+        // 70 counts a period: 2520 rpm
+        sample.encoder = sample.encoder.wrapping_add(70);
+        let now = load.sample();
+        sample = Sample { encoder: sample.encoder, ..now };
+        let compare = drive.step(&sample);
+        load.advance(compare);
+    }
+    assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
+}
+
+#[test]
+fn a_stuck_current_sensor_is_found_before_the_current_runs_away() {
+    let (mut drive, mut load) = running();
+    let stuck = load.sample();
+    drive.command(Command::Torque(1.0)).unwrap();
+    let mut largest = 0.0_f32;
+    for _ in 0..3000 {
+        let sample = Sample { current_a: stuck.current_a, ..load.sample() };
+        let compare = drive.step(&sample);
+        load.advance(compare);
+        largest = largest.max(load.current.length_squared());
+        if matches!(drive.state(), State::Fault(_)) {
+            break;
+        }
+    }
+    assert_eq!(drive.state(), State::Fault(Fault::CurrentNotAsPredicted));
+    assert!(largest < 4.47_f32 * 4.47, "{largest}");
+}
+
+#[test]
+fn a_silent_channel_is_found_by_its_carrier() {
+    for (channel, fault) in [(0, Fault::CarrierMissingA), (1, Fault::CarrierMissingB)] {
+        let mut settings = settings();
+        settings.injection.beside_encoder = true;
+        // With the other check out of the way.
+        settings.limits.unexplained_v = 1000.0;
+        let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        // The injection at 60°: 0.5 along phase a, 0.5 along phase b.
+        drive.command(Command::TurnInjection(-30.0)).unwrap();
+        let zero = Load::new().sample();
+        let mut periods = 0;
+        while drive.state() == State::Torque && periods < 600 {
+            let mut sample = load.sample();
+            if channel == 0 && periods > 100 {
+                sample.current_a = zero.current_a;
+            } else if channel == 1 && periods > 100 {
+                sample.current_b = zero.current_b;
+            }
+            let compare = drive.step(&sample);
+            load.advance(compare);
+            periods += 1;
+        }
+        assert_eq!(drive.state(), State::Fault(fault), "channel {channel}");
+        // Three carrier periods, and up to one to the end of the running one.
+        assert!((120..=150).contains(&periods), "{periods}");
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
+    type Break = fn(&mut Drive);
+    let cases: [(Break, Fault); 6] = [
+        (|d| d.c.current_loop.d.k_c = f32::NAN, Fault::NonFiniteSettings),
+        (|d| d.c.sensing.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
+        (|d| d.references.current.q = f32::NAN, Fault::NonFiniteCommand),
+        (
+            |d| d.control.current_loop.preset(Dq::new(f32::NAN, 0.0), Dq::ZERO),
+            Fault::NonFiniteState,
+        ),
+        (|d| d.control.tracker.step = f32::NAN, Fault::NonFiniteState),
+        (
+            |d| {
+                let nan = AlphaBeta::new(f32::NAN, 0.0);
+                LPF.step_alpha_beta(&mut d.control.low_pass, nan);
+            },
+            Fault::NonFiniteState,
+        ),
+    ];
+    for (number, (break_it, fault)) in cases.into_iter().enumerate() {
+        let mut good = settings();
+        if number == 4 {
+            good.angle_source = AngleSource::Injection;
+        }
+        let (mut drive, mut load) = (Drive::new(good.build().unwrap()), Load::new());
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        break_it(&mut drive);
+        let compare = drive.step(&load.sample());
+        assert_eq!((compare, drive.state()), (Compare::OFF, State::Fault(fault)), "case {number}");
+        drive.command(Command::Clear).unwrap();
+        drive.command(Command::Configure(&good.build().unwrap())).unwrap();
+        load = Load::new();
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque), "case {number}");
+    }
+}
+
+#[test]
+fn commands_are_taken_limited_or_refused() {
+    let mut d = drive();
+    let coefficients = settings().build().unwrap();
+    assert_eq!(d.command(Command::Torque(1.0)), Err(Refused::State(State::Off)));
+    assert_eq!(d.command(Command::Start(Mode::Speed)), Err(Refused::ModeNotAvailable(Mode::Speed)));
+    assert_eq!(d.state(), State::Off);
+
+    let (mut d, _) = running();
+    assert_eq!(d.command(Command::Start(Mode::Torque)), Err(Refused::State(State::Torque)));
+    assert_eq!(d.command(Command::Configure(&coefficients)), Err(Refused::State(State::Torque)));
+    assert_eq!(d.command(Command::Torque(1.0)), Ok(Taken::AsGiven));
+    assert_eq!(d.command(Command::Torque(f32::NAN)), Err(Refused::NotFinite));
+    assert_eq!(d.command(Command::Torque(f32::INFINITY)), Err(Refused::NotFinite));
+    assert_eq!(d.references.current.q, 1.0, "refused commands change nothing");
+    // sqrt(3.5^2 - 0.7^2)
+    let Ok(Taken::Limited(most)) = d.command(Command::Torque(-99.0)) else { panic!() };
+    assert!((most + 3.429).abs() < 1e-3);
+    assert_eq!(
+        d.command(Command::Position(1.0)),
+        Err(Refused::State(State::Torque)),
+        "position belongs to another mode"
+    );
+    assert!(matches!(d.command(Command::Magnetising(0.0)), Err(Refused::OutOfRange { .. })));
+
+    let mut sensorless = Drive::new(Settings::default().build().unwrap());
+    assert_eq!(sensorless.command(Command::Start(Mode::Position)), Err(Refused::NeedsEncoder));
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    type Change = fn(&mut Settings);
+    let cases: [(Change, &str); 7] = [
+        (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000"),
+        (|s| s.motor.l_m = 0.0, "motor.l_m = 0"),
+        (|s| s.limits.trip_a = 5.0, "limits.trip_a = 5"),
+        (|s| s.injection.amplitude_v = -1.0, "injection.amplitude_v = -1: allowed is 0 to 150"),
+        (|s| s.sequence.i_d = 9.0, "sequence.i_d = 9"),
+        (|s| s.inverter.dead_time_s = 1e-3, "inverter.dead_time_s = 0.001"),
+        (
+            |s| {
+                let bad = crate::tuning::FirstOrder { k: 0.003, p: 1.5 };
+                s.current_plant = CurrentPlant::Identified { d: bad, q: bad };
+            },
+            "current controllers:",
+        ),
+    ];
+    for (change, text) in cases {
+        let mut bad = settings();
+        change(&mut bad);
+        let error = bad.build().unwrap_err().to_string();
+        assert!(error.starts_with(text), "{error}");
+    }
+}
+
+/// What a host, a bit flip and a broken wire can do.
+fn any_sample() -> impl Strategy<Value = Sample> {
+    (0u16..=4095, 0u16..=4095, 0u16..=4095, any::<u32>(), 0u8..20).prop_map(
+        |(current_a, current_b, dc_link, encoder, n)| Sample {
+            current_a,
+            current_b,
+            dc_link,
+            heat_sink: 0,
+            encoder: if n < 10 { 0 } else { encoder },
+            hardware: if n == 19 { Hardware::BREAK } else { Hardware::NONE },
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn anything_may_come_in(
+        samples in prop::collection::vec((any_sample(), 0u8..8, any::<f32>()), 1..300),
+        injection in any::<bool>(),
+    ) {
+        let source = if injection { AngleSource::Injection } else { AngleSource::Encoder };
+        let mut s = Settings { angle_source: source, ..settings() };
+        s.sequence.calibrate_s = 0.001;
+        s.sequence.magnetise_s = 0.001;
+        let mut drive = Drive::new(s.build().unwrap());
+        let quiet = Load::new().sample();
+        for (n, (sample, command, value)) in samples.into_iter().enumerate() {
+            let _ = drive.command(match command {
+                0 => Command::Start(Mode::Torque),
+                1 => Command::Start(Mode::Position),
+                2 => Command::Torque(value),
+                3 => Command::Position(value),
+                4 => Command::Magnetising(value),
+                5 => Command::TurnInjection(value),
+                _ => Command::Clear,
+            });
+            // Mostly quiet samples, so that it gets somewhere.
+            let compare = drive.step(if n % 40 == 39 { &sample } else { &quiet });
+            prop_assert!(compare.a <= 14_167 && compare.b <= 14_167 && compare.c <= 14_167);
+            if matches!(drive.state(), State::Off | State::Fault(_)) {
+                prop_assert!(!compare.enabled);
+            }
+        }
+    }
+}
