@@ -29,16 +29,7 @@ impl DeadTime {
     /// of `v_dc`, V.
     pub fn step(&self, i: Abc, v_dc: f32) -> Abc {
         let full = self.ratio * v_dc;
-        let share = |i: f32| {
-            let x = i * self.per_ampere;
-            full * if x > 1.0 {
-                1.0
-            } else if x < -1.0 {
-                -1.0
-            } else {
-                x
-            }
-        };
+        let share = |i: f32| full * (i * self.per_ampere).clamp(-1.0, 1.0);
         Abc { a: share(i.a), b: share(i.b), c: share(i.c) }
     }
 }

@@ -4,6 +4,8 @@ mod commands;
 #[cfg(test)]
 mod tests;
 
+use core::f32::consts::TAU;
+
 use crate::angle::{Angle, UnitVector};
 use crate::demodulator::DemodulatorState;
 use crate::fault::Fault;
@@ -221,7 +223,7 @@ impl Drive {
                 FluxAngle { phi: s.tracker.angle - Angle::QUARTER, step: s.tracker.step }
             }
         };
-        let lag = lpf_lag_samples(flux.step * core::f32::consts::TAU) + c.current_lag;
+        let lag = c.lag_share * (lpf_lag_samples(flux.step * TAU) + c.current_lag);
         let seen = (flux.phi - Angle::within_turn(flux.step * lag)).unit_vector();
         let applied = (flux.phi + Angle::within_turn(flux.step * VOLTAGE_LEAD)).unit_vector();
 

@@ -212,7 +212,9 @@ mod tests {
         let theta = Angle::from_degrees(73.0);
         let i = AlphaBeta::along(theta.unit_vector(), 1.0)
             .to_dm_qm((theta - Angle::EIGHTH).unit_vector());
-        assert!((i.dm - i.qm).abs() < 2e-5 && (i.dm - 0.707_106_8).abs() < 2e-5);
+        assert!(
+            (i.dm - i.qm).abs() < 2e-5 && (i.dm - core::f32::consts::FRAC_1_SQRT_2).abs() < 2e-5
+        );
     }
 
     proptest! {

@@ -14,6 +14,12 @@ pub struct Line {
 }
 
 impl Line {
+    /// Channel A of the dissertation's board, Eq. 3.5.
+    pub const CHANNEL_A: Self = Self { gain: 0.002_212_0, offset: -4.472_713_4 };
+    /// Channel B, Eq. 3.5, with all printed digits.
+    #[allow(clippy::excessive_precision)]
+    pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
+
     fn at(self, code: u16) -> f32 {
         self.gain * f32::from(code) + self.offset
     }
@@ -130,8 +136,8 @@ mod tests {
 
     fn sensing() -> Sensing {
         Sensing {
-            current_a: Line { gain: 0.002_212_0, offset: -4.472_713_4 },
-            current_b: Line { gain: 0.002_231_4, offset: -4.496_623_8 },
+            current_a: Line::CHANNEL_A,
+            current_b: Line::CHANNEL_B,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
             heat_sink_trip: 4000,

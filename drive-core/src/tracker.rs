@@ -65,7 +65,7 @@ mod tests {
             (last, u, e1) = (u, next, e);
         }
         let turns = u / core::f64::consts::TAU;
-        let difference = f64::from(state.angle.to_turns()) - (turns - turns.round());
+        let difference = f64::from((state.angle - Angle::from_turns(turns as f32)).to_turns());
         assert!(difference.abs() < 1e-5, "{difference}");
     }
 

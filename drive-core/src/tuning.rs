@@ -25,10 +25,10 @@
 //! | Eq. 3.42, q | 182.35 Hz | 0.953374 | 51.215 | - |
 //!
 //! # What the rule does not see
-//! The identified plants have no delay and no filter in them, only a faster pole. On the plant
-//! computed from the motor, with the filter and one period of delay, the rule's gains for Eq. 3.41
-//! leave a phase margin of 41.3° and a sensitivity peak of 2.87. [`design_current_loop`] therefore
-//! lowers k_c until both are in order.
+//! A plant of first order cannot hold the phase of the filter and of a delay, whatever was in the
+//! loop when it was identified. On the plant computed from the motor, with the filter and one period
+//! of delay, the rule's gains for Eq. 3.41 leave a phase margin of 41.3° and a sensitivity peak of
+//! 2.87. [`design_current_loop`] therefore lowers k_c until both are in order.
 
 use core::f64::consts::{PI, TAU};
 use core::fmt;

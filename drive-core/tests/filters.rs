@@ -32,10 +32,10 @@ const TABLE_7_LPF: Printed<9> = Printed {
     a: [
         1.0,
         -6.311293551201974,
-        18.463310785092791,
-        -32.436104849347807,
-        37.322148071647149,
-        -28.775658178634401,
+        18.46331078509279,
+        -32.43610484934781,
+        37.32214807164715,
+        -28.7756581786344,
         14.5364179364932,
         -4.413169859261352,
         0.621866049065974,
@@ -165,8 +165,10 @@ impl Noise {
     }
 }
 
+type Input = Box<dyn FnMut(usize) -> f32>;
+
 /// Currents up to 3 A, as the filters get them.
-fn inputs() -> [(&'static str, Box<dyn FnMut(usize) -> f32>); 3] {
+fn inputs() -> [(&'static str, Input); 3] {
     let mut noise = Noise(0x9E37_79B9_7F4A_7C15);
     let sine = |f: f64, k: usize| libm::sin(TAU * (f * k as f64 / RATE));
     [

@@ -5,6 +5,7 @@ use super::*;
 use crate::frames::Abc;
 
 use crate::io::{Command, Refused, Taken};
+use crate::sensing::Line;
 use crate::settings::{CurrentPlant, Settings};
 use proptest::prelude::*;
 
@@ -22,9 +23,10 @@ impl Load {
 
     fn sample(&self) -> Sample {
         let i = self.current.to_abc();
+        let code = |line: Line, i: f32| ((i - line.offset) / line.gain) as u16;
         Sample {
-            current_a: ((i.a + 4.472_713_4) / 0.002_212) as u16,
-            current_b: ((i.b + 4.496_623_8) / 0.002_231_4) as u16,
+            current_a: code(Line::CHANNEL_A, i.a),
+            current_b: code(Line::CHANNEL_B, i.b),
             dc_link: (self.v_dc / 0.11) as u16,
             ..Sample::default()
         }

@@ -1,0 +1,51 @@
+//! The bench that the procedures share.
+#![allow(dead_code)] // every procedure uses its own part of it
+
+use drive_core::{Command, Mode, Settings};
+use hil_sim::Config;
+use hil_sim::plant::PlantSettings;
+use hil_sim::rig::{Rig, drive_settings, plant_settings};
+
+/// The configuration with these changes, `key=value`.
+pub fn config(changes: &[&str]) -> Config {
+    let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
+    Config::load(None, &changes).unwrap()
+}
+
+/// No noise, a converter of 16 bits, no analog filter, an ideal inverter.
+pub const IDEAL: [&str; 6] = [
+    "measurement.noise_a=0",
+    "measurement.lsb_a=0.00014",
+    "measurement.filter_hz=0",
+    "inverter.residual_v=0",
+    "inverter.dead_time_us=0",
+    "inverter.propagation_us=0",
+];
+
+/// The textbook machine.
+pub const ISOTROPIC: [&str; 2] = ["saliency.a_psi=0", "saliency.b1=0"];
+
+/// All of these changes.
+pub fn all(parts: &[&[&'static str]]) -> Vec<&'static str> {
+    parts.concat()
+}
+
+/// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
+pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
+    regulating_with(&plant_settings(config), &drive_settings(config), seed, i_q, settle)
+}
+
+/// The same from settings.
+pub fn regulating_with(
+    plant: &PlantSettings,
+    drive: &Settings,
+    seed: u64,
+    i_q: f32,
+    settle: f64,
+) -> Rig {
+    let mut rig = Rig::new(plant, drive, seed).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    rig.command(Command::Torque(i_q)).unwrap();
+    rig.run(settle, |_| {});
+    rig
+}
