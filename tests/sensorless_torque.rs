@@ -17,14 +17,33 @@ fn run(name: &str, changes: &[&str], seed: u64) -> Outcome {
     .unwrap()
 }
 
-/// G5: thesis mode (rectified, 10 mA, k_s 0.132546, z_s 0.9) on plant A without noise.
+/// The source compensates no delay.
+const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
+
+/// G5: rectified, 10 mA, k_s 0.132546, z_s 0.9 on plant A without noise: with the delays left as in
+/// the source, and compensated.
 #[test]
 fn the_rectified_chain_tracks_within_13_degrees() {
     for name in ["torque-steps", "torque-ramp"] {
-        let outcome = run(name, &IDEAL, 1);
-        println!("{name}: {:?} {:?}", outcome.metrics, outcome.steps);
-        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 13.0, "{name}");
+        for more in [&AS_PRINTED[..], &[]] {
+            let outcome = run(name, &all(&[&IDEAL, more]), 1);
+            println!("{name} {more:?}: {:?} {:?}", outcome.metrics, outcome.steps);
+            assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 13.0, "{name}");
+            assert_eq!(outcome.metrics.get("lost"), Some(0.0));
+        }
+    }
+}
+
+/// With converter, noise and dead-time residual, default settings, several seeds.
+#[test]
+fn the_default_drive_holds_torque_with_a_realistic_measurement() {
+    for seed in 1..=5 {
+        let outcome = run("torque-steps", &[], seed);
+        println!("{:?}", outcome.metrics);
         assert_eq!(outcome.metrics.get("lost"), Some(0.0));
+        // 3.7 to 4.1 rms and 11.2 to 12.8 largest over the first six seeds; noise decides the rest.
+        assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 5.0);
+        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 16.0);
     }
 }
 
@@ -41,7 +60,8 @@ fn torque_follows_equation_4_4() {
 /// the source: with a tenth of the assumed saliency the same chain errs by tens of degrees.
 #[test]
 fn a_tenth_of_the_saliency_gives_tens_of_degrees() {
-    let outcome = run("torque-steps", &all(&[&IDEAL, &["saliency.a_psi=-0.0035"]]), 1);
+    let weak = ["saliency.a_psi=-0.0035"];
+    let outcome = run("torque-steps", &all(&[&IDEAL, &AS_PRINTED, &weak]), 1);
     let mean = outcome.metrics.get("angle_error_mean_deg").unwrap();
     println!("mean error {mean}");
     assert!((20.0..60.0).contains(&mean), "{mean}");

@@ -83,6 +83,9 @@ struct ControlState {
     position: PositionState,
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
+    /// Mean speed of the flux, turns per period, for the lag of the demodulation: the present one
+    /// would feed the tracker's own steps back to it.
+    mean_step: f32,
     /// Mean electrical speed of the rotor as the injection sees it, turns per period.
     rotor_step: f32,
 }
@@ -249,7 +252,8 @@ impl Drive {
         let theta = flux.phi + r.injection_turn;
         let mut delta_i = 0.0;
         if c.demodulate {
-            let back = Angle::within_turn(flux.step * c.demodulation_lag);
+            s.mean_step += FLUX_SMOOTHING * (flux.step - s.mean_step);
+            let back = Angle::within_turn(s.mean_step * c.demodulation_lag);
             let dm_axis = (theta - Angle::EIGHTH - back).unit_vector();
             delta_i = c.demodulator.step(&mut s.demodulator, measured.current, dm_axis);
         }
@@ -371,6 +375,8 @@ impl Drive {
 
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
+/// Share of the newest value in the mean speed of the flux: 50 ms.
+const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 

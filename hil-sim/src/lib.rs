@@ -1,2 +1,16 @@
 //! The motor, inverter and sensors that the drive is tested against, and the experiments.
+
+pub mod cli;
+pub mod config;
+pub mod error;
+pub mod experiments;
+pub mod outcome;
 pub mod plant;
+pub mod progress;
+pub mod report;
+pub mod rig;
+pub mod stats;
+
+pub use config::Config;
+pub use error::Error;
+pub use outcome::Outcome;

@@ -1,2 +1,7 @@
-//! Command line.
-fn main() {}
+//! The command line; see [`hil_sim::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    hil_sim::cli::main()
+}

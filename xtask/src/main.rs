@@ -1,2 +1,84 @@
-//! xtask
-fn main() {}
+//! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
+
+mod image;
+mod run;
+mod toolchain;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Result;
+
+use run::Step;
+
+const HELP: &str = "\
+Usage: cargo xtask <task>
+
+  test      everything a change must pass: format, lints, host tests, documentation, firmware;
+            gets what is missing from the system, or says what to type
+  firmware  builds the image for the board (also: cargo firmware)
+  flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
+  size      shows what the image takes of each memory";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match arguments[..] {
+        ["test"] => test(),
+        ["firmware"] => image::build().map(|elf| println!("{}", elf.display())),
+        ["flash"] => image::flash(),
+        ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
+        [] | ["help" | "-h" | "--help"] => {
+            println!("{HELP}");
+            Ok(())
+        }
+        _ => {
+            eprintln!("unknown task: {}\n\n{HELP}", arguments.join(" "));
+            return ExitCode::from(2);
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nFAILED: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Everything a change must pass, the quick things first; stops at the first failure.
+fn test() -> Result<()> {
+    let began = Instant::now();
+    toolchain::ensure_format_and_lints()?;
+    let host = run::cargo();
+
+    Step::new("format").run(host().args(["fmt", "--all", "--check"]))?;
+    Step::new("lints").run(host().args([
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
+    Step::new("host tests").run(host().args(["test", "--workspace"]))?;
+    Step::new("documentation")
+        .run(host().args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
+
+    let target = toolchain::for_target()?;
+    Step::new("drive-core for the controller")
+        .run(target.cargo("build").args(["--package", "drive-core"]))?;
+    Step::new("lints of the firmware").run(target.cargo("clippy").args([
+        "--package",
+        "induction-drive",
+        "--no-deps",
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
+    let elf = image::build_with(&target)?;
+    image::report_size(&elf)?;
+
+    println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! Wall time of one control step, one plant period and both together: `cargo bench`.
+//!
+//! The machines it runs on are noisy: compare figures of one run only. Real time is 6000 periods a
+//! second, so `real time / (time of "drive and motor")` is how many times faster than real time a
+//! simulation runs.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use drive_core::{Command, Compare, Mode, Sample};
+use hil_sim::Config;
+use hil_sim::rig::Rig;
+use std::hint::black_box;
+
+/// A rig that regulates 1.5 A, sensorless or with the encoder, with the default plant.
+fn rig(changes: &[&str]) -> Rig {
+    let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
+    let config = Config::load(None, &changes).expect("keys of the configuration");
+    let mut rig = Rig::from_config(&config, 1).expect("the default rig");
+    rig.start(Mode::Torque).expect("a start");
+    rig.command(Command::Torque(1.5)).expect("a reference");
+    rig.run(0.5, |_| {});
+    rig
+}
+
+fn speed(c: &mut Criterion) {
+    let variants: [(&str, &[&str]); 2] =
+        [("sensorless", &[]), ("encoder", &["angle.source=encoder"])];
+    for (name, changes) in variants {
+        // A second of recorded samples, replayed from the state in which the recording began.
+        let mut recorder = rig(changes);
+        let begin = recorder.drive.clone();
+        let samples: Vec<Sample> = (0..6000)
+            .map(|_| {
+                let sample = recorder.plant.sample();
+                recorder.step_with(&sample);
+                sample
+            })
+            .collect();
+        c.bench_function(&format!("Drive::step, {name}, 6000 periods"), |b| {
+            b.iter_batched_ref(
+                || begin.clone(),
+                |drive| {
+                    for sample in &samples {
+                        black_box(drive.step(black_box(sample)));
+                    }
+                },
+                criterion::BatchSize::SmallInput,
+            );
+        });
+        c.bench_function(&format!("drive and motor, {name}, 6000 periods"), |b| {
+            let mut rig = rig(changes);
+            b.iter(|| (0..6000).for_each(|_| rig.step()));
+        });
+    }
+
+    let mut plant = rig(&[]).plant;
+    let compare = Compare { a: 7300, b: 7000, c: 6950, enabled: true };
+    c.bench_function("plant, averaged inverter, 6000 periods", |b| {
+        b.iter(|| {
+            for _ in 0..6000 {
+                plant.advance(black_box(&compare), 1.0 / 6000.0);
+                black_box(plant.sample());
+            }
+        });
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = speed
+}
+criterion_main!(benches);

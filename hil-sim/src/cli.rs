@@ -1,0 +1,210 @@
+//! The command line.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use rayon::prelude::*;
+
+use crate::config::{Config, KEYS, Value};
+use crate::error::Error;
+use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
+use crate::outcome::{Cell, Outcome, Table};
+use crate::progress::Progress;
+use crate::report::{self, Section};
+
+/// Simulates an induction-motor drive: the control code of the firmware, closed over a motor model.
+///
+/// Without a command: the sensorless torque steps of Figure 38.
+#[derive(Parser)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Every experiment, with the figure or table it stands for
+    List,
+    /// Every key that --set and a configuration file take, with unit, default and range
+    Keys,
+    /// Run one experiment: print its tables and write its page
+    Run {
+        /// Name of the experiment, as `list` shows it
+        name: String,
+        #[command(flatten)]
+        input: Input,
+        /// Folder of the page [default: out; with --json no page unless this is given]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Print one JSON object and nothing else
+        #[arg(long)]
+        json: bool,
+    },
+    /// Run all experiments into one page
+    Report {
+        #[command(flatten)]
+        input: Input,
+        /// Folder of the page
+        #[arg(long, value_name = "DIR", default_value = OUT)]
+        out: PathBuf,
+    },
+}
+
+#[derive(Args, Default)]
+struct Input {
+    /// Configuration file, TOML
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Sets one key, after the configuration file; can be given many times
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    assignments: Vec<String>,
+    /// Seed of all that is random
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    seed: u64,
+    /// Simulated time, s; the same as --set seconds=S
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    seconds: Option<f64>,
+}
+
+/// Where pages are written unless another folder is named.
+const OUT: &str = "out";
+
+/// Reads the arguments of the process, does what they ask, and says how it went: 0 done, 1 failed,
+/// 2 something has to be changed in what was asked for.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        None => run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, None, false),
+        Some(Command::List) => say(&list()),
+        Some(Command::Keys) => say(&report::table(&keys())),
+        Some(Command::Run { name, input, out, json }) => run(&name, &input, out, json),
+        Some(Command::Report { input, out }) => full_report(&input, &out),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+impl Input {
+    fn config(&self) -> Result<Config, Error> {
+        let mut config = Config::load(self.config.as_deref(), &self.assignments)?;
+        if let Some(seconds) = self.seconds {
+            config.set("seconds", &Value::Number(seconds))?;
+        }
+        Ok(config)
+    }
+
+    /// What has to be typed to repeat a run.
+    fn command(&self, experiment: &str, config: &Config) -> String {
+        let mut command = format!("cargo sim run {experiment} --seed {}", self.seed);
+        for change in config.changes() {
+            command.push_str(&format!(" --set {change}"));
+        }
+        command
+    }
+}
+
+fn list() -> String {
+    let mut text = String::new();
+    for Experiment { name, stands_for, about, .. } in EXPERIMENTS {
+        text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
+    }
+    text
+}
+
+fn keys() -> Table {
+    let default = Config::default();
+    let mut table = Table::new("", &["key", "unit", "default", "allowed", "meaning"]);
+    for key in KEYS {
+        let default = (key.get)(&default).to_string();
+        let range = key.allowed.describe("");
+        let meaning = key.doc.trim().trim_end_matches('.').to_owned();
+        let cells = [key.name.to_owned(), key.unit.to_owned(), default, range, meaning];
+        table.row(cells.map(Cell::from));
+    }
+    table
+}
+
+fn execute(
+    experiment: &Experiment,
+    config: &Config,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Outcome, Error> {
+    let seconds = config.extent.seconds;
+    (experiment.run)(&Context { config, seed, seconds, progress: progress.clone() })
+}
+
+fn section<'a>(
+    experiment: &'a Experiment,
+    input: &Input,
+    config: &Config,
+    outcome: &'a Outcome,
+) -> Section<'a> {
+    let Experiment { name, stands_for, about, .. } = experiment;
+    Section { name, stands_for, about, command: input.command(name, config), outcome }
+}
+
+fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<(), Error> {
+    let experiment = experiments::find(name)?;
+    let config = input.config()?;
+    let outcome = execute(experiment, &config, input.seed, &Progress::default())?;
+    let folder = out.or_else(|| (!json).then(|| OUT.into()));
+    let path = folder.map(|folder| folder.join(format!("{name}.html")));
+    if let Some(path) = &path {
+        let page =
+            report::page("Induction drive", &[section(experiment, input, &config, &outcome)])?;
+        report::write_whole(path, &page)?;
+    }
+    if json {
+        let object = outcome.to_json(name, input.seed);
+        return say(&(object.map_err(|e| Error::Internal(e.to_string()))? + "\n"));
+    }
+    let Experiment { about, stands_for, .. } = experiment;
+    let mut text = format!("{name}: {about} ({stands_for})\n\n{}", report::text(&outcome));
+    if let Some(path) = path {
+        text.push_str(&format!("\nReport: {}\n", path.display()));
+    }
+    say(&text)
+}
+
+fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
+    let config = input.config()?;
+    let progress = Progress::default();
+    let bar = progress.bar("report", EXPERIMENTS.len() as u64);
+    let outcomes: Vec<Result<Outcome, Error>> = EXPERIMENTS
+        .par_iter()
+        .map(|experiment| {
+            let outcome = execute(experiment, &config, input.seed, &progress);
+            bar.advance(1);
+            outcome
+        })
+        .collect();
+    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let sections: Vec<_> = EXPERIMENTS
+        .iter()
+        .zip(&outcomes)
+        .map(|(experiment, outcome)| section(experiment, input, &config, outcome))
+        .collect();
+    let path = out.join("report.html");
+    report::write_whole(&path, &report::page("Induction drive: all experiments", &sections)?)?;
+    drop(bar);
+    say(&format!("Report: {}\n", path.display()))
+}
+
+/// Prints on standard output. A reader that has gone away, like `head`, is no error.
+fn say(text: &str) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::write(Path::new("standard output"))(e))
+        }
+        _ => Ok(()),
+    }
+}

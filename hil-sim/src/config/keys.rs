@@ -1,0 +1,228 @@
+//! The one table of keys: name, type, default, allowed values, unit, meaning.
+//!
+//! The configuration types, their defaults, the checks, the error messages and what `keys` prints
+//! all come from it. To add a key, add a line.
+
+use super::value::{Allowed, Field, Value, words};
+
+words! {
+    /// Where the drive takes the flux angle from.
+    AngleSource {
+        /// Encoder and slip, Eq. 2.10.
+        Encoder = "encoder",
+        /// Injected voltage, section 3.6.
+        Injection = "injection",
+    }
+}
+
+words! {
+    /// What is made of the carrier current.
+    Demodulator {
+        /// As printed: the difference of the two channels, filtered.
+        Literal = "literal",
+        /// The difference of their magnitudes, filtered.
+        Rectified = "rectified",
+    }
+}
+
+words! {
+    /// What the shaft is coupled to.
+    LoadMode {
+        /// Shaft blocked.
+        Locked = "locked",
+        /// Turns freely against `load.torque_nm`.
+        Free = "free",
+        /// A dynamometer holds `load.speed_rpm`.
+        Speed = "speed",
+    }
+}
+
+/// One line of the table.
+#[derive(Clone, Copy)]
+pub struct Key {
+    /// How `--set` and TOML name it.
+    pub name: &'static str,
+    /// Unit, empty for a pure number.
+    pub unit: &'static str,
+    /// The values it can have.
+    pub allowed: Allowed,
+    /// What it is.
+    pub doc: &'static str,
+    /// Reads it.
+    pub get: fn(&Config) -> Value,
+    /// Writes it, if the value is allowed; otherwise says what is wrong with the value.
+    pub set: fn(&mut Config, &Value) -> Result<(), &'static str>,
+}
+
+macro_rules! allowed {
+    ($min:literal .. $max:literal) => {
+        Allowed::Range { min: $min as f64, max: $max as f64 }
+    };
+    (switch) => {
+        Allowed::Switch
+    };
+    ($words:ident) => {
+        Allowed::Words($words::WORDS)
+    };
+}
+
+macro_rules! keys {
+    ($(
+        #[doc = $group_doc:literal]
+        $prefix:literal $group:ident: $type:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $field:ident: $field_type:ty = $default:expr, [$($allowed:tt)+], $unit:literal;
+            )+
+        }
+    )+) => {
+        $(
+            #[doc = $group_doc]
+            #[derive(Clone, Debug, PartialEq, serde::Serialize)]
+            pub struct $type {
+                $($(#[doc = $doc])+ pub $field: $field_type,)+
+            }
+
+            impl Default for $type {
+                fn default() -> Self {
+                    Self { $($field: $default,)+ }
+                }
+            }
+        )+
+
+        /// Everything that an experiment can be told.
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+        pub struct Config {
+            $(#[doc = $group_doc] pub $group: $type,)+
+        }
+
+        /// All keys, in groups.
+        pub const KEYS: &[Key] = &[$($(Key {
+            name: concat!($prefix, stringify!($field)),
+            unit: $unit,
+            allowed: allowed!($($allowed)+),
+            doc: concat!($($doc,)+),
+            get: |config| config.$group.$field.to_value(),
+            set: |config, value| {
+                config.$group.$field = Field::from_value(value, &allowed!($($allowed)+))?;
+                Ok(())
+            },
+        },)+)+];
+    };
+}
+
+keys! {
+    /// The motor: T equivalent circuit of Figure 21, values of Table 5.
+    "motor." motor: Motor {
+        /// Stator resistance.
+        rs: f64 = 5.4, [0.01 .. 1000], "ohm";
+        /// Rotor resistance, referred to the stator.
+        rr: f64 = 1.1, [0.01 .. 1000], "ohm";
+        /// Leakage inductance of the stator.
+        lls: f64 = 0.0276, [1e-5 .. 10], "H";
+        /// Leakage inductance of the rotor, referred to the stator.
+        llr: f64 = 0.0276, [1e-5 .. 10], "H";
+        /// Magnetising inductance.
+        lm: f64 = 0.1771, [1e-4 .. 100], "H";
+        /// Pairs of poles.
+        pole_pairs: u32 = 2, [1 .. 50], "";
+        /// Inertia of rotor and load (assumed; not in the source).
+        inertia: f64 = 0.012, [1e-6 .. 1000], "kg m2";
+        /// Viscous friction (assumed; not in the source).
+        friction: f64 = 0.001, [0 .. 100], "Nm s/rad";
+    }
+    /// What makes the motor differ from the textbook machine; all of it is assumed.
+    "saliency." saliency: Saliency {
+        /// Saliency fixed to the rotor flux, at nominal flux.
+        a_psi: f64 = -0.035, [-0.25 .. 0.25], "";
+        /// Saliency that follows the stator current.
+        b1: f64 = 0.036, [-0.1 .. 0.1], "1/A";
+        /// Weight of the high-frequency rotor resistance of Eq. 3.8.
+        chi: f64 = 0.0, [0 .. 10], "";
+    }
+    /// The inverter.
+    "inverter." inverter: Inverter {
+        /// Voltage of the dc link.
+        vdc: f64 = 311.0, [20 .. 1000], "V";
+        /// Time during which neither switch of a leg conducts, at each edge.
+        dead_time_us: f64 = 2.2, [0 .. 10], "us";
+        /// Time from the command to the first switch (section 3.9).
+        propagation_us: f64 = 2.2, [0 .. 20], "us";
+        /// Further voltage per phase that goes with the sign of the current and that no compensation
+        /// knows of; 40 % of the dead time's (assumed).
+        residual_v: f64 = 1.64, [0 .. 20], "V";
+        /// Whether the drive compensates the dead time.
+        compensate: bool = true, [switch], "";
+        /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
+        switched: bool = false, [switch], "";
+    }
+    /// The current sensors and their converter.
+    "measurement." measurement: Measurement {
+        /// Noise of each channel, rms.
+        noise_a: f64 = 0.005, [0 .. 1], "A";
+        /// Step of the converter; a finer one has more bits over the same range, up to 16.
+        lsb_a: f64 = 0.002212, [0.00014 .. 0.05], "A";
+        /// Corner of the analog filter of Figure 16, first order; 0 for none.
+        filter_hz: f64 = 5305.0, [0 .. 1e6], "Hz";
+        /// Relative error of the gain of channel a.
+        gain_error_a: f64 = 0.0, [-0.5 .. 0.5], "";
+        /// Relative error of the gain of channel b.
+        gain_error_b: f64 = 0.0, [-0.5 .. 0.5], "";
+        /// Offset of channel a.
+        offset_a: f64 = 0.0, [-5 .. 5], "A";
+        /// Offset of channel b.
+        offset_b: f64 = 0.0, [-5 .. 5], "A";
+    }
+    /// The injected voltage and what is made of the current it causes.
+    "injection." injection: Injection {
+        /// Peak of the injected voltage.
+        amplitude_v: f64 = 50.0, [0 .. 150], "V";
+        /// How the angle error is taken from the carrier current.
+        demodulator: Demodulator = Demodulator::Rectified, [Demodulator], "";
+        /// Reference of the current difference (section 4.2).
+        reference_a: f64 = 0.010, [-1 .. 1], "A";
+    }
+    /// The flux angle.
+    "angle." angle: Angle {
+        /// Where the drive takes the flux angle from.
+        source: AngleSource = AngleSource::Injection, [AngleSource], "";
+        /// Whether the known delays of measurement and demodulation are compensated.
+        compensate_delays: bool = true, [switch], "";
+    }
+    /// The load.
+    "load." load: Load {
+        /// What the shaft is coupled to.
+        mode: LoadMode = LoadMode::Locked, [LoadMode], "";
+        /// Speed that the dynamometer holds, with load.mode = speed.
+        speed_rpm: f64 = 0.0, [-6000 .. 6000], "rpm";
+        /// Torque of the load, with load.mode = free.
+        torque_nm: f64 = 0.0, [-1000 .. 1000], "Nm";
+    }
+    /// References, for experiments that do not bring their own.
+    "reference." reference: Reference {
+        /// Direct-axis (magnetising) current, peak.
+        id_a: f64 = 0.7, [0.01 .. 20], "A";
+        /// Quadrature-axis (torque) current, peak.
+        iq_a: f64 = 1.0, [-20 .. 20], "A";
+    }
+    /// What the drive believes of the motor; what is not set follows `motor.*`.
+    "drive.motor." drive_motor: DriveMotor {
+        /// Stator resistance; follows motor.rs.
+        rs: Option<f64> = None, [0.01 .. 1000], "ohm";
+        /// Rotor resistance; follows motor.rr.
+        rr: Option<f64> = None, [0.01 .. 1000], "ohm";
+        /// Leakage inductance of the stator; follows motor.lls.
+        lls: Option<f64> = None, [1e-5 .. 10], "H";
+        /// Leakage inductance of the rotor; follows motor.llr.
+        llr: Option<f64> = None, [1e-5 .. 10], "H";
+        /// Magnetising inductance; follows motor.lm.
+        lm: Option<f64> = None, [1e-4 .. 100], "H";
+    }
+    /// How much is simulated.
+    "" extent: Extent {
+        /// Runs of a statistical experiment; unset: the experiment's own number.
+        runs: Option<u32> = None, [1 .. 1000000], "";
+        /// Simulated time; unset: the experiment's own.
+        seconds: Option<f64> = None, [0.001 .. 3600], "s";
+    }
+}

@@ -1,0 +1,169 @@
+//! Values of keys: what they can be, and how text and TOML become one.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// A value as it was written, before a key has taken it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number.
+    Number(f64),
+    /// `true` or `false`.
+    Switch(bool),
+    /// A word.
+    Word(String),
+    /// Nothing was given: the doc of the key says what holds then.
+    Unset,
+}
+
+impl Value {
+    /// From what stands behind the equals sign on the command line.
+    pub fn from_text(text: &str) -> Self {
+        let text = text.trim();
+        match (text.parse(), text) {
+            (Ok(number), _) => Self::Number(number),
+            (_, "true") => Self::Switch(true),
+            (_, "false") => Self::Switch(false),
+            _ => Self::Word(text.to_owned()),
+        }
+    }
+
+    /// From a TOML value; a date or an array becomes a word, which no key takes.
+    pub fn from_toml(value: &toml::Value) -> Self {
+        match value {
+            toml::Value::Float(number) => Self::Number(*number),
+            toml::Value::Integer(number) => Self::Number(*number as f64),
+            toml::Value::Boolean(on) => Self::Switch(*on),
+            toml::Value::String(word) => Self::Word(word.clone()),
+            other => Self::Word(other.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Switch(on) => write!(f, "{on}"),
+            Self::Word(word) => f.write_str(word),
+            Self::Unset => f.write_str("-"),
+        }
+    }
+}
+
+/// The values a key allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Allowed {
+    /// A number from `min` to `max`, both included.
+    Range {
+        /// Smallest value.
+        min: f64,
+        /// Largest value.
+        max: f64,
+    },
+    /// One of these words.
+    Words(&'static [&'static str]),
+    /// `true` or `false`.
+    Switch,
+}
+
+impl Allowed {
+    /// In words, with the unit.
+    pub fn describe(&self, unit: &str) -> String {
+        match self {
+            Self::Range { min, max } => format!("{min} to {max} {unit}").trim_end().to_owned(),
+            Self::Words(words) => words.join(", "),
+            Self::Switch => "true, false".to_owned(),
+        }
+    }
+}
+
+/// A type that a field of the configuration can have.
+pub trait Field: Sized {
+    /// The value as text or TOML would give it.
+    fn to_value(&self) -> Value;
+    /// From a value; the error says what is wrong with it.
+    fn from_value(value: &Value, allowed: &Allowed) -> Result<Self, &'static str>;
+}
+
+impl Field for f64 {
+    fn to_value(&self) -> Value {
+        Value::Number(*self)
+    }
+    fn from_value(value: &Value, allowed: &Allowed) -> Result<Self, &'static str> {
+        match (value, allowed) {
+            (Value::Number(number), _) if !number.is_finite() => Err("not a finite number"),
+            (Value::Number(number), Allowed::Range { min, max }) => {
+                if (min..=max).contains(&number) { Ok(*number) } else { Err("out of range") }
+            }
+            _ => Err("not a number"),
+        }
+    }
+}
+
+impl Field for u32 {
+    fn to_value(&self) -> Value {
+        Value::Number(f64::from(*self))
+    }
+    fn from_value(value: &Value, allowed: &Allowed) -> Result<Self, &'static str> {
+        let number = f64::from_value(value, allowed)?;
+        if number.fract() == 0.0 { Ok(number as u32) } else { Err("not a whole number") }
+    }
+}
+
+impl Field for bool {
+    fn to_value(&self) -> Value {
+        Value::Switch(*self)
+    }
+    fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
+        match value {
+            Value::Switch(on) => Ok(*on),
+            _ => Err("neither true nor false"),
+        }
+    }
+}
+
+impl<T: Field> Field for Option<T> {
+    fn to_value(&self) -> Value {
+        self.as_ref().map_or(Value::Unset, Field::to_value)
+    }
+    fn from_value(value: &Value, allowed: &Allowed) -> Result<Self, &'static str> {
+        match value {
+            Value::Unset => Ok(None),
+            _ => T::from_value(value, allowed).map(Some),
+        }
+    }
+}
+
+/// An enumeration whose variants are written as words.
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $word:literal,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+        pub enum $name { $($(#[$variant_doc])* #[serde(rename = $word)] $variant,)+ }
+
+        impl $name {
+            /// How the variants are written.
+            pub const WORDS: &'static [&'static str] = &[$($word,)+];
+        }
+
+        impl crate::config::value::Field for $name {
+            fn to_value(&self) -> crate::config::value::Value {
+                let word = match self { $(Self::$variant => $word,)+ };
+                crate::config::value::Value::Word(word.to_owned())
+            }
+            fn from_value(
+                value: &crate::config::value::Value,
+                _: &crate::config::value::Allowed,
+            ) -> Result<Self, &'static str> {
+                match value {
+                    $(crate::config::value::Value::Word(word) if word == $word => Ok(Self::$variant),)+
+                    _ => Err("not one of the words"),
+                }
+            }
+        }
+    };
+}
+pub(crate) use words;

@@ -1,0 +1,122 @@
+//! What can go wrong, and the exit code it leads to.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a command did not do what it was asked to.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// No experiment has this name.
+    #[error("there is no experiment `{name}`{}; `list` shows all of them", did_you_mean(.nearest))]
+    UnknownExperiment {
+        /// The name that was given.
+        name: String,
+        /// The experiment with the most similar name.
+        nearest: Option<&'static str>,
+    },
+    /// No key has this name.
+    #[error("there is no key `{key}`{}; `keys` shows all of them", did_you_mean(.nearest))]
+    UnknownKey {
+        /// The name that was given.
+        key: String,
+        /// The key with the most similar name.
+        nearest: Option<&'static str>,
+    },
+    /// A key cannot have this value.
+    #[error("{key} = {value}: {problem}; allowed: {allowed}")]
+    Value {
+        /// The key.
+        key: String,
+        /// The value that was given.
+        value: String,
+        /// What is wrong with it.
+        problem: &'static str,
+        /// The values that are allowed, with their unit.
+        allowed: String,
+    },
+    /// `--set` without an equals sign.
+    #[error("`{0}`: write KEY=VALUE, for example --set motor.rs=5.4")]
+    Assignment(String),
+    /// The configuration file cannot be read or is not TOML.
+    #[error("{}: {problem}", .path.display())]
+    ConfigFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Every value is in its range, but together they are refused by a model, a filter or a design
+    /// rule.
+    #[error("{0}")]
+    Refused(String),
+    /// A file or folder cannot be written.
+    #[error("cannot write {}: {source}", .path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Something that no input should be able to bring about.
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl Error {
+    /// A failure to write `path`.
+    pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
+        move |source| Self::Write { path: path.to_owned(), source }
+    }
+
+    /// What the process exits with: 2 where the user has to change something in what was asked for,
+    /// 1 for everything else.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Write { .. } | Self::Internal(_) => 1,
+            _ => 2,
+        }
+    }
+}
+
+fn did_you_mean(nearest: &Option<&'static str>) -> String {
+    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+}
+
+/// The name most similar to `name`, if any is similar enough to be what was meant.
+pub fn nearest(name: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
+    known
+        .map(|candidate| (edit_distance(name, candidate), candidate))
+        .filter(|&(distance, candidate)| distance <= 2 + candidate.len() / 4)
+        .min()
+        .map(|(_, candidate)| candidate)
+}
+
+/// Levenshtein distance, without regard to case.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.to_lowercase().chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.to_lowercase().chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_name_is_found_and_a_far_one_is_not() {
+        let known = ["motor.rs", "motor.rr", "inverter.vdc"];
+        assert_eq!(nearest("motor.sr", known.into_iter()), Some("motor.rr"));
+        assert_eq!(nearest("inverter.vcd", known.into_iter()), Some("inverter.vdc"));
+        assert_eq!(nearest("xylophone", known.into_iter()), None);
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+    }
+}

@@ -1,0 +1,86 @@
+//! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
+
+mod adc_calibration;
+mod anti_windup;
+mod bode;
+mod current_step;
+mod dead_time;
+mod filters;
+mod injection_map;
+mod modulation;
+mod pi_design;
+mod position;
+mod sweep;
+mod torque;
+
+use crate::config::Config;
+use crate::error::{Error, nearest};
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+
+/// What an experiment is given.
+pub struct Context<'a> {
+    /// What is simulated.
+    pub config: &'a Config,
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// Simulated time, s; unset: the experiment's own.
+    pub seconds: Option<f64>,
+    /// For long work.
+    pub progress: Progress,
+}
+
+/// An experiment.
+pub struct Experiment {
+    /// How the command line names it.
+    pub name: &'static str,
+    /// What of the source it stands for: `Figure 38`.
+    pub stands_for: &'static str,
+    /// What it does, in one sentence.
+    pub about: &'static str,
+    /// Does it.
+    pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
+}
+
+/// All experiments, in the order of the report.
+#[rustfmt::skip] // one a line: the list grows
+pub const EXPERIMENTS: &[Experiment] = &[
+    modulation::EXPERIMENT,
+    filters::EXPERIMENT,
+    adc_calibration::EXPERIMENT,
+    pi_design::EXPERIMENT,
+    current_step::EXPERIMENT,
+    anti_windup::EXPERIMENT,
+    dead_time::EXPERIMENT,
+    injection_map::EXPERIMENT,
+    position::EXPERIMENT,
+    torque::STEPS,
+    torque::RAMP,
+    sweep::EXPERIMENT,
+];
+
+/// What runs when nothing is asked for.
+pub const DEFAULT: &str = "torque-steps";
+
+/// The experiment with this name.
+pub fn find(name: &str) -> Result<&'static Experiment, Error> {
+    EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
+        Error::UnknownExperiment {
+            name: name.to_owned(),
+            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name)),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_found() {
+        assert!(find(DEFAULT).is_ok());
+        for experiment in EXPERIMENTS {
+            assert_eq!(find(experiment.name).map(|found| found.about).ok(), Some(experiment.about));
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! What anti-windup is for, on the example of Appendix B.
+
+use drive_core::pi::{Pi, PiState};
+use drive_core::sos::Complex;
+use drive_core::tuning::roots;
+
+use super::{Context, Experiment};
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+
+/// Figure 40, Eq. B.1 to B.3.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "anti-windup",
+    stands_for: "Figure 40",
+    about: "Step of an integrator under a limited PI controller, without and with anti-windup.",
+    run,
+};
+
+const K_C: f64 = 0.25;
+const Z_C: f64 = 0.1;
+const LIMIT: f64 = 0.15;
+const SAMPLES: usize = 200;
+
+/// A controller: from the error to the output it wants, given what it is limited to.
+type Controller = Box<dyn FnMut(f64) -> f64>;
+
+/// Eq. B.1 in immediate form, which forgets that there is a limit.
+fn without() -> Controller {
+    let (mut u, mut before) = (0.0, 0.0);
+    Box::new(move |e| {
+        u += K_C * (e - Z_C * before);
+        before = e;
+        u
+    })
+}
+
+/// The controller of the drive.
+fn with() -> Controller {
+    let pi = Pi { k_c: K_C as f32, z_c: Z_C as f32 };
+    let mut state = PiState::ZERO;
+    Box::new(move |e| {
+        let u = pi.step(&mut state, e as f32);
+        state.realised(u.clamp(-LIMIT as f32, LIMIT as f32) - u);
+        f64::from(u)
+    })
+}
+
+/// Eq. B.1 as printed: the output of a step appears one step later.
+fn literal() -> Controller {
+    let (mut u, mut next, mut before) = (0.0, 0.0, 0.0);
+    Box::new(move |e| {
+        std::mem::swap(&mut u, &mut next);
+        next = u + K_C * (e - Z_C * before);
+        before = e;
+        u
+    })
+}
+
+/// Output of the plant and of the controller, over samples.
+struct Response {
+    y: Vec<f64>,
+    u: Vec<f64>,
+}
+
+impl Response {
+    /// A unit step on an integrator behind a limit.
+    fn of(mut controller: Controller, limit: f64) -> Self {
+        let (mut y, mut u) = (vec![0.0], Vec::new());
+        let mut output = 0.0;
+        for _ in 0..SAMPLES {
+            u.push(controller(1.0 - output));
+            output += u[u.len() - 1].clamp(-limit, limit);
+            y.push(output);
+        }
+        y.pop();
+        Self { y, u }
+    }
+
+    fn saturated(&self) -> f64 {
+        // The controller of the drive is f32: its limit is not quite this one.
+        let beyond = self.u.iter().filter(|u| u.abs() > LIMIT + 1e-6).count();
+        beyond as f64 / self.u.len() as f64
+    }
+
+    fn u_at_crossing(&self) -> f64 {
+        let crossing = self.y.iter().position(|&y| y >= 1.0);
+        crossing.map_or(f64::NAN, |k| self.u[k])
+    }
+}
+
+fn highest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn largest_pole<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
+    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
+}
+
+fn run(_: &Context<'_>) -> Result<Outcome, Error> {
+    let mut outcome = Outcome::default();
+    // (z - 1)^2 + k_c (z - z_c), and z (z - 1)^2 + k_c (z - z_c) with the delayed index.
+    let immediate = largest_pole(roots([K_C - 2.0, 1.0 - K_C * Z_C]));
+    let delayed = largest_pole(roots([-2.0, 1.0 + K_C, -K_C * Z_C]));
+
+    let mut table = Table::new(
+        "Unit step, limit 0.15",
+        &[
+            "controller",
+            "largest y",
+            "largest u",
+            "u where y reaches 1",
+            "saturated (%)",
+            "largest pole |z|, no limit",
+        ],
+    );
+    let cases = [
+        ("without anti-windup", "plain", without as fn() -> Controller, immediate),
+        ("with anti-windup", "anti_windup", with, immediate),
+        ("Eq. B.1 with its printed index", "printed_index", literal, delayed),
+    ];
+    let mut figure = Figure::new(
+        "step",
+        "Unit step of an integrator: without anti-windup (top), with it (middle), and with the \
+         index of Eq. B.1 as printed (bottom)",
+        "Figure 40",
+    );
+    for (name, key, controller, pole) in cases {
+        let response = Response::of(controller(), LIMIT);
+        table.row([
+            Cell::from(name),
+            Cell::fixed(highest(&response.y), 3),
+            Cell::fixed(highest(&response.u), 3),
+            Cell::fixed(response.u_at_crossing(), 3),
+            Cell::fixed(100.0 * response.saturated(), 1),
+            Cell::fixed(pole, 4),
+        ]);
+        outcome.metrics.set(format!("{key}_y_max"), highest(&response.y));
+        outcome.metrics.set(format!("{key}_u_max"), highest(&response.u));
+        outcome.metrics.set(format!("{key}_u_at_crossing"), response.u_at_crossing());
+        outcome.metrics.set(format!("{key}_saturated_ratio"), response.saturated());
+        outcome.metrics.set(format!("{key}_largest_pole"), pole);
+        let over = |values: &[f64]| (0..).map(f64::from).zip(values.iter().copied()).collect();
+        let level = |value: f64| vec![(0.0, value), ((SAMPLES - 1) as f64, value)];
+        figure = figure.panel(
+            Panel::new("sample", "y, u")
+                .with(Series::line("output y", over(&response.y)))
+                .with(Series::line("wanted u", over(&response.u)))
+                .with(Series::reference("reference", level(1.0)))
+                .with(Series::limit("limit of u", level(LIMIT)))
+                .with(Series::limit("", level(-LIMIT))),
+        );
+    }
+    outcome.tables.push(table.note(
+        "The source gives no numbers, only that u is nearly 1 where y reaches the reference, that \
+         the plain system is saturated most of the time, and that anti-windup cures it.",
+    ));
+    outcome.figures.push(figure);
+    outcome.remarks.push(format!(
+        "Eq. B.1 and B.3 print u[k+1] on the left. Taken literally that is one more delay, and the \
+         example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
+         u[k] = u[k-1] + Kc (e[k] - zc e[k-1]), gives what Figure 40 is said to show; the drive \
+         uses that."
+    ));
+    Ok(outcome)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figure_40() {
+        let plain = Response::of(without(), LIMIT);
+        assert!((highest(&plain.y) - 2.005).abs() < 1e-3);
+        assert!((highest(&plain.u) - 0.869).abs() < 1e-3);
+        assert!((plain.u_at_crossing() - 0.854).abs() < 1e-3);
+        assert!((plain.saturated() - 0.76).abs() < 1e-2);
+        let cured = Response::of(with(), LIMIT);
+        assert!((highest(&cured.y) - 1.301).abs() < 1e-3);
+        assert!((cured.saturated() - 0.035).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_printed_index_is_unstable_without_a_limit() {
+        assert!((largest_pole(roots([-2.0, 1.0 + K_C, -K_C * Z_C])) - 1.0996).abs() < 1e-4);
+        let unlimited = Response::of(literal(), f64::INFINITY);
+        assert!(highest(&unlimited.y) > 1e6);
+    }
+}

@@ -1,0 +1,67 @@
+//! Frequency responses as panels.
+
+use std::f64::consts::TAU;
+
+use drive_core::sos::Complex;
+
+use crate::outcome::{Panel, Series};
+
+/// Control rate, Hz.
+pub const RATE: f64 = 6000.0;
+
+/// rad/sample at the control rate.
+pub fn omega_t(hz: f64) -> f64 {
+    TAU * hz / RATE
+}
+
+/// `count` frequencies from `low` to `high`, evenly spaced in the logarithm.
+pub fn frequencies(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let step = (high / low).ln() / (count - 1) as f64;
+    (0..count).map(|k| low * (k as f64 * step).exp()).collect()
+}
+
+/// Gain and phase (without jumps of 360°) of some responses, functions of rad/sample, over the
+/// frequencies in Hz that `shown` makes of those in `hz`.
+pub struct Bode<'a> {
+    /// Real frequencies, Hz.
+    pub hz: &'a [f64],
+    /// Label of the frequency axis.
+    pub label: &'a str,
+    /// From a real frequency to the one on the axis.
+    pub shown: fn(f64) -> f64,
+}
+
+impl Bode<'_> {
+    /// The panels of gain and phase.
+    pub fn panels(&self, responses: &[(&str, &dyn Fn(f64) -> Complex)]) -> (Panel, Panel) {
+        let mut gain = Panel::new(self.label, "gain (dB)").log_x();
+        let mut phase = Panel::new(self.label, "phase (°)").log_x();
+        for (name, response) in responses {
+            let values: Vec<Complex> = self.hz.iter().map(|&hz| response(omega_t(hz))).collect();
+            gain = gain.with(Series::line(*name, self.along(values.iter().map(|h| h.db()))));
+            phase = phase.with(Series::line(*name, self.along(unwrapped(&values).into_iter())));
+        }
+        (gain, phase)
+    }
+
+    fn along(&self, values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
+        self.hz.iter().map(|&hz| (self.shown)(hz)).zip(values).collect()
+    }
+}
+
+/// Phases in degrees, each within 180° of the one before.
+pub fn unwrapped(values: &[Complex]) -> Vec<f64> {
+    let mut before = 0.0;
+    let mut phases = Vec::with_capacity(values.len());
+    for value in values {
+        let phase = value.arg_deg();
+        before = phase - 360.0 * ((phase - before) / 360.0).round();
+        phases.push(before);
+    }
+    phases
+}
+
+/// Fictitious frequency of the w plane (Eq. 2.18), Hz, of a real one.
+pub fn fictitious(hz: f64) -> f64 {
+    RATE / (0.5 * TAU) * (0.5 * omega_t(hz)).tan()
+}

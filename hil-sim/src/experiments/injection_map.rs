@@ -1,0 +1,231 @@
+//! The current difference over the injection angle, Figure 19.
+
+use drive_core::{Command, Mode};
+use rayon::prelude::*;
+
+use super::{Context, Experiment};
+use crate::config::{AngleSource, Config, Demodulator, LoadMode};
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::rig::{Rig, drive_settings, plant_settings};
+use crate::stats::Stats;
+
+/// Figure 19.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "injection-map",
+    stands_for: "Figure 19, Figure 18",
+    about: "Current difference over the injection angle, with the encoder: what each demodulator sees.",
+    run,
+};
+
+const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
+/// Gain of the post-processing filter at dc.
+const PP_DC: f64 = 0.944_061;
+/// Step of phi2 - theta, degrees.
+const STEP_DEG: i32 = 15;
+/// Time for the filters to settle at each angle, and to average, s.
+const SETTLE_S: f64 = 0.08;
+const AVERAGE_S: f64 = 0.05;
+
+/// One family of curves.
+#[derive(Clone, Copy)]
+struct Variant {
+    name: &'static str,
+    title: &'static str,
+    demodulator: Demodulator,
+    saliency: bool,
+    inject: bool,
+    /// Whether the delay of the demodulation is compensated.
+    compensate: bool,
+}
+
+const LITERAL: Variant = Variant {
+    name: "literal",
+    title: "As printed, motor with saliency",
+    demodulator: Demodulator::Literal,
+    saliency: true,
+    inject: true,
+    compensate: false,
+};
+const RECTIFIED: Variant = Variant {
+    name: "rectified",
+    title: "Rectified, delay compensated, motor with saliency",
+    demodulator: Demodulator::Rectified,
+    saliency: true,
+    inject: true,
+    compensate: true,
+};
+const VARIANTS: [Variant; 7] = [
+    LITERAL,
+    Variant {
+        name: "literal_isotropic",
+        title: "As printed, motor without saliency",
+        saliency: false,
+        ..LITERAL
+    },
+    Variant {
+        name: "literal_silent",
+        title: "As printed, no saliency and no injection",
+        saliency: false,
+        inject: false,
+        ..LITERAL
+    },
+    RECTIFIED,
+    Variant {
+        name: "rectified_isotropic",
+        title: "Rectified, delay compensated, motor without saliency",
+        saliency: false,
+        ..RECTIFIED
+    },
+    Variant {
+        name: "rectified_delayed",
+        title: "Rectified, delay left in, motor with saliency",
+        compensate: false,
+        ..RECTIFIED
+    },
+    Variant {
+        name: "rectified_isotropic_delayed",
+        title: "Rectified, delay left in, motor without saliency",
+        saliency: false,
+        compensate: false,
+        ..RECTIFIED
+    },
+];
+
+/// delta_i in mA over phi2 - theta in degrees.
+type Curve = Vec<(f64, f64)>;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let jobs: Vec<(Variant, f64)> =
+        VARIANTS.iter().flat_map(|&v| IQ_A.iter().map(move |&iq| (v, iq))).collect();
+    let bar = context.progress.bar("injection-map", jobs.len() as u64);
+    let curves: Vec<Curve> = jobs
+        .par_iter()
+        .map(|&(variant, iq)| {
+            let result = curve(context.config, context.seed, variant, iq);
+            bar.advance(1);
+            result
+        })
+        .collect::<Result<_, _>>()?;
+
+    let mut outcome = Outcome::default();
+    for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
+        let mut panel = Panel::new("phi2 - theta (° electrical)", "delta_i (mA)");
+        for (iq, curve) in IQ_A.iter().zip(family) {
+            panel = panel.with(Series::line(format!("iq = {iq} A"), curve.clone()));
+        }
+        outcome.figures.push(Figure::new(variant.name, variant.title, "Figure 19").panel(panel));
+        for (iq, curve) in [(IQ_A[2], &family[2]), (IQ_A[4], &family[4])] {
+            let name = format!("{}_at_90_deg_iq_{iq}a_ma", variant.name);
+            outcome.metrics.set(name, at(curve, 90.0));
+        }
+    }
+    outcome.tables.push(table(&curves, context.config.reference.id_a));
+    let isotropic = &curves[IQ_A.len()..2 * IQ_A.len()];
+    let silent = &curves[2 * IQ_A.len()..3 * IQ_A.len()];
+    let same =
+        Stats::of(isotropic.iter().flatten().zip(silent.iter().flatten()).map(|(a, b)| a.1 - b.1));
+    outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
+    outcome.remarks.push(
+        "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
+         zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \
+         fundamental current leaking through the 40 dB of the band-pass at dc, which says nothing \
+         about the flux. The rectified chain sees the saliency."
+            .into(),
+    );
+    outcome.remarks.push(
+        "The rectified chain, its delay compensated, gives about the same current difference at \
+         ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
+         the delay of the band-pass (8.83 samples) left in, 2.8 mA per ampere are added by the slip \
+         of the flux, with or without saliency."
+            .into(),
+    );
+    Ok(outcome)
+}
+
+/// Sweeps the injection angle with the encoder as angle source and the shaft locked.
+fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
+    let mut config = config.clone();
+    config.angle.source = AngleSource::Encoder;
+    config.load.mode = LoadMode::Locked;
+    config.injection.demodulator = variant.demodulator;
+    config.angle.compensate_delays = variant.compensate;
+    if !variant.saliency {
+        (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, 0.0, 0.0);
+    }
+    if !variant.inject {
+        config.injection.amplitude_v = 0.0;
+    }
+    let mut drive = drive_settings(&config);
+    drive.injection.beside_encoder = true;
+    let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
+    rig.start(Mode::Torque)?;
+    rig.command(Command::Torque(iq as f32))?;
+    rig.run(0.3, |_| {});
+    let mut curve = Curve::new();
+    for x in (-180..=180).step_by(STEP_DEG as usize) {
+        // theta = phi + 90° + turn, so phi2 - theta = -90° - turn
+        rig.command(Command::TurnInjection((-90 - x) as f32))?;
+        rig.run(SETTLE_S, |_| {});
+        let (mut delta_i, mut error) = (Stats::default(), Stats::default());
+        rig.run(AVERAGE_S, |p| {
+            delta_i.push(p.delta_i * 1e3);
+            error.push(p.angle_error_deg);
+        });
+        curve.push((f64::from(x) + error.mean(), delta_i.mean()));
+    }
+    Ok(curve)
+}
+
+/// Linear interpolation.
+fn at(curve: &Curve, x: f64) -> f64 {
+    let after = curve.iter().position(|p| p.0 >= x).unwrap_or(curve.len() - 1).max(1);
+    let (a, b) = (curve[after - 1], curve[after]);
+    a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)
+}
+
+/// Where the curve goes through zero between -90° and 90°, upwards or downwards.
+fn zero(curve: &Curve) -> f64 {
+    curve
+        .windows(2)
+        .filter(|w| w[0].0 > -100.0 && w[1].0 < 100.0)
+        .find(|w| w[0].1.signum() != w[1].1.signum())
+        .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
+}
+
+/// The printed chain on the motor without saliency beside what leakage predicts, and the rectified
+/// chain on the motor with saliency.
+fn table(curves: &[Curve], id: f64) -> Table {
+    let heads = [
+        "iq (A)",
+        "leak predicts at -90° (mA)",
+        "as printed, isotropic, at -90° (mA)",
+        "leak predicts zero at (°)",
+        "zero found at (°)",
+        "rectified, saliency, at 90° (mA)",
+        "rectified, isotropic, at 90° (mA)",
+        "delay left in, saliency, at 90° (mA)",
+        "delay left in, isotropic, at 90° (mA)",
+    ];
+    let mut table = Table::new("What Figure 19 shows", &heads).note(
+        "The leak predicts delta_i = -sqrt2 * 0.01 * 0.944 * |i| * sin(phi2 - theta + gamma), gamma \
+         = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
+         (In the source the 0.944 of the low-pass, which makes the real currents larger than \
+         commanded, cancels that of PP: 9.9 mA.)",
+    );
+    let n = IQ_A.len();
+    for (k, iq) in IQ_A.iter().enumerate() {
+        table.row([
+            Cell::fixed(*iq, 1),
+            Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3),
+            Cell::fixed(at(&curves[n + k], -90.0), 3),
+            Cell::fixed(-(iq / id).atan().to_degrees(), 2),
+            Cell::fixed(zero(&curves[n + k]), 2),
+            Cell::fixed(at(&curves[3 * n + k], 90.0), 2),
+            Cell::fixed(at(&curves[4 * n + k], 90.0), 2),
+            Cell::fixed(at(&curves[5 * n + k], 90.0), 2),
+            Cell::fixed(at(&curves[6 * n + k], 90.0), 2),
+        ]);
+    }
+    table
+}

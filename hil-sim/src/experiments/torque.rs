@@ -1,0 +1,197 @@
+//! The torque experiments of section 4.2: steps (Figure 38) and ramp (Figure 39) of the current on
+//! the quadrature axis, shaft locked, without a position sensor.
+
+use drive_core::injection::CARRIER_SAMPLES;
+use drive_core::{Command, Mode, State};
+
+use crate::config::Config;
+use crate::error::Error;
+use crate::experiments::{Context, Experiment};
+use crate::outcome::{Figure, Outcome, Panel, Series, Step, Table};
+use crate::rig::{Point, RATE_HZ, Rig};
+use crate::stats::Stats;
+
+/// Figure 38.
+pub const STEPS: Experiment = Experiment {
+    name: "torque-steps",
+    stands_for: "Figure 38, Eq. 4.4",
+    about: "Torque steps with a locked shaft and no position sensor: 1 A to 2 A in steps of 0.25 A.",
+    run: steps,
+};
+
+/// Figure 39.
+pub const RAMP: Experiment = Experiment {
+    name: "torque-ramp",
+    stands_for: "Figure 39, Eq. 4.4",
+    about: "Torque ramp with a locked shaft and no position sensor: 1 A to 2 A and back.",
+    run: ramp,
+};
+
+/// Seconds after the first torque reference that are not judged: the angle settles from the
+/// magnetising position.
+const SETTLING_S: f64 = 0.5;
+/// An error beyond this, degrees, is a lost angle: the torque has lost its sign at half of it.
+pub const LOST_DEG: f64 = 45.0;
+
+/// Levels of Figure 38, A.
+const LEVELS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+/// Time at each level, s.
+const LEVEL_S: f64 = 1.0;
+
+/// Steps of the torque reference, Figure 38.
+fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
+    let level_s = context.seconds.map_or(LEVEL_S, |s| s / LEVELS.len() as f64);
+    let sign = if context.config.reference.iq_a < 0.0 { -1.0 } else { 1.0 };
+    let profile = |t: f64| sign * LEVELS[((t / level_s) as usize).min(LEVELS.len() - 1)];
+    let run = Run::new(context, level_s * LEVELS.len() as f64, profile)?;
+
+    let mut outcome = run.outcome("steps", "Torque steps without a position sensor", "Figure 38");
+    let steps: Vec<Step> = (0..LEVELS.len())
+        .map(|n| run.level(sign * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
+        .collect();
+    outcome.tables.push(Table::of_steps(&steps));
+    outcome.steps = Some(steps);
+    Ok(outcome)
+}
+
+/// Ramp of the torque reference, Figure 39: 1 A, up to 2 A, hold, back to 1 A.
+fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
+    let scale = context.seconds.map_or(1.0, |s| s / 9.0);
+    let sign = if context.config.reference.iq_a < 0.0 { -1.0 } else { 1.0 };
+    let profile = |t: f64| {
+        let t = t / scale;
+        sign * (1.0 + ((t - 2.0) / 2.0).clamp(0.0, 1.0) - ((t - 6.0) / 2.0).clamp(0.0, 1.0))
+    };
+    let run = Run::new(context, 9.0 * scale, profile)?;
+    let mut outcome = run.outcome("ramp", "Torque ramp without a position sensor", "Figure 39");
+    let steps = [(1.0, 1.0, 2.0), (2.0, 5.0, 6.0), (1.0, 8.5, 9.0)]
+        .map(|(iq, from, to)| run.level(sign * iq, from * scale, to * scale))
+        .to_vec();
+    outcome.tables.push(Table::of_steps(&steps));
+    outcome.steps = Some(steps);
+    Ok(outcome)
+}
+
+/// What was recorded of one run; times count from the first torque reference.
+struct Run {
+    points: Vec<Point>,
+    fault: Option<String>,
+    notes: Vec<String>,
+}
+
+impl Run {
+    fn new(
+        context: &Context<'_>,
+        seconds: f64,
+        profile: impl Fn(f64) -> f64,
+    ) -> Result<Self, Error> {
+        let mut rig = Rig::from_config(context.config, context.seed)?;
+        rig.start(Mode::Torque)?;
+        let start = rig.time();
+        let periods = (seconds * RATE_HZ).round() as usize;
+        let mut points = Vec::with_capacity(periods);
+        let progress = context.progress.bar("simulating", periods as u64);
+        // References change at the pace of a host, not of the control.
+        for n in 0..periods.div_ceil(CARRIER_SAMPLES) {
+            let reference = profile((n * CARRIER_SAMPLES) as f64 / RATE_HZ) as f32;
+            if matches!(rig.drive.state(), State::Fault(_)) {
+                break;
+            }
+            rig.command(Command::Torque(reference))?;
+            rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {
+                points.push(Point { t: p.t - start, ..*p })
+            });
+            progress.advance(CARRIER_SAMPLES as u64);
+        }
+        let fault = match rig.drive.state() {
+            State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
+            _ => None,
+        };
+        Ok(Self { points, fault, notes: assumptions(context.config) })
+    }
+
+    fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(move |p| p.t >= from && p.t < to)
+    }
+
+    fn level(&self, iq_ref_a: f64, from: f64, to: f64) -> Step {
+        let mean = |of: fn(&Point) -> f64| Stats::of(self.after(from, to).map(of)).mean();
+        Step {
+            iq_ref_a,
+            iq_a: mean(|p| p.iq),
+            torque_nm: mean(|p| p.torque),
+            angle_error_mean_deg: mean(|p| p.angle_error_deg),
+        }
+    }
+
+    fn outcome(&self, name: &str, title: &str, source: &str) -> Outcome {
+        let mut outcome = Outcome::default();
+        let judged = || self.after(SETTLING_S, f64::INFINITY);
+        let error = Stats::of(judged().map(|p| p.angle_error_deg));
+        let lost = self.fault.is_some() || error.largest() > LOST_DEG;
+        let m = &mut outcome.metrics;
+        m.set("angle_error_rms_deg", error.rms());
+        m.set("angle_error_mean_deg", error.mean());
+        m.set("angle_error_max_deg", error.largest());
+        m.set("lost", f64::from(u8::from(lost)));
+        m.set("iq_error_rms_a", Stats::of(judged().map(|p| p.iq - p.iq_ref)).rms());
+        let difference = Stats::of(judged().map(|p| p.torque - eq_4_4(p)));
+        m.set("torque_minus_eq_4_4_rms_nm", difference.rms());
+
+        if let Some(fault) = &self.fault {
+            outcome.remarks.push(format!("The drive stopped itself with {fault}."));
+        }
+        outcome.remarks.extend(self.notes.iter().cloned());
+        outcome.figures.push(self.figure(name, title, source));
+        outcome
+    }
+
+    fn figure(&self, name: &str, title: &str, source: &str) -> Figure {
+        // Means over a carrier period: the injection's own ripple would hide everything else.
+        let line = |of: &dyn Fn(&Point) -> f64| {
+            let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
+            self.points.chunks(CARRIER_SAMPLES).map(|c| (c[0].t, mean(c))).collect()
+        };
+        let x = "time (s)";
+        Figure::new(name, title, source)
+            .panel(
+                Panel::new(x, "quadrature current (A)")
+                    .with(Series::line("measured", line(&|p| p.iq)))
+                    .with(Series::reference("reference", line(&|p| p.iq_ref))),
+            )
+            .panel(
+                Panel::new(x, "torque (Nm)")
+                    .with(Series::line("motor", line(&|p| p.torque)))
+                    .with(Series::reference("by Eq. 4.4 from flux and angle", line(&eq_4_4))),
+            )
+            .panel(Panel::new(x, "angle error (° electrical)").with(Series::line(
+                "true minus estimated flux angle",
+                line(&|p| p.angle_error_deg),
+            )))
+            .panel(
+                Panel::new(x, "current difference (mA)")
+                    .with(Series::line("delta_i", line(&|p| p.delta_i * 1e3))),
+            )
+    }
+}
+
+/// Torque by Eq. 4.4 with what the drive believes and the angle error: 3/2 P psi |i| sin(Delta
+/// alpha), times L_m/L_r since psi is the rotor flux; Delta alpha = gamma - e, gamma from the
+/// measured currents.
+fn eq_4_4(p: &Point) -> f64 {
+    let gamma = p.iq.atan2(p.id);
+    let length = p.iq.hypot(p.id);
+    p.torque_per_flux_ampere * p.flux * length * (gamma - p.angle_error_deg.to_radians()).sin()
+}
+
+/// What the reader must know about the simulated plant.
+pub fn assumptions(config: &Config) -> Vec<String> {
+    let s = &config.saliency;
+    vec![format!(
+        "Simulated motor of Table 5 with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
+         %/A by the current. Nothing in the source measures the saliency: every angle error here is a \
+         statement about this simulated motor.",
+        s.a_psi * 100.0,
+        s.b1 * 100.0
+    )]
+}

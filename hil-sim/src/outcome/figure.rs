@@ -1,0 +1,140 @@
+//! Figures, without any word about how they are drawn.
+
+/// A figure: panels above each other.
+#[derive(Clone, Debug, Default)]
+pub struct Figure {
+    /// Short name, unique in the experiment, used in JSON: `step`, `bode`.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// What of the source it stands for: `Figure 38`.
+    pub source: String,
+    /// Panels from top to bottom; those with the same x label share the x axis.
+    pub panels: Vec<Panel>,
+}
+
+impl Figure {
+    /// A figure without panels.
+    pub fn new(
+        name: impl Into<String>,
+        title: impl Into<String>,
+        source: impl Into<String>,
+    ) -> Self {
+        let (name, title, source) = (name.into(), title.into(), source.into());
+        Self { name, title, source, panels: Vec::new() }
+    }
+
+    /// With one more panel below.
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+}
+
+/// One pair of axes.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    /// Horizontal quantity and unit.
+    pub x_label: String,
+    /// Vertical quantity and unit.
+    pub y_label: String,
+    /// What is drawn.
+    pub series: Vec<Series>,
+    /// Logarithmic horizontal axis.
+    pub log_x: bool,
+    /// Range of the vertical axis; unset: that of the data.
+    pub y_range: Option<(f64, f64)>,
+    /// One unit is as long on either axis.
+    pub equal_axes: bool,
+}
+
+impl Panel {
+    /// Empty axes.
+    pub fn new(x_label: impl Into<String>, y_label: impl Into<String>) -> Self {
+        Self { x_label: x_label.into(), y_label: y_label.into(), ..Self::default() }
+    }
+
+    /// With one more series.
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// With a logarithmic horizontal axis.
+    pub fn log_x(mut self) -> Self {
+        self.log_x = true;
+        self
+    }
+
+    /// With this range of the vertical axis.
+    pub fn y_range(mut self, low: f64, high: f64) -> Self {
+        self.y_range = Some((low, high));
+        self
+    }
+
+    /// With a unit as long on either axis.
+    pub fn equal_axes(mut self) -> Self {
+        self.equal_axes = true;
+        self
+    }
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Style {
+    /// A line in a colour of its own.
+    #[default]
+    Line,
+    /// A dashed dark line: what something should be.
+    Reference,
+    /// A thin dashed grey line: a limit or a level to compare with.
+    Limit,
+    /// Markers in a colour of their own.
+    Points,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// What the legend says.
+    pub name: String,
+    /// Points; one that is not finite interrupts the line.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub style: Style,
+    /// Whether it has the colour of the series before it.
+    pub like_previous: bool,
+}
+
+impl Series {
+    fn new(name: impl Into<String>, points: Vec<(f64, f64)>, style: Style) -> Self {
+        let name = name.into();
+        Self { name, points, style, like_previous: false }
+    }
+
+    /// In the colour of the series before it.
+    pub fn like_previous(mut self) -> Self {
+        self.like_previous = true;
+        self
+    }
+
+    /// A line.
+    pub fn line(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, points, Style::Line)
+    }
+
+    /// A reference.
+    pub fn reference(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, points, Style::Reference)
+    }
+
+    /// A limit.
+    pub fn limit(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, points, Style::Limit)
+    }
+
+    /// Markers.
+    pub fn points(name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, points, Style::Points)
+    }
+}

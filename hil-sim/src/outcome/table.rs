@@ -1,0 +1,123 @@
+//! Tables and their cells.
+
+use serde::ser::{Serialize, Serializer};
+
+use super::Step;
+
+/// A table.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Table {
+    /// What it shows.
+    pub title: String,
+    /// Heads of the columns, with units.
+    pub columns: Vec<String>,
+    /// Rows, each as long as `columns`.
+    pub rows: Vec<Vec<Cell>>,
+    /// Source, conditions, reading help; may be empty.
+    pub note: String,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(title: impl Into<String>, columns: &[&str]) -> Self {
+        let columns = columns.iter().map(|&column| column.to_owned()).collect();
+        Self { title: title.into(), columns, ..Self::default() }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// With this note below it.
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// The standard table of the levels of a torque experiment.
+    pub fn of_steps(steps: &[Step]) -> Self {
+        let heads = ["iq reference (A)", "iq (A)", "torque (Nm)", "mean angle error (°)"];
+        let mut table = Self::new("Levels", &heads);
+        for step in steps {
+            table.row([
+                Cell::fixed(step.iq_ref_a, 3),
+                Cell::fixed(step.iq_a, 3),
+                Cell::fixed(step.torque_nm, 3),
+                Cell::fixed(step.angle_error_mean_deg, 2),
+            ]);
+        }
+        table
+    }
+}
+
+/// One cell of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// Words.
+    Text(String),
+    /// A number and how it is shown.
+    Number {
+        /// The number.
+        value: f64,
+        /// How it is shown.
+        text: String,
+    },
+}
+
+impl Cell {
+    /// A number with this many decimals.
+    pub fn fixed(value: f64, decimals: usize) -> Self {
+        Self::Number { value, text: plain_minus(format!("{value:.decimals$}")) }
+    }
+
+    /// A number with this many significant digits; powers of ten for the very small and the very
+    /// large.
+    pub fn significant(value: f64, digits: usize) -> Self {
+        let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+        let text = if !value.is_finite() {
+            value.to_string()
+        } else if (-4..6).contains(&exponent) {
+            let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+            format!("{value:.decimals$}")
+        } else {
+            format!("{value:.*e}", digits.saturating_sub(1))
+        };
+        Self::Number { value, text: plain_minus(text) }
+    }
+
+    /// How it is shown.
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Text(text) | Self::Number { text, .. } => text,
+        }
+    }
+
+    /// Whether it is a number.
+    pub fn is_number(&self) -> bool {
+        matches!(self, Self::Number { .. })
+    }
+}
+
+/// Takes the sign from a rounded zero.
+fn plain_minus(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
+    }
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self::Text(text.into())
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Number { value, .. } => serializer.serialize_f64(*value),
+        }
+    }
+}

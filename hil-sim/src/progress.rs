@@ -1,0 +1,51 @@
+//! Progress bars on standard error; invisible where that is not a terminal.
+
+use std::time::Duration;
+
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Makes the progress bars of a command.
+#[derive(Clone)]
+pub struct Progress(MultiProgress);
+
+impl Default for Progress {
+    /// Bars on standard error, if that is a terminal.
+    fn default() -> Self {
+        Self(MultiProgress::with_draw_target(ProgressDrawTarget::stderr()))
+    }
+}
+
+impl Progress {
+    /// No bars at all.
+    pub fn hidden() -> Self {
+        Self(MultiProgress::with_draw_target(ProgressDrawTarget::hidden()))
+    }
+
+    /// A bar for `length` units of work.
+    pub fn bar(&self, label: &str, length: u64) -> Bar {
+        let bar = self.0.add(ProgressBar::new(length));
+        let template = "{msg:24} {bar:32} {percent:>3}% {elapsed}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(label.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Bar(bar)
+    }
+}
+
+/// A progress bar; gone when dropped. Can be used from many threads at once.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    /// So much more of the work is done.
+    pub fn advance(&self, units: u64) {
+        self.0.inc(units);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,59 @@
+//! Results for people: tables on the console, one page with plots, and files written whole.
+
+mod axis;
+mod console;
+mod layout;
+mod line;
+mod page;
+mod plot;
+
+use std::io::Write as _;
+use std::path::Path;
+
+pub use console::{paragraph, table, text};
+pub use page::{Section, page};
+
+use crate::error::Error;
+
+/// Writes a file whole or not at all: into a file beside it, which then takes its name. Folders on
+/// the way are made.
+pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let beside = folder.join(format!(".{name}.{}.part", std::process::id()));
+    let written = std::fs::File::create(&beside)
+        .and_then(|mut file| file.write_all(contents.as_bytes()).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&beside, path));
+    written.map_err(|e| {
+        // What could not be finished is not left behind; that it may not have been begun is fine.
+        let _ = std::fs::remove_file(&beside);
+        Error::write(path)(e)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
+        let folder = std::env::temp_dir().join(format!("hil-sim-{}", std::process::id()));
+        let path = folder.join("new/page.html");
+        write_whole(&path, "first").unwrap();
+        write_whole(&path, "second").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        // A folder is in the way: the error names it, and no part stays.
+        let blocked = folder.join("new/blocked.html");
+        std::fs::create_dir_all(blocked.join("inside")).unwrap();
+        let error = write_whole(&blocked, "third").unwrap_err();
+        assert!(error.to_string().contains("blocked.html") && error.exit_code() == 1, "{error}");
+        let entries = std::fs::read_dir(folder.join("new")).unwrap();
+        let names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(names.len(), 2, "{names:?}");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,289 @@
+//! The bench: a drive, a plant, and the one period between them.
+
+use std::f64::consts::TAU;
+
+use drive_core::demodulator;
+use drive_core::settings::{self, PERIOD_S};
+use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State};
+
+use crate::config::{self, Config};
+use crate::error::Error;
+use crate::plant::{
+    CalibrationLine, InverterSettings, Load, MachineSettings, MeasurementSettings,
+    MechanicsSettings, Plant, PlantSettings, SaliencySettings,
+};
+
+/// Control periods per second.
+pub const RATE_HZ: f64 = 6000.0;
+
+/// A drive connected to a simulated inverter, motor and load.
+#[derive(Clone)]
+pub struct Rig {
+    /// The motor with everything around it.
+    pub plant: Plant,
+    /// The drive under test.
+    pub drive: Drive,
+    /// Compare values on their way: computed in the last period, in force in this one.
+    pending: Compare,
+    periods: u64,
+}
+
+/// What was true and what the drive saw at one sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Point {
+    /// Time, s.
+    pub t: f64,
+    /// Current reference on the quadrature axis, after its filter, A.
+    pub iq_ref: f64,
+    /// Currents in the estimated frame as the drive sees them, A.
+    pub id: f64,
+    /// Quadrature axis, likewise.
+    pub iq: f64,
+    /// Electromagnetic torque of the motor, Nm.
+    pub torque: f64,
+    /// Length of the rotor flux, Wb peak.
+    pub flux: f64,
+    /// Length of the stator current, A peak.
+    pub current: f64,
+    /// True minus estimated rotor-flux angle, electrical degrees, within ±180.
+    pub angle_error_deg: f64,
+    /// Current difference of the demodulation, A.
+    pub delta_i: f64,
+    /// Speed of the rotor, rpm.
+    pub speed_rpm: f64,
+    /// Rotor speed as the drive estimates it, rpm.
+    pub speed_estimate_rpm: f64,
+    /// Torque per flux and quadrature current, 3/2 P L_m/L_r.
+    pub torque_per_flux_ampere: f64,
+    /// Position of the rotor, mechanical turns.
+    pub turns: f64,
+}
+
+impl Rig {
+    /// A drive that is off, connected to a motor at rest.
+    ///
+    /// # Errors
+    /// What the plant or the drive refuse, by name.
+    pub fn new(plant: &PlantSettings, drive: &Settings, seed: u64) -> Result<Self, Error> {
+        let refused = |e: &dyn std::fmt::Display| Error::Refused(e.to_string());
+        Ok(Self {
+            plant: Plant::new(plant, seed).map_err(|e| refused(&e))?,
+            drive: Drive::new(drive.build().map_err(|e| refused(&e))?),
+            pending: Compare::OFF,
+            periods: 0,
+        })
+    }
+
+    /// The bench that the configuration describes.
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
+        Self::new(&plant_settings(config), &drive_settings(config), seed)
+    }
+
+    /// Seconds since the beginning.
+    pub fn time(&self) -> f64 {
+        self.periods as f64 / RATE_HZ
+    }
+
+    /// One PWM period.
+    #[inline]
+    pub fn step(&mut self) {
+        let sample = self.plant.sample();
+        self.step_with(&sample);
+    }
+
+    /// One PWM period in which the drive is given `sample` instead of what was sampled.
+    #[inline]
+    pub fn step_with(&mut self, sample: &Sample) {
+        let compare = self.drive.step(sample);
+        if !compare.enabled {
+            // Off is off at once, not at the end of the period.
+            self.pending = Compare::OFF;
+        }
+        self.plant.advance(&self.pending, f64::from(PERIOD_S));
+        self.pending = compare;
+        self.periods += 1;
+    }
+
+    /// Goes on for `seconds` and hands every sample to `look` before the period is simulated.
+    pub fn run(&mut self, seconds: f64, mut look: impl FnMut(&Point)) {
+        for _ in 0..(seconds * RATE_HZ).round() as u64 {
+            // The truth at the instant of the sample, and what the drive makes of that sample.
+            let mut point = self.truth();
+            let phi = self.plant.rotor_flux_angle();
+            self.step();
+            let telemetry = self.drive.telemetry();
+            let rpm = |step: f32| {
+                f64::from(step) * RATE_HZ * 60.0 / self.plant.motor().machine.pole_pairs()
+            };
+            point.iq_ref = telemetry.reference.q.into();
+            point.id = telemetry.current.d.into();
+            point.iq = telemetry.current.q.into();
+            point.delta_i = telemetry.delta_i.into();
+            point.speed_estimate_rpm = rpm(telemetry.rotor_step);
+            let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
+            point.angle_error_deg = wrapped_degrees(error);
+            look(&point);
+        }
+    }
+
+    /// Starts in `mode` and runs until the drive regulates.
+    ///
+    /// # Errors
+    /// When the command is refused, or the drive does not get there within 30 s.
+    pub fn start(&mut self, mode: Mode) -> Result<(), Error> {
+        self.command(Command::Start(mode))?;
+        for _ in 0..(30.0 * RATE_HZ) as u32 {
+            self.step();
+            if self.drive.state() == State::of_mode(mode) {
+                return Ok(());
+            }
+        }
+        Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))
+    }
+
+    /// Gives the drive a command.
+    ///
+    /// # Errors
+    /// When the drive refuses it.
+    pub fn command(&mut self, command: Command) -> Result<(), Error> {
+        let state = self.drive.state();
+        match self.drive.command(command) {
+            Ok(_) => Ok(()),
+            Err(e) => Err(Error::Refused(format!("{command:?} while {state}: {e}"))),
+        }
+    }
+
+    /// Couples another load.
+    ///
+    /// # Errors
+    /// When the load is out of range.
+    pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
+        self.plant.set_load(load).map_err(|e| Error::Refused(e.to_string()))
+    }
+
+    fn truth(&self) -> Point {
+        let plant = &self.plant;
+        Point {
+            t: self.time(),
+            torque: plant.torque(),
+            torque_per_flux_ampere: plant.motor().machine.torque_factor(),
+            flux: plant.rotor_flux().norm(),
+            current: plant.current().norm(),
+            speed_rpm: plant.mechanical_speed() * 60.0 / TAU,
+            turns: plant.mechanical_angle() / TAU,
+            ..Point::default()
+        }
+    }
+}
+
+/// An angle in radians as degrees within ±180.
+pub fn wrapped_degrees(radians: f64) -> f64 {
+    let turns = radians / TAU;
+    (turns - turns.round()) * 360.0
+}
+
+/// The plant that the configuration describes.
+pub fn plant_settings(config: &Config) -> PlantSettings {
+    let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
+    PlantSettings {
+        machine: MachineSettings {
+            rs: m.rs,
+            rr: m.rr,
+            lls: m.lls,
+            llr: m.llr,
+            lm: m.lm,
+            pole_pairs: m.pole_pairs,
+        },
+        saliency: SaliencySettings {
+            a_psi: config.saliency.a_psi,
+            b1: config.saliency.b1,
+            chi: config.saliency.chi,
+            ..SaliencySettings::default()
+        },
+        inverter: InverterSettings {
+            vdc: i.vdc,
+            dead_time_us: i.dead_time_us,
+            propagation_us: i.propagation_us,
+            residual_v: i.residual_v,
+            switched: i.switched,
+            ..InverterSettings::default()
+        },
+        measurement: MeasurementSettings {
+            noise_a: s.noise_a,
+            lsb_a: s.lsb_a,
+            filter_hz: s.filter_hz,
+            gain_error_a: s.gain_error_a,
+            gain_error_b: s.gain_error_b,
+            offset_a: s.offset_a,
+            offset_b: s.offset_b,
+            ..MeasurementSettings::default()
+        },
+        mechanics: MechanicsSettings {
+            inertia: m.inertia,
+            friction: m.friction,
+            load: match config.load.mode {
+                config::LoadMode::Locked => Load::Locked,
+                config::LoadMode::Free => Load::Free { torque: config.load.torque_nm },
+                config::LoadMode::Speed => {
+                    Load::Speed { speed: config.load.speed_rpm * TAU / 60.0 }
+                }
+            },
+        },
+        ..PlantSettings::default()
+    }
+}
+
+/// The drive that the configuration describes: it knows its converters, its dead time and what it
+/// was told of the motor.
+pub fn drive_settings(config: &Config) -> Settings {
+    let (believed, base) = (config.believed_motor(), Settings::default());
+    let measurement = plant_settings(config).measurement;
+    let [line_a, line_b] = measurement.calibration();
+    let line = |l: CalibrationLine| drive_core::sensing::Line {
+        gain: l.a_per_code as f32,
+        offset: l.a_at_zero as f32,
+    };
+    let filter_hz = config.measurement.filter_hz;
+    Settings {
+        motor: settings::Motor {
+            r_s: believed.rs as f32,
+            r_r: believed.rr as f32,
+            l_ls: believed.lls as f32,
+            l_lr: believed.llr as f32,
+            l_m: believed.lm as f32,
+            pole_pairs: believed.pole_pairs as u8,
+            inertia: believed.inertia as f32,
+        },
+        inverter: settings::Inverter {
+            dead_time_s: (config.inverter.dead_time_us * 1e-6) as f32,
+            compensate: config.inverter.compensate,
+            ..base.inverter
+        },
+        scales: settings::Scales {
+            current_a: line(line_a),
+            current_b: line(line_b),
+            full_scale: line_a.full_scale,
+            current_delay_s: if filter_hz > 0.0 { (1.0 / (TAU * filter_hz)) as f32 } else { 0.0 },
+            ..base.scales
+        },
+        angle_source: match config.angle.source {
+            config::AngleSource::Encoder => settings::AngleSource::Encoder,
+            config::AngleSource::Injection => settings::AngleSource::Injection,
+        },
+        ignore_delays: !config.angle.compensate_delays,
+        injection: settings::InjectionSettings {
+            amplitude_v: config.injection.amplitude_v as f32,
+            demodulator: match config.injection.demodulator {
+                config::Demodulator::Literal => demodulator::Demodulator::Literal,
+                config::Demodulator::Rectified => demodulator::Demodulator::Rectified,
+            },
+            reference_a: config.injection.reference_a as f32,
+            ..base.injection
+        },
+        sequence: settings::Sequence { i_d: config.reference.id_a as f32, ..base.sequence },
+        ..base
+    }
+}

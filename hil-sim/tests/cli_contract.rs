@@ -1,0 +1,111 @@
+//! What the command line promises: exit codes, messages, one JSON object, no half-written files.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+    command.current_dir(folder).args(arguments).output().expect("the binary runs")
+}
+
+/// An empty folder of its own for each test.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("the folder can be read");
+    entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("UTF-8")
+}
+
+#[test]
+fn a_run_prints_its_table_and_writes_its_page() {
+    let folder = folder("run");
+    let output = hil_sim(&folder, &["run", "adc-calibration"]);
+    assert_eq!(output.status.code(), Some(0));
+    let printed = text(&output.stdout);
+    assert!(printed.contains("-4.472713") && printed.contains("out/adc-calibration.html"));
+    assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
+    assert_eq!(files(&folder.join("out")), ["adc-calibration.html"]);
+    let page = std::fs::read_to_string(folder.join("out/adc-calibration.html")).unwrap();
+    assert!(page.contains("<svg") && page.trim_end().ends_with("</html>"));
+    let outside = ["src=", "href=\"http", "url(", "<script", "@import"];
+    assert!(outside.iter().all(|word| !page.contains(word)), "the page is self-contained");
+}
+
+#[test]
+fn json_is_one_object_and_nothing_else() {
+    let folder = folder("json");
+    let arguments = ["run", "anti-windup", "--json", "--seed", "42"];
+    let output = hil_sim(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0));
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!(object["experiment"], "anti-windup");
+    assert_eq!(object["seed"], 42);
+    assert!((object["metrics"]["plain_y_max"].as_f64().unwrap() - 2.005).abs() < 1e-3);
+    assert!(output.stderr.is_empty() && files(&folder).is_empty());
+    assert_eq!(
+        hil_sim(&folder, &arguments).stdout,
+        output.stdout,
+        "the same seed, the same result"
+    );
+}
+
+#[test]
+fn user_errors_say_what_is_allowed_and_write_nothing() {
+    let folder = folder("errors");
+    std::fs::write(folder.join("bad.toml"), "[motor]\nrs = \"5.4\"\n").unwrap();
+    std::fs::write(folder.join("broken.toml"), "[motor\n").unwrap();
+    let cases: [(&[&str], &[&str]); 11] = [
+        (&["run", "filter"], &["`filter`", "did you mean `filters`?"]),
+        (&["run", "filters", "--set", "motor.r_s=5"], &["`motor.r_s`", "did you mean `motor.rs`?"]),
+        (&["run", "filters", "--set", "motor.rs=-1"], &["motor.rs = -1", "0.01 to 1000 ohm"]),
+        (&["run", "filters", "--set", "motor.rs=inf"], &["motor.rs = inf", "not a finite number"]),
+        (&["run", "filters", "--set", "load.mode=sideways"], &["sideways", "locked, free, speed"]),
+        (&["run", "filters", "--set", "motor.rs"], &["KEY=VALUE"]),
+        (&["run", "filters", "--seconds", "-1"], &["seconds = -1", "0.001 to 3600 s"]),
+        (&["run", "filters", "--seed", "-1"], &["--seed"]),
+        (&["run", "filters", "--config", "bad.toml"], &["motor.rs = 5.4", "not a number"]),
+        (&["run", "filters", "--config", "broken.toml"], &["broken.toml", "line 1"]),
+        (&["report", "--config", "missing.toml"], &["missing.toml"]),
+    ];
+    for (arguments, expected) in cases {
+        let output = hil_sim(&folder, arguments);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(expected.iter().all(|part| message.contains(part)), "{arguments:?}: {message}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+    assert_eq!(files(&folder).len(), 2, "no output folder: {:?}", files(&folder));
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_a_failure_of_its_own() {
+    let folder = folder("unwritable");
+    std::fs::write(folder.join("taken"), "a file").unwrap();
+    let output = hil_sim(&folder, &["run", "adc-calibration", "--out", "taken"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("taken"), "{}", text(&output.stderr));
+    assert_eq!(std::fs::read_to_string(folder.join("taken")).unwrap(), "a file");
+}
+
+#[test]
+fn lists_name_every_experiment_and_key() {
+    let folder = folder("lists");
+    let list = hil_sim(&folder, &["list"]);
+    for experiment in hil_sim::experiments::EXPERIMENTS {
+        assert!(text(&list.stdout).contains(experiment.name));
+        assert!(text(&list.stdout).contains(experiment.stands_for));
+    }
+    let keys = hil_sim(&folder, &["keys"]);
+    for key in hil_sim::config::KEYS {
+        assert!(text(&keys.stdout).contains(key.name));
+    }
+}

@@ -1,0 +1,268 @@
+//! The inverter: averaged against switched, dead time, outputs off, and the integration steps.
+
+use std::f64::consts::TAU;
+
+use drive_core::Compare;
+use hil_sim::plant::{
+    Complex, InverterSettings, Load, MeasurementSettings, Plant, PlantSettings, SaliencySettings,
+    phases,
+};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const PERIOD: f64 = 1.0 / 6000.0;
+const TOP: u16 = 14_167;
+
+fn settings(inverter: InverterSettings) -> PlantSettings {
+    let mut settings = PlantSettings { inverter, ..Default::default() };
+    settings.mechanics.load = Load::Locked;
+    settings.measurement = MeasurementSettings::IDEAL;
+    settings
+}
+
+fn plant(settings: &PlantSettings) -> Plant {
+    Plant::new(settings, 1).expect("settings of the test")
+}
+
+/// Duty cycles as compare values.
+fn duties([a, b, c]: [f64; 3]) -> Compare {
+    let compare = |duty: f64| (duty * f64::from(TOP)).round().clamp(0.0, f64::from(TOP)) as u16;
+    Compare { a: compare(a), b: compare(b), c: compare(c), enabled: true }
+}
+
+/// Compare values for a line-to-neutral voltage, all legs about half the dc link.
+fn voltage(v: Complex) -> Compare {
+    duties(phases(v).map(|v| 0.5 + v / 311.0))
+}
+
+/// After 0.2 s of these duty cycles: the current, and the voltage of the last period.
+fn settled(inverter: InverterSettings, d: [f64; 3]) -> (Complex, Complex) {
+    let mut plant = plant(&settings(inverter));
+    let compare = duties(d);
+    for _ in 0..1200 {
+        plant.advance(&compare, PERIOD);
+    }
+    (plant.current(), plant.applied_voltage())
+}
+
+#[test]
+fn averaged_and_switched_agree_on_the_mean_voltage() {
+    let averaged = InverterSettings::default();
+    let switched = InverterSettings { switched: true, ..averaged };
+    // Large currents of either direction; legs that do not switch; pulses (0.5 us) and gaps shorter
+    // than the dead time, with the current that takes them away and with the other one.
+    for d in [
+        [0.56, 0.48, 0.46],
+        [0.46, 0.52, 0.54],
+        [0.08, 0.0, 0.0],
+        [1.0, 0.93, 0.94],
+        [0.08, 0.04, 0.003],
+        [0.003, 0.06, 0.05],
+        [0.997, 0.94, 0.95],
+        [0.94, 0.99, 0.997],
+    ] {
+        let (i, v) = settled(averaged, d);
+        let (i_switched, v_switched) = settled(switched, d);
+        println!("{d:?}: {i:.4} A {v:.5} V, switched {i_switched:.4} A {v_switched:.5} V");
+        assert!(phases(i).iter().all(|i| i.abs() > 0.1), "{i}: phases well off zero");
+        // The same edges, and all currents keep their sign through the ripple: only rounding.
+        assert!((v - v_switched).norm() < 1e-6, "{d:?}: {v} against {v_switched}");
+        // The samples are taken in the middle of the zero vector, give or take delay and dead time
+        // (3 us of at most 20 V on 51 mH: 1.2 mA), where the ripple crosses zero.
+        assert!((i - i_switched).norm() < 5e-3, "{d:?}: {i} against {i_switched}");
+    }
+}
+
+#[test]
+fn the_dead_time_takes_4_1_volts() {
+    let with = InverterSettings { residual_v: 0.0, ..Default::default() };
+    let without = InverterSettings { dead_time_us: 0.0, ..with };
+    for switched in [false, true] {
+        let d = [0.56, 0.47, 0.47];
+        let (_, v) = settled(InverterSettings { switched, ..with }, d);
+        let (_, v0) = settled(InverterSettings { switched, ..without }, d);
+        // a loses e, b and c gain it: 4/3 e along alpha.
+        let e = 0.75 * (v0 - v).re;
+        assert!((e - 311.0 * 2.2 / 166.667).abs() < 1e-3, "switched {switched}: {e} V");
+        assert!((e - 4.1).abs() < 0.01 && (v0 - v).im.abs() < 1e-6, "{e} {v0} {v}");
+        // And nothing from legs that do not switch.
+        let d = [1.0, 0.0, 0.0];
+        let short = |s: InverterSettings| {
+            let mut plant = plant(&settings(InverterSettings { switched, vdc: 20.0, ..s }));
+            (0..600).for_each(|_| plant.advance(&duties(d), PERIOD));
+            plant.applied_voltage()
+        };
+        assert!((short(with) - Complex::new(20.0 * 2.0 / 3.0, 0.0)).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn the_delay_shifts_the_voltage() {
+    // A step of the voltage: the period after it has the delay's part of the old one.
+    for switched in [false, true] {
+        let ideal = InverterSettings { switched, ..InverterSettings::IDEAL };
+        let delayed = InverterSettings { propagation_us: 2.2, ..ideal };
+        let mut plant = plant(&settings(delayed));
+        plant.advance(&Compare::LOW_SIDES_ON, PERIOD);
+        plant.advance(&duties([0.6, 0.5, 0.5]), PERIOD);
+        let v = plant.applied_voltage().re;
+        let full = 311.0 * 0.1 * 2.0 / 3.0;
+        // Switched, the pulses are well inside the period and merely move; averaged, 1.32 % spills.
+        let expected = if switched { full } else { full * (1.0 - 2.2 / 166.667) };
+        // Compare values are whole numbers: 311 V/14167 = 22 mV.
+        assert!((v - expected).abs() < 0.02, "{switched}: {v} V instead of {expected}");
+    }
+}
+
+/// Largest difference between the currents of two plants at the sampling instants, A, under a
+/// rotating voltage with the injected one, on a free shaft.
+fn worst_difference(one: &PlantSettings, other: &PlantSettings) -> f64 {
+    let (mut one, mut other) = (plant(one), plant(other));
+    let mut worst = 0f64;
+    for k in 0..6000 {
+        let t = f64::from(k) * PERIOD;
+        let v = Complex::from_polar(25.0, TAU * 8.0 * t)
+            + Complex::from_polar(50.0 * (TAU * 600.0 * t).cos(), TAU * 8.0 * t);
+        let compare = voltage(v);
+        one.advance(&compare, PERIOD);
+        other.advance(&compare, PERIOD);
+        worst = worst.max((one.current() - other.current()).norm());
+    }
+    assert!(one.mechanical_speed().abs() > 1.0, "it turns: {}", one.mechanical_speed());
+    worst
+}
+
+#[test]
+fn two_substeps_are_enough() {
+    let mut coarse = settings(InverterSettings::default());
+    coarse.mechanics.load = Load::Free { torque: 0.05 };
+    let fine = PlantSettings { substeps: 24, ..coarse };
+    let worst = worst_difference(&coarse, &fine);
+    let one = worst_difference(&PlantSettings { substeps: 1, ..coarse }, &fine);
+    println!("against 24 substeps: {worst:.1e} A with 2, {one:.1e} A with 1");
+    assert!(worst < 1e-4, "{worst:e} A");
+}
+
+#[test]
+fn averaged_and_switched_currents_stay_together() {
+    let mut averaged = settings(InverterSettings { residual_v: 0.0, ..Default::default() });
+    averaged.mechanics.load = Load::Free { torque: 0.05 };
+    let mut switched = averaged;
+    switched.inverter.switched = true;
+    let worst = worst_difference(&averaged, &switched);
+    println!("averaged and switched: {worst:.1e} A apart at most");
+    // Where a current passes zero the two differ by up to the dead-time error: the ripple, not
+    // in the average, decides about its sign.
+    assert!(worst < 0.1, "{worst} A");
+}
+
+#[test]
+fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
+    for rpm in [0.0, 30.0, 1440.0] {
+        for direction in 0..24 {
+            let mut s = settings(InverterSettings::default());
+            s.mechanics.load = Load::Speed { speed: rpm * TAU / 60.0 };
+            let mut plant = plant(&s);
+            let turning = 2.0 * rpm * TAU / 60.0 * PERIOD;
+            let start = TAU * f64::from(direction) / 24.0 + 0.01;
+            for k in 0..1800 {
+                let angle = start + turning * f64::from(k);
+                plant.advance(&voltage(Complex::from_polar(22.0, angle)), PERIOD);
+            }
+            assert!(plant.current().norm() > 0.15, "{rpm} rpm: {}", plant.current());
+            let mut periods = 0;
+            while plant.current() != Complex::ZERO {
+                let before = plant.current().norm();
+                plant.advance(&Compare::OFF, PERIOD);
+                assert!(plant.current().norm() < before, "{rpm} rpm: the current must fall");
+                periods += 1;
+                // 4 A from 207 V on 52 mH take a millisecond.
+                assert!(periods < 12, "{rpm} rpm: {} A is left", plant.current());
+            }
+            let (flux, angle) = (plant.rotor_flux().norm(), plant.rotor_flux_angle());
+            for _ in 0..600 {
+                plant.advance(&Compare::OFF, PERIOD);
+                assert_eq!(plant.current(), Complex::ZERO);
+            }
+            // psi decays by rr/Lr = 5.37 1/s and turns with the rotor.
+            let decayed = flux * (-1.1f64 / 0.2047 * 0.1).exp();
+            let turned = Complex::from_polar(1.0, angle + 600.0 * turning);
+            let expected = turned * decayed;
+            assert!((plant.rotor_flux() - expected).norm() < 1e-7 * flux, "{rpm} rpm");
+            // The terminals show the back-emf, (Lm/Lr) |alpha - j w| psi.
+            let w = 2.0 * rpm * TAU / 60.0;
+            let emf = 0.1771 / 0.2047 * (1.1f64 / 0.2047).hypot(w) * decayed;
+            // Averaged over a period in which it turns and decays a little.
+            let v = plant.applied_voltage().norm();
+            assert!((v - emf).abs() < 2e-3 * emf + 1e-9, "{rpm} rpm: {v} V, not {emf}");
+        }
+    }
+}
+
+#[test]
+fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
+    let mut s = settings(InverterSettings { residual_v: 0.0, ..Default::default() });
+    s.saliency = SaliencySettings::default();
+    let speed = 1440.0 * TAU / 60.0;
+    s.mechanics.load = Load::Speed { speed };
+    let mut plant = plant(&s);
+    for k in 0..3000 {
+        let angle = 2.0 * speed * PERIOD * f64::from(k);
+        plant.advance(&voltage(Complex::from_polar(40.0, angle)), PERIOD);
+    }
+    for _ in 0..20 {
+        plant.advance(&Compare::OFF, PERIOD);
+    }
+    assert_eq!(plant.current(), Complex::ZERO);
+    // Line-to-line the back-emf is sqrt(3) of its length.
+    let emf = plant.applied_voltage().norm() * 3f64.sqrt();
+    plant.set_dc_link(1.05 * emf).expect("voltage");
+    for _ in 0..20 {
+        plant.advance(&Compare::OFF, PERIOD);
+        assert_eq!(plant.current(), Complex::ZERO);
+    }
+    plant.set_dc_link(0.3 * emf).expect("voltage");
+    let (mut most, mut charged) = (0f64, 0f64);
+    for _ in 0..200 {
+        plant.advance(&Compare::OFF, PERIOD);
+        let i = plant.current();
+        assert!(i.is_finite());
+        most = most.max(i.norm());
+        // Power into the machine, by the mean voltage of the period and the current at its end.
+        charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * PERIOD;
+    }
+    println!("emf {emf:.1} V line to line: up to {most:.2} A, {charged:.4} J into the link");
+    assert!(most > 0.05 && charged > 0.0, "{most} A, {charged} J");
+    // The energy comes from the flux, so it dies down, and with it the current.
+    for _ in 0..12_000 {
+        plant.advance(&Compare::OFF, PERIOD);
+    }
+    assert_eq!(plant.current(), Complex::ZERO);
+}
+
+#[test]
+fn any_sequence_of_commands_keeps_the_state_finite() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    for switched in [false, true] {
+        let mut s = settings(InverterSettings { switched, ..Default::default() });
+        s.mechanics.load = Load::Free { torque: 0.0 };
+        s.saliency.chi = 1.0;
+        let mut plant = plant(&s);
+        for k in 0..20_000 {
+            let mut compare = || match rng.random_range(0..5) {
+                0 => 0,
+                1 => TOP,
+                2 => u16::MAX,
+                _ => rng.random_range(0..=TOP),
+            };
+            let (a, b, c) = (compare(), compare(), compare());
+            let enabled = rng.random_bool(0.7);
+            plant.advance(&Compare { a, b, c, enabled }, PERIOD);
+            assert!(plant.current().norm() < 60.0, "period {k}: {}", plant.current());
+            assert!(plant.rotor_flux().is_finite() && plant.mechanical_speed().is_finite());
+            if k % 1000 == 0 {
+                plant.set_dc_link(rng.random_range(0.0..400.0)).expect("voltage");
+            }
+        }
+    }
+}

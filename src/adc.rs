@@ -1,0 +1,138 @@
+//! The converters: ADC1 and ADC2 sample both phase currents at the same instant, then dc link and
+//! heat sink, started by TIM1 once per period. The end of the sequence is the control interrupt.
+#![cfg(target_os = "none")]
+
+use cortex_m::asm;
+use stm32g4xx_hal::gpio::{Analog, PA0, PA1, PC1, PC2};
+use stm32g4xx_hal::pac;
+use stm32g4xx_hal::pac::adc1::RegisterBlock;
+use stm32g4xx_hal::rcc::Rcc;
+
+use crate::board;
+
+/// The pins of the converters.
+pub struct Pins {
+    /// Current a.
+    pub current_a: PA0<Analog>,
+    /// Current b.
+    pub current_b: PC1<Analog>,
+    /// Dc link.
+    pub dc_link: PA1<Analog>,
+    /// Heat sink.
+    pub heat_sink: PC2<Analog>,
+}
+
+/// What a converter did not do in time.
+#[derive(Clone, Copy, defmt::Format)]
+pub enum Stuck {
+    /// Calibrate itself.
+    Calibrating,
+    /// Get ready.
+    Enabling,
+}
+
+/// Codes of one period.
+#[derive(Clone, Copy)]
+pub struct Codes {
+    /// Current a.
+    pub current_a: u16,
+    /// Current b.
+    pub current_b: u16,
+    /// Dc link.
+    pub dc_link: u16,
+    /// Heat sink.
+    pub heat_sink: u16,
+    /// Whether both converters had finished.
+    pub complete: bool,
+}
+
+/// Both converters.
+pub struct Adc {
+    one: pac::ADC1,
+    two: pac::ADC2,
+}
+
+impl Adc {
+    /// Sets both converters up and leaves them waiting for the trigger.
+    pub fn new(
+        one: pac::ADC1,
+        two: pac::ADC2,
+        common: &pac::ADC12_COMMON,
+        pins: Pins,
+        rcc: &mut Rcc,
+    ) -> Result<Self, Stuck> {
+        pins.current_a.into_analog();
+        pins.current_b.into_analog();
+        pins.dc_link.into_analog();
+        pins.heat_sink.into_analog();
+
+        rcc.ahb2enr().modify(|_, w| w.adc12en().enabled());
+        // See board::ADC_CLOCK_DIVIDER.
+        common.ccr().write(|w| w.ckmode().sync_div4());
+        prepare(&one, board::ADC1_CHANNELS)?;
+        prepare(&two, board::ADC2_CHANNELS)?;
+        // Both sequences take the same time, so one interrupt is enough.
+        one.ier().write(|w| w.jeosie().enabled());
+        for converter in [&*one, &*two] {
+            converter.cr().modify(|_, w| w.jadstart().start_conversion());
+        }
+        Ok(Self { one, two })
+    }
+
+    /// The codes of the sequence that has just ended; takes the interrupt request back.
+    pub fn read(&mut self) -> Codes {
+        let complete = self.one.isr().read().jeos().bit() && self.two.isr().read().jeos().bit();
+        // Before the data are read: a sequence that ends from here on asks again.
+        for converter in [&*self.one, &*self.two] {
+            converter.isr().write(|w| w.jeoc().clear().jeos().clear());
+        }
+        Codes {
+            current_a: self.one.jdr1().read().jdata().bits(),
+            current_b: self.two.jdr1().read().jdata().bits(),
+            dc_link: self.one.jdr2().read().jdata().bits(),
+            heat_sink: self.two.jdr2().read().jdata().bits(),
+            complete,
+        }
+    }
+}
+
+/// Power, calibration, sequence; in the order of RM0440.
+fn prepare(adc: &RegisterBlock, (current, slow): (u8, u8)) -> Result<(), Stuck> {
+    adc.cr().modify(|_, w| w.deeppwd().disabled());
+    adc.cr().modify(|_, w| w.advregen().enabled());
+    asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
+
+    adc.cr().modify(|_, w| w.adcaldif().single_ended().adcal().start_calibration());
+    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(Stuck::Calibrating)?;
+    // At least four converter clocks between the calibration and the next step.
+    asm::delay(8 * board::ADC_CLOCK_DIVIDER);
+
+    adc.isr().write(|w| w.adrdy().clear());
+    adc.cr().modify(|_, w| w.aden().enabled());
+    wait_for(|| adc.isr().read().adrdy().bit()).ok_or(Stuck::Enabling)?;
+
+    for (channel, time) in [(current, board::CURRENT_SAMPLING), (slow, board::SLOW_SAMPLING)] {
+        // Channels 0 to 9: all that are used.
+        adc.smpr1().modify(|_, w| w.smp(channel).set(time.code));
+    }
+    // No queue of sequences: the one below holds for good.
+    adc.cfgr().modify(|_, w| w.jqdis().set_bit());
+    adc.jsqr().write(|w| {
+        // SAFETY: five bits each, channels that exist.
+        unsafe { w.jsq1().bits(current).jsq2().bits(slow) };
+        // Length 2, which the register writes as 1; a rising trigger output 2 of TIM1.
+        w.jl().set(1).jextsel().tim1_trgo2().jexten().rising_edge()
+    });
+    Ok(())
+}
+
+/// Waits until `done`, for [`board::ADC_TIMEOUT_US`] at most.
+fn wait_for(done: impl Fn() -> bool) -> Option<()> {
+    for _ in 0..board::ADC_TIMEOUT_US {
+        if done() {
+            return Some(());
+        }
+        asm::delay(board::CYCLES_PER_US);
+    }
+    None
+}

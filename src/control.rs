@@ -1,0 +1,147 @@
+//! The control interrupt: samples in, [`Drive::step`], compare values out, 6000 times a second.
+//!
+//! It starts when both converters have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the
+//! low sides came on, and must have written the compare values before they do again, one period
+//! later. It never logs, formats, waits, or takes a lock.
+#![cfg(target_os = "none")]
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::peripheral::{DWT, NVIC};
+use drive_core::{Drive, Hardware, Sample, State};
+use stm32g4xx_hal::pac::Interrupt;
+use stm32g4xx_hal::stm32::interrupt;
+
+use crate::adc::Adc;
+use crate::board;
+use crate::encoder::Encoder;
+use crate::mailbox::Sender;
+use crate::pwm::Pwm;
+
+/// What the main loop hears from the interrupt, [`board::PERIODS_PER_STATUS`] apart.
+#[derive(Clone, Copy)]
+pub struct Status {
+    /// Control periods since the start, wrapping.
+    pub periods: u32,
+    /// What the drive is doing.
+    pub state: State,
+    /// What the drive was last given.
+    pub sample: Sample,
+    /// Core cycles of the longest control period so far.
+    pub worst_cycles: u32,
+    /// Events of [`Hardware`] since the last status.
+    pub hardware: Hardware,
+}
+
+/// Everything the interrupt works with.
+pub struct Control {
+    /// The drive.
+    pub drive: Drive,
+    /// The power stage.
+    pub pwm: Pwm,
+    /// The converters.
+    pub adc: Adc,
+    /// The encoder.
+    pub encoder: Encoder,
+    /// The way to the main loop.
+    pub status: Sender<'static, Status>,
+}
+
+impl Control {
+    /// Hands everything over to the interrupt and lets it run. Only the first call does.
+    pub fn run(self) {
+        static STARTED: AtomicBool = AtomicBool::new(false);
+        if STARTED.swap(true, Ordering::AcqRel) {
+            return;
+        }
+        let running = Running {
+            control: self,
+            periods: 0,
+            worst_cycles: 0,
+            late: Hardware::NONE,
+            seen: Hardware::NONE,
+        };
+        // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
+        // still masked.
+        unsafe { *RUNNING.0.get() = Some(running) };
+        // SAFETY: no critical section relies on this mask; what the interrupt needs stands.
+        unsafe { NVIC::unmask(Interrupt::ADC1_2) };
+    }
+}
+
+/// The interrupt's own memory.
+struct Owned(UnsafeCell<Option<Running>>);
+
+// SAFETY: shared between contexts, but not at one time: `Control::run` writes it before it unmasks
+// the interrupt, and after that only the interrupt touches it, which cannot interrupt itself.
+unsafe impl Sync for Owned {}
+
+static RUNNING: Owned = Owned(UnsafeCell::new(None));
+
+struct Running {
+    control: Control,
+    periods: u32,
+    worst_cycles: u32,
+    /// Whether the period before took too long.
+    late: Hardware,
+    seen: Hardware,
+}
+
+#[interrupt]
+fn ADC1_2() {
+    // SAFETY: see `Owned`; the reference ends with this function.
+    if let Some(running) = unsafe { &mut *RUNNING.0.get() } {
+        running.period();
+    }
+}
+
+impl Running {
+    fn period(&mut self) {
+        let began = DWT::cycle_count();
+        let Control { drive, pwm, adc, encoder, status } = &mut self.control;
+
+        pwm.clear_updated();
+        let codes = adc.read();
+        let mut hardware = self.late;
+        if pwm.take_break() {
+            hardware = hardware.and(Hardware::BREAK);
+        }
+        if !codes.complete {
+            hardware = hardware.and(Hardware::CONVERTER_OVERRUN);
+        }
+        let sample = Sample {
+            current_a: codes.current_a,
+            current_b: codes.current_b,
+            dc_link: codes.dc_link,
+            heat_sink: codes.heat_sink,
+            encoder: encoder.count(),
+            hardware,
+        };
+
+        pwm.apply(drive.step(&sample));
+
+        // The timer has taken over before all compare values were written.
+        self.late = if pwm.updated() { Hardware::DEADLINE_MISS } else { Hardware::NONE };
+
+        self.seen = self.seen.and(hardware);
+        self.periods = self.periods.wrapping_add(1);
+        let cycles = DWT::cycle_count().wrapping_sub(began);
+        if cycles > self.worst_cycles {
+            self.worst_cycles = cycles;
+        }
+        if self.periods.is_multiple_of(board::PERIODS_PER_STATUS) {
+            let report = Status {
+                periods: self.periods,
+                state: drive.state(),
+                sample,
+                worst_cycles: self.worst_cycles,
+                hardware: self.seen,
+            };
+            // The main loop may be slow or hang; then this status is lost, but not its events.
+            if status.send(report) {
+                self.seen = Hardware::NONE;
+            }
+        }
+    }
+}

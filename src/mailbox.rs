@@ -1,0 +1,108 @@
+//! One place for one message, from the control interrupt to the main loop.
+//!
+//! No queue of `heapless` here: its index arithmetic divides by a length known only at run time, and
+//! the check of that would be a panic reachable from the interrupt.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+/// Holds at most one message; the sender and the receiver never wait for each other.
+///
+/// Shared by one [`Sender`] and one [`Receiver`].
+pub struct Mailbox<T> {
+    /// Who may touch the message: the receiver if set, else the sender.
+    full: AtomicBool,
+    message: UnsafeCell<Option<T>>,
+}
+
+// SAFETY: sender and receiver take turns, as `full` says, so that they never touch the message at
+// the same time; there is one of each, because `split` borrows the mailbox mutably.
+unsafe impl<T: Send> Sync for Mailbox<T> {}
+
+/// The end that fills the mailbox.
+pub struct Sender<'a, T>(&'a Mailbox<T>);
+
+/// The end that empties the mailbox.
+pub struct Receiver<'a, T>(&'a Mailbox<T>);
+
+impl<T> Mailbox<T> {
+    /// An empty mailbox.
+    pub const fn new() -> Self {
+        Self { full: AtomicBool::new(false), message: UnsafeCell::new(None) }
+    }
+
+    /// Its two ends.
+    pub fn split(&mut self) -> (Sender<'_, T>, Receiver<'_, T>) {
+        (Sender(self), Receiver(self))
+    }
+}
+
+impl<T> Sender<'_, T> {
+    /// Sends `message`, if the last one has been taken out; says whether it did.
+    pub fn send(&mut self, message: T) -> bool {
+        if self.0.full.load(Ordering::Acquire) {
+            return false;
+        }
+        // SAFETY: the receiver leaves the message alone while the mailbox is not full, and `&mut
+        // self` keeps out other senders.
+        unsafe { *self.0.message.get() = Some(message) };
+        self.0.full.store(true, Ordering::Release);
+        true
+    }
+}
+
+impl<T> Receiver<'_, T> {
+    /// Takes the message out, if there is one.
+    pub fn take(&mut self) -> Option<T> {
+        if !self.0.full.load(Ordering::Acquire) {
+            return None;
+        }
+        // SAFETY: the sender leaves the message alone while the mailbox is full, and `&mut self`
+        // keeps out other receivers.
+        let message = unsafe { (*self.0.message.get()).take() };
+        self.0.full.store(false, Ordering::Release);
+        message
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_mailbox_keeps_what_it_has() {
+        let mut mailbox = Mailbox::new();
+        let (mut sender, mut receiver) = mailbox.split();
+        assert_eq!(receiver.take(), None);
+        assert!(sender.send(1));
+        assert!(!sender.send(2));
+        assert_eq!(receiver.take(), Some(1));
+        assert_eq!(receiver.take(), None);
+        assert!(sender.send(3));
+        assert_eq!(receiver.take(), Some(3));
+    }
+
+    #[test]
+    fn messages_arrive_whole_and_in_order_across_threads() {
+        let mut mailbox = Mailbox::new();
+        let (mut sender, mut receiver) = mailbox.split();
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                for i in 0..10_000_u64 {
+                    while !sender.send([i; 8]) {
+                        std::thread::yield_now();
+                    }
+                }
+            });
+            for i in 0..10_000_u64 {
+                let message = loop {
+                    match receiver.take() {
+                        Some(message) => break message,
+                        None => std::thread::yield_now(),
+                    }
+                };
+                assert_eq!(message, [i; 8]);
+            }
+        });
+    }
+}
