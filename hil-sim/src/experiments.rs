@@ -8,6 +8,7 @@ mod dead_time;
 mod filters;
 mod injection_map;
 mod modulation;
+mod orientation;
 mod pi_design;
 mod position;
 mod sweep;
@@ -52,6 +53,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     current_step::EXPERIMENT,
     anti_windup::EXPERIMENT,
     dead_time::EXPERIMENT,
+    orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
     position::EXPERIMENT,
     torque::STEPS,

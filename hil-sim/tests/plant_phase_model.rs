@@ -27,8 +27,7 @@ struct PhaseModel {
 }
 
 impl PhaseModel {
-    /// Inductances of the windings at an electrical angle, or, shifted by a quarter turn and
-    /// without the constant part, their derivatives by the angle.
+    /// Inductances of the windings at an electrical angle, or their derivatives by that angle.
     fn inductances(&self, angle: f64, derivative: bool) -> Matrix6<f64> {
         // Sinusoidal windings: the mutual inductance of two is proportional to the cosine of the
         // angle between their axes, with M = 2/3 Lm at angle zero (the source: Lm = 3/2 M).

@@ -165,7 +165,7 @@ fn without_filter_the_current_is_read_at_once() {
 
 fn running(seed: u64) -> Plant {
     let mut plant = Plant::new(&PlantSettings::default(), seed).expect("settings");
-    let compare = Compare { a: 7500, b: 6900, c: 6900, enabled: true };
+    let compare = Compare { a: 8500, b: 6900, c: 6900, enabled: true };
     (0..200).for_each(|_| plant.advance(&compare, PERIOD));
     plant
 }

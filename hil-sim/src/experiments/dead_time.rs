@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode};
+use drive_core::{Command, Mode, State};
 
 use super::{Context, Experiment};
 use crate::config::{AngleSource, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::{RATE_HZ, Rig};
+use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;
 
 /// Figures 28 and 29.
@@ -22,6 +22,8 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;
 const IQ_A: f64 = 1.0;
+/// Turns of the flux that are looked at.
+const TURNS: f64 = 8.0;
 /// Harmonics of the current vector that six voltage steps a period make.
 const HARMONICS: [i32; 4] = [-5, 7, -11, 13];
 
@@ -80,6 +82,8 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.angle.source = AngleSource::Encoder;
     config.inverter.switched = true;
     config.inverter.compensate = compensate;
+    // The residual is what no compensation knows of; here the dead time alone is looked at.
+    config.inverter.residual_v = 0.0;
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
     let mut rig = Rig::from_config(&config, context.seed)?;
@@ -92,12 +96,19 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     let mut error_stats = Stats::default();
     // Mean of i e^(-j n angle) over the run: complex amplitude of harmonic n.
     let mut amplitudes = [(0.0, 0.0); 5];
-    let periods = (context.seconds.unwrap_or(1.0) * RATE_HZ) as usize;
     let mut wanted = (0.0, 0.0);
-    for _ in 0..periods {
+    // Whole turns of the flux, so that the fundamental leaks into no harmonic.
+    let mut turned = 0.0;
+    let mut last = rig.plant.rotor_flux_angle();
+    while turned < TURNS * 360.0 {
         let i = rig.plant.current();
         let angle = i.im.atan2(i.re);
         let phi = rig.plant.rotor_flux_angle();
+        turned += wrapped_degrees(phi - last);
+        last = phi;
+        if matches!(rig.drive.state(), State::Fault(_)) {
+            return Err(Error::Refused(format!("the drive is {}", rig.drive.state())));
+        }
         rig.step();
         // The voltage of this period was computed from the sample before.
         let applied = rig.plant.applied_voltage();

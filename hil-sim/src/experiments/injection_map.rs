@@ -136,7 +136,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks.push(
         "The rectified chain, its delay compensated, gives about the same current difference at \
          ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
-         the delay of the band-pass (8.83 samples) left in, 2.8 mA per ampere are added by the slip \
+         the delay of the band-pass (8.83 samples) left in, 2.4 mA per ampere are added by the slip \
          of the flux, with or without saliency."
             .into(),
     );

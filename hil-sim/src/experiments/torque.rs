@@ -7,7 +7,7 @@ use drive_core::{Command, Mode, State};
 use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::{Context, Experiment};
-use crate::outcome::{Figure, Outcome, Panel, Series, Step, Table};
+use crate::outcome::{Figure, Outcome, Panel, Series, Step};
 use crate::rig::{Point, RATE_HZ, Rig};
 use crate::stats::Stats;
 
@@ -49,7 +49,6 @@ fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
     let steps: Vec<Step> = (0..LEVELS.len())
         .map(|n| run.level(sign * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
         .collect();
-    outcome.tables.push(Table::of_steps(&steps));
     outcome.steps = Some(steps);
     Ok(outcome)
 }
@@ -67,7 +66,6 @@ fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
     let steps = [(1.0, 1.0, 2.0), (2.0, 5.0, 6.0), (1.0, 8.5, 9.0)]
         .map(|(iq, from, to)| run.level(sign * iq, from * scale, to * scale))
         .to_vec();
-    outcome.tables.push(Table::of_steps(&steps));
     outcome.steps = Some(steps);
     Ok(outcome)
 }
@@ -160,9 +158,9 @@ impl Run {
                     .with(Series::reference("reference", line(&|p| p.iq_ref))),
             )
             .panel(
-                Panel::new(x, "torque (Nm)")
-                    .with(Series::line("motor", line(&|p| p.torque)))
-                    .with(Series::reference("by Eq. 4.4 from flux and angle", line(&eq_4_4))),
+                Panel::new(x, "torque (Nm)").with(Series::line("motor", line(&|p| p.torque))).with(
+                    Series::line("by Eq. 4.4 from flux, current and angle error", line(&eq_4_4)),
+                ),
             )
             .panel(Panel::new(x, "angle error (° electrical)").with(Series::line(
                 "true minus estimated flux angle",

@@ -54,11 +54,23 @@ impl Motor {
         h: f64,
         rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
     ) -> (MotorState, Complex) {
+        let w = self.machine.pole_pairs * self.state.speed;
+        self.stepped_from(rates(&self.state.electrical, w), h, rates)
+    }
+
+    /// The same, where `first` is what `rates` gives at the present state.
+    #[inline]
+    pub(crate) fn stepped_from(
+        &self,
+        first: (MachineState, Complex),
+        h: f64,
+        rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
+    ) -> (MotorState, Complex) {
         let (m, p) = (&self.machine, self.machine.pole_pairs);
         let (x0, n0) = (self.state.electrical, self.state.speed);
         let accelerate = |x: &MachineState, n: f64| self.mechanics.acceleration(m.torque(x), n);
 
-        let (k1, v1) = rates(&x0, p * n0);
+        let (k1, v1) = first;
         let a1 = accelerate(&x0, n0);
         let half = 0.5 * h;
         let (x, n1) = (moved(&x0, &k1, half), n0 + a1 * half);

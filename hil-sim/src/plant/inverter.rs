@@ -13,11 +13,9 @@
 use drive_core::Compare;
 use serde::{Deserialize, Serialize};
 
+use super::averaged::{Averaged, smooth_sign};
 use super::complex::{Complex, clarke, phases};
 use super::error::{PlantError, check};
-
-/// Inverse of the current, A, beyond which the sign of a phase current counts fully.
-const SIGN_SLOPE: f64 = 1.0 / 0.020;
 
 /// Settings of the inverter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,34 +136,5 @@ impl Inverter {
     pub(crate) fn dropped(&self, legs: [f64; 3], i: Complex) -> Complex {
         let signs = phases(i).map(smooth_sign);
         clarke(legs) - clarke(signs) * self.residual
-    }
-}
-
-/// Sign of a current, smoothed over ±20 mA.
-#[inline]
-fn smooth_sign(i: f64) -> f64 {
-    (i * SIGN_SLOPE).clamp(-1.0, 1.0)
-}
-
-/// Averages of one period.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Averaged {
-    v: Complex,
-    /// What each leg loses with a positive current, V.
-    lost: [f64; 3],
-    /// What each leg gains with a negative current, V.
-    gained: [f64; 3],
-}
-
-impl Averaged {
-    /// Line-to-neutral voltage at the stator current `i`.
-    #[inline]
-    pub(crate) fn voltage(&self, i: Complex) -> Complex {
-        let currents = phases(i);
-        let error = |k: usize| {
-            let sign = smooth_sign(currents[k]);
-            sign * if sign > 0.0 { self.lost[k] } else { self.gained[k] }
-        };
-        self.v - clarke([error(0), error(1), error(2)])
     }
 }
