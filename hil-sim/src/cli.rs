@@ -30,7 +30,7 @@ enum Command {
     List,
     /// Every key that --set and a configuration file take, with unit, default and range
     Keys,
-    /// Run one experiment: print its tables and write its page
+    /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run {
         /// Name of the experiment, as `list` shows it
         name: String,
@@ -156,11 +156,15 @@ fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<()
     let config = input.config()?;
     let outcome = execute(experiment, &config, input.seed, &Progress::default())?;
     let folder = out.or_else(|| (!json).then(|| OUT.into()));
-    let path = folder.map(|folder| folder.join(format!("{name}.html")));
-    if let Some(path) = &path {
+    let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
+    if let (Some(folder), Some(path)) = (&folder, &path) {
         let page =
             report::page("Induction drive", &[section(experiment, input, &config, &outcome)])?;
         report::write_whole(path, &page)?;
+        for figure in &outcome.figures {
+            let file = folder.join(format!("{name}-{}.svg", figure.name));
+            report::write_whole(&file, &report::svg(figure)?)?;
+        }
     }
     if json {
         let object = outcome.to_json(name, input.seed);

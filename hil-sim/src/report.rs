@@ -12,6 +12,7 @@ use std::path::Path;
 
 pub use console::{paragraph, table, text};
 pub use page::{Section, page};
+pub use plot::svg;
 
 use crate::error::Error;
 

@@ -33,7 +33,9 @@ fn a_run_prints_its_table_and_writes_its_page() {
     let printed = text(&output.stdout);
     assert!(printed.contains("-4.472713") && printed.contains("out/adc-calibration.html"));
     assert!(output.stderr.is_empty(), "{}", text(&output.stderr));
-    assert_eq!(files(&folder.join("out")), ["adc-calibration.html"]);
+    let mut written = files(&folder.join("out"));
+    written.sort();
+    assert_eq!(written, ["adc-calibration-calibration.svg", "adc-calibration.html"]);
     let page = std::fs::read_to_string(folder.join("out/adc-calibration.html")).unwrap();
     assert!(page.contains("<svg") && page.trim_end().ends_with("</html>"));
     let outside = ["src=", "href=\"http", "url(", "<script", "@import"];

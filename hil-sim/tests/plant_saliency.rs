@@ -115,7 +115,7 @@ fn the_saliency_stays_below_half() {
 fn refusal(change: impl Fn(&mut PlantSettings)) -> String {
     let mut settings = PlantSettings::default();
     change(&mut settings);
-    Plant::new(&settings, 0).err().expect("must be refused").to_string()
+    Plant::new(&settings, 0).expect_err("must be refused").to_string()
 }
 
 #[test]

@@ -50,8 +50,10 @@ fn draw(figure: &Figure) -> Result<String, Failure> {
         }
         canvas.0.present()?;
     }
-    // The page decides how large the figure is; the view box keeps its shape.
-    Ok(text.replacen(&format!("width=\"{width}\" height=\"{height}\" "), "", 1))
+    // The page decides how large the figure is; the view box keeps its shape. White behind it, so
+    // that the file can be shown alone on a dark page.
+    let size = format!("width=\"{width}\" height=\"{height}\" ");
+    Ok(text.replacen(&size, "style=\"background:#fff\" ", 1))
 }
 
 fn scaled(pixels: f64) -> i32 {
