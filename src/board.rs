@@ -167,16 +167,16 @@ pub const ADC_FULL_SCALE: u16 = 4095;
 const CALIBRATION_REFERENCE_V: f32 = 3.0;
 
 /// Current a, A: Eq. 3.5, moved from the reference it was calibrated with to this board's.
-pub const CURRENT_A: Line = on_this_board(0.002_212_0, -4.472_713_4);
+pub const CURRENT_A: Line = on_this_board(Line::CHANNEL_A);
 /// Current b, A; see [`CURRENT_A`].
-pub const CURRENT_B: Line = on_this_board(0.002_231_4, -4.496_624);
+pub const CURRENT_B: Line = on_this_board(Line::CHANNEL_B);
 /// Dc link, V: a divider by 136.5, so that 450 V are full scale. The source does not say how it
 /// measured the dc link: adapt this to the divider of the inverter.
 pub const DC_LINK: Line = Line { gain: 0.11, offset: 0.0 };
 
-const fn on_this_board(gain: f32, offset: f32) -> Line {
+const fn on_this_board(line: Line) -> Line {
     // The same voltage gives a smaller code with a higher reference; code 0 stays 0 V.
-    Line { gain: gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), offset }
+    Line { gain: line.gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), ..line }
 }
 
 // Encoder -------------------------------------------------------------------------------------

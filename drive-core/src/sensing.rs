@@ -20,7 +20,8 @@ impl Line {
     #[allow(clippy::excessive_precision)]
     pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
 
-    fn at(self, code: u16) -> f32 {
+    /// Value at a code.
+    pub fn at(self, code: u16) -> f32 {
         self.gain * f32::from(code) + self.offset
     }
 }

@@ -93,6 +93,36 @@ fn chi_is_the_resistive_saliency_of_eq_3_8() {
 }
 
 #[test]
+fn the_inductance_is_the_tensor_of_the_model() {
+    let (m, settings) = (MachineSettings::default(), SaliencySettings::default());
+    let machine = Machine::new(&m, &settings).expect("machine");
+    let textbook = Machine::new(&m, &SaliencySettings::NONE).expect("machine");
+    let psi_n = 0.7 * m.lm;
+    for n in 0..200 {
+        let n = f64::from(n);
+        let (i_length, i_angle) = (0.02 + 0.024 * n, 0.7 * n);
+        let (psi_length, psi_angle) = (0.004 * n, 1.9 * n);
+        let x = MachineState {
+            i: Complex::from_polar(i_length, i_angle),
+            psi: Complex::from_polar(psi_length, psi_angle),
+            i_lp: Complex::ZERO,
+        };
+        // s = a_psi (psi/psi_n)^2 2/(1 + r) + b1 i^2/|i|, by lengths and angles.
+        let r = (psi_length / psi_n).powi(2);
+        let s = Complex::from_polar(1.0, 2.0 * psi_angle) * (-0.035 * r * 2.0 / (1.0 + r))
+            + Complex::from_polar(0.036 * i_length, 2.0 * i_angle);
+        assert!((machine.saliency(&x) - s).norm() < 1e-14, "{} {s}", machine.saliency(&x));
+        // The voltage that is left for the transient inductance is that of the textbook machine;
+        // sigma Ls (x - s x*) of the current's rate must give it back.
+        let v = Complex::from_polar(100.0, n);
+        let (rate, plain) = (machine.derivative(&x, v, 50.0), textbook.derivative(&x, v, 50.0));
+        let left = rate.i - s * rate.i.conj();
+        assert!((left - plain.i).norm() < 1e-12 * plain.i.norm(), "{left} {}", plain.i);
+        assert_eq!(rate.psi, plain.psi);
+    }
+}
+
+#[test]
 fn the_saliency_stays_below_half() {
     let (m, s) = (MachineSettings::default(), SaliencySettings::default());
     let machine = Machine::new(&m, &s).expect("machine");

@@ -1,0 +1,71 @@
+//! The range of every setting.
+
+use super::{PERIOD_S, Settings, SettingsError};
+
+fn check(name: &'static str, value: f32, min: f32, max: f32) -> Result<f32, SettingsError> {
+    // Not-a-number fails the test.
+    if value >= min && value <= max {
+        Ok(value)
+    } else {
+        Err(SettingsError::Range { name, value, min, max })
+    }
+}
+
+impl Settings {
+    /// Every value against its range.
+    pub(super) fn check(&self) -> Result<(), SettingsError> {
+        let m = &self.motor;
+        check("motor.r_s", m.r_s, 0.001, 1000.0)?;
+        check("motor.r_r", m.r_r, 0.001, 1000.0)?;
+        check("motor.l_ls", m.l_ls, 1e-6, 10.0)?;
+        check("motor.l_lr", m.l_lr, 1e-6, 10.0)?;
+        check("motor.l_m", m.l_m, 1e-5, 100.0)?;
+        check("motor.pole_pairs", f32::from(m.pole_pairs), 1.0, 50.0)?;
+        check("motor.inertia", m.inertia, 1e-7, 1000.0)?;
+
+        let i = &self.inverter;
+        check("inverter.top", f32::from(i.top), 1000.0, 65_534.0)?;
+        check("inverter.dead_time_s", i.dead_time_s, 0.0, 6e-6)?;
+        check("inverter.full_compensation_a", i.full_compensation_a, 1e-4, 10.0)?;
+
+        let s = &self.scales;
+        for (name, line) in [("scales.current_a", s.current_a), ("scales.current_b", s.current_b)] {
+            check(name, line.gain, 1e-6, 1.0)?;
+            check(name, line.offset, -1000.0, 1000.0)?;
+        }
+        check("scales.dc_link.gain", s.dc_link.gain, 1e-4, 10.0)?;
+        check("scales.dc_link.offset", s.dc_link.offset, -100.0, 100.0)?;
+        check("scales.full_scale", f32::from(s.full_scale), 100.0, 65_535.0)?;
+        check("scales.current_delay_s", s.current_delay_s, 0.0, 5.0 * PERIOD_S)?;
+        check("scales.encoder_counts", s.encoder_counts as f32, 16.0, 1e7)?;
+
+        let inj = &self.injection;
+        check("injection.amplitude_v", inj.amplitude_v, 0.0, 150.0)?;
+        check("injection.reference_a", inj.reference_a, -1.0, 1.0)?;
+        check("injection.full_reference_iq_a", inj.full_reference_iq_a, 0.01, 10.0)?;
+        check("injection.k_s", inj.k_s, 0.0, 100.0)?;
+        check("injection.z_s", inj.z_s, 0.0, 1.0)?;
+
+        let l = &self.limits;
+        // The nearest end of either sensor's range: a trip beyond it would never come.
+        let end = [s.current_a, s.current_b]
+            .into_iter()
+            .fold(f32::MAX, |end, line| end.min(-line.offset).min(line.at(s.full_scale)));
+        check("limits.trip_a", l.trip_a, 0.05, end)?;
+        check("limits.current_a", l.current_a, 0.01, l.trip_a)?;
+        check("limits.dc_over_v", l.dc_over_v, 10.0, 1000.0)?;
+        check("limits.dc_under_v", l.dc_under_v, 5.0, l.dc_over_v)?;
+        check("limits.speed_rpm", l.speed_rpm, 1.0, 20_000.0)?;
+        check("limits.unexplained_v", l.unexplained_v, 0.1, 1000.0)?;
+
+        let q = &self.sequence;
+        check("sequence.calibrate_s", q.calibrate_s, 0.001, 10.0)?;
+        check("sequence.precharge_s", q.precharge_s, 0.0, 10.0)?;
+        check("sequence.magnetise_s", q.magnetise_s, 0.0, 60.0)?;
+        check("sequence.i_d", q.i_d, 0.01, l.current_a)?;
+        check("sequence.stop_a_per_s", q.stop_a_per_s, 0.1, 1e5)?;
+        check("position.i_q_limit_a", self.position.i_q_limit_a, 0.01, l.current_a)?;
+        check("position.guard_rpm", self.position.guard_rpm, 1.0, l.speed_rpm)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,243 @@
+//! From settings to what the control step works with.
+
+use core::f32::consts::TAU;
+
+use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError};
+use crate::dead_time::DeadTime;
+use crate::demodulator::Demodulator;
+use crate::indirect::Indirect;
+use crate::injection::Injection;
+use crate::modulation::Modulator;
+use crate::pi::{DqPi, Pi, ReferenceFilter};
+use crate::plausibility::Prediction;
+use crate::position::Position;
+use crate::sensing::Sensing;
+use crate::tracker::Tracker;
+use crate::tuning::{self, CurrentLoopDesign};
+
+/// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
+/// lags.
+const BPF_GROUP_DELAY: f32 = 8.83;
+
+/// Everything the control step needs, made from [`Settings`] outside the interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coefficients {
+    pub(crate) sensing: Sensing,
+    pub(crate) source: AngleSource,
+    pub(crate) indirect: Indirect,
+    /// Inject a carrier at all.
+    pub(crate) inject: bool,
+    /// Demodulate and, with the injection as source, track.
+    pub(crate) demodulate: bool,
+    pub(crate) injection: Injection,
+    pub(crate) demodulator: Demodulator,
+    /// Samples by which the demodulated current lags the injection axis.
+    pub(crate) demodulation_lag: f32,
+    pub(crate) tracker: Tracker,
+    pub(crate) injection_reference: InjectionReference,
+    pub(crate) current_loop: DqPi,
+    pub(crate) reference_filter: [ReferenceFilter; 2],
+    /// Delay of the measured current beside the filter, samples.
+    pub(crate) current_lag: f32,
+    /// 1 where the delays of the current are compensated, 0 where not.
+    pub(crate) lag_share: f32,
+    pub(crate) modulator: Modulator,
+    pub(crate) dead_time: DeadTime,
+    pub(crate) prediction: Prediction,
+    pub(crate) position: Position,
+    pub(crate) protection: Protection,
+    pub(crate) sequence: SequenceSteps,
+    /// What the design of the current controllers came to, d and q.
+    pub designs: [CurrentLoopDesign; 2],
+}
+
+impl Coefficients {
+    /// Whether what was set is still finite numbers: a flipped bit may have changed that.
+    pub(crate) fn is_finite(&self) -> bool {
+        let (s, l) = (&self.sensing, &self.current_loop);
+        let sum = s.current_a.gain
+            + s.current_a.offset
+            + s.current_b.gain
+            + s.current_b.offset
+            + s.dc_link.gain
+            + s.dc_link.offset
+            + l.d.k_c
+            + l.d.z_c
+            + l.q.k_c
+            + l.q.z_c
+            + self.injection.current_amplitude
+            + self.injection_reference.full
+            + self.injection_reference.slope
+            + self.demodulation_lag
+            + self.current_lag
+            + self.reference_filter[0].one_minus_p
+            + self.reference_filter[1].one_minus_p
+            + self.position.pi.k_c
+            + self.position.damping
+            + self.sequence.i_d
+            + self.sequence.stop_ramp;
+        sum.is_finite()
+    }
+}
+
+/// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct InjectionReference {
+    full: f32,
+    slope: f32,
+    from: f32,
+}
+
+impl InjectionReference {
+    /// Reference of the current difference, A.
+    pub(crate) fn at(&self, i_q: f32) -> f32 {
+        if i_q > self.from {
+            self.full
+        } else if i_q < -self.from {
+            -self.full
+        } else {
+            self.slope * i_q
+        }
+    }
+}
+
+/// Limits in the units of the control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Protection {
+    pub trip_a: f32,
+    pub dc_over: f32,
+    pub dc_under: f32,
+    /// Electrical turns per period.
+    pub rotor_step: f32,
+    /// Square of the largest regulated current, A^2.
+    pub current_squared: f32,
+}
+
+/// The sequence in control periods.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SequenceSteps {
+    pub precharge: u32,
+    pub magnetise: u32,
+    pub i_d: f32,
+    /// A per period.
+    pub stop_ramp: f32,
+}
+
+fn periods(seconds: f32) -> u32 {
+    libm::roundf(seconds / PERIOD_S) as u32
+}
+
+impl Settings {
+    /// Checks every value and runs the design rules.
+    ///
+    /// # Errors
+    /// The first value outside its range, by name, with the range; or why a design rule cannot be
+    /// met.
+    pub fn build(&self) -> Result<Coefficients, SettingsError> {
+        self.check()?;
+        let m = &self.motor;
+        let motor_plant = tuning::motor_plant(
+            &tuning::Motor {
+                r_s: f64::from(m.r_s),
+                r_r: f64::from(m.r_r),
+                l_m: f64::from(m.l_m),
+                l_ls: f64::from(m.l_ls),
+                l_lr: f64::from(m.l_lr),
+            },
+            f64::from(PERIOD_S),
+        )?;
+        let (d, q) = match self.current_plant {
+            CurrentPlant::Identified { d, q } => (d, q),
+            CurrentPlant::Motor => (motor_plant, motor_plant),
+        };
+        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
+        let designs = [design(d)?, design(q)?];
+        let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
+
+        let injecting =
+            self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
+        let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
+        // Back-emf, V per electrical turn per period, at the largest flux the limits allow.
+        let flux = m.l_m * self.sequence.i_d;
+        let emf_per_step = m.l_m / m.l_r() * flux * TAU / PERIOD_S;
+        let current_lag = self.scales.current_delay_s / PERIOD_S;
+        let inj = &self.injection;
+        let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
+
+        Ok(Coefficients {
+            sensing: Sensing {
+                current_a: self.scales.current_a,
+                current_b: self.scales.current_b,
+                dc_link: self.scales.dc_link,
+                full_scale: self.scales.full_scale,
+                heat_sink_trip: self.scales.heat_sink_trip,
+                calibration_samples: periods(self.sequence.calibrate_s) as u16,
+                largest_offset: 0.2,
+            },
+            source: self.angle_source,
+            indirect: Indirect::new(
+                self.scales.encoder_counts,
+                m.pole_pairs,
+                m.t_sec(),
+                PERIOD_S,
+                self.sequence.i_d,
+                2.0 * self.limits.speed_rpm / 60.0,
+            ),
+            inject: injecting && inj.amplitude_v > 0.0,
+            demodulate: injecting,
+            injection: Injection::new(inj.amplitude_v, motor_plant),
+            demodulator: inj.demodulator,
+            demodulation_lag: lag_share * (BPF_GROUP_DELAY + current_lag),
+            tracker: Tracker::new(inj.k_s, inj.z_s, 1.5 * turns_per_step(self.limits.speed_rpm)),
+            injection_reference: InjectionReference {
+                full: inj.reference_a,
+                slope: inj.reference_a / inj.full_reference_iq_a,
+                from: inj.full_reference_iq_a,
+            },
+            current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
+            reference_filter: [
+                ReferenceFilter::new(designs[0].p_f),
+                ReferenceFilter::new(designs[1].p_f),
+            ],
+            current_lag,
+            lag_share,
+            modulator: Modulator::new(
+                self.inverter.top,
+                PERIOD_S,
+                self.inverter.dead_time_s,
+                self.inverter.compensate,
+            ),
+            dead_time: if self.inverter.compensate {
+                DeadTime::new(
+                    self.inverter.dead_time_s,
+                    PERIOD_S,
+                    self.inverter.full_compensation_a,
+                )
+            } else {
+                DeadTime::NONE
+            },
+            prediction: Prediction::new(motor_plant, self.limits.unexplained_v, emf_per_step),
+            position: Position::new(
+                m.torque_per_ampere(self.sequence.i_d) / m.inertia,
+                self.scales.encoder_counts,
+                self.position.guard_rpm / 60.0,
+                self.position.i_q_limit_a,
+                PERIOD_S,
+            ),
+            protection: Protection {
+                trip_a: self.limits.trip_a,
+                dc_over: self.limits.dc_over_v,
+                dc_under: self.limits.dc_under_v,
+                rotor_step: turns_per_step(self.limits.speed_rpm),
+                current_squared: self.limits.current_a * self.limits.current_a,
+            },
+            sequence: SequenceSteps {
+                precharge: periods(self.sequence.precharge_s),
+                magnetise: periods(self.sequence.magnetise_s),
+                i_d: self.sequence.i_d,
+                stop_ramp: self.sequence.stop_a_per_s * PERIOD_S,
+            },
+            designs,
+        })
+    }
+}

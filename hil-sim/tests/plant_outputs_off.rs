@@ -1,0 +1,157 @@
+//! All outputs off: the currents end in the diodes.
+
+use std::f64::consts::TAU;
+
+use drive_core::Compare;
+use hil_sim::plant::{
+    Complex, InverterSettings, Load, MeasurementSettings, Plant, PlantSettings, clarke, phases,
+};
+
+const PERIOD: f64 = 1.0 / 6000.0;
+const TOP: u16 = 14_167;
+
+fn settings(inverter: InverterSettings) -> PlantSettings {
+    let mut settings = PlantSettings { inverter, ..Default::default() };
+    settings.mechanics.load = Load::Locked;
+    settings.measurement = MeasurementSettings::IDEAL;
+    settings
+}
+
+fn plant(settings: &PlantSettings) -> Plant {
+    Plant::new(settings, 1).expect("settings of the test")
+}
+
+/// Compare values for a line-to-neutral voltage, all legs about half the dc link.
+fn voltage(v: Complex) -> Compare {
+    let [a, b, c] = phases(v).map(|v| ((0.5 + v / 311.0) * f64::from(TOP)).round() as u16);
+    Compare { a, b, c, enabled: true }
+}
+
+#[test]
+fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
+    for rpm in [0.0, 30.0, 1440.0] {
+        for direction in 0..24 {
+            let mut s = settings(InverterSettings::default());
+            s.mechanics.load = Load::Speed { speed: rpm * TAU / 60.0 };
+            let mut plant = plant(&s);
+            let turning = 2.0 * rpm * TAU / 60.0 * PERIOD;
+            let start = TAU * f64::from(direction) / 24.0 + 0.01;
+            for k in 0..1800 {
+                let angle = start + turning * f64::from(k);
+                plant.advance(&voltage(Complex::from_polar(22.0, angle)), PERIOD);
+            }
+            assert!(plant.current().norm() > 0.15, "{rpm} rpm: {}", plant.current());
+            let mut periods = 0;
+            while plant.current() != Complex::ZERO {
+                let before = plant.current().norm();
+                plant.advance(&Compare::OFF, PERIOD);
+                assert!(plant.current().norm() < before, "{rpm} rpm: the current must fall");
+                periods += 1;
+                // 4 A from 207 V on 52 mH take a millisecond.
+                assert!(periods < 12, "{rpm} rpm: {} A is left", plant.current());
+            }
+            let (flux, angle) = (plant.rotor_flux().norm(), plant.rotor_flux_angle());
+            for _ in 0..600 {
+                plant.advance(&Compare::OFF, PERIOD);
+                assert_eq!(plant.current(), Complex::ZERO);
+            }
+            // psi decays by rr/Lr = 5.37 1/s and turns with the rotor.
+            let decayed = flux * (-1.1f64 / 0.2047 * 0.1).exp();
+            let turned = Complex::from_polar(1.0, angle + 600.0 * turning);
+            let expected = turned * decayed;
+            assert!((plant.rotor_flux() - expected).norm() < 1e-7 * flux, "{rpm} rpm");
+            // The terminals show the back-emf, (Lm/Lr) |alpha - j w| psi.
+            let w = 2.0 * rpm * TAU / 60.0;
+            let emf = 0.1771 / 0.2047 * (1.1f64 / 0.2047).hypot(w) * decayed;
+            // Averaged over a period in which it turns and decays a little.
+            let v = plant.applied_voltage().norm();
+            assert!((v - emf).abs() < 2e-3 * emf + 1e-9, "{rpm} rpm: {v} V, not {emf}");
+        }
+    }
+}
+
+#[test]
+fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
+    let mut s = settings(InverterSettings { residual_v: 0.0, ..Default::default() });
+    let speed = 1440.0 * TAU / 60.0;
+    s.mechanics.load = Load::Speed { speed };
+    let mut plant = plant(&s);
+    for k in 0..3000 {
+        let angle = 2.0 * speed * PERIOD * f64::from(k);
+        plant.advance(&voltage(Complex::from_polar(40.0, angle)), PERIOD);
+    }
+    for _ in 0..20 {
+        plant.advance(&Compare::OFF, PERIOD);
+    }
+    assert_eq!(plant.current(), Complex::ZERO);
+    // Line-to-line the back-emf is sqrt(3) of its length.
+    let emf = plant.applied_voltage().norm() * 3f64.sqrt();
+    plant.set_dc_link(1.05 * emf).expect("voltage");
+    for _ in 0..20 {
+        plant.advance(&Compare::OFF, PERIOD);
+        assert_eq!(plant.current(), Complex::ZERO);
+    }
+    plant.set_dc_link(0.3 * emf).expect("voltage");
+    let (mut most, mut charged) = (0f64, 0f64);
+    for _ in 0..200 {
+        plant.advance(&Compare::OFF, PERIOD);
+        let i = plant.current();
+        assert!(i.is_finite());
+        most = most.max(i.norm());
+        // Power into the machine, by the mean voltage of the period and the current at its end.
+        charged -= 1.5 * (i.conj() * plant.applied_voltage()).re * PERIOD;
+    }
+    println!("emf {emf:.1} V line to line: up to {most:.2} A, {charged:.4} J into the link");
+    assert!(most > 0.05 && charged > 0.0, "{most} A, {charged} J");
+    // The energy comes from the flux, so it dies down, and with it the current.
+    for _ in 0..12_000 {
+        plant.advance(&Compare::OFF, PERIOD);
+    }
+    assert_eq!(plant.current(), Complex::ZERO);
+}
+
+/// Largest difference of the currents, A, over these periods with the outputs off, from a bridge
+/// whose diodes are not ideal: its legs go from rail to rail between -1 mA and 1 mA.
+fn worst_against_soft_diodes(plant: &mut Plant, periods: u32) -> f64 {
+    let mut reference = *plant.motor();
+    let vdc = plant.dc_link();
+    let mut worst = 0f64;
+    for _ in 0..periods {
+        plant.advance(&Compare::OFF, PERIOD);
+        // 311 V/2 mA on 51 mH is a pole at 3e6 rad/s; Runge and Kutta bear 2.7 of it in a step.
+        for _ in 0..400 {
+            let legs = phases(reference.state.electrical.i).map(|i| (-i / 1e-3).clamp(-1.0, 1.0));
+            reference.step(clarke(legs) * (0.5 * vdc), PERIOD / 400.0);
+        }
+        worst = worst.max((plant.current() - reference.state.electrical.i).norm());
+    }
+    worst
+}
+
+#[test]
+fn outputs_off_is_a_bridge_of_diodes() {
+    let mut worst = 0f64;
+    for rpm in [0.0, 1440.0] {
+        for direction in 0..12 {
+            let mut s = settings(InverterSettings::default());
+            s.mechanics.load = Load::Speed { speed: rpm * TAU / 60.0 };
+            let mut plant = plant(&s);
+            let turning = 2.0 * rpm * TAU / 60.0 * PERIOD;
+            let start = TAU * f64::from(direction) / 12.0 + 0.1;
+            for k in 0..1800 {
+                let angle = start + turning * f64::from(k);
+                plant.advance(&voltage(Complex::from_polar(40.0, angle)), PERIOD);
+            }
+            assert!(plant.current().norm() > 0.4, "{}", plant.current());
+            // Decay against a high link; then, against one below the back-emf if there is one,
+            // diodes that come and go through several turns of the rotor.
+            worst = worst.max(worst_against_soft_diodes(&mut plant, 8));
+            plant.set_dc_link(20.0).expect("voltage");
+            worst = worst.max(worst_against_soft_diodes(&mut plant, 200));
+        }
+    }
+    println!("ideal and soft diodes: {worst:.1e} A apart at most");
+    // The soft ones carry up to 1 mA where the ideal ones carry none, in each phase, and switch
+    // that much later.
+    assert!(worst < 3e-3, "{worst} A");
+}
