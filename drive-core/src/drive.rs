@@ -307,10 +307,13 @@ impl Drive {
                 return Err(fault);
             }
         }
-        let realised = modulated.realised;
-        if let Some(fault) =
-            c.prediction.step(&mut s.prediction, measured.current, realised, flux.step)
-        {
+        let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
+        if let Some(fault) = c.prediction.step(
+            &mut s.prediction,
+            measured.current,
+            modulated.realised,
+            rotor.to_alpha_beta(seen),
+        ) {
             return Err(fault);
         }
 

@@ -33,7 +33,8 @@ pub struct IndirectState {
     slip: Angle,
     /// Slip, electrical turns per period.
     pub slip_step: f32,
-    magnetising: f32,
+    /// Magnetising current, A: the rotor flux over L_m.
+    pub magnetising: f32,
     /// Mean electrical speed of the rotor, turns per period.
     pub rotor_step: f32,
 }

@@ -3,11 +3,15 @@
 //! * The carrier must be seen by both channels, wherever the injection axis has a component along
 //!   the axis of the channel: finds an open or stuck channel.
 //! * The current must follow the applied voltage: the voltage that a first-order model of the motor
-//!   cannot explain is filtered and must stay within what the back-emf can be.
+//!   and the back-emf of its rotor flux cannot explain is filtered and must stay small. That finds
+//!   a sensor that lies, an open phase, and an angle or speed that is wrong while the rotor turns
+//!   fast enough for its back-emf to stand out.
+
+use core::f32::consts::TAU;
 
 use crate::angle::UnitVector;
 use crate::fault::Fault;
-use crate::frames::{AlphaBeta, SQRT_3};
+use crate::frames::{AlphaBeta, Dq, SQRT_3};
 use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod};
 use crate::sensing::Measured;
 use crate::tuning::FirstOrder;
@@ -82,10 +86,23 @@ pub struct Prediction {
     per_ampere: f32,
     /// Pole of the motor.
     pole: f32,
+    /// What the rotor flux of 1 A of magnetising current adds along it, V/A.
+    decay: f32,
+    /// What it takes away across it, V/A per electrical turn per period of the rotor.
+    emf: f32,
     /// Voltage that may stay unexplained at standstill, V.
     allowed: f32,
-    /// Further volts per electrical turn per period: one and a half times the back-emf.
-    per_step: f32,
+}
+
+/// What the comparison takes of the motor, SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFlux {
+    /// (L_m / L_r) L_m, H.
+    pub coupled_inductance: f32,
+    /// Rotor time constant, s.
+    pub t_sec: f32,
+    /// Period of the control, s.
+    pub period_s: f32,
 }
 
 /// State of the comparison.
@@ -100,34 +117,45 @@ pub struct PredictionState {
 /// Share of the newest value in the filtered unexplained voltage: 2.7 ms at 6 kHz, which takes the
 /// carrier out.
 const SMOOTHING: f32 = 1.0 / 16.0;
+/// Share of the expected back-emf that may be wrong as well. All of it: 15° of angle error at 2 A
+/// make the flux 1.7 times what the drive believes.
+const EMF_SHARE: f32 = 1.0;
 
 impl Prediction {
-    /// For the current response of the motor, A/V, an allowed voltage, V, and the back-emf, V per
-    /// electrical turn per period.
-    pub fn new(plant: FirstOrder, allowed_v: f32, emf_per_step: f32) -> Self {
+    /// For the current response of the motor, A/V, its rotor flux, and an allowed voltage, V.
+    pub fn new(plant: FirstOrder, flux: RotorFlux, allowed_v: f32) -> Self {
         Self {
             per_ampere: (1.0 / plant.k) as f32,
             pole: plant.p as f32,
+            decay: flux.coupled_inductance / flux.t_sec,
+            emf: flux.coupled_inductance * TAU / flux.period_s,
             allowed: allowed_v,
-            per_step: 1.5 * emf_per_step,
         }
     }
 
+    /// The voltage that the rotor flux adds to the applied one, V in the flux frame,
+    /// (L_m/L_r)(1/T_sec - j w_r) psi, with the magnetising current in A and the electrical speed of
+    /// the rotor in turns per period.
+    pub fn rotor_voltage(&self, magnetising: f32, rotor_step: f32) -> Dq {
+        Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_step }
+    }
+
     /// One sample: the current, A; the voltage just computed, which acts in the next period, V; and
-    /// the electrical speed, turns per period.
+    /// the expected voltage of the rotor, V.
     pub fn step(
         &self,
         state: &mut PredictionState,
         current: AlphaBeta,
         computed: AlphaBeta,
-        speed: f32,
+        rotor: AlphaBeta,
     ) -> Option<Fault> {
         let needed = (current - state.last * self.pole) * self.per_ampere;
-        state.unexplained += (needed - state.applied[1] - state.unexplained) * SMOOTHING;
+        let unexplained = needed - state.applied[1] - rotor;
+        state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         state.last = current;
         state.applied = [computed, state.applied[0]];
-        let allowed = self.allowed + self.per_step * speed.abs();
-        (state.unexplained.length_squared() > allowed * allowed)
-            .then_some(Fault::CurrentNotAsPredicted)
+        // The two uncertainties are independent: their squares add.
+        let allowed = self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * rotor.length_squared();
+        (state.unexplained.length_squared() > allowed).then_some(Fault::CurrentNotAsPredicted)
     }
 }

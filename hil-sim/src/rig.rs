@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::demodulator;
 use drive_core::settings::{self, PERIOD_S};
-use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State};
+use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State, Taken};
 
 use crate::config::{self, Config};
 use crate::error::Error;
@@ -144,16 +144,13 @@ impl Rig {
         Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))
     }
 
-    /// Gives the drive a command.
+    /// Gives the drive a command; says whether it was taken as given or limited.
     ///
     /// # Errors
     /// When the drive refuses it.
-    pub fn command(&mut self, command: Command) -> Result<(), Error> {
-        let state = self.drive.state();
-        match self.drive.command(command) {
-            Ok(_) => Ok(()),
-            Err(e) => Err(Error::Refused(format!("{command:?} while {state}: {e}"))),
-        }
+    pub fn command(&mut self, command: Command) -> Result<Taken, Error> {
+        let refused = |e| Error::Refused(format!("{command:?}: {e}"));
+        self.drive.command(command).map_err(refused)
     }
 
     /// Couples another load.

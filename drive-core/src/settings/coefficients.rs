@@ -1,7 +1,5 @@
 //! From settings to what the control step works with.
 
-use core::f32::consts::TAU;
-
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError};
 use crate::dead_time::DeadTime;
 use crate::demodulator::Demodulator;
@@ -9,7 +7,7 @@ use crate::indirect::Indirect;
 use crate::injection::Injection;
 use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
-use crate::plausibility::Prediction;
+use crate::plausibility::{Prediction, RotorFlux};
 use crate::position::Position;
 use crate::sensing::Sensing;
 use crate::tracker::Tracker;
@@ -157,9 +155,11 @@ impl Settings {
         let injecting =
             self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
         let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
-        // Back-emf, V per electrical turn per period, at the largest flux the limits allow.
-        let flux = m.l_m * self.sequence.i_d;
-        let emf_per_step = m.l_m / m.l_r() * flux * TAU / PERIOD_S;
+        let rotor_flux = RotorFlux {
+            coupled_inductance: m.l_m / m.l_r() * m.l_m,
+            t_sec: m.t_sec(),
+            period_s: PERIOD_S,
+        };
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
@@ -216,7 +216,7 @@ impl Settings {
             } else {
                 DeadTime::NONE
             },
-            prediction: Prediction::new(motor_plant, self.limits.unexplained_v, emf_per_step),
+            prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
             position: Position::new(
                 m.torque_per_ampere(self.sequence.i_d) / m.inertia,
                 self.scales.encoder_counts,

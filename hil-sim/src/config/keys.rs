@@ -129,7 +129,7 @@ keys! {
         /// Inertia of rotor and load (assumed; not in the source).
         inertia: f64 = 0.012, [1e-6 .. 1000], "kg m2";
         /// Viscous friction (assumed; not in the source).
-        friction: f64 = 0.001, [0 .. 100], "Nm s/rad";
+        friction: f64 = 0.001, [0 .. 10], "Nm s/rad";
     }
     /// What makes the motor differ from the textbook machine; all of it is assumed.
     "saliency." saliency: Saliency {
@@ -145,9 +145,9 @@ keys! {
         /// Voltage of the dc link.
         vdc: f64 = 311.0, [20 .. 1000], "V";
         /// Time during which neither switch of a leg conducts, at each edge.
-        dead_time_us: f64 = 2.2, [0 .. 10], "us";
+        dead_time_us: f64 = 2.2, [0 .. 6], "us";
         /// Time from the command to the first switch (section 3.9).
-        propagation_us: f64 = 2.2, [0 .. 20], "us";
+        propagation_us: f64 = 2.2, [0 .. 10], "us";
         /// Further voltage per phase that goes with the sign of the current and that no compensation
         /// knows of; 40 % of the dead time's (assumed).
         residual_v: f64 = 1.64, [0 .. 20], "V";
@@ -201,7 +201,7 @@ keys! {
     /// References, for experiments that do not bring their own.
     "reference." reference: Reference {
         /// Direct-axis (magnetising) current, peak.
-        id_a: f64 = 0.7, [0.01 .. 20], "A";
+        id_a: f64 = 0.7, [0.01 .. 3.5], "A";
         /// Quadrature-axis (torque) current, peak.
         iq_a: f64 = 1.0, [-20 .. 20], "A";
     }

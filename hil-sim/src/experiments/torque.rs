@@ -2,7 +2,7 @@
 //! the quadrature axis, shaft locked, without a position sensor.
 
 use drive_core::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode, State, Taken};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -30,10 +30,11 @@ pub const RAMP: Experiment = Experiment {
 /// Seconds after the first torque reference that are not judged: the angle settles from the
 /// magnetising position.
 const SETTLING_S: f64 = 0.5;
-/// An error beyond this, degrees, is a lost angle: the torque has lost its sign at half of it.
+/// An error beyond this, degrees, is a lost angle: half way to where the saliency, which repeats
+/// every 180°, has the wrong sign.
 pub const LOST_DEG: f64 = 45.0;
 
-/// Levels of Figure 38, A.
+/// Levels of Figure 38, as multiples of `reference.iq_a`.
 const LEVELS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 /// Time at each level, s.
 const LEVEL_S: f64 = 1.0;
@@ -41,30 +42,30 @@ const LEVEL_S: f64 = 1.0;
 /// Steps of the torque reference, Figure 38.
 fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
     let level_s = context.seconds.map_or(LEVEL_S, |s| s / LEVELS.len() as f64);
-    let sign = if context.config.reference.iq_a < 0.0 { -1.0 } else { 1.0 };
-    let profile = |t: f64| sign * LEVELS[((t / level_s) as usize).min(LEVELS.len() - 1)];
+    let iq = context.config.reference.iq_a;
+    let profile = |t: f64| iq * LEVELS[((t / level_s) as usize).min(LEVELS.len() - 1)];
     let run = Run::new(context, level_s * LEVELS.len() as f64, profile)?;
 
     let mut outcome = run.outcome("steps", "Torque steps without a position sensor", "Figure 38");
     let steps: Vec<Step> = (0..LEVELS.len())
-        .map(|n| run.level(sign * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
+        .map(|n| run.level(iq * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
         .collect();
     outcome.steps = Some(steps);
     Ok(outcome)
 }
 
-/// Ramp of the torque reference, Figure 39: 1 A, up to 2 A, hold, back to 1 A.
+/// Ramp of the torque reference, Figure 39: `reference.iq_a`, up to twice that, hold, and back.
 fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
     let scale = context.seconds.map_or(1.0, |s| s / 9.0);
-    let sign = if context.config.reference.iq_a < 0.0 { -1.0 } else { 1.0 };
+    let iq = context.config.reference.iq_a;
     let profile = |t: f64| {
         let t = t / scale;
-        sign * (1.0 + ((t - 2.0) / 2.0).clamp(0.0, 1.0) - ((t - 6.0) / 2.0).clamp(0.0, 1.0))
+        iq * (1.0 + ((t - 2.0) / 2.0).clamp(0.0, 1.0) - ((t - 6.0) / 2.0).clamp(0.0, 1.0))
     };
     let run = Run::new(context, 9.0 * scale, profile)?;
     let mut outcome = run.outcome("ramp", "Torque ramp without a position sensor", "Figure 39");
     let steps = [(1.0, 1.0, 2.0), (2.0, 5.0, 6.0), (1.0, 8.5, 9.0)]
-        .map(|(iq, from, to)| run.level(sign * iq, from * scale, to * scale))
+        .map(|(times, from, to)| run.level(iq * times, from * scale, to * scale))
         .to_vec();
     outcome.steps = Some(steps);
     Ok(outcome)
@@ -88,6 +89,7 @@ impl Run {
         let start = rig.time();
         let periods = (seconds * RATE_HZ).round() as usize;
         let mut points = Vec::with_capacity(periods);
+        let mut limited = None;
         let progress = context.progress.bar("simulating", periods as u64);
         // References change at the pace of a host, not of the control.
         for n in 0..periods.div_ceil(CARRIER_SAMPLES) {
@@ -95,17 +97,23 @@ impl Run {
             if matches!(rig.drive.state(), State::Fault(_)) {
                 break;
             }
-            rig.command(Command::Torque(reference))?;
+            if let Taken::Limited(a) = rig.command(Command::Torque(reference))? {
+                limited = Some(a);
+            }
             rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {
                 points.push(Point { t: p.t - start, ..*p })
             });
             progress.advance(CARRIER_SAMPLES as u64);
         }
+        let mut notes = assumptions(context.config);
+        if let Some(a) = limited {
+            notes.insert(0, format!("The drive limited the torque reference to {a:.3} A."));
+        }
         let fault = match rig.drive.state() {
             State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
             _ => None,
         };
-        Ok(Self { points, fault, notes: assumptions(context.config) })
+        Ok(Self { points, fault, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {
@@ -124,7 +132,8 @@ impl Run {
 
     fn outcome(&self, name: &str, title: &str, source: &str) -> Outcome {
         let mut outcome = Outcome::default();
-        let judged = || self.after(SETTLING_S, f64::INFINITY);
+        let end = self.points.last().map_or(0.0, |p| p.t);
+        let judged = || self.after(SETTLING_S.min(0.1 * end), f64::INFINITY);
         let error = Stats::of(judged().map(|p| p.angle_error_deg));
         let lost = self.fault.is_some() || error.largest() > LOST_DEG;
         let m = &mut outcome.metrics;

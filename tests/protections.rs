@@ -1,0 +1,132 @@
+//! Procedure: break a sensor while the motor runs. The drive must switch off before the current in
+//! any phase leaves the range of the sensors, and must not switch off without reason.
+
+mod common;
+
+use common::{config, regulating};
+use drive_core::{Command, Fault, Mode, State};
+use hil_sim::plant::{Channel, CurrentFault, EncoderFault, Load};
+use hil_sim::rig::Rig;
+
+/// End of the sensors' range, A.
+const RANGE_A: f64 = 4.47;
+
+/// Steps until the drive has switched off, at most `periods`: how many it took, the fault, and the
+/// largest phase current on the way and after it, A.
+fn until_off(rig: &mut Rig, periods: u32) -> (u32, Option<Fault>, f64) {
+    let mut peak = 0.0_f64;
+    let mut took = None;
+    for n in 0..periods + 60 {
+        rig.step();
+        peak = rig.plant.phase_currents().iter().fold(peak, |p, i| p.max(i.abs()));
+        if let State::Fault(fault) = rig.drive.state() {
+            took.get_or_insert((n + 1, fault));
+        }
+    }
+    took.map_or((periods, None, peak), |(n, fault)| (n, Some(fault), peak))
+}
+
+#[test]
+fn a_broken_current_sensor_switches_off_in_time() {
+    let faults = [
+        ("open", CurrentFault::Open),
+        ("stuck at 0 A", CurrentFault::Stuck(2022)),
+        ("stuck at 1 A", CurrentFault::Stuck(2474)),
+        ("at the top", CurrentFault::SaturatedHigh),
+        ("at the bottom", CurrentFault::SaturatedLow),
+    ];
+    for source in ["angle.source=encoder", "angle.source=injection"] {
+        for (name, fault) in faults {
+            for channel in [Channel::A, Channel::B] {
+                // At different moments of the electrical period.
+                for (seed, settle) in [(1, 0.5), (2, 0.6), (3, 0.73), (4, 0.9)] {
+                    let mut rig = regulating(&config(&[source]), seed, 2.0, settle);
+                    rig.plant.set_current_fault(channel, fault);
+                    let (took, found, peak) = until_off(&mut rig, 6000);
+                    println!("{source} {channel:?} {name}: {found:?} after {took}, {peak:.2} A");
+                    assert!(found.is_some(), "{source} {channel:?} {name}: not found");
+                    assert!(peak < RANGE_A, "{source} {channel:?} {name}: {peak} A");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dead_encoder_switches_off() {
+    // At standstill nothing tells a dead encoder from a still shaft; from 600 rpm on the back-emf
+    // does.
+    for rpm in [600, -900, 1440] {
+        let speed = format!("load.speed_rpm={rpm}");
+        let config = config(&["angle.source=encoder", "load.mode=speed", &speed]);
+        let mut rig = regulating(&config, 1, 2.0, 0.5);
+        rig.plant.set_encoder_fault(EncoderFault::Stuck);
+        let (took, found, peak) = until_off(&mut rig, 6000);
+        println!("{rpm} rpm: {found:?} after {took} periods, {peak:.2} A");
+        assert!(found.is_some() && took < 300, "{rpm} rpm");
+        assert!(peak < RANGE_A);
+    }
+}
+
+#[test]
+fn the_dc_link_is_watched() {
+    for (v_dc, fault) in [(420.0, Fault::DcLinkOverVoltage), (150.0, Fault::DcLinkUnderVoltage)] {
+        let mut rig = regulating(&config(&[]), 1, 1.0, 0.3);
+        rig.plant.set_dc_link(v_dc).unwrap();
+        rig.step();
+        assert_eq!(rig.drive.state(), State::Fault(fault));
+    }
+}
+
+/// Full reversals, starts, stops and a turning shaft, over seeds: no fault.
+#[test]
+fn nothing_trips_without_reason() {
+    for seed in 1..=6 {
+        let mut rig = Rig::from_config(
+            &config(&["angle.source=encoder", "load.mode=free", "motor.friction=0.002"]),
+            seed,
+        )
+        .unwrap();
+        for _ in 0..2 {
+            rig.start(Mode::Torque).unwrap();
+            for i_q in [3.0, -3.0, 3.0, -2.0, 0.5, -0.5, 0.0] {
+                rig.command(Command::Torque(i_q)).unwrap();
+                rig.run(0.25, |_| {});
+                assert_eq!(rig.drive.state(), State::Torque, "seed {seed}, i_q {i_q}");
+            }
+            rig.command(Command::Stop).unwrap();
+            rig.run(0.5, |_| {});
+            assert_eq!(rig.drive.state(), State::Off, "seed {seed}");
+            // Off is off: the motor is without current before it is started again.
+            assert!(rig.plant.current().norm() < 1e-6);
+            rig.set_load(Load::Speed { speed: 0.0 }).unwrap();
+            rig.set_load(Load::Free { torque: 0.0 }).unwrap();
+        }
+    }
+    for seed in 1..=6 {
+        let mut rig = Rig::from_config(&config(&[]), seed).unwrap();
+        rig.start(Mode::Torque).unwrap();
+        for i_q in [1.0, 2.0, 3.0, -3.0, -1.0, 1.5] {
+            rig.command(Command::Torque(i_q)).unwrap();
+            rig.run(0.4, |_| {});
+            assert_eq!(rig.drive.state(), State::Torque, "sensorless, seed {seed}, i_q {i_q}");
+        }
+    }
+}
+
+/// A fault, a clear and a start later the drive works as before.
+#[test]
+fn a_cleared_drive_works_again() {
+    let mut rig = regulating(&config(&[]), 1, 1.5, 0.4);
+    rig.plant.set_dc_link(420.0).unwrap();
+    rig.run(0.5, |_| {});
+    assert!(matches!(rig.drive.state(), State::Fault(_)));
+    rig.plant.set_dc_link(311.0).unwrap();
+    rig.command(Command::Clear).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    rig.command(Command::Torque(1.5)).unwrap();
+    rig.run(0.5, |_| {});
+    let mut worst = 0.0_f64;
+    rig.run(0.5, |p| worst = worst.max(p.angle_error_deg.abs()));
+    assert!(worst < 16.0, "{worst}");
+}
