@@ -8,7 +8,7 @@
 //! `i_q = PI(e) - k_v v`, which gives the plant the shape of Eq. 4.1, `k / ((z - 1)(z - p))`, with a
 //! pole `p` that is chosen instead of found; the zero stays where it was printed, 0.974, and the gain
 //! puts the crossover at the geometric mean of zero and pole (symmetric optimum), where the phase
-//! margin is largest: 49° with the figures of [`Position::new`].
+//! margin is largest: 51° with the figures of [`Position::new`].
 
 use core::f64::consts::TAU;
 
@@ -145,6 +145,21 @@ mod tests {
         let (overshoot, settled, _) = simulate(5.0, 0.08);
         assert!(overshoot < 0.02, "overshoot {overshoot}");
         assert!(settled < 3.5, "settled after {settled} s");
+    }
+
+    #[test]
+    fn the_phase_margin_is_the_stated_one() {
+        use crate::tuning::{IntegratorLag, pi_response};
+        let position = Position::new(26.8, 10_000, 24.0, 3.0, 1.0 / 6000.0);
+        let plant =
+            IntegratorLag { k: (1.0 - SPEED_POLE) / f64::from(position.damping), p: SPEED_POLE };
+        let open = |w: f64| {
+            pi_response(f64::from(position.pi.k_c), f64::from(position.pi.z_c), w)
+                * plant.response(w)
+        };
+        let crossover = (1..3000).map(|n| f64::from(n) * 1e-3).find(|&w| open(w).abs() < 1.0);
+        let margin = 180.0 + open(crossover.unwrap()).arg_deg();
+        assert!((margin - 51.3).abs() < 0.5, "{margin}");
     }
 
     #[test]
