@@ -3,6 +3,7 @@
 mod common;
 
 use common::{IDEAL, all, config};
+use drive_core::schedule::{ReferenceTable, Schedule};
 use hil_sim::Outcome;
 use hil_sim::experiments::{self, Context};
 use hil_sim::progress::Progress;
@@ -17,6 +18,8 @@ fn run(name: &str, changes: &[&str], seed: u64) -> Outcome {
     .unwrap()
 }
 
+/// The chain of the source with a rectifier.
+const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];
 /// The source compensates no delay.
 const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
 
@@ -26,7 +29,7 @@ const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
 fn the_rectified_chain_tracks_within_13_degrees() {
     for name in ["torque-steps", "torque-ramp"] {
         for more in [&AS_PRINTED[..], &[]] {
-            let outcome = run(name, &all(&[&IDEAL, more]), 1);
+            let outcome = run(name, &all(&[&IDEAL, &RECTIFIED, more]), 1);
             println!("{name} {more:?}: {:?} {:?}", outcome.metrics, outcome.steps);
             assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 13.0, "{name}");
             assert_eq!(outcome.metrics.get("lost"), Some(0.0));
@@ -34,16 +37,79 @@ fn the_rectified_chain_tracks_within_13_degrees() {
     }
 }
 
-/// With converter, noise and dead-time residual, default settings, several seeds.
+/// With converter, noise and dead-time residual, several seeds: rectified, and the default.
 #[test]
-fn the_default_drive_holds_torque_with_a_realistic_measurement() {
-    for seed in 1..=5 {
-        let outcome = run("torque-steps", &[], seed);
-        println!("{:?}", outcome.metrics);
-        assert_eq!(outcome.metrics.get("lost"), Some(0.0));
-        // 3.7 to 4.1 rms and 11.2 to 12.8 largest over the first six seeds; noise decides the rest.
-        assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 5.0);
-        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 16.0);
+fn the_drive_holds_torque_with_a_realistic_measurement() {
+    // Rectified: 3.7 to 4.1 rms and 10.7 to 12.8 largest over the first six seeds; synchronous: 1.3
+    // to 1.9 and 4 to 9. Noise decides the rest.
+    for (changes, rms, most) in [(&RECTIFIED[..], 5.0, 16.0), (&[], 2.5, 11.0)] {
+        for seed in 1..=5 {
+            let outcome = run("torque-steps", changes, seed);
+            println!("{changes:?} {:?}", outcome.metrics);
+            assert_eq!(outcome.metrics.get("lost"), Some(0.0));
+            assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= rms);
+            assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= most);
+        }
+    }
+}
+
+/// The default drive without measurement errors: what is left is the reference's own error, which
+/// was learned with a dead-time residual.
+#[test]
+fn the_synchronous_chain_is_exact_to_a_degree() {
+    for (name, sign) in [("torque-steps", "1"), ("torque-steps", "-1"), ("torque-ramp", "1")] {
+        let iq = format!("reference.iq_a={sign}");
+        let mut changes = IDEAL.to_vec();
+        changes.push(&iq);
+        let outcome = run(name, &changes, 1);
+        println!("{name}: {:?}", outcome.metrics);
+        // 1.3 seen: 0.9 of the reference and 0.4 in the steps.
+        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 2.0);
+    }
+}
+
+/// G8: steps up to full reversal, and with a rotor 30 % warmer than the drive believes.
+#[test]
+fn reversals_keep_the_angle() {
+    for (changes, limit) in [(vec![], 9.0), (vec!["drive.motor.rr=0.846"], 18.0)] {
+        for seed in 1..=4 {
+            let outcome = run("torque-reversal", &changes, seed);
+            let largest = outcome.metrics.get("angle_error_max_deg").unwrap();
+            println!("{changes:?} seed {seed}: {largest:.2}");
+            assert!(largest <= limit, "{changes:?} seed {seed}: {largest}");
+            assert_eq!(outcome.metrics.get("lost"), Some(0.0));
+        }
+    }
+}
+
+/// Random operating points: a share of what `cargo sim run monte-carlo --set runs=1000` shows.
+#[test]
+fn no_angle_is_lost_within_150_and_300_rpm() {
+    for (speed, seed) in [("0", 21), ("300", 22)] {
+        let speed = format!("load.speed_rpm={speed}");
+        let outcome = run("monte-carlo", &["runs=100", &speed], seed);
+        println!("{speed}: {:?}", outcome.metrics);
+        assert_eq!(outcome.metrics.get("lost_runs"), Some(0.0));
+        // 1.6 pooled, 9 to 12 largest of 1000.
+        assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 2.3);
+        assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 14.0);
+    }
+}
+
+/// The reference that the drive has by default is what learning finds on the default motor.
+#[test]
+fn learning_finds_the_default_reference() {
+    let changes = ["measurement.noise_a=0", "measurement.lsb_a=0.00014"];
+    let learned = hil_sim::learn::reference(&config(&changes), 1).unwrap();
+    let points: Vec<_> = learned.iter().map(|p| (p.i_q as f32, p.q as f32)).collect();
+    let schedule = |table: &ReferenceTable| Schedule::new(table, -0.035, 0.0338, 0.7);
+    let mut table = points.clone();
+    table[0].1 = 0.0;
+    let found = schedule(&ReferenceTable::new(&table).unwrap());
+    let default = schedule(&ReferenceTable::default());
+    for (i_q, _) in points {
+        // 0.0002 of saliency are 0.16°.
+        assert!((found.at(i_q).0 - default.at(i_q).0).abs() < 2e-4, "{i_q} A");
     }
 }
 
@@ -61,7 +127,7 @@ fn torque_follows_equation_4_4() {
 #[test]
 fn a_tenth_of_the_saliency_gives_tens_of_degrees() {
     let weak = ["saliency.a_psi=-0.0035"];
-    let outcome = run("torque-steps", &all(&[&IDEAL, &AS_PRINTED, &weak]), 1);
+    let outcome = run("torque-steps", &all(&[&IDEAL, &RECTIFIED, &AS_PRINTED, &weak]), 1);
     let mean = outcome.metrics.get("angle_error_mean_deg").unwrap();
     println!("mean error {mean}");
     assert!((20.0..60.0).contains(&mean), "{mean}");

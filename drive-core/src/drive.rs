@@ -7,7 +7,7 @@ mod tests;
 use core::f32::consts::TAU;
 
 use crate::angle::{Angle, UnitVector};
-use crate::demodulator::DemodulatorState;
+use crate::estimator::EstimatorState;
 use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
@@ -20,7 +20,6 @@ use crate::position::PositionState;
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
 use crate::state::State;
-use crate::tracker::TrackerState;
 
 /// The drive: coefficients, state, and the references it was given.
 ///
@@ -75,19 +74,13 @@ impl Default for References {
 struct ControlState {
     low_pass: LpfState,
     indirect: IndirectState,
-    tracker: TrackerState,
-    demodulator: DemodulatorState,
+    estimator: EstimatorState,
     carrier: Carrier,
     reference: [ReferenceState; 2],
     current_loop: DqPiState,
     position: PositionState,
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
-    /// Mean speed of the flux, turns per period, for the lag of the demodulation: the present one
-    /// would feed the tracker's own steps back to it.
-    mean_step: f32,
-    /// Mean electrical speed of the rotor as the injection sees it, turns per period.
-    rotor_step: f32,
 }
 
 /// What the drive saw and did in the last step.
@@ -105,8 +98,10 @@ pub struct Telemetry {
     pub current: Dq,
     /// Wanted voltage without the carrier, V.
     pub voltage: Dq,
-    /// Current difference of the demodulation, A.
+    /// Current difference of the printed demodulation, A.
     pub delta_i: f32,
+    /// Saliency that the synchronous demodulation sees.
+    pub saliency: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
     /// Position in mechanical turns from the start.
@@ -198,8 +193,7 @@ impl Drive {
     fn precharge(&mut self, sample: &Sample) -> Compare {
         if self.elapsed >= self.c.sequence.precharge {
             self.control = ControlState::default();
-            // The flux is going to be built up along phase a: phi = 0, the injection 90° ahead.
-            self.control.tracker.angle = Angle::QUARTER;
+            self.control.estimator.start();
             self.c.position.start(&mut self.control.position, sample.encoder);
             self.enter(State::Magnetising);
         }
@@ -214,18 +208,24 @@ impl Drive {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
             q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
         };
-        let filtered = LPF.step_alpha_beta(&mut s.low_pass, measured.current);
-
         // Flux angle at the sample. The current is seen from where the flux was when the filtered
         // current flowed; the voltage is put where the flux will be when it acts.
         let flux = match c.source {
             AngleSource::Encoder => {
                 c.indirect.angle(&mut s.indirect, sample.encoder).map_err(|_| Fault::Encoder)?
             }
-            AngleSource::Injection => {
-                FluxAngle { phi: s.tracker.angle - Angle::QUARTER, step: s.tracker.step }
-            }
+            AngleSource::Injection => s.estimator.flux(),
         };
+        let theta = FluxAngle { phi: flux.phi + r.injection_turn, step: flux.step };
+
+        // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
+        // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
+        let carrier =
+            if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
+        let theta_axis = theta.phi.unit_vector();
+        let rest = measured.current - AlphaBeta::along(theta_axis, carrier.sampled);
+        let filtered = LPF.step_alpha_beta(&mut s.low_pass, rest);
+
         let lag = c.lag_share * (lpf_lag_samples(flux.step * TAU) + c.current_lag);
         let seen = (flux.phi - Angle::within_turn(flux.step * lag)).unit_vector();
         let applied = (flux.phi + Angle::within_turn(flux.step * VOLTAGE_LEAD)).unit_vector();
@@ -235,8 +235,6 @@ impl Drive {
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current);
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
-        let carrier =
-            if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
         let axis = applied.turned_by(r.injection_axis);
         let total = voltage.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.voltage);
 
@@ -248,27 +246,28 @@ impl Drive {
         s.current_loop.realised((modulated.realised - total).to_dq(applied));
 
         // Angles for the next sample.
-        c.indirect.update(&mut s.indirect, current);
-        let theta = flux.phi + r.injection_turn;
-        let mut delta_i = 0.0;
         if c.demodulate {
-            s.mean_step += FLUX_SMOOTHING * (flux.step - s.mean_step);
-            let back = Angle::within_turn(s.mean_step * c.demodulation_lag);
-            let dm_axis = (theta - Angle::EIGHTH - back).unit_vector();
-            delta_i = c.demodulator.step(&mut s.demodulator, measured.current, dm_axis);
+            let e = &mut s.estimator;
+            c.estimator.observe(e, measured.current, theta, carrier.index, reference.q);
         }
         let rotor_step = match c.source {
-            AngleSource::Encoder => s.indirect.rotor_step,
-            // The flux is held still until it stands.
-            AngleSource::Injection if self.state == State::Magnetising => 0.0,
+            AngleSource::Encoder => {
+                c.indirect.update(&mut s.indirect, current);
+                s.indirect.rotor_step
+            }
             AngleSource::Injection => {
-                let error = c.injection_reference.at(reference.q) - delta_i;
-                if !c.tracker.step(&mut s.tracker, error) {
+                // The slip of what is asked for: that of the measured current would feed the angle
+                // error back.
+                c.indirect.update(&mut s.indirect, reference);
+                // The flux is held still until it stands.
+                if self.state != State::Magnetising
+                    && c.estimator
+                        .track(&mut s.estimator, reference.q, s.indirect.slip_step)
+                        .is_err()
+                {
                     return Err(self.not_finite().unwrap_or(Fault::LostAngle));
                 }
-                s.rotor_step +=
-                    ROTOR_SMOOTHING * (s.tracker.step - s.indirect.slip_step - s.rotor_step);
-                s.rotor_step
+                s.estimator.rotor_step
             }
         };
 
@@ -279,7 +278,8 @@ impl Drive {
             reference,
             current,
             voltage,
-            delta_i,
+            delta_i: s.estimator.delta_i,
+            saliency: s.estimator.saliency.q,
             dc_link: measured.dc_link,
             turns: c.position.turns(&s.position, sample.encoder),
         };
@@ -291,7 +291,8 @@ impl Drive {
             + voltage.q
             + current.d
             + current.q
-            + delta_i
+            + s.estimator.delta_i
+            + s.estimator.saliency.q
             + flux.step
             + rotor_step;
         if !sum.is_finite() {
@@ -301,9 +302,8 @@ impl Drive {
             return Err(Fault::OverSpeed);
         }
         if c.inject {
-            let axis = theta.unit_vector();
             let amplitude = c.injection.current_amplitude;
-            if let Some(fault) = s.carrier_watch.step(measured, carrier, axis, amplitude) {
+            if let Some(fault) = s.carrier_watch.step(measured, carrier, theta_axis, amplitude) {
                 return Err(fault);
             }
         }
@@ -363,7 +363,7 @@ impl Drive {
             Some(Fault::NonFiniteSettings)
         } else if !(r.current.is_finite() && r.turns.is_finite()) {
             Some(Fault::NonFiniteCommand)
-        } else if !(self.control.tracker.step.is_finite()) {
+        } else if !self.control.estimator.is_finite() {
             Some(Fault::NonFiniteState)
         } else {
             None
@@ -378,10 +378,6 @@ impl Drive {
 
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
-/// Share of the newest value in the mean speed of the flux: 50 ms.
-const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
-/// Share of the newest value in the mean speed of the rotor: 5 ms.
-const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

@@ -10,6 +10,7 @@ mod coefficients;
 use core::fmt;
 
 use crate::demodulator::Demodulator;
+use crate::schedule::ReferenceTable;
 use crate::sensing::Line;
 use crate::tuning::{FirstOrder, TuningError};
 
@@ -158,12 +159,25 @@ impl Default for CurrentPlant {
     }
 }
 
-/// The injection and what tracks the angle with it.
+/// How the carrier is demodulated and the angle tracked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InjectionSettings {
-    /// Amplitude of the injected voltage, V peak; 0 for none.
-    pub amplitude_v: f32,
-    /// How the current is demodulated.
+pub enum Tracking {
+    /// The chain of the dissertation.
+    Printed(PrintedChain),
+    /// Synchronous demodulation with a learned reference.
+    Synchronous(SynchronousTracking),
+}
+
+impl Default for Tracking {
+    fn default() -> Self {
+        Self::Synchronous(SynchronousTracking::default())
+    }
+}
+
+/// The chain of sections 3.4 and 3.11.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrintedChain {
+    /// How the current difference is taken.
     pub demodulator: Demodulator,
     /// `ref_delta_i`, A (section 3.3): reference of the current difference from
     /// [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it follows
@@ -175,23 +189,62 @@ pub struct InjectionSettings {
     pub k_s: f32,
     /// Zero z_s of the tracker (Eq. 3.44).
     pub z_s: f32,
-    /// Inject and demodulate also while the angle comes from the encoder.
-    pub beside_encoder: bool,
 }
 
-impl Default for InjectionSettings {
-    /// Sections 3.3 and 3.11; 50 V (28 % of what the dc link gives) is assumed, the dissertation
-    /// does not say.
+impl Default for PrintedChain {
+    /// Sections 3.3 and 3.11.
     fn default() -> Self {
         Self {
-            amplitude_v: 50.0,
             demodulator: Demodulator::Rectified,
             reference_a: 0.010,
             full_reference_iq_a: 1.0,
             k_s: 0.132_546,
             z_s: 0.90,
-            beside_encoder: false,
         }
+    }
+}
+
+/// Synchronous demodulation and its loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SynchronousTracking {
+    /// Natural frequency of the tracking loop, Hz.
+    pub bandwidth_hz: f32,
+    /// Saliency fixed to the flux at the nominal magnetising current: negative where the inductance
+    /// along the flux is the larger one.
+    pub flux_saliency: f32,
+    /// Saliency by the stator current, 1/A; for the gain schedule.
+    pub current_saliency: f32,
+    /// Reference of the saliency over the torque current, learned with the shaft locked.
+    pub reference: ReferenceTable,
+}
+
+impl Default for SynchronousTracking {
+    /// For the simulated motor; see [`ReferenceTable::default`].
+    fn default() -> Self {
+        Self {
+            bandwidth_hz: 4.0,
+            flux_saliency: -0.035,
+            current_saliency: 0.0338,
+            reference: ReferenceTable::default(),
+        }
+    }
+}
+
+/// The injection and what tracks the angle with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InjectionSettings {
+    /// Amplitude of the injected voltage, V peak; 0 for none.
+    pub amplitude_v: f32,
+    /// What is made of the carrier current.
+    pub tracking: Tracking,
+    /// Inject and demodulate also while the angle comes from the encoder.
+    pub beside_encoder: bool,
+}
+
+impl Default for InjectionSettings {
+    /// 50 V (28 % of what the dc link gives) is assumed, the dissertation does not say.
+    fn default() -> Self {
+        Self { amplitude_v: 50.0, tracking: Tracking::default(), beside_encoder: false }
     }
 }
 

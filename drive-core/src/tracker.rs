@@ -48,6 +48,56 @@ impl Tracker {
     }
 }
 
+/// The loop behind the synchronous demodulation: a type-2 loop whose speed is the rotor's, with the
+/// slip fed forward.
+///
+/// ```text
+/// w_i += T k_i e      w = w_i + slip      theta += T (w + k_p g e)      k_p = 2 w_n, k_i = w_n^2
+/// ```
+///
+/// Critically damped at `w_n`. `w_i` is an estimate of the electrical speed of the rotor. The
+/// schedule `g` goes with the proportional part alone: the rise of the gain with the torque current
+/// that it makes up for is one of fast errors only, slow ones always see the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pll {
+    /// Turns per period and radian.
+    proportional: f32,
+    /// Turns per period, per period and radian.
+    integral: f32,
+    /// Largest speed, turns per period.
+    limit: f32,
+}
+
+/// Largest error that is corrected at once, rad.
+const LARGEST_ERROR: f32 = 0.6;
+
+impl Pll {
+    /// For a bandwidth in Hz, the period of the control, s, and the largest speed, turns per period.
+    pub fn new(bandwidth_hz: f32, period_s: f32, limit: f32) -> Self {
+        let w = TAU * bandwidth_hz * period_s;
+        Self { proportional: 2.0 * w / TAU, integral: w * w / TAU, limit }
+    }
+
+    /// Moves on by one period with an angle error, rad, the schedule's share of the proportional part,
+    /// and the slip, turns per period. The rotor's
+    /// speed is kept in `rotor_step`. False when a speed has reached its limit or is not a number:
+    /// the angle is lost.
+    pub fn step(
+        &self,
+        state: &mut TrackerState,
+        rotor_step: &mut f32,
+        error: f32,
+        share: f32,
+        slip_step: f32,
+    ) -> bool {
+        let error = error.clamp(-LARGEST_ERROR, LARGEST_ERROR);
+        *rotor_step += self.integral * error;
+        state.step = *rotor_step + slip_step;
+        state.angle += Angle::within_turn(state.step + self.proportional * share * error);
+        state.step < self.limit && state.step > -self.limit
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,10 +7,14 @@ mod current_step;
 mod dead_time;
 mod filters;
 mod injection_map;
+mod learn_reference;
 mod modulation;
+mod monte_carlo;
 mod orientation;
 mod pi_design;
 mod position;
+mod reversal;
+mod steady;
 mod sweep;
 mod torque;
 
@@ -55,10 +59,13 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    learn_reference::EXPERIMENT,
     position::EXPERIMENT,
     torque::STEPS,
     torque::RAMP,
+    reversal::EXPERIMENT,
     sweep::EXPERIMENT,
+    monte_carlo::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.

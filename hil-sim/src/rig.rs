@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::demodulator;
-use drive_core::settings::{self, PERIOD_S};
+use drive_core::demodulator::Demodulator;
+use drive_core::settings::{self, PERIOD_S, PrintedChain, SynchronousTracking, Tracking};
 use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State, Taken};
 
 use crate::config::{self, Config};
@@ -49,6 +49,8 @@ pub struct Point {
     pub angle_error_deg: f64,
     /// Current difference of the demodulation, A.
     pub delta_i: f64,
+    /// Saliency that the synchronous demodulation sees.
+    pub saliency: f64,
     /// Speed of the rotor, rpm.
     pub speed_rpm: f64,
     /// Rotor speed as the drive estimates it, rpm.
@@ -122,6 +124,7 @@ impl Rig {
             point.id = telemetry.current.d.into();
             point.iq = telemetry.current.q.into();
             point.delta_i = telemetry.delta_i.into();
+            point.saliency = telemetry.saliency.into();
             point.speed_estimate_rpm = rpm(telemetry.rotor_step);
             let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
             point.angle_error_deg = wrapped_degrees(error);
@@ -273,14 +276,29 @@ pub fn drive_settings(config: &Config) -> Settings {
         ignore_delays: !config.angle.compensate_delays,
         injection: settings::InjectionSettings {
             amplitude_v: config.injection.amplitude_v as f32,
-            demodulator: match config.injection.demodulator {
-                config::Demodulator::Literal => demodulator::Demodulator::Literal,
-                config::Demodulator::Rectified => demodulator::Demodulator::Rectified,
-            },
-            reference_a: config.injection.reference_a as f32,
+            tracking: tracking(config),
             ..base.injection
         },
         sequence: settings::Sequence { i_d: config.reference.id_a as f32, ..base.sequence },
         ..base
+    }
+}
+
+fn tracking(config: &Config) -> Tracking {
+    let i = &config.injection;
+    let printed = |demodulator| {
+        Tracking::Printed(PrintedChain {
+            demodulator,
+            reference_a: i.reference_a as f32,
+            ..PrintedChain::default()
+        })
+    };
+    match i.demodulator {
+        config::Demodulator::Literal => printed(Demodulator::Literal),
+        config::Demodulator::Rectified => printed(Demodulator::Rectified),
+        config::Demodulator::Synchronous => Tracking::Synchronous(SynchronousTracking {
+            bandwidth_hz: i.bandwidth_hz as f32,
+            ..SynchronousTracking::default()
+        }),
     }
 }

@@ -230,7 +230,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
             |d| d.control.current_loop.preset(Dq::new(f32::NAN, 0.0), Dq::ZERO),
             Fault::NonFiniteState,
         ),
-        (|d| d.control.tracker.step = f32::NAN, Fault::NonFiniteState),
+        (|d| d.control.estimator.rotor_step = f32::NAN, Fault::NonFiniteState),
         (
             |d| {
                 let nan = AlphaBeta::new(f32::NAN, 0.0);

@@ -1,16 +1,17 @@
 //! From settings to what the control step works with.
 
-use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError};
+use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::dead_time::DeadTime;
-use crate::demodulator::Demodulator;
+use crate::estimator::{ConstantReference, Estimator, Method};
 use crate::indirect::Indirect;
 use crate::injection::Injection;
 use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
 use crate::position::Position;
+use crate::schedule::Schedule;
 use crate::sensing::Sensing;
-use crate::tracker::Tracker;
+use crate::tracker::{Pll, Tracker};
 use crate::tuning::{self, CurrentLoopDesign};
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
@@ -28,11 +29,7 @@ pub struct Coefficients {
     /// Demodulate and, with the injection as source, track.
     pub(crate) demodulate: bool,
     pub(crate) injection: Injection,
-    pub(crate) demodulator: Demodulator,
-    /// Samples by which the demodulated current lags the injection axis.
-    pub(crate) demodulation_lag: f32,
-    pub(crate) tracker: Tracker,
-    pub(crate) injection_reference: InjectionReference,
+    pub(crate) estimator: Estimator,
     pub(crate) current_loop: DqPi,
     pub(crate) reference_filter: [ReferenceFilter; 2],
     /// Delay of the measured current beside the filter, samples.
@@ -64,9 +61,7 @@ impl Coefficients {
             + l.q.k_c
             + l.q.z_c
             + self.injection.current_amplitude
-            + self.injection_reference.full
-            + self.injection_reference.slope
-            + self.demodulation_lag
+            + self.estimator.lag
             + self.current_lag
             + self.reference_filter[0].one_minus_p
             + self.reference_filter[1].one_minus_p
@@ -75,27 +70,6 @@ impl Coefficients {
             + self.sequence.i_d
             + self.sequence.stop_ramp;
         sum.is_finite()
-    }
-}
-
-/// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct InjectionReference {
-    full: f32,
-    slope: f32,
-    from: f32,
-}
-
-impl InjectionReference {
-    /// Reference of the current difference, A.
-    pub(crate) fn at(&self, i_q: f32) -> f32 {
-        if i_q > self.from {
-            self.full
-        } else if i_q < -self.from {
-            -self.full
-        } else {
-            self.slope * i_q
-        }
     }
 }
 
@@ -185,15 +159,8 @@ impl Settings {
             ),
             inject: injecting && inj.amplitude_v > 0.0,
             demodulate: injecting,
-            injection: Injection::new(inj.amplitude_v, motor_plant),
-            demodulator: inj.demodulator,
-            demodulation_lag: lag_share * (BPF_GROUP_DELAY + current_lag),
-            tracker: Tracker::new(inj.k_s, inj.z_s, 1.5 * turns_per_step(self.limits.speed_rpm)),
-            injection_reference: InjectionReference {
-                full: inj.reference_a,
-                slope: inj.reference_a / inj.full_reference_iq_a,
-                from: inj.full_reference_iq_a,
-            },
+            injection: Injection::new(inj.amplitude_v, motor_plant, current_lag),
+            estimator: self.estimator(lag_share, turns_per_step(self.limits.speed_rpm)),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
                 ReferenceFilter::new(designs[0].p_f),
@@ -239,5 +206,36 @@ impl Settings {
             },
             designs,
         })
+    }
+
+    fn estimator(&self, lag_share: f32, speed_limit: f32) -> Estimator {
+        let analog = self.scales.current_delay_s / PERIOD_S;
+        let limit = 1.5 * speed_limit;
+        match &self.injection.tracking {
+            Tracking::Printed(t) => Estimator {
+                method: Method::Printed {
+                    demodulator: t.demodulator,
+                    reference: ConstantReference {
+                        full: t.reference_a,
+                        slope: t.reference_a / t.full_reference_iq_a,
+                        from: t.full_reference_iq_a,
+                    },
+                    tracker: Tracker::new(t.k_s, t.z_s, limit),
+                },
+                lag: lag_share * (BPF_GROUP_DELAY + analog),
+            },
+            Tracking::Synchronous(t) => Estimator {
+                method: Method::Synchronous {
+                    schedule: Schedule::new(
+                        &t.reference,
+                        t.flux_saliency,
+                        t.current_saliency,
+                        self.sequence.i_d,
+                    ),
+                    pll: Pll::new(t.bandwidth_hz, PERIOD_S, limit),
+                },
+                lag: lag_share * analog,
+            },
+        }
     }
 }

@@ -22,6 +22,8 @@ words! {
         Literal = "literal",
         /// The difference of their magnitudes, filtered.
         Rectified = "rectified",
+        /// Mixed with the carrier, averaged and normalised; compared with a learned reference.
+        Synchronous = "synchronous",
     }
 }
 
@@ -178,9 +180,11 @@ keys! {
         /// Peak of the injected voltage.
         amplitude_v: f64 = 50.0, [0 .. 150], "V";
         /// How the angle error is taken from the carrier current.
-        demodulator: Demodulator = Demodulator::Rectified, [Demodulator], "";
-        /// Reference of the current difference (section 4.2).
+        demodulator: Demodulator = Demodulator::Synchronous, [Demodulator], "";
+        /// Reference of the current difference of literal and rectified (section 3.3).
         reference_a: f64 = 0.010, [-1 .. 1], "A";
+        /// Natural frequency of the loop behind synchronous.
+        bandwidth_hz: f64 = 4.0, [0.1 .. 30], "Hz";
     }
     /// The flux angle.
     "angle." angle: Angle {

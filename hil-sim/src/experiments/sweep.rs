@@ -1,18 +1,12 @@
 //! The angle error over torque current and speed.
 
-use std::f64::consts::TAU;
-
-use drive_core::{Command, Mode, State};
 use rayon::prelude::*;
 
-use super::torque::{LOST_DEG, assumptions};
+use super::steady::{Case, SteadyRun, steady_run};
+use super::torque::assumptions;
 use super::{Context, Experiment};
-use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::plant::Load;
-use crate::rig::Rig;
-use crate::stats::Stats;
 
 /// Not a figure of the source: it shows how far its statement "about 50°" goes.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -25,22 +19,16 @@ pub const EXPERIMENT: Experiment = Experiment {
 const IQ_A: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 3.0, -1.0, -2.0];
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, -30.0, 150.0, -150.0, 300.0, 600.0];
 
-/// One run.
-struct Cellrun {
-    error: Stats,
-    torque: f64,
-    lost: bool,
-}
-
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let grid: Vec<(f64, f64)> =
         SPEEDS_RPM.iter().flat_map(|&n| IQ_A.iter().map(move |&iq| (n, iq))).collect();
     let bar = context.progress.bar("speed-torque-sweep", grid.len() as u64);
-    let runs: Vec<Cellrun> = grid
+    let runs: Vec<SteadyRun> = grid
         .par_iter()
         .enumerate()
         .map(|(number, &(rpm, iq))| {
-            let result = one(context, rpm, iq, context.seed.wrapping_add(number as u64));
+            let case = Case { rpm, iq, seed: context.seed.wrapping_add(number as u64) };
+            let result = steady_run(context.config, case, context.seconds.unwrap_or(2.0));
             bar.advance(1);
             result
         })
@@ -48,7 +36,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let kept = || runs.iter().filter(|r| !r.lost);
-    let largest = |of: fn(&Cellrun) -> f64| kept().map(of).fold(0.0, f64::max);
+    let largest = |of: fn(&SteadyRun) -> f64| kept().map(of).fold(0.0, f64::max);
     let pooled =
         (kept().map(|r| r.error.rms().powi(2)).sum::<f64>() / kept().count() as f64).sqrt();
     let m = &mut outcome.metrics;
@@ -68,7 +56,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     .note("Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.");
     table.columns = heads;
     for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
-        let cell = |r: &Cellrun| {
+        let cell = |r: &SteadyRun| {
             if r.lost {
                 Cell::from("lost")
             } else {
@@ -82,7 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut error = Panel::new("quadrature current (A)", "mean angle error (°)");
     let mut torque = Panel::new("quadrature current (A)", "mean torque (Nm)");
     for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
-        let line = |of: fn(&Cellrun) -> f64| {
+        let line = |of: fn(&SteadyRun) -> f64| {
             let mut points: Vec<_> =
                 IQ_A.iter().zip(row).filter(|(_, r)| !r.lost).map(|(&iq, r)| (iq, of(r))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -95,28 +83,4 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(Figure::new("sweep", title, "").panel(error).panel(torque));
     outcome.remarks = assumptions(context.config);
     Ok(outcome)
-}
-
-/// One point of the grid: torque at standstill, then up to speed, then two seconds of judging.
-fn one(context: &Context<'_>, rpm: f64, iq: f64, seed: u64) -> Result<Cellrun, Error> {
-    let mut config = context.config.clone();
-    config.load.mode = LoadMode::Speed;
-    config.load.speed_rpm = 0.0;
-    let mut rig = Rig::from_config(&config, seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(Command::Torque(iq as f32))?;
-    rig.run(0.5, |_| {});
-    for n in 1..=50 {
-        let speed = rpm * TAU / 60.0 * f64::from(n) / 50.0;
-        rig.set_load(Load::Speed { speed })?;
-        rig.run(0.01, |_| {});
-    }
-    rig.run(1.0, |_| {});
-    let (mut error, mut torque) = (Stats::default(), Stats::default());
-    rig.run(context.seconds.unwrap_or(2.0), |p| {
-        error.push(p.angle_error_deg);
-        torque.push(p.torque);
-    });
-    let lost = error.largest() > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
-    Ok(Cellrun { error, torque: torque.mean(), lost })
 }

@@ -4,7 +4,7 @@
 use drive_core::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State, Taken};
 
-use crate::config::Config;
+use crate::config::{Config, Demodulator};
 use crate::error::Error;
 use crate::experiments::{Context, Experiment};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
@@ -74,6 +74,7 @@ fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
 /// What was recorded of one run; times count from the first torque reference.
 struct Run {
     points: Vec<Point>,
+    demodulator: Demodulator,
     fault: Option<String>,
     notes: Vec<String>,
 }
@@ -113,7 +114,7 @@ impl Run {
             State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
             _ => None,
         };
-        Ok(Self { points, fault, notes })
+        Ok(Self { points, demodulator: context.config.injection.demodulator, fault, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {
@@ -175,10 +176,12 @@ impl Run {
                 "true minus estimated flux angle",
                 line(&|p| p.angle_error_deg),
             )))
-            .panel(
-                Panel::new(x, "current difference (mA)")
+            .panel(match self.demodulator {
+                Demodulator::Synchronous => Panel::new(x, "saliency (10^-3)")
+                    .with(Series::line("q, as demodulated", line(&|p| p.saliency * 1e3))),
+                _ => Panel::new(x, "current difference (mA)")
                     .with(Series::line("delta_i", line(&|p| p.delta_i * 1e3))),
-            )
+            })
     }
 }
 

@@ -1,0 +1,170 @@
+//! What the synchronous demodulation is compared with, and how strongly it corrects, over the torque
+//! current.
+//!
+//! At the right angle the saliency `q` is not zero but depends on i_q, because part of the saliency
+//! follows the stator current. The reference is an odd table over i_q, learned with the shaft locked.
+//! The loop gain depends on i_q as well: an error of the angle turns the real current, and with it
+//! the current's part of the saliency, so that fast errors see a slope of 2 (|a| + b |i| |cos 2g|)
+//! instead of 2 |a|. The gain is scheduled to make up for that.
+
+use core::fmt;
+
+/// Points of the tables, from i_q = 0 on.
+const POINTS: usize = 16;
+/// Their distance, A.
+const STEP_A: f32 = 0.25;
+/// Largest saliency that is believed.
+const LARGEST: f32 = 0.3;
+
+/// The reference of `q` over i_q, odd.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceTable {
+    q: [f32; POINTS],
+}
+
+/// Why a table was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TableError {
+    /// Fewer than two points.
+    TooShort,
+    /// The first point is not 0 at i_q = 0: the table would not be odd.
+    NotOdd,
+    /// The currents do not increase strictly, or are not finite, from this point on.
+    NotIncreasing(usize),
+    /// A value beyond ±0.3, or not finite, at this point.
+    TooLarge(usize, f32),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooShort => write!(f, "a table needs two points at least"),
+            Self::NotOdd => write!(f, "point 0 must be 0 at 0 A: the table is odd"),
+            Self::NotIncreasing(n) => write!(f, "point {n}: the currents must increase strictly"),
+            Self::TooLarge(n, q) => write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}"),
+        }
+    }
+}
+
+impl core::error::Error for TableError {}
+
+impl ReferenceTable {
+    /// From points `(i_q in A, q)`, i_q = 0 first; linear between them, constant beyond the last.
+    ///
+    /// # Errors
+    /// See [`TableError`].
+    pub fn new(points: &[(f32, f32)]) -> Result<Self, TableError> {
+        let first = points.first().ok_or(TableError::TooShort)?;
+        if *first != (0.0, 0.0) {
+            return Err(TableError::NotOdd);
+        }
+        if points.len() < 2 {
+            return Err(TableError::TooShort);
+        }
+        for (n, pair) in points.windows(2).enumerate() {
+            // Not-a-number fails the tests.
+            if !(pair[1].0 > pair[0].0 && pair[1].0.is_finite()) {
+                return Err(TableError::NotIncreasing(n + 1));
+            }
+            if !(pair[1].1.abs() <= LARGEST) {
+                return Err(TableError::TooLarge(n + 1, pair[1].1));
+            }
+        }
+        let at = |i_q: f32| {
+            let pair = points.windows(2).find(|pair| i_q <= pair[1].0);
+            match pair {
+                Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
+                None => points[points.len() - 1].1,
+            }
+        };
+        Ok(Self { q: core::array::from_fn(|n| at(n as f32 * STEP_A)) })
+    }
+}
+
+impl Default for ReferenceTable {
+    /// Learned on the simulated motor of Table 5 with a flux-fixed saliency of -3.5 % (experiment
+    /// `learn-reference`): it belongs to that motor.
+    fn default() -> Self {
+        const LEARNED: [f32; POINTS] = [
+            0.0, 0.01658, 0.02893, 0.03628, 0.04018, 0.04207, 0.04323, 0.04386, 0.04422, 0.04421,
+            0.04417, 0.04406, 0.04384, 0.04357, 0.04357, 0.04357,
+        ];
+        Self { q: LEARNED }
+    }
+}
+
+/// Reference and gain over i_q, for the control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Schedule {
+    q: [f32; POINTS],
+    share: [f32; POINTS],
+    /// Angle error per difference of the saliency, rad.
+    pub per_saliency: f32,
+}
+
+impl Schedule {
+    /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
+    /// current, 1/A, and the direct-axis current, A.
+    pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
+        let share = |n: usize| {
+            let i_q = n as f32 * STEP_A;
+            let length = libm::sqrtf(i_d * i_d + i_q * i_q);
+            // b |i| cos 2 gamma, where it adds to the slope
+            let current_part = b * (i_q * i_q - i_d * i_d) / length;
+            a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 })
+        };
+        Self { q: table.q, share: core::array::from_fn(share), per_saliency: -0.5 / a }
+    }
+
+    /// Reference of `q`, and share of the proportional part, at a quadrature current, A.
+    pub fn at(&self, i_q: f32) -> (f32, f32) {
+        let x = i_q.abs() * (1.0 / STEP_A);
+        // Saturating cast; the last interval is held beyond its end.
+        let n = (x as usize).min(POINTS - 2);
+        let past = x - n as f32;
+        let share = if past < 1.0 { past } else { 1.0 };
+        let between = |table: &[f32; POINTS]| table[n] + (table[n + 1] - table[n]) * share;
+        let q = between(&self.q);
+        (if i_q < 0.0 { -q } else { q }, between(&self.share))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_checked() {
+        let new = ReferenceTable::new;
+        assert_eq!(new(&[]), Err(TableError::TooShort));
+        assert_eq!(new(&[(0.0, 0.0)]), Err(TableError::TooShort));
+        assert_eq!(new(&[(0.0, 0.01), (1.0, 0.02)]), Err(TableError::NotOdd));
+        assert_eq!(new(&[(0.0, 0.0), (1.0, 0.02), (1.0, 0.03)]), Err(TableError::NotIncreasing(2)));
+        assert_eq!(new(&[(0.0, 0.0), (f32::NAN, 0.02)]), Err(TableError::NotIncreasing(1)));
+        assert_eq!(new(&[(0.0, 0.0), (1.0, 0.31)]), Err(TableError::TooLarge(1, 0.31)));
+        assert!(matches!(new(&[(0.0, 0.0), (1.0, f32::NAN)]), Err(TableError::TooLarge(1, _))));
+    }
+
+    #[test]
+    fn lookup_is_odd_linear_and_held() {
+        let table = ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
+        let schedule = Schedule::new(&table, -0.035, 0.034, 0.7);
+        for (i_q, q) in
+            [(0.0, 0.0), (0.5, 0.02), (1.0, 0.04), (2.0, 0.045), (3.5, 0.05), (99.0, 0.05)]
+        {
+            assert!((schedule.at(i_q).0 - q).abs() < 1e-6, "{i_q}");
+            assert!((schedule.at(-i_q).0 + q).abs() < 1e-6, "-{i_q}");
+        }
+        assert!(schedule.at(f32::NAN).0.abs() < 0.3, "not-a-number is found elsewhere");
+    }
+
+    #[test]
+    fn the_gain_falls_as_the_slope_rises() {
+        // Of an independent study: 1, 1, .71, .49, .38, .32, .27 at 0, .5, 1, 1.5, 2, 2.5, 3 A.
+        let schedule = Schedule::new(&ReferenceTable::default(), -0.035, 0.0338, 0.7);
+        for (n, share) in [1.0, 1.0, 0.71, 0.49, 0.38, 0.32, 0.27].into_iter().enumerate() {
+            let found = schedule.at(0.5 * n as f32).1;
+            assert!((found - share).abs() < 0.011, "{n}: {found}");
+        }
+    }
+}
