@@ -17,6 +17,7 @@ use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
 use crate::position::PositionState;
+use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
 use crate::state::State;
@@ -81,6 +82,7 @@ struct ControlState {
     position: PositionState,
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
+    saliency_check: SaliencyCheckState,
 }
 
 /// What the drive saw and did in the last step.
@@ -202,7 +204,7 @@ impl Drive {
 
     /// Regulates the current. This is the control law, top to bottom.
     fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        let wanted = self.reference(sample);
+        let wanted = self.reference(sample)?;
         let (c, r, s) = (&self.c, &self.references, &mut self.control);
         let reference = Dq {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
@@ -325,15 +327,10 @@ impl Drive {
     }
 
     /// The current to regulate in this state, A; moves on to the next state where it is time.
-    fn reference(&mut self, sample: &Sample) -> Dq {
+    fn reference(&mut self, sample: &Sample) -> Result<Dq, Fault> {
         let r = &mut self.references;
         let i_q = match self.state {
-            State::Magnetising => {
-                if self.elapsed >= self.c.sequence.magnetise {
-                    self.enter(State::of_mode(self.mode));
-                }
-                0.0
-            }
+            State::Magnetising => return self.magnetise(),
             State::Position => {
                 let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
                 r.current.q = i_q;
@@ -353,7 +350,36 @@ impl Drive {
             }
             _ => r.current.q,
         };
-        Dq { d: self.references.current.d, q: i_q }
+        Ok(Dq { d: self.references.current.d, q: i_q })
+    }
+
+    /// The current while the flux is built up, and while the saliency is checked, A.
+    fn magnetise(&mut self) -> Result<Dq, Fault> {
+        let (r, s) = (&mut self.references, &mut self.control);
+        let magnetising = Dq { d: r.current.d, q: 0.0 };
+        let phase =
+            match (self.elapsed.checked_sub(self.c.sequence.magnetise), self.c.saliency_check) {
+                (None, _) => return Ok(magnetising),
+                (Some(_), None) => Phase::Passed,
+                (Some(n), Some(check)) => {
+                    check.step(&mut s.saliency_check, n, s.estimator.saliency.q)
+                }
+            };
+        match phase {
+            Phase::Look => {
+                r.injection_turn = SaliencyCheck::LOOK;
+                r.injection_axis = SaliencyCheck::LOOK_AXIS;
+                return Ok(Dq::ZERO);
+            }
+            Phase::Restore => {
+                let usual = References::default();
+                r.injection_turn = usual.injection_turn;
+                r.injection_axis = usual.injection_axis;
+            }
+            Phase::Passed => self.enter(State::of_mode(self.mode)),
+            Phase::Failed => return Err(Fault::NoSaliency),
+        }
+        Ok(magnetising)
     }
 
     /// Which of settings, references and state is to blame when a result is not finite.

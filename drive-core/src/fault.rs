@@ -52,6 +52,7 @@ faults! {
     DeadlineMiss = 22, "the control interrupt missed its deadline";
     ConverterOverrun = 23, "a conversion was lost";
     ClockFailure = 24, "the clock failed";
+    NoSaliency = 25, "the motor shows too little saliency for the injection";
 }
 
 impl Fault {
@@ -104,6 +105,7 @@ mod tests {
             (22, Fault::DeadlineMiss),
             (23, Fault::ConverterOverrun),
             (24, Fault::ClockFailure),
+            (25, Fault::NoSaliency),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

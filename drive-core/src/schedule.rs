@@ -66,7 +66,8 @@ impl ReferenceTable {
             if !(pair[1].0 > pair[0].0 && pair[1].0.is_finite()) {
                 return Err(TableError::NotIncreasing(n + 1));
             }
-            if !(pair[1].1.abs() <= LARGEST) {
+            let believable = pair[1].1.abs() <= LARGEST;
+            if !believable {
                 return Err(TableError::TooLarge(n + 1, pair[1].1));
             }
         }

@@ -216,6 +216,8 @@ pub struct SynchronousTracking {
     pub current_saliency: f32,
     /// Reference of the saliency over the torque current, learned with the shaft locked.
     pub reference: ReferenceTable,
+    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]).
+    pub check: bool,
 }
 
 impl Default for SynchronousTracking {
@@ -226,6 +228,7 @@ impl Default for SynchronousTracking {
             flux_saliency: -0.035,
             current_saliency: 0.0338,
             reference: ReferenceTable::default(),
+            check: true,
         }
     }
 }

@@ -14,6 +14,7 @@ mod orientation;
 mod pi_design;
 mod position;
 mod reversal;
+mod saliency_check;
 mod steady;
 mod sweep;
 mod torque;
@@ -60,6 +61,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
     learn_reference::EXPERIMENT,
+    saliency_check::EXPERIMENT,
     position::EXPERIMENT,
     torque::STEPS,
     torque::RAMP,

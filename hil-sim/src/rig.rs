@@ -298,6 +298,7 @@ fn tracking(config: &Config) -> Tracking {
         config::Demodulator::Rectified => printed(Demodulator::Rectified),
         config::Demodulator::Synchronous => Tracking::Synchronous(SynchronousTracking {
             bandwidth_hz: i.bandwidth_hz as f32,
+            check: i.check,
             ..SynchronousTracking::default()
         }),
     }

@@ -9,6 +9,7 @@ use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
 use crate::position::Position;
+use crate::saliency_check::SaliencyCheck;
 use crate::schedule::Schedule;
 use crate::sensing::Sensing;
 use crate::tracker::{Pll, Tracker};
@@ -30,6 +31,8 @@ pub struct Coefficients {
     pub(crate) demodulate: bool,
     pub(crate) injection: Injection,
     pub(crate) estimator: Estimator,
+    /// The check of a sensorless start, if it is wanted.
+    pub(crate) saliency_check: Option<SaliencyCheck>,
     pub(crate) current_loop: DqPi,
     pub(crate) reference_filter: [ReferenceFilter; 2],
     /// Delay of the measured current beside the filter, samples.
@@ -160,6 +163,14 @@ impl Settings {
             inject: injecting && inj.amplitude_v > 0.0,
             demodulate: injecting,
             injection: Injection::new(inj.amplitude_v, motor_plant, current_lag),
+            saliency_check: match &self.injection.tracking {
+                Tracking::Synchronous(t)
+                    if t.check && self.angle_source == AngleSource::Injection =>
+                {
+                    Some(SaliencyCheck::new(t.flux_saliency, m.t_sec(), PERIOD_S))
+                }
+                _ => None,
+            },
             estimator: self.estimator(lag_share, turns_per_step(self.limits.speed_rpm)),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [

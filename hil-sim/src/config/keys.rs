@@ -183,6 +183,8 @@ keys! {
         demodulator: Demodulator = Demodulator::Synchronous, [Demodulator], "";
         /// Reference of the current difference of literal and rectified (section 3.3).
         reference_a: f64 = 0.010, [-1 .. 1], "A";
+        /// Whether a start with synchronous checks that the motor has a saliency.
+        check: bool = true, [switch], "";
         /// Natural frequency of the loop behind synchronous.
         bandwidth_hz: f64 = 4.0, [0.1 .. 30], "Hz";
     }

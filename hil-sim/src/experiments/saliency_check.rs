@@ -1,0 +1,80 @@
+//! Starts on motors with more and less saliency: which ones does the drive refuse?
+
+use drive_core::{Command, Fault, Mode, State};
+use rayon::prelude::*;
+
+use super::torque::assumptions;
+use super::{Context, Experiment};
+use crate::config::{AngleSource, Config, Demodulator};
+use crate::error::Error;
+use crate::outcome::{Cell, Outcome, Table};
+use crate::rig::{RATE_HZ, Rig};
+
+/// Not in the source: without saliency its method cannot work, and nothing would tell.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "saliency-check",
+    stands_for: "what section 3.5 takes for granted",
+    about: "Starts on motors with none, a tenth, half and all of the expected saliency; `--set runs=N`.",
+    run,
+};
+
+/// Share of the configured flux-fixed saliency, and its name in the metrics.
+const SHARES: [(f64, &str); 5] =
+    [(0.0, "none"), (0.1, "a_tenth"), (0.5, "half"), (1.0, "all"), (1.5, "one_and_a_half")];
+const RUNS: u32 = 100;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let runs = context.config.extent.runs.unwrap_or(RUNS);
+    let bar = context.progress.bar("saliency-check", SHARES.len() as u64 * u64::from(runs));
+    let mut outcome = Outcome::default();
+    let heads = ["share of the expected saliency", "starts", "accepted", "refused"];
+    let mut table = Table::new("Starts", &heads);
+    for (share, name) in SHARES {
+        let mut config = context.config.clone();
+        config.saliency.a_psi *= share;
+        let accepted: Vec<bool> = (0..u64::from(runs))
+            .into_par_iter()
+            .map(|n| {
+                let result = accepts(&config, context.seed.wrapping_mul(1_000_003).wrapping_add(n));
+                bar.advance(1);
+                result
+            })
+            .collect::<Result<_, _>>()?;
+        let count = accepted.iter().filter(|&&a| a).count() as f64;
+        outcome.metrics.set(format!("accepted_{name}"), count);
+        table.row([
+            Cell::fixed(share, 1),
+            Cell::fixed(f64::from(runs), 0),
+            Cell::fixed(count, 0),
+            Cell::fixed(f64::from(runs) - count, 0),
+        ]);
+    }
+    outcome.metrics.set("runs", f64::from(runs));
+    outcome.tables.push(table);
+    outcome.remarks = assumptions(context.config);
+    Ok(outcome)
+}
+
+/// Whether the drive starts on this motor.
+fn accepts(config: &Config, seed: u64) -> Result<bool, Error> {
+    let mut config = config.clone();
+    config.angle.source = AngleSource::Injection;
+    config.injection.demodulator = Demodulator::Synchronous;
+    let mut rig = Rig::from_config(&config, seed)?;
+    rig.command(Command::Start(Mode::Torque))?;
+    for _ in 0..(10.0 * RATE_HZ) as u32 {
+        rig.step();
+        match rig.drive.state() {
+            State::Torque => return Ok(true),
+            State::Fault(Fault::NoSaliency) => return Ok(false),
+            State::Fault(fault) => {
+                return Err(Error::Refused(format!(
+                    "a start ended in fault {}: {fault}",
+                    fault.code()
+                )));
+            }
+            _ => {}
+        }
+    }
+    Err(Error::Refused(format!("the drive does not start: it is {}", rig.drive.state())))
+}
