@@ -42,6 +42,7 @@ pub mod modulation;
 pub mod pi;
 pub mod plausibility;
 pub mod position;
+pub mod rls;
 pub mod saliency_check;
 pub mod schedule;
 pub mod sensing;

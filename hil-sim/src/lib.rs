@@ -4,6 +4,7 @@ pub mod cli;
 pub mod config;
 pub mod error;
 pub mod experiments;
+pub mod identification;
 pub mod learn;
 pub mod outcome;
 pub mod plant;

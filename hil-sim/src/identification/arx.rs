@@ -1,0 +1,54 @@
+//! General ARX model by least squares (appendix A of Barroso 2017):
+//! y[k] = -a1 y[k-1] - ... - an y[k-n] + b1 u[k-d-1] + ... + bm u[k-d-m].
+//!
+//! The appendix prints the last row of Eq. A.4 and A.5 one sample too far and Eq. A.8 without the
+//! inverse; here all rows are those for which every term exists.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::batch::least_squares;
+use super::models::NotIdentifiable;
+
+/// Orders of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Orders {
+    /// Coefficients of past outputs, n.
+    pub outputs: usize,
+    /// Coefficients of past inputs, m.
+    pub inputs: usize,
+    /// Samples of delay beyond one, d.
+    pub delay: usize,
+}
+
+/// What least squares found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arx {
+    /// a1 to an.
+    pub a: Vec<f64>,
+    /// b1 to bm.
+    pub b: Vec<f64>,
+    /// Ratio of the singular values of the regression, its columns scaled to the same length.
+    pub condition: f64,
+    /// Root of the mean squared error left, in the unit of y.
+    pub rms: f64,
+}
+
+/// Fits the model. Refuses data that do not excite it, judged by the condition number.
+pub fn fit(u: &[f64], y: &[f64], orders: Orders) -> Result<Arx, NotIdentifiable> {
+    let Orders { outputs, inputs, delay } = orders;
+    let first = outputs.max(inputs + delay);
+    let count = y.len().min(u.len()).saturating_sub(first);
+    let regression = DMatrix::from_fn(count, outputs + inputs, |row, column| {
+        let k = first + row;
+        if column < outputs { -y[k - 1 - column] } else { u[k - 1 - delay - (column - outputs)] }
+    });
+    let target = DVector::from_fn(count, |row, _| y[first + row]);
+    let solution = least_squares(regression, target)?;
+    let theta = solution.theta.as_slice();
+    Ok(Arx {
+        a: theta[..outputs].to_vec(),
+        b: theta[outputs..].to_vec(),
+        condition: solution.condition,
+        rms: (solution.residual / count as f64).sqrt(),
+    })
+}

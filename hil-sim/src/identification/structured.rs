@@ -1,0 +1,206 @@
+//! Model S: the five parameters that fit the data best through the exact sampled equation.
+//!
+//! The least-squares problem of Model A has four complex unknowns, a machine five real ones. Model
+//! S stays on the machine: it minimises |R (theta - theta(p))|², with R the triangular factor of
+//! the regression and theta(p) the exact map, by Levenberg and Marquardt's method. It cuts the error
+//! of the speed 30 to 100 times against Model C; r_s and tau_r stay limited by the noise in the
+//! regressors.
+
+use nalgebra::{SMatrix, SVector, Vector4};
+
+use super::models::{NotIdentifiable, model_c, model_d};
+use super::{Complex, Delta, Parameters, Regression};
+
+/// Most steps from one start.
+const STEPS: u32 = 200;
+/// Below this relative change of the unknowns a fit has converged.
+const TOLERANCE: f64 = 1e-9;
+/// Nor is there more to gain below this cosine between residual and what an unknown changes.
+const FLAT: f64 = 1e-7;
+/// A speed well below this many rad/s counts in proportion, one well above in decades.
+const SLOW: f64 = 10.0;
+/// Unknowns beyond e^±30 end a fit.
+const LARGEST: f64 = 30.0;
+/// What counts as a machine: tau_r / h, sigma_l_s / (r_s h) and l_s / sigma_l_s - 1. A fit that
+/// goes astray runs one of them to zero or infinity.
+const MACHINE: [std::ops::Range<f64>; 3] = [1.0..1e7, 1.0..1e7, 0.01..1e3];
+
+type Unknowns = SVector<f64, 5>;
+type Residual = SVector<f64, 8>;
+
+/// Where a fit from one start ended.
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    /// The machine.
+    pub parameters: Parameters,
+    /// |R (theta - theta(p))|², what Model S leaves beyond Model A, A².
+    pub cost: f64,
+    /// Times the exact map was computed.
+    pub evaluations: u32,
+}
+
+/// Logarithms of r_s, tau_r, sigma_l_s and l_s/sigma_l_s - 1, and asinh of the speed: every vector
+/// is a machine.
+fn unknowns(p: &Parameters) -> Unknowns {
+    let k = p.l_s / p.sigma_l_s - 1.0;
+    let speed = (p.omega_m / SLOW).asinh();
+    Unknowns::new(p.r_s.ln(), p.tau_r.ln(), p.sigma_l_s.ln(), k.ln(), speed)
+}
+
+fn machine(x: &Unknowns) -> Parameters {
+    let sigma_l_s = x[2].exp();
+    Parameters {
+        r_s: x[0].exp(),
+        tau_r: x[1].exp(),
+        sigma_l_s,
+        l_s: sigma_l_s * (1.0 + x[3].exp()),
+        omega_m: SLOW * x[4].sinh(),
+    }
+}
+
+fn is_machine(p: &Parameters, h: f64) -> bool {
+    let ratios = [p.tau_r / h, p.sigma_l_s / (p.r_s * h), p.l_s / p.sigma_l_s - 1.0];
+    std::iter::zip(&MACHINE, &ratios).all(|(range, ratio)| range.contains(ratio))
+}
+
+struct Problem<'a> {
+    regression: &'a Regression,
+    h: f64,
+    evaluations: u32,
+}
+
+impl Problem<'_> {
+    fn residual(&mut self, x: &Unknowns) -> Option<Residual> {
+        if x.iter().any(|x| x.abs() > LARGEST) {
+            return None;
+        }
+        self.evaluations += 1;
+        let fitted = Vector4::from(machine(x).delta(self.h).array());
+        let estimated = Vector4::from(self.regression.delta.array());
+        let residual = self.regression.r * (estimated - fitted);
+        let part = |k: usize| if k < 4 { residual[k].re } else { residual[k - 4].im };
+        let residual = Residual::from_fn(|k, _| part(k));
+        residual.iter().all(|x| x.is_finite()).then_some(residual)
+    }
+
+    fn jacobian(&mut self, x: &Unknowns) -> Option<SMatrix<f64, 8, 5>> {
+        const H: f64 = 1e-5;
+        let mut jacobian = SMatrix::<f64, 8, 5>::zeros();
+        for k in 0..5 {
+            let (mut up, mut down) = (*x, *x);
+            up[k] += H;
+            down[k] -= H;
+            let slope = (self.residual(&up)? - self.residual(&down)?) / (2.0 * H);
+            jacobian.set_column(k, &slope);
+        }
+        Some(jacobian)
+    }
+}
+
+/// Model S from one start. Of 500 starts with every parameter five times too large or too small
+/// (noisy data, 4000 samples), 477 came to the best fit and 23 failed and said so; [`model_s`] with
+/// the same starts came to it in 498, and in 2 there was none: the noise put r_s below zero.
+pub fn fit_from(
+    regression: &Regression,
+    h: f64,
+    start: &Parameters,
+) -> Result<Fit, NotIdentifiable> {
+    let fit = descend(regression, h, start)?;
+    if is_machine(&fit.parameters, h) { Ok(fit) } else { Err(FAILED) }
+}
+
+const FAILED: NotIdentifiable = NotIdentifiable::NotConverged;
+
+/// Levenberg and Marquardt's method, to a minimum.
+fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, NotIdentifiable> {
+    let mut problem = Problem { regression, h, evaluations: 0 };
+    let mut x = unknowns(start);
+    let mut residual = problem.residual(&x).ok_or(FAILED)?;
+    let mut jacobian = problem.jacobian(&x).ok_or(FAILED)?;
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let normal = jacobian.transpose() * jacobian;
+        let gradient = jacobian.transpose() * residual;
+        let scale = normal.diagonal();
+        // Cosine of the angle between the residual and what an unknown changes.
+        let flat = |limit: f64| {
+            (0..5).all(|k| gradient[k].abs() <= limit * (scale[k] * residual.norm_squared()).sqrt())
+        };
+        let here = Fit {
+            parameters: machine(&x),
+            cost: residual.norm_squared(),
+            evaluations: problem.evaluations,
+        };
+        if flat(FLAT) {
+            return Ok(here);
+        }
+        let mut damped = normal;
+        for k in 0..5 {
+            damped[(k, k)] += damping * scale[k].max(1e-12 * scale.max());
+        }
+        let step = damped.cholesky().map(|factor| -factor.solve(&gradient));
+        // No leap of more than a factor e^2 in any unknown.
+        let step = step.map(|step| step * (2.0 / step.amax()).min(1.0));
+        let taken = step.and_then(|step| {
+            let next = x + step;
+            let there = problem.residual(&next)?;
+            (there.norm_squared() < residual.norm_squared()).then_some((next, there, step))
+        });
+        if let Some((next, there, step)) = taken {
+            (x, residual) = (next, there);
+            if step.amax() < TOLERANCE && damping < 1.0 {
+                let parameters = machine(&x);
+                return Ok(Fit { parameters, cost: residual.norm_squared(), ..here });
+            }
+            jacobian = problem.jacobian(&x).ok_or(FAILED)?;
+            damping = (damping * 0.2).max(1e-15);
+        } else if damping > 1e9 {
+            // No direction leads down: the minimum to rounding, if the gradient says so too.
+            return if flat(1e3 * FLAT) { Ok(here) } else { Err(FAILED) };
+        } else {
+            damping *= 8.0;
+        }
+    }
+    Err(FAILED)
+}
+
+/// Starts that need nothing known: Models D and C where they give a machine, and machines with
+/// sigma_l_s and the speed of the data, r_s and tau_r over four decades.
+pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
+    let estimates = [model_d(delta, h), model_c(delta, h)];
+    let mut starts: Vec<_> = estimates.iter().filter_map(|e| e.parameters().ok()).collect();
+    starts.retain(|p| p.r_s > 0.0 && p.tau_r > 0.0 && p.sigma_l_s > 0.0 && p.l_s > p.sigma_l_s);
+    let sigma_l_s = (h / delta.h1.re).abs();
+    let omega_m = delta.g1.im / h;
+    if sigma_l_s.is_finite() && sigma_l_s > 0.0 && omega_m.is_finite() {
+        for (rate, tau_r) in [(100.0, 0.1), (30.0, 0.3), (300.0, 0.03)] {
+            starts.push(Parameters {
+                r_s: rate * sigma_l_s,
+                tau_r,
+                sigma_l_s,
+                l_s: 10.0 * sigma_l_s,
+                omega_m,
+            });
+        }
+    }
+    starts
+}
+
+/// Model S: the best of the fits from `guess`, if there is one, and from [`starts`]. Speed error
+/// below 0.5 % on 4000 samples of S_s with the noise of section 5 halved, at all three periods.
+pub fn model_s(
+    regression: &Regression,
+    h: f64,
+    guess: Option<&Parameters>,
+) -> Result<Fit, NotIdentifiable> {
+    let starts = starts(&regression.delta, h);
+    let fits = guess.into_iter().chain(&starts).filter_map(|p| fit_from(regression, h, p).ok());
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or(NotIdentifiable::NotConverged)
+}
+
+/// How far a machine is from a regression: |R (theta - theta(p))|², A².
+pub fn cost(regression: &Regression, h: f64, p: &Parameters) -> f64 {
+    let fitted = Vector4::from(p.delta(h).array());
+    let estimated: Vector4<Complex> = Vector4::from(regression.delta.array());
+    (regression.r * (estimated - fitted)).norm_squared()
+}
