@@ -9,7 +9,6 @@ mod coefficients;
 
 use core::fmt;
 
-use crate::demodulator::Demodulator;
 use crate::schedule::ReferenceTable;
 use crate::sensing::Line;
 use crate::tuning::{FirstOrder, TuningError};
@@ -160,25 +159,21 @@ impl Default for CurrentPlant {
 }
 
 /// How the carrier is demodulated and the angle tracked.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tracking {
-    /// The chain of the dissertation.
-    Printed(PrintedChain),
-    /// Synchronous demodulation with a learned reference.
-    Synchronous(SynchronousTracking),
-}
-
-impl Default for Tracking {
-    fn default() -> Self {
-        Self::Synchronous(SynchronousTracking::default())
-    }
+    /// The chain of the dissertation as printed; see [`Demodulator::Literal`](crate::demodulator::Demodulator::Literal). It cannot track.
+    Literal,
+    /// The same with a rectifier; see
+    /// [`Demodulator::Rectified`](crate::demodulator::Demodulator::Rectified).
+    Rectified,
+    /// Synchronous demodulation with a learned reference; see [`crate::synchronous`].
+    #[default]
+    Synchronous,
 }
 
 /// The chain of sections 3.4 and 3.11.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrintedChain {
-    /// How the current difference is taken.
-    pub demodulator: Demodulator,
     /// `ref_delta_i`, A (section 3.3): reference of the current difference from
     /// [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it follows
     /// the sign of i_q, and goes through zero linearly.
@@ -194,13 +189,7 @@ pub struct PrintedChain {
 impl Default for PrintedChain {
     /// Sections 3.3 and 3.11.
     fn default() -> Self {
-        Self {
-            demodulator: Demodulator::Rectified,
-            reference_a: 0.010,
-            full_reference_iq_a: 1.0,
-            k_s: 0.132_546,
-            z_s: 0.90,
-        }
+        Self { reference_a: 0.010, full_reference_iq_a: 1.0, k_s: 0.132_546, z_s: 0.90 }
     }
 }
 
@@ -239,7 +228,11 @@ pub struct InjectionSettings {
     /// Amplitude of the injected voltage, V peak; 0 for none.
     pub amplitude_v: f32,
     /// What is made of the carrier current.
-    pub tracking: Tracking,
+    pub demodulator: Tracking,
+    /// Settings of the chain of the dissertation.
+    pub printed: PrintedChain,
+    /// Settings of the synchronous demodulation.
+    pub synchronous: SynchronousTracking,
     /// Inject and demodulate also while the angle comes from the encoder.
     pub beside_encoder: bool,
 }
@@ -247,7 +240,13 @@ pub struct InjectionSettings {
 impl Default for InjectionSettings {
     /// 50 V (28 % of what the dc link gives) is assumed, the dissertation does not say.
     fn default() -> Self {
-        Self { amplitude_v: 50.0, tracking: Tracking::default(), beside_encoder: false }
+        Self {
+            amplitude_v: 50.0,
+            demodulator: Tracking::default(),
+            printed: PrintedChain::default(),
+            synchronous: SynchronousTracking::default(),
+            beside_encoder: false,
+        }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::demodulator::Demodulator;
 use drive_core::settings::{self, PERIOD_S, PrintedChain, SynchronousTracking, Tracking};
 use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State, Taken};
 
@@ -276,30 +275,23 @@ pub fn drive_settings(config: &Config) -> Settings {
         ignore_delays: !config.angle.compensate_delays,
         injection: settings::InjectionSettings {
             amplitude_v: config.injection.amplitude_v as f32,
-            tracking: tracking(config),
+            demodulator: match config.injection.demodulator {
+                config::Demodulator::Literal => Tracking::Literal,
+                config::Demodulator::Rectified => Tracking::Rectified,
+                config::Demodulator::Synchronous => Tracking::Synchronous,
+            },
+            printed: PrintedChain {
+                reference_a: config.injection.reference_a as f32,
+                ..base.injection.printed
+            },
+            synchronous: SynchronousTracking {
+                bandwidth_hz: config.injection.bandwidth_hz as f32,
+                check: config.injection.check,
+                ..base.injection.synchronous
+            },
             ..base.injection
         },
         sequence: settings::Sequence { i_d: config.reference.id_a as f32, ..base.sequence },
         ..base
-    }
-}
-
-fn tracking(config: &Config) -> Tracking {
-    let i = &config.injection;
-    let printed = |demodulator| {
-        Tracking::Printed(PrintedChain {
-            demodulator,
-            reference_a: i.reference_a as f32,
-            ..PrintedChain::default()
-        })
-    };
-    match i.demodulator {
-        config::Demodulator::Literal => printed(Demodulator::Literal),
-        config::Demodulator::Rectified => printed(Demodulator::Rectified),
-        config::Demodulator::Synchronous => Tracking::Synchronous(SynchronousTracking {
-            bandwidth_hz: i.bandwidth_hz as f32,
-            check: i.check,
-            ..SynchronousTracking::default()
-        }),
     }
 }

@@ -6,7 +6,7 @@ use crate::frames::Abc;
 
 use crate::io::{Command, Refused, Taken};
 use crate::sensing::Line;
-use crate::settings::{CurrentPlant, Settings, SynchronousTracking, Tracking};
+use crate::settings::{CurrentPlant, Settings};
 use proptest::prelude::*;
 
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
@@ -244,8 +244,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         if number == 4 {
             good.angle_source = AngleSource::Injection;
             // This load has no saliency.
-            good.injection.tracking =
-                Tracking::Synchronous(SynchronousTracking { check: false, ..Default::default() });
+            good.injection.synchronous.check = false;
         }
         let (mut drive, mut load) = (Drive::new(good.build().unwrap()), Load::new());
         drive.command(Command::Start(Mode::Torque)).unwrap();

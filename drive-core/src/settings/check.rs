@@ -1,6 +1,6 @@
 //! The range of every setting.
 
-use super::{PERIOD_S, Settings, SettingsError, Tracking};
+use super::{PERIOD_S, Settings, SettingsError};
 
 fn check(name: &'static str, value: f32, min: f32, max: f32) -> Result<f32, SettingsError> {
     // Not-a-number fails the test.
@@ -41,20 +41,16 @@ impl Settings {
 
         let inj = &self.injection;
         check("injection.amplitude_v", inj.amplitude_v, 0.0, 150.0)?;
-        match &inj.tracking {
-            Tracking::Printed(t) => {
-                check("injection.reference_a", t.reference_a, -1.0, 1.0)?;
-                check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0)?;
-                check("injection.k_s", t.k_s, 0.0, 100.0)?;
-                check("injection.z_s", t.z_s, 0.0, 1.0)?;
-            }
-            Tracking::Synchronous(t) => {
-                check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0)?;
-                // A loop gain through zero would be none.
-                check("injection.flux_saliency", t.flux_saliency.abs(), 0.001, 0.3)?;
-                check("injection.current_saliency", t.current_saliency, -0.3, 0.3)?;
-            }
-        }
+        let t = &inj.printed;
+        check("injection.reference_a", t.reference_a, -1.0, 1.0)?;
+        check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0)?;
+        check("injection.k_s", t.k_s, 0.0, 100.0)?;
+        check("injection.z_s", t.z_s, 0.0, 1.0)?;
+        let t = &inj.synchronous;
+        check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0)?;
+        // A loop gain through zero would be none.
+        check("injection.flux_saliency (magnitude)", t.flux_saliency.abs(), 0.001, 0.3)?;
+        check("injection.current_saliency", t.current_saliency, -0.3, 0.3)?;
 
         let l = &self.limits;
         // The nearest end of either sensor's range: a trip beyond it would never come.

@@ -2,6 +2,7 @@
 
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::dead_time::DeadTime;
+use crate::demodulator::Demodulator;
 use crate::estimator::{ConstantReference, Estimator, Method};
 use crate::indirect::Indirect;
 use crate::injection::Injection;
@@ -163,14 +164,7 @@ impl Settings {
             inject: injecting && inj.amplitude_v > 0.0,
             demodulate: injecting,
             injection: Injection::new(inj.amplitude_v, motor_plant, current_lag),
-            saliency_check: match &self.injection.tracking {
-                Tracking::Synchronous(t)
-                    if t.check && self.angle_source == AngleSource::Injection =>
-                {
-                    Some(SaliencyCheck::new(t.flux_saliency, m.t_sec(), PERIOD_S))
-                }
-                _ => None,
-            },
+            saliency_check: self.saliency_check(),
             estimator: self.estimator(lag_share, turns_per_step(self.limits.speed_rpm)),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
@@ -219,23 +213,35 @@ impl Settings {
         })
     }
 
+    /// Only a sensorless start with the synchronous demodulation is checked.
+    fn saliency_check(&self) -> Option<SaliencyCheck> {
+        let t = &self.injection.synchronous;
+        let checked = t.check
+            && self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == Tracking::Synchronous;
+        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.t_sec(), PERIOD_S))
+    }
+
     fn estimator(&self, lag_share: f32, speed_limit: f32) -> Estimator {
         let analog = self.scales.current_delay_s / PERIOD_S;
         let limit = 1.5 * speed_limit;
-        match &self.injection.tracking {
-            Tracking::Printed(t) => Estimator {
-                method: Method::Printed {
-                    demodulator: t.demodulator,
-                    reference: ConstantReference {
-                        full: t.reference_a,
-                        slope: t.reference_a / t.full_reference_iq_a,
-                        from: t.full_reference_iq_a,
-                    },
-                    tracker: Tracker::new(t.k_s, t.z_s, limit),
+        let (p, t) = (&self.injection.printed, &self.injection.synchronous);
+        let printed = |demodulator| Estimator {
+            method: Method::Printed {
+                demodulator,
+                reference: ConstantReference {
+                    full: p.reference_a,
+                    slope: p.reference_a / p.full_reference_iq_a,
+                    from: p.full_reference_iq_a,
                 },
-                lag: lag_share * (BPF_GROUP_DELAY + analog),
+                tracker: Tracker::new(p.k_s, p.z_s, limit),
             },
-            Tracking::Synchronous(t) => Estimator {
+            lag: lag_share * (BPF_GROUP_DELAY + analog),
+        };
+        match self.injection.demodulator {
+            Tracking::Literal => printed(Demodulator::Literal),
+            Tracking::Rectified => printed(Demodulator::Rectified),
+            Tracking::Synchronous => Estimator {
                 method: Method::Synchronous {
                     schedule: Schedule::new(
                         &t.reference,
