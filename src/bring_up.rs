@@ -90,7 +90,8 @@ fn start_control(
     let status = singleton!(: Mailbox<Status> = Mailbox::new()).ok_or(NotStarted::Twice)?;
     let orders = singleton!(: Mailbox<Order> = Mailbox::new()).ok_or(NotStarted::Twice)?;
     let answers = singleton!(: Mailbox<Answer> = Mailbox::new()).ok_or(NotStarted::Twice)?;
-    let trace = singleton!(: Trace<{ board::TRACE_RECORDS }> = Trace::new());
+    // Named, so that `cargo xtask size` can tell it from the rest.
+    let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
     let (send_status, status) = status.split();
     let (orders, take_orders) = orders.split();
     let (send_answers, answers) = answers.split();

@@ -6,6 +6,7 @@
 #![cfg(target_os = "none")]
 
 use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
@@ -65,20 +66,22 @@ impl Control {
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
-        unsafe { *RUNNING.0.get() = Some(running) };
+        unsafe { (*RUNNING.0.get()).write(running) };
         // SAFETY: no critical section relies on this mask; what the interrupt needs stands.
         unsafe { NVIC::unmask(Interrupt::ADC1_2) };
     }
 }
 
 /// The interrupt's own memory.
-struct Owned(UnsafeCell<Option<Running>>);
+struct Owned(UnsafeCell<MaybeUninit<Running>>);
 
 // SAFETY: shared between contexts, but not at one time: `Control::run` writes it before it unmasks
 // the interrupt, and after that only the interrupt touches it, which cannot interrupt itself.
 unsafe impl Sync for Owned {}
 
-static RUNNING: Owned = Owned(UnsafeCell::new(None));
+// SAFETY: a section of memory.x for data that nobody initialises, which `MaybeUninit` allows for.
+#[unsafe(link_section = ".ccm_data")]
+static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 struct Running {
     control: Control,
@@ -92,10 +95,9 @@ struct Running {
 
 #[interrupt]
 fn ADC1_2() {
-    // SAFETY: see `Owned`; the reference ends with this function.
-    if let Some(running) = unsafe { &mut *RUNNING.0.get() } {
-        running.period();
-    }
+    // SAFETY: see `Owned`; written before the interrupt was unmasked, and the reference ends with this
+    // function.
+    unsafe { (*RUNNING.0.get()).assume_init_mut() }.period();
 }
 
 impl Running {

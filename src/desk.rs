@@ -16,6 +16,7 @@ use crate::console::{Machine, NotDone};
 use crate::control;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
+use crate::memory;
 use crate::trace;
 
 /// Which firmware this is.
@@ -165,7 +166,7 @@ impl Machine for Desk {
     }
 
     fn stack(&self) -> (usize, usize) {
-        (0, 0)
+        (memory::stack_used(), memory::stack_size())
     }
 
     fn version(&self, to: &mut dyn fmt::Write) -> fmt::Result {

@@ -22,6 +22,7 @@ mod clocks;
 mod control;
 mod desk;
 mod encoder;
+mod memory;
 mod pwm;
 mod serial;
 mod stop;
@@ -52,6 +53,7 @@ mod trace;
 fn main() -> ! {
     use defmt_rtt as _; // the log goes to the debug probe
 
+    memory::paint_stack();
     defmt::info!("induction-drive {}", desk::VERSION);
     let bring_up::Board { mut port, mut desk } = bring_up::bring_up();
     let mut console = console::Console::new(console::keys::Everything::of_the_board());
