@@ -1,6 +1,8 @@
-//! Gives the linker `memory.x` when the firmware is built; does nothing on a host.
+//! Gives the linker `memory.x` when the firmware is built, and the firmware its commit; does nothing
+//! else on a host.
 
 use std::path::PathBuf;
+use std::process::Command;
 use std::{env, fs};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,6 +13,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let out = PathBuf::from(env::var("OUT_DIR")?);
         fs::copy("memory.x", out.join("memory.x"))?;
         println!("cargo::rustc-link-search={}", out.display());
+        println!("cargo::rustc-env=GIT_HASH={}", commit());
     }
     Ok(())
+}
+
+/// The commit this is built from, with a `+` if something was changed since.
+fn commit() -> String {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    // Looked at again when the sources or the commit change.
+    for path in ["src", "drive-core/src"] {
+        println!("cargo::rerun-if-changed={path}");
+    }
+    if let Some(head) = git(&["rev-parse", "--git-path", "HEAD"]) {
+        println!("cargo::rerun-if-changed={head}");
+    }
+    let Some(hash) = git(&["rev-parse", "--short=10", "HEAD"]) else { return "unknown".into() };
+    let changed = git(&["status", "--porcelain", "--untracked-files=no"]);
+    if changed.is_some_and(|list| list.is_empty()) { hash } else { hash + "+" }
 }

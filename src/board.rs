@@ -14,6 +14,7 @@
 //! | PA1 | dc link | ADC1_IN2 |
 //! | PC2 | heat sink | ADC2_IN8 |
 //! | PA15, PB3 | encoder A, B | TIM2_CH1, CH2 |
+//! | PA2, PA3 | console: transmit, receive (the ST-LINK's serial port) | LPUART1 |
 //!
 //! The gate inputs of the power stage need pull-down resistors of their own: while the controller
 //! is in reset or being flashed, its pins float.
@@ -186,6 +187,29 @@ pub const ENCODER_AF: u8 = 1;
 /// The ICxF field of TIM2: six samples at an eighth of the clock, so pulses below 282 ns are noise.
 /// 10 000 counts a turn at 1440 rpm come every 4.2 us.
 pub const ENCODER_FILTER: u8 = 0b1000;
+
+// Console -------------------------------------------------------------------------------------
+
+/// Alternate function of the pins that belong to LPUART1 (datasheet).
+pub const SERIAL_AF: u8 = 12;
+/// Bits per second; 8 data bits, no parity, 1 stop bit.
+pub const SERIAL_BAUD: u32 = 115_200;
+/// Clock ticks of LPUART1 per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
+pub const SERIAL_DIVIDER: u32 = {
+    let divider = (256 * CLOCK_HZ as u64 + SERIAL_BAUD as u64 / 2) / SERIAL_BAUD as u64;
+    // What the register holds.
+    assert!(divider >= 0x300 && divider <= 0xf_ffff);
+    divider as u32
+};
+/// Bytes received and not yet read: 22 ms of a flood, the main loop reads a thousand times as often.
+pub const SERIAL_RECEIVE: usize = 256;
+/// Bytes to be sent: the longest line waits 44 ms at most.
+pub const SERIAL_TRANSMIT: usize = 512;
+/// Records of a trace, 32 bytes each: all that the console can ask for.
+pub const TRACE_RECORDS: usize = crate::console::grammar::LONGEST_TRACE as usize;
+/// Longest wait for the answer to an order, us: it is taken in the next period, which lasts 167 us.
+pub const ANSWER_TIMEOUT_US: u32 = 500;
+const _: () = assert!(ANSWER_TIMEOUT_US > 2 * 1_000_000 / PWM_HZ);
 
 // Log -----------------------------------------------------------------------------------------
 

@@ -6,7 +6,8 @@
 #![cfg(target_os = "none")]
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::{Drive, Hardware, Sample, State};
@@ -16,23 +17,10 @@ use stm32g4xx_hal::stm32::interrupt;
 use crate::adc::Adc;
 use crate::board;
 use crate::encoder::Encoder;
-use crate::mailbox::Sender;
+use crate::link::{Answer, Order, Status};
+use crate::mailbox::{Receiver, Sender};
 use crate::pwm::Pwm;
-
-/// What the main loop hears from the interrupt, [`board::PERIODS_PER_STATUS`] apart.
-#[derive(Clone, Copy)]
-pub struct Status {
-    /// Control periods since the start, wrapping.
-    pub periods: u32,
-    /// What the drive is doing.
-    pub state: State,
-    /// What the drive was last given.
-    pub sample: Sample,
-    /// Core cycles of the longest control period so far.
-    pub worst_cycles: u32,
-    /// Events of [`Hardware`] since the last status.
-    pub hardware: Hardware,
-}
+use crate::trace::Recorder;
 
 /// Everything the interrupt works with.
 pub struct Control {
@@ -46,7 +34,20 @@ pub struct Control {
     pub encoder: Encoder,
     /// The way to the main loop.
     pub status: Sender<'static, Status>,
+    /// What the console wants of the drive.
+    pub orders: Receiver<'static, Order>,
+    /// What the drive makes of it.
+    pub answers: Sender<'static, Answer>,
+    /// The trace.
+    pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
 }
+
+/// Control periods since the start, wrapping.
+pub static PERIODS: AtomicU32 = AtomicU32::new(0);
+/// Whether the drive is off or in fault: the outputs are off, and stay off until the next order.
+pub static IS_OFF: AtomicBool = AtomicBool::new(true);
+/// Whether a deadline was ever missed.
+pub static MISSED: AtomicBool = AtomicBool::new(false);
 
 impl Control {
     /// Hands everything over to the interrupt and lets it run. Only the first call does.
@@ -59,30 +60,34 @@ impl Control {
             control: self,
             periods: 0,
             worst_cycles: 0,
+            worst_latency: 0,
             late: Hardware::NONE,
             seen: Hardware::NONE,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
-        unsafe { *RUNNING.0.get() = Some(running) };
+        unsafe { (*RUNNING.0.get()).write(running) };
         // SAFETY: no critical section relies on this mask; what the interrupt needs stands.
         unsafe { NVIC::unmask(Interrupt::ADC1_2) };
     }
 }
 
 /// The interrupt's own memory.
-struct Owned(UnsafeCell<Option<Running>>);
+struct Owned(UnsafeCell<MaybeUninit<Running>>);
 
 // SAFETY: shared between contexts, but not at one time: `Control::run` writes it before it unmasks
 // the interrupt, and after that only the interrupt touches it, which cannot interrupt itself.
 unsafe impl Sync for Owned {}
 
-static RUNNING: Owned = Owned(UnsafeCell::new(None));
+// SAFETY: a section of memory.x for data that nobody initialises, which `MaybeUninit` allows for.
+#[unsafe(link_section = ".ccm_data")]
+static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 struct Running {
     control: Control,
     periods: u32,
     worst_cycles: u32,
+    worst_latency: u32,
     /// Whether the period before took too long.
     late: Hardware,
     seen: Hardware,
@@ -90,17 +95,22 @@ struct Running {
 
 #[interrupt]
 fn ADC1_2() {
-    // SAFETY: see `Owned`; the reference ends with this function.
-    if let Some(running) = unsafe { &mut *RUNNING.0.get() } {
-        running.period();
-    }
+    // SAFETY: see `Owned`; written before the interrupt was unmasked, and the reference ends with this
+    // function.
+    unsafe { (*RUNNING.0.get()).assume_init_mut() }.period();
 }
 
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, status } = &mut self.control;
+        let Control { drive, pwm, adc, encoder, status, orders, answers, trace } =
+            &mut self.control;
 
+        // The timer counts down since it was at the top, where the sampling ended.
+        let latency = pwm.since_top().saturating_sub(board::SAMPLES_READY_TICKS);
+        if latency > self.worst_latency {
+            self.worst_latency = latency;
+        }
         pwm.clear_updated();
         let codes = adc.read();
         let mut hardware = self.late;
@@ -122,10 +132,25 @@ impl Running {
         pwm.apply(drive.step(&sample));
 
         // The timer has taken over before all compare values were written.
-        self.late = if pwm.updated() { Hardware::DEADLINE_MISS } else { Hardware::NONE };
+        self.late = Hardware::NONE;
+        if pwm.updated() {
+            self.late = Hardware::DEADLINE_MISS;
+            MISSED.store(true, Ordering::Relaxed);
+        }
+
+        // An order comes between two steps: it acts from the next one on.
+        let answered = orders.take_with(|order| drive.command(order.command()));
+        let is_off = matches!(drive.state(), State::Off | State::Fault(_));
+        IS_OFF.store(is_off, Ordering::Relaxed);
+        if let Some(answer) = answered {
+            // There is room: the main loop takes the last answer before it sends an order.
+            answers.send(answer);
+        }
+        trace.step(drive.telemetry());
 
         self.seen = self.seen.and(hardware);
         self.periods = self.periods.wrapping_add(1);
+        PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         if cycles > self.worst_cycles {
             self.worst_cycles = cycles;
@@ -135,7 +160,10 @@ impl Running {
                 periods: self.periods,
                 state: drive.state(),
                 sample,
+                telemetry: *drive.telemetry(),
                 worst_cycles: self.worst_cycles,
+                last_cycles: cycles,
+                worst_latency: self.worst_latency,
                 hardware: self.seen,
             };
             // The main loop may be slow or hang; then this status is lost, but not its events.

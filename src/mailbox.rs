@@ -1,4 +1,4 @@
-//! One place for one message, from the control interrupt to the main loop.
+//! One place for one message between the control interrupt and the main loop.
 //!
 //! No queue of `heapless` here: its index arithmetic divides by a length known only at run time, and
 //! the check of that would be a panic reachable from the interrupt.
@@ -52,6 +52,19 @@ impl<T> Sender<'_, T> {
 }
 
 impl<T> Receiver<'_, T> {
+    /// Lets `with` look at the message, if there is one, then empties the mailbox.
+    pub fn take_with<R>(&mut self, with: impl FnOnce(&T) -> R) -> Option<R> {
+        if !self.0.full.load(Ordering::Acquire) {
+            return None;
+        }
+        // SAFETY: the sender leaves the message alone while the mailbox is full, and `&mut self`
+        // keeps out other receivers.
+        let message = unsafe { &*self.0.message.get() };
+        let result = message.as_ref().map(with);
+        self.0.full.store(false, Ordering::Release);
+        result
+    }
+
     /// Takes the message out, if there is one.
     pub fn take(&mut self) -> Option<T> {
         if !self.0.full.load(Ordering::Acquire) {
@@ -79,7 +92,8 @@ mod tests {
         assert_eq!(receiver.take(), Some(1));
         assert_eq!(receiver.take(), None);
         assert!(sender.send(3));
-        assert_eq!(receiver.take(), Some(3));
+        assert_eq!(receiver.take_with(|message| 2 * message), Some(6));
+        assert_eq!(receiver.take_with(|message| 2 * message), None);
     }
 
     #[test]

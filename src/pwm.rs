@@ -155,6 +155,17 @@ impl Pwm {
         pulled
     }
 
+    /// Ticks since the counter was at its top, if it is on its way down; else as much as half a
+    /// period, or more.
+    pub fn since_top(&self) -> u32 {
+        let count = self.timer.cnt().read().cnt().bits();
+        if self.timer.cr1().read().dir().is_down() {
+            u32::from(board::PWM_TOP.saturating_sub(count))
+        } else {
+            u32::from(board::PWM_TOP) + u32::from(count)
+        }
+    }
+
     /// Whether the timer has taken over compare values since [`clear_updated`](Self::clear_updated).
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()

@@ -198,8 +198,8 @@ impl Default for PrintedChain {
 pub struct SynchronousTracking {
     /// Natural frequency of the tracking loop, Hz.
     pub bandwidth_hz: f32,
-    /// Saliency fixed to the flux at the nominal magnetising current: negative where the inductance
-    /// along the flux is the larger one.
+    /// Saliency fixed to the flux at the nominal magnetising current. Negative: the inductance along
+    /// the flux is the larger one.
     pub flux_saliency: f32,
     /// Saliency by the stator current, 1/A; for the gain schedule.
     pub current_saliency: f32,

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use object::Endianness;
-use object::elf::{FileHeader32, SHF_ALLOC, SHT_PROGBITS};
-use object::read::elf::{FileHeader, SectionHeader};
+use object::elf::{FileHeader32, SHF_ALLOC, SHT_PROGBITS, SHT_SYMTAB};
+use object::read::elf::{FileHeader, SectionHeader, Sym};
 
+use crate::control;
 use crate::run::{self, Step};
 use crate::toolchain::{self, PROFILE, TARGET, Target};
 
@@ -23,7 +24,10 @@ pub fn build() -> Result<PathBuf> {
 /// The same, when it is known how to build for the target.
 pub fn build_with(target: &Target) -> Result<PathBuf> {
     Step::new("firmware").run(target.cargo("build").args(["--package", "induction-drive"]))?;
-    Ok(target.target_dir()?.join(TARGET).join(PROFILE).join("induction-drive"))
+    let elf = target.target_dir()?.join(TARGET).join(PROFILE).join("induction-drive");
+    let bytes = fs::read(&elf).with_context(|| elf.display().to_string())?;
+    control::check(&bytes).context("the control interrupt")?;
+    Ok(elf)
 }
 
 /// Builds the image, writes it to the board and shows its log until interrupted.
@@ -58,7 +62,47 @@ pub fn report_size(elf: &Path) -> Result<()> {
             list.join(", ")
         );
     }
+    let code = sum(&sections, |s| matches!(s.name.as_str(), ".vector_table" | ".text" | ".ccm"));
+    let constants = sum(&sections, |s| s.name == ".rodata");
+    let trace = symbol_size(&bytes, TRACE)?;
+    let ram =
+        sum(&sections, |s| matches!(s.name.as_str(), ".data" | ".bss" | ".uninit" | ".ccm_data"));
+    println!("code {code}, constants {constants}, static RAM {ram} with {trace} for the trace");
+    limit("code and constants", code + constants, CODE_LIMIT)?;
+    limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT)
+}
+
+/// Most that code and constants may take, bytes.
+const CODE_LIMIT: u64 = 96 * 1024;
+/// Most that variables may take, the trace and the stack left out, bytes.
+const RAM_LIMIT: u64 = 24 * 1024;
+/// What the symbol of the trace's memory contains.
+const TRACE: &str = "TRACE_MEMORY";
+
+fn sum(sections: &[Section], which: impl Fn(&Section) -> bool) -> u64 {
+    sections.iter().filter(|section| which(section)).map(|section| section.size).sum()
+}
+
+fn limit(what: &str, used: u64, limit: u64) -> Result<()> {
+    if used > limit {
+        bail!("{what}: {used} bytes, {limit} are allowed");
+    }
+    println!("{what}: {used} of {limit} bytes");
     Ok(())
+}
+
+fn symbol_size(bytes: &[u8], part: &str) -> Result<u64> {
+    let header = FileHeader32::<Endianness>::parse(bytes)?;
+    let endian = header.endian()?;
+    let symbols = header.sections(endian, bytes)?.symbols(endian, bytes, SHT_SYMTAB)?;
+    let mut size = 0;
+    for symbol in symbols.iter() {
+        let name = symbol.name(endian, symbols.strings())?;
+        if String::from_utf8_lossy(name).contains(part) {
+            size += u64::from(symbol.st_size(endian));
+        }
+    }
+    Ok(size)
 }
 
 /// A section that takes memory on the controller.
@@ -140,9 +184,12 @@ mod tests {
         assert_eq!(
             known,
             [
-                ("FLASH", 0x0800_0000, 512),
-                // Not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_0000, 96),
+                ("FLASH", 0x0800_0000, 240),
+                ("CONTROL", 0x0803_c000, 16),
+                // Overflows where there is no memory.
+                ("STACK", 0x2000_0000, 8),
+                // To 96, not 128: CCM is mapped again behind it.
+                ("RAM", 0x2000_2000, 88),
                 ("CCM", 0x1000_0000, 32),
             ]
         );

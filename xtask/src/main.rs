@@ -1,5 +1,6 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
 
+mod control;
 mod image;
 mod run;
 mod toolchain;
@@ -18,7 +19,7 @@ Usage: cargo xtask <task>
             gets what is missing from the system, or says what to type
   firmware  builds the image for the board (also: cargo firmware)
   flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
-  size      shows what the image takes of each memory";
+  size      shows what the image takes of each memory, and fails above the limits";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

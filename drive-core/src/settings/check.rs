@@ -48,8 +48,9 @@ impl Settings {
         check("injection.z_s", t.z_s, 0.0, 1.0)?;
         let t = &inj.synchronous;
         check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0)?;
-        // A loop gain through zero would be none.
-        check("injection.flux_saliency (magnitude)", t.flux_saliency.abs(), 0.001, 0.3)?;
+        // Towards zero the loop would have no gain; positive, the current's part would work against
+        // the flux's.
+        check("injection.flux_saliency", t.flux_saliency, -0.3, -0.001)?;
         check("injection.current_saliency", t.current_saliency, -0.3, 0.3)?;
 
         let l = &self.limits;

@@ -1,0 +1,114 @@
+//! From reset to a running control interrupt.
+#![cfg(target_os = "none")]
+
+use cortex_m::singleton;
+use drive_core::Drive;
+use stm32g4xx_hal::gpio::GpioExt;
+use stm32g4xx_hal::pac;
+
+use crate::console::keys::Everything;
+use crate::desk::{Desk, Ends};
+use crate::link::{Answer, Order, Status};
+use crate::mailbox::Mailbox;
+use crate::serial::Port;
+use crate::trace::Trace;
+use crate::{adc, board, clocks, control, encoder, pwm};
+
+/// What the main loop works with.
+pub struct Board {
+    /// The serial port of the console.
+    pub port: Port,
+    /// The drive.
+    pub desk: Desk,
+}
+
+/// Why the drive was not started.
+#[derive(Clone, Copy, defmt::Format)]
+enum NotStarted {
+    /// The firmware started twice.
+    Twice,
+    /// The settings make no drive.
+    Settings,
+    /// A converter.
+    Converter(adc::Stuck),
+    /// The timer of the power stage.
+    Timer(pwm::NotInStep),
+}
+
+/// Sets everything up and starts the control interrupt. If something is wrong with the drive, the
+/// outputs stay off and the console says so.
+pub fn bring_up() -> Board {
+    match (cortex_m::Peripherals::take(), pac::Peripherals::take()) {
+        (Some(core), Some(chip)) => with(core, chip),
+        _ => unreachable!("main runs once"),
+    }
+}
+
+fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
+    let (mut rcc, source) = clocks::start(chip.RCC, chip.PWR, &chip.FLASH);
+    if source == clocks::Source::Internal {
+        defmt::warn!("the crystal does not start: on the internal oscillator, 1 % accurate");
+    }
+    // Keep the debug port alive while the core sleeps.
+    chip.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
+    // The cycle counter measures the control interrupt and is the main loop's clock.
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+
+    let a = chip.GPIOA.split(&mut rcc);
+    let b = chip.GPIOB.split(&mut rcc);
+    let c = chip.GPIOC.split(&mut rcc);
+    let pwm_pins =
+        pwm::Pins { high: (a.pa8, a.pa9, a.pa10), low: (a.pa7, b.pb0, b.pb1), fault: a.pa6 };
+    let adc_pins =
+        adc::Pins { current_a: a.pa0, current_b: c.pc1, dc_link: a.pa1, heat_sink: c.pc2 };
+
+    // First of all: the gates are driven low from here on.
+    let pwm = pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU);
+    let Some(port) = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc) else {
+        unreachable!("main runs once")
+    };
+    let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
+    let ends = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, adc_pins, &mut rcc)
+        .map_err(NotStarted::Converter)
+        .and_then(|adc| start_control(pwm, adc, encoder));
+    if let Err(error) = &ends {
+        defmt::error!("the drive is not started, outputs stay off: {}", error);
+    }
+    Board { port, desk: Desk::new(ends.ok()) }
+}
+
+fn start_control(
+    mut pwm: pwm::Pwm,
+    adc: adc::Adc,
+    encoder: encoder::Encoder,
+) -> Result<Ends, NotStarted> {
+    let coefficients = Everything::of_the_board().build().map_err(|error| {
+        defmt::error!("settings: {}", defmt::Display2Format(&error));
+        NotStarted::Settings
+    })?;
+    let status = singleton!(: Mailbox<Status> = Mailbox::new()).ok_or(NotStarted::Twice)?;
+    let orders = singleton!(: Mailbox<Order> = Mailbox::new()).ok_or(NotStarted::Twice)?;
+    let answers = singleton!(: Mailbox<Answer> = Mailbox::new()).ok_or(NotStarted::Twice)?;
+    // Named, so that `cargo xtask size` can tell it from the rest.
+    let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
+    let (send_status, status) = status.split();
+    let (orders, take_orders) = orders.split();
+    let (send_answers, answers) = answers.split();
+    let (recorder, trace) = trace.ok_or(NotStarted::Twice)?.split();
+
+    pwm.start().map_err(NotStarted::Timer)?;
+    let drive = Drive::new(coefficients);
+    control::Control {
+        drive,
+        pwm,
+        adc,
+        encoder,
+        status: send_status,
+        orders: take_orders,
+        answers: send_answers,
+        trace: recorder,
+    }
+    .run();
+    Ok(Ends { status, orders, answers, trace })
+}

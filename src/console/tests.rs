@@ -1,0 +1,305 @@
+use std::collections::VecDeque;
+
+use drive_core::{Drive, Fault, Hardware, Mode, Sample, Telemetry};
+use proptest::prelude::*;
+
+use super::*;
+
+/// A drive on the desk.
+struct Desk {
+    drive: Drive,
+    running: bool,
+    trace: Vec<trace::Record>,
+    orders: Vec<Order>,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let drive = Drive::new(Everything::of_the_board().build().unwrap());
+        Self { drive, running: true, trace: Vec::new(), orders: Vec::new() }
+    }
+}
+
+impl Machine for Desk {
+    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
+        if !self.running {
+            return Err(NotDone::NoAnswer);
+        }
+        self.orders.push(order);
+        self.drive.command(order.command()).map_err(NotDone::Refused)
+    }
+    fn status(&self) -> Option<Status> {
+        self.running.then(|| Status {
+            periods: 1,
+            state: self.drive.state(),
+            sample: Sample::default(),
+            telemetry: *self.drive.telemetry(),
+            worst_cycles: 900,
+            last_cycles: 800,
+            worst_latency: 50,
+            hardware: Hardware::NONE,
+        })
+    }
+    fn is_off(&self) -> bool {
+        matches!(self.drive.state(), State::Off | State::Fault(_))
+    }
+    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
+        settings.build()
+    }
+    fn save(&mut self, _: &Everything) -> Result<(), &'static str> {
+        Err("not available")
+    }
+    fn begin_trace(&mut self, records: u16, _: u16) -> bool {
+        let record = trace::Record::of(&Telemetry::default());
+        self.trace = vec![record; usize::from(records)];
+        true
+    }
+    fn tracing(&self) -> bool {
+        false
+    }
+    fn traced(&self, i: u16) -> Option<trace::Record> {
+        self.trace.get(usize::from(i)).copied()
+    }
+    fn set_log_level(&mut self, _: Level) {}
+    fn stack(&self) -> (usize, usize) {
+        (1000, 8192)
+    }
+    fn version(&self, to: &mut dyn Write) -> fmt::Result {
+        write!(to, "version")
+    }
+    fn last_run(&self, to: &mut dyn Write) -> fmt::Result {
+        write!(to, "power-on")
+    }
+}
+
+#[derive(Default)]
+struct Wire {
+    sent: VecDeque<u8>,
+    damaged: bool,
+    room: usize,
+    received: String,
+}
+
+impl Port for Wire {
+    fn read(&mut self) -> Option<u8> {
+        self.sent.pop_front()
+    }
+    fn take_damage(&mut self) -> bool {
+        std::mem::take(&mut self.damaged)
+    }
+    fn write(&mut self, text: &str) -> bool {
+        let fits = text.len() <= self.room;
+        if fits {
+            self.received.push_str(text);
+        }
+        fits
+    }
+}
+
+struct Talk {
+    console: Console,
+    desk: Desk,
+    wire: Wire,
+    now_ms: u32,
+}
+
+impl Talk {
+    fn new() -> Self {
+        Self {
+            console: Console::new(Everything::of_the_board()),
+            desk: Desk::new(),
+            wire: Wire { room: usize::MAX, ..Wire::default() },
+            now_ms: 0,
+        }
+    }
+
+    fn poll(&mut self) {
+        self.console.poll(&mut self.wire, &mut self.desk, self.now_ms);
+    }
+
+    /// Sends bytes and gives the replies.
+    fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
+        self.wire.sent.extend(bytes.as_ref());
+        while !self.wire.sent.is_empty() {
+            self.poll();
+        }
+        self.poll();
+        let text = std::mem::take(&mut self.wire.received);
+        text.split_terminator("\r\n").map(str::to_owned).collect()
+    }
+
+    /// Sends a line that has one reply.
+    fn ask(&mut self, line: &str) -> String {
+        let replies = self.say(format!("{line}\n"));
+        assert_eq!(replies.len(), 1, "{replies:?}");
+        replies.into_iter().next().unwrap()
+    }
+}
+
+#[test]
+fn says_at_the_start_who_it_is_and_what_ended_the_last_run() {
+    let mut talk = Talk::new();
+    talk.console.greet(&talk.desk);
+    assert_eq!(talk.say(""), ["induction-drive version; last run: power-on"]);
+}
+
+#[test]
+fn a_session() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok");
+    assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.5 ohm (0.001 to 1000)");
+    assert_eq!(
+        talk.ask("get angle_source"),
+        "angle_source = injection (one of: encoder injection)"
+    );
+    assert_eq!(talk.ask("angle encoder"), "ok");
+    assert_eq!(talk.ask("get angle_source"), "angle_source = encoder (one of: encoder injection)");
+    assert_eq!(talk.ask("torque 1"), "error: not possible while the drive is off");
+    assert_eq!(talk.ask("start"), "ok");
+    assert_eq!(talk.ask("start"), "error: not possible while the drive is calibrating");
+    assert_eq!(talk.ask("torque 1"), "ok");
+    assert!(talk.ask("torque 100").starts_with("ok: limited to 3.4"));
+    assert!(talk.ask("set motor.r_s 5.4").starts_with("error: the drive must be off"));
+    assert!(talk.ask("save").starts_with("error: the drive must be off"));
+    assert!(talk.ask("status").starts_with("calibrating; i_d 0.00 A"));
+    assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.ask("save"), "error: not available");
+    assert_eq!(talk.ask("start position"), "ok");
+    assert_eq!(talk.ask("position 2.5"), "ok");
+    assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.ask("faults"), "none latched; last run: power-on");
+    assert_eq!(talk.ask("defaults"), "ok");
+    assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
+}
+
+#[test]
+fn settings_out_of_range_are_refused_with_the_range() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000");
+    assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
+    assert!(talk.desk.orders.is_empty());
+}
+
+#[test]
+fn a_latched_fault_is_shown_and_cleared() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("start"), "ok");
+    talk.desk.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    let code = Fault::Break.code();
+    assert!(talk.ask("faults").starts_with(&format!("latched: fault {code}, ")));
+    assert!(talk.ask("start").starts_with(&format!("error: fault {code} is latched")));
+    assert_eq!(talk.ask("clear"), "ok");
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
+fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
+    let mut talk = Talk::new();
+    let help = talk.say("help\n");
+    assert_eq!((help.len(), help.last().unwrap().as_str()), (HELP.len() + 1, "ok"));
+    let all = talk.say("get\n");
+    assert_eq!(all.len(), KEYS.len() + 1);
+    let trace = talk.say("trace 3\n");
+    assert_eq!(trace[0], trace::HEADER);
+    assert_eq!(trace[1], "0,0.00,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
+    assert_eq!(trace.len(), 5);
+    // Nothing leaves, and meanwhile a line comes.
+    talk.wire.room = 0;
+    talk.wire.sent.extend(b"get\n");
+    talk.poll();
+    talk.poll();
+    talk.wire.sent.extend(b"stop\n");
+    talk.wire.room = 1000;
+    talk.poll();
+    let lines: Vec<&str> = talk.wire.received.lines().collect();
+    assert_eq!(lines, [lines[0], "ok"]);
+}
+
+#[test]
+fn silence_stops_a_running_drive_once_and_only_if_asked_for() {
+    let mut talk = Talk::new();
+    talk.ask("start");
+    talk.now_ms = 1_000_000;
+    assert!(talk.say("").is_empty());
+    talk.ask("stop");
+    assert_eq!(talk.ask("set command.timeout_s 2"), "ok");
+    talk.ask("start");
+    talk.now_ms += 1900;
+    assert!(talk.say("").is_empty());
+    // What is not understood does not count.
+    talk.ask("rubbish");
+    talk.now_ms += 200;
+    assert_eq!(talk.say(""), ["stopped: no command for 2 s"]);
+    assert_eq!(talk.desk.drive.state(), State::Off);
+    talk.now_ms += 5000;
+    assert!(talk.say("").is_empty());
+}
+
+#[test]
+fn half_lines_are_dropped_in_time() {
+    let mut talk = Talk::new();
+    assert!(talk.say("start").is_empty());
+    talk.now_ms += LINE_MS + 1;
+    assert_eq!(talk.say(""), ["error: the line was not finished"]);
+    assert_eq!(talk.say("\n"), [""; 0]);
+    assert!(talk.desk.orders.is_empty());
+}
+
+#[test]
+fn damage_on_the_wire_is_told_and_changes_nothing() {
+    let mut talk = Talk::new();
+    talk.say("sta");
+    talk.wire.damaged = true;
+    assert_eq!(talk.say("rt\n"), ["error: characters were lost or damaged"]);
+    assert!(talk.desk.orders.is_empty());
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
+fn without_a_control_interrupt_nothing_is_promised() {
+    let mut talk = Talk::new();
+    talk.desk.running = false;
+    for line in ["start", "torque 1", "set motor.r_s 5.5", "status"] {
+        assert_eq!(talk.ask(line), "error: the control does not run");
+    }
+    assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
+}
+
+#[test]
+fn commands_reach_the_drive_as_they_were_given() {
+    let mut talk = Talk::new();
+    talk.say("start\ntorque 1.5\nstop\nclear\n");
+    assert_eq!(
+        talk.desk.orders,
+        [Order::Start(Mode::Torque), Order::Torque(1.5), Order::Stop, Order::Clear]
+    );
+}
+
+proptest! {
+    #[test]
+    fn garbage_changes_nothing_and_gets_replies(bytes in proptest::collection::vec(128_u8.., 0..400)) {
+        let mut talk = Talk::new();
+        for reply in talk.say(&bytes) {
+            prop_assert!(reply.starts_with("error: "));
+        }
+        prop_assert!(talk.desk.orders.is_empty());
+        let replies = talk.say("\nstop\n");
+        prop_assert_eq!(replies.last().unwrap(), "ok");
+    }
+
+    #[test]
+    fn any_bytes_on_a_wire_with_any_room_leave_a_console_that_answers(
+        bytes: Vec<u8>, room in 0_usize..200,
+    ) {
+        let mut talk = Talk::new();
+        talk.wire.room = room;
+        talk.wire.sent.extend(&bytes);
+        for _ in 0..20 {
+            talk.poll();
+        }
+        talk.wire.room = usize::MAX;
+        talk.say("\n");
+        let replies = talk.say("stop\n");
+        prop_assert_eq!(replies.last().unwrap(), "ok");
+    }
+}

@@ -1,0 +1,179 @@
+//! The main loop's side of the drive: what the console talks about, and the log.
+#![cfg(target_os = "none")]
+
+use core::fmt;
+use core::sync::atomic::Ordering;
+
+use cortex_m::peripheral::DWT;
+use defmt::Display2Format;
+use drive_core::settings::SettingsError;
+use drive_core::{Coefficients, Hardware, State, Taken};
+
+use crate::board;
+use crate::console::grammar::Level;
+use crate::console::keys::Everything;
+use crate::console::{Machine, NotDone};
+use crate::control;
+use crate::link::{Answer, Order, Status};
+use crate::mailbox::{Receiver, Sender};
+use crate::memory;
+use crate::trace;
+
+/// Which firmware this is.
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
+
+/// The ends of what goes to the control interrupt and comes from it.
+pub struct Ends {
+    /// Reports.
+    pub status: Receiver<'static, Status>,
+    /// To the drive.
+    pub orders: Sender<'static, Order>,
+    /// From the drive.
+    pub answers: Receiver<'static, Answer>,
+    /// The trace.
+    pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
+}
+
+/// The main loop's side of the drive.
+pub struct Desk {
+    /// Nothing if the control does not run.
+    ends: Option<Ends>,
+    status: Option<Status>,
+    level: Level,
+    clock: Clock,
+}
+
+/// Milliseconds, from the cycle counter, which wraps every 25 s: read it more often.
+struct Clock {
+    last: u32,
+    cycles: u32,
+    ms: u32,
+}
+
+impl Clock {
+    fn update(&mut self) {
+        let now = DWT::cycle_count();
+        self.cycles += now.wrapping_sub(self.last);
+        self.last = now;
+        let per_ms = board::CYCLES_PER_US * 1000;
+        self.ms = self.ms.wrapping_add(self.cycles / per_ms);
+        self.cycles %= per_ms;
+    }
+}
+
+impl Desk {
+    /// A desk; without `ends`, one whose control does not run.
+    pub fn new(ends: Option<Ends>) -> Self {
+        let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
+        Self { ends, status: None, level: Level::Info, clock }
+    }
+
+    /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.
+    pub fn listen(&mut self) -> u32 {
+        self.clock.update();
+        if let Some(status) = self.ends.as_mut().and_then(|ends| ends.status.take()) {
+            self.log(status);
+        }
+        self.clock.ms
+    }
+
+    fn log(&mut self, s: Status) {
+        let before = self.status.replace(s).map(|status| status.state);
+        if self.level >= Level::Error
+            && before != Some(s.state)
+            && let State::Fault(fault) = s.state
+        {
+            defmt::error!("fault {}: {}", fault.code(), fault.meaning());
+        }
+        if self.level >= Level::Warn {
+            for (event, text) in [
+                (Hardware::BREAK, "the power stage pulls the break input, or is not there"),
+                (Hardware::ANALOG_WATCHDOG, "over-current at a converter"),
+                (Hardware::DEADLINE_MISS, "a control period took too long"),
+                (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
+            ] {
+                if s.hardware.has(event) {
+                    defmt::warn!("{}", text);
+                }
+            }
+        }
+        if self.level >= Level::Info {
+            defmt::info!(
+                "{}: codes {} {}, dc link {}, heat sink {}, encoder {}; {} periods, {} cycles, late {}",
+                Display2Format(&s.state),
+                s.sample.current_a,
+                s.sample.current_b,
+                s.sample.dc_link,
+                s.sample.heat_sink,
+                s.sample.encoder,
+                s.periods,
+                s.worst_cycles,
+                s.worst_latency,
+            );
+        }
+    }
+}
+
+impl Machine for Desk {
+    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
+        let ends = self.ends.as_mut().ok_or(NotDone::NoAnswer)?;
+        // An answer that came too late for its order.
+        ends.answers.take();
+        if !ends.orders.send(order) {
+            return Err(NotDone::NoAnswer);
+        }
+        let began = DWT::cycle_count();
+        while DWT::cycle_count().wrapping_sub(began)
+            < board::ANSWER_TIMEOUT_US * board::CYCLES_PER_US
+        {
+            if let Some(answer) = ends.answers.take() {
+                return answer.map_err(NotDone::Refused);
+            }
+        }
+        Err(NotDone::NoAnswer)
+    }
+
+    fn status(&self) -> Option<Status> {
+        self.status
+    }
+
+    fn is_off(&self) -> bool {
+        control::IS_OFF.load(Ordering::Relaxed)
+    }
+
+    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
+        settings.build()
+    }
+
+    fn save(&mut self, _settings: &Everything) -> Result<(), &'static str> {
+        Err("saving is not available yet: the settings hold until the next reset")
+    }
+
+    fn begin_trace(&mut self, records: u16, divider: u16) -> bool {
+        self.ends.as_mut().is_some_and(|ends| ends.trace.begin(records, divider))
+    }
+
+    fn tracing(&self) -> bool {
+        self.ends.as_ref().is_some_and(|ends| ends.trace.recording())
+    }
+
+    fn traced(&self, i: u16) -> Option<trace::Record> {
+        self.ends.as_ref()?.trace.get(i)
+    }
+
+    fn set_log_level(&mut self, level: Level) {
+        self.level = level;
+    }
+
+    fn stack(&self) -> (usize, usize) {
+        (memory::stack_used(), memory::stack_size())
+    }
+
+    fn version(&self, to: &mut dyn fmt::Write) -> fmt::Result {
+        to.write_str(VERSION)
+    }
+
+    fn last_run(&self, to: &mut dyn fmt::Write) -> fmt::Result {
+        to.write_str("not recorded")
+    }
+}
