@@ -41,6 +41,7 @@ pub mod modulation;
 pub mod pi;
 pub mod plausibility;
 pub mod position;
+pub mod rls;
 pub mod sensing;
 pub mod settings;
 pub mod sos;

@@ -17,6 +17,7 @@ pub mod arx;
 pub mod batch;
 pub mod model;
 pub mod models;
+pub mod recursive;
 pub mod signals;
 pub mod structured;
 pub mod trial;
