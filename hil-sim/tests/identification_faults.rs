@@ -151,7 +151,7 @@ fn r4_bad_input() {
             // One sample is no fault that lasts; a saturated one is left out like it, and what is
             // left can be enough. The flag is then true, and so is the estimate.
             let lasting = !matches!(fault, Fault::OneNan | Fault::Saturated);
-            let flagged = !lasting || !(result.valid_in_fault || noisy.valid_in_fault);
+            let flagged = !(lasting && (result.valid_in_fault || noisy.valid_in_fault));
             let honest = lasting && open || result.worst_valid < 0.1;
             if !(back && flagged && honest) {
                 failed.push((fault, signal, speed));

@@ -142,10 +142,10 @@ fn r2_the_plain_recursion_fails() {
             let narrow = |x: Complex| Of::new(x.re as f32, x.im as f32);
             single.step(narrow(v), narrow(i));
             double.step(v, i);
-            if !(single.smallest() > 0.0) {
+            if !single.is_finite() || single.smallest() <= 0.0 {
                 lost[0] = lost[0].or(Some(n));
             }
-            if !(double.smallest() > 0.0) {
+            if !double.is_finite() || double.smallest() <= 0.0 {
                 lost[1] = lost[1].or(Some(n));
             }
         }
@@ -179,7 +179,7 @@ fn convergence(signal: Signal, speed: f64) -> [f64; 2] {
     values.map(|values| {
         let end = median(&values[3 * RATE / 2..]);
         let outside = |n: &usize| (median(&values[n - 400..*n]) / end - 1.0).abs() > 0.1;
-        let last = (400..values.len()).step_by(20).filter(outside).last();
+        let last = (400..values.len()).step_by(20).rfind(outside);
         last.unwrap_or(0) as f64 / RATE as f64
     })
 }
