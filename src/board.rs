@@ -107,6 +107,11 @@ pub const fn dead_time_ticks(code: u8) -> u32 {
 /// or to end a trip. Spikes of the gate drivers are shorter, damage takes microseconds.
 pub const BREAK_FILTER: u8 = 0b0100;
 
+/// Address of TIM1_BDTR, for the handler that cannot rely on anything (RM0440, memory map).
+pub const TIM1_BDTR: u32 = 0x4001_2c44;
+/// Its bit MOE: outputs on.
+pub const TIM1_BDTR_MOE: u32 = 1 << 15;
+
 // Converters ----------------------------------------------------------------------------------
 
 /// Clock of the converters, Hz: a quarter of the core clock and synchronous to it, so the sampling
@@ -210,6 +215,31 @@ pub const TRACE_RECORDS: usize = crate::console::grammar::LONGEST_TRACE as usize
 /// Longest wait for the answer to an order, us: it is taken in the next period, which lasts 167 us.
 pub const ANSWER_TIMEOUT_US: u32 = 500;
 const _: () = assert!(ANSWER_TIMEOUT_US > 2 * 1_000_000 / PWM_HZ);
+
+// Watchdog ------------------------------------------------------------------------------------
+
+/// Slowest clock of the watchdog, Hz (datasheet: 32 kHz, 29.5 to 34 kHz over all conditions).
+const WATCHDOG_HZ: u32 = 29_500;
+/// Fastest.
+const WATCHDOG_HZ_MAX: u32 = 34_000;
+/// The PR field: divided by 4.
+pub const WATCHDOG_PRESCALER: u8 = 0;
+/// Counts less one until it resets the chip.
+pub const WATCHDOG_RELOAD: u16 = 35;
+/// Shortest time from a feeding to the reset, us: 4.2 ms.
+pub const WATCHDOG_US: u32 = (WATCHDOG_RELOAD as u32 + 1) * 4 * 1000 / (WATCHDOG_HZ_MAX / 1000);
+// At most 5 ms, with the slowest clock.
+const _: () = assert!((WATCHDOG_RELOAD as u32 + 1) * 4 * 1000 <= 5 * WATCHDOG_HZ);
+/// The PR field while the outputs are off and something takes long: divided by 64.
+pub const WATCHDOG_LONG_PRESCALER: u8 = 4;
+/// Counts less one: a second.
+pub const WATCHDOG_LONG_RELOAD: u16 = 499;
+/// Longest wait for the watchdog to take both over, us: six of its longest clocks, 12 ms.
+pub const WATCHDOG_SET_US: u32 = 15_000;
+/// Unwished resets in a row after which the drive is not started any more.
+pub const MOST_RESETS: u32 = 4;
+/// Time without a reset after which they are no longer in a row, ms.
+pub const WELL_AFTER_MS: u32 = 10_000;
 
 // Log -----------------------------------------------------------------------------------------
 

@@ -7,12 +7,13 @@ use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
 use crate::console::keys::Everything;
-use crate::desk::{Desk, Ends};
+use crate::desk::{Desk, Ends, LastRun};
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::Mailbox;
 use crate::serial::Port;
 use crate::trace::Trace;
-use crate::{adc, board, clocks, control, encoder, pwm};
+use crate::watchdog::Watchdog;
+use crate::{adc, board, clocks, control, encoder, pwm, stop};
 
 /// What the main loop works with.
 pub struct Board {
@@ -31,6 +32,8 @@ enum NotStarted {
     Settings,
     /// A converter.
     Converter(adc::Stuck),
+    /// Too many resets in a row; a power cycle or the reset pin tries again.
+    Resets,
     /// The timer of the power stage.
     Timer(pwm::NotInStep),
 }
@@ -45,6 +48,17 @@ pub fn bring_up() -> Board {
 }
 
 fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
+    let (last, resets) = last_run(&chip.RCC);
+    defmt::info!(
+        "reset by {}, {} unwished in a row; option bytes {:08x}, {} bank(s)",
+        last.cause,
+        resets,
+        chip.FLASH.optr().read().bits(),
+        if chip.FLASH.optr().read().dbank().is_dual_bank_mode() { 2 } else { 1 },
+    );
+    if let Some(record) = &last.record {
+        defmt::error!("the last run ended with {}", defmt::Display2Format(record));
+    }
     let (mut rcc, source) = clocks::start(chip.RCC, chip.PWR, &chip.FLASH);
     if source == clocks::Source::Internal {
         defmt::warn!("the crystal does not start: on the internal oscillator, 1 % accurate");
@@ -71,18 +85,47 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     let ends = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, adc_pins, &mut rcc)
         .map_err(NotStarted::Converter)
-        .and_then(|adc| start_control(pwm, adc, encoder));
+        .and_then(|adc| start_control(pwm, adc, encoder, resets));
     if let Err(error) = &ends {
         defmt::error!("the drive is not started, outputs stay off: {}", error);
     }
-    Board { port, desk: Desk::new(ends.ok()) }
+    // Only over a control that runs: without it the outputs stay off.
+    let watchdog = ends.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
+    Board { port, desk: Desk::new(ends.ok(), watchdog, last) }
+}
+
+/// What ended the last run, and how many in a row ended so that nobody wished.
+fn last_run(rcc: &pac::RCC) -> (LastRun, u32) {
+    let flags = rcc.csr().read();
+    // The cause first that says most: every reset pulls the reset pin as well.
+    let cause = if flags.iwdgrstf().is_reset() {
+        "watchdog"
+    } else if flags.sftrstf().is_reset() {
+        "software"
+    } else if flags.oblrstf().is_reset() {
+        "option bytes"
+    } else if flags.lpwrrstf().is_reset() {
+        "low-power"
+    } else if flags.borrstf().is_reset() {
+        "power-on"
+    } else {
+        "reset pin"
+    };
+    let record = stop::take_record();
+    let unwished = flags.iwdgrstf().is_reset() || (flags.sftrstf().is_reset() && record.is_some());
+    rcc.csr().modify(|_, w| w.rmvf().clear());
+    (LastRun { cause, record }, stop::count_reset(unwished))
 }
 
 fn start_control(
     mut pwm: pwm::Pwm,
     adc: adc::Adc,
     encoder: encoder::Encoder,
+    resets: u32,
 ) -> Result<Ends, NotStarted> {
+    if resets > board::MOST_RESETS {
+        return Err(NotStarted::Resets);
+    }
     let coefficients = Everything::of_the_board().build().map_err(|error| {
         defmt::error!("settings: {}", defmt::Display2Format(&error));
         NotStarted::Settings

@@ -17,7 +17,9 @@ use crate::control;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::memory;
-use crate::trace;
+use crate::record::{Reason, Record};
+use crate::watchdog::{Rule, Verdict, Watchdog};
+use crate::{pwm, stop, trace};
 
 /// Which firmware this is.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
@@ -41,6 +43,19 @@ pub struct Desk {
     status: Option<Status>,
     level: Level,
     clock: Clock,
+    guard: Option<(Watchdog, Rule)>,
+    /// Whether it has run for a while.
+    well: bool,
+    last: LastRun,
+}
+
+/// What ended the last run.
+#[derive(Clone, Copy)]
+pub struct LastRun {
+    /// What reset the chip.
+    pub cause: &'static str,
+    /// What the firmware wrote before.
+    pub record: Option<Record>,
 }
 
 /// Milliseconds, from the cycle counter, which wraps every 25 s: read it more often.
@@ -63,9 +78,11 @@ impl Clock {
 
 impl Desk {
     /// A desk; without `ends`, one whose control does not run.
-    pub fn new(ends: Option<Ends>) -> Self {
+    pub fn new(ends: Option<Ends>, watchdog: Option<Watchdog>, last: LastRun) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
-        Self { ends, status: None, level: Level::Info, clock }
+        let periods = control::PERIODS.load(Ordering::Relaxed);
+        let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
+        Self { ends, status: None, level: Level::Info, clock, guard, well: false, last }
     }
 
     /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.
@@ -77,13 +94,36 @@ impl Desk {
         self.clock.ms
     }
 
+    /// Feeds the watchdog, if the rule allows. Last thing in a pass of the main loop.
+    pub fn feed_watchdog(&mut self) {
+        let Some((watchdog, rule)) = &mut self.guard else { return };
+        let missed = control::MISSED.load(Ordering::Relaxed);
+        let periods = control::PERIODS.load(Ordering::Relaxed);
+        match rule.judge(DWT::cycle_count(), periods, missed) {
+            Verdict::Wait => {}
+            Verdict::Feed => watchdog.feed(),
+            // The watchdog resets the chip in a moment. Until then nothing is wrong with the loop, and
+            // what the console is asked for is still done.
+            Verdict::Refuse { periods, cycles } => {
+                pwm::outputs_off();
+                stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
+            }
+        }
+        if self.clock.ms > board::WELL_AFTER_MS && !self.well {
+            self.well = true;
+            stop::forget_resets();
+        }
+    }
+
     fn log(&mut self, s: Status) {
         let before = self.status.replace(s).map(|status| status.state);
-        if self.level >= Level::Error
-            && before != Some(s.state)
+        if before != Some(s.state)
             && let State::Fault(fault) = s.state
         {
-            defmt::error!("fault {}: {}", fault.code(), fault.meaning());
+            stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
+            if self.level >= Level::Error {
+                defmt::error!("fault {}: {}", fault.code(), fault.meaning());
+            }
         }
         if self.level >= Level::Warn {
             for (event, text) in [
@@ -142,7 +182,10 @@ impl Machine for Desk {
     }
 
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
-        settings.build()
+        match &mut self.guard {
+            Some((watchdog, _)) => watchdog.stretched(|| settings.build()),
+            None => settings.build(),
+        }
     }
 
     fn save(&mut self, _settings: &Everything) -> Result<(), &'static str> {
@@ -174,6 +217,10 @@ impl Machine for Desk {
     }
 
     fn last_run(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        to.write_str("not recorded")
+        to.write_str(self.last.cause)?;
+        match &self.last.record {
+            Some(record) => write!(to, ", {record}"),
+            None => Ok(()),
+        }
     }
 }

@@ -9,7 +9,8 @@
 //! * the interrupt of the serial port (`serial.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console, and the log ten times a second
 //!   (`desk.rs`).
-//! * `stop.rs`, when it cannot go on: outputs off.
+//! * `stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
+//! * the watchdog (`watchdog.rs`), when the loop or the control interrupt does not come round.
 //!
 //! The drive starts off; `start` at the console is what switches the outputs on.
 //!
@@ -42,10 +43,16 @@ mod link;
 mod mailbox;
 #[cfg(any(target_os = "none", test))]
 #[cfg_attr(test, allow(dead_code))]
+mod record;
+#[cfg(any(target_os = "none", test))]
+#[cfg_attr(test, allow(dead_code))]
 mod ring;
 #[cfg(any(target_os = "none", test))]
 #[cfg_attr(test, allow(dead_code))]
 mod trace;
+#[cfg(any(target_os = "none", test))]
+#[cfg_attr(test, allow(dead_code))]
+mod watchdog;
 
 /// See the top of this file.
 #[cfg(target_os = "none")]
@@ -63,6 +70,7 @@ fn main() -> ! {
         cortex_m::asm::wfi();
         let now_ms = desk.listen();
         console.poll(&mut port, &mut desk, now_ms);
+        desk.feed_watchdog();
     }
 }
 

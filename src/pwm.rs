@@ -37,6 +37,8 @@ pub struct Pwm {
 impl Pwm {
     /// Sets up the timer, with all six switches off and the counter at rest.
     pub fn new(timer: pac::TIM1, pins: Pins, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Self {
+        // Both names of one register: see board.rs.
+        assert!(timer.bdtr().as_ptr() as u32 == board::TIM1_BDTR);
         rcc.apb2enr().modify(|_, w| w.tim1en().enabled());
         // Halted by a debugger, the counter stops and the outputs go off.
         debug.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());

@@ -43,6 +43,8 @@ pub mod pi;
 pub mod plausibility;
 pub mod position;
 pub mod rls;
+pub mod saliency_check;
+pub mod schedule;
 pub mod sensing;
 pub mod settings;
 pub mod sos;

@@ -1,0 +1,127 @@
+//! Why the last run ended, in a form that survives a reset in RAM that nobody clears.
+
+use core::fmt;
+
+/// Reasons to stop, with the numbers that follow those of the drive's faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Reason {
+    /// The firmware found itself wrong; details: the line.
+    Panic = 64,
+    /// A fault of the processor; details: program counter, link register, CFSR, BFAR.
+    HardFault = 65,
+    /// A non-maskable interrupt; details: RCC_CIFR, FLASH_ECCR.
+    NonMaskable = 66,
+    /// An interrupt nobody expects; details: its number.
+    Unexpected = 67,
+    /// The watchdog was not fed; details: control periods, cycles, whether a deadline was missed.
+    NotFed = 68,
+    /// The drive's own fault; details: its number.
+    Drive = 69,
+}
+
+impl Reason {
+    const ALL: [Self; 6] = [
+        Self::Panic,
+        Self::HardFault,
+        Self::NonMaskable,
+        Self::Unexpected,
+        Self::NotFed,
+        Self::Drive,
+    ];
+
+    /// In a few words.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Panic => "panic",
+            Self::HardFault => "processor fault",
+            Self::NonMaskable => "clock or flash failure",
+            Self::Unexpected => "unexpected interrupt",
+            Self::NotFed => "watchdog not fed",
+            Self::Drive => "fault of the drive",
+        }
+    }
+}
+
+/// One record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Why.
+    pub reason: Reason,
+    /// What [`Reason`] says.
+    pub details: [u32; 4],
+}
+
+/// Words of a record in memory.
+pub const WORDS: usize = 7;
+
+/// Tells a record from what RAM holds after power-on.
+const MAGIC: u32 = 0x7265_6331;
+
+impl Record {
+    /// As it is kept.
+    pub fn to_words(self) -> [u32; WORDS] {
+        let [a, b, c, d] = self.details;
+        let reason = self.reason as u32;
+        let check = check(&[MAGIC, reason, a, b, c, d]);
+        [MAGIC, reason, a, b, c, d, check]
+    }
+
+    /// What was kept, if it is whole.
+    pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
+        let [magic, reason, a, b, c, d, checked] = *words;
+        if magic != MAGIC || checked != check(&[magic, reason, a, b, c, d]) {
+            return None;
+        }
+        let reason = Reason::ALL.into_iter().find(|known| *known as u32 == reason)?;
+        Some(Self { reason, details: [a, b, c, d] })
+    }
+}
+
+impl fmt::Display for Record {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.reason as u8, self.reason.meaning())?;
+        self.details.iter().try_for_each(|word| write!(f, " {word:#x}"))
+    }
+}
+
+/// FNV-1a over the bytes: finds what a reset in the middle of the writing leaves.
+fn check(words: &[u32]) -> u32 {
+    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
+    bytes.fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn numbers_follow_those_of_the_drive_and_never_change() {
+        let codes: Vec<u8> = Reason::ALL.iter().map(|reason| *reason as u8).collect();
+        assert_eq!(codes, [64, 65, 66, 67, 68, 69]);
+        assert!(drive_core::Fault::ALL.iter().all(|fault| fault.code() < 64));
+    }
+
+    proptest! {
+        #[test]
+        fn a_record_is_read_back(i in 0..Reason::ALL.len(), details: [u32; 4]) {
+            let record = Record { reason: Reason::ALL[i], details };
+            prop_assert_eq!(Record::from_words(&record.to_words()), Some(record));
+        }
+
+        #[test]
+        fn a_flipped_bit_is_found(i in 0..Reason::ALL.len(), details: [u32; 4],
+                                  word in 0..WORDS, bit in 0_u32..32) {
+            let mut words = Record { reason: Reason::ALL[i], details }.to_words();
+            words[word] ^= 1 << bit;
+            prop_assert_eq!(Record::from_words(&words), None);
+        }
+
+        #[test]
+        fn what_ram_holds_after_power_on_is_no_record(words: [u32; WORDS]) {
+            prop_assert_eq!(Record::from_words(&words), None);
+        }
+    }
+}
