@@ -69,14 +69,33 @@ impl Adc {
         rcc.ahb2enr().modify(|_, w| w.adc12en().enabled());
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4());
-        prepare(&one, board::ADC1_CHANNELS)?;
-        prepare(&two, board::ADC2_CHANNELS)?;
-        // Both sequences take the same time, so one interrupt is enough.
-        one.ier().write(|w| w.jeosie().enabled());
+        prepare(&one, board::ADC1_CHANNELS, board::ANALOG_WINDOW_A)?;
+        prepare(&two, board::ADC2_CHANNELS, board::ANALOG_WINDOW_B)?;
+        // Both sequences take the same time, so one interrupt at their end is enough. The watchdogs
+        // ask earlier, when the current is converted.
+        one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
+        two.ier().write(|w| w.awd1ie().enabled());
         for converter in [&*one, &*two] {
             converter.cr().modify(|_, w| w.jadstart().start_conversion());
         }
         Ok(Self { one, two })
+    }
+
+    /// Whether a current was outside its window since the last call; takes the interrupt request back.
+    pub fn take_over_current(&mut self) -> bool {
+        let mut over = false;
+        for converter in [&*self.one, &*self.two] {
+            if converter.isr().read().awd1().bit() {
+                converter.isr().write(|w| w.awd1().clear());
+                over = true;
+            }
+        }
+        over
+    }
+
+    /// Whether the sequence has ended: the interrupt may have come for a watchdog.
+    pub fn ended(&self) -> bool {
+        self.one.isr().read().jeos().bit()
     }
 
     /// The codes of the sequence that has just ended; takes the interrupt request back.
@@ -97,7 +116,11 @@ impl Adc {
 }
 
 /// Power, calibration, sequence; in the order of RM0440.
-fn prepare(adc: &RegisterBlock, (current, slow): (u8, u8)) -> Result<(), Stuck> {
+fn prepare(
+    adc: &RegisterBlock,
+    (current, slow): (u8, u8),
+    (low, high): (u16, u16),
+) -> Result<(), Stuck> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
@@ -115,8 +138,14 @@ fn prepare(adc: &RegisterBlock, (current, slow): (u8, u8)) -> Result<(), Stuck> 
         // Channels 0 to 9: all that are used.
         adc.smpr1().modify(|_, w| w.smp(channel).set(time.code));
     }
-    // No queue of sequences: the one below holds for good.
-    adc.cfgr().modify(|_, w| w.jqdis().set_bit());
+    // The watchdog asks at the first code outside the window.
+    // SAFETY: twelve bits each, from codes of twelve bits.
+    adc.tr1().write(|w| unsafe { w.lt1().bits(low).ht1().bits(high) });
+    // It looks at the current alone. No queue of sequences: the one below holds for good.
+    // SAFETY: five bits, a channel that exists.
+    adc.cfgr().modify(|_, w| unsafe {
+        w.awd1ch().bits(current).awd1sgl().set_bit().jawd1en().set_bit().jqdis().set_bit()
+    });
     adc.jsqr().write(|w| {
         // SAFETY: five bits each, channels that exist.
         unsafe { w.jsq1().bits(current).jsq2().bits(slow) };

@@ -38,6 +38,9 @@ pub const CLOCK_HZ: u32 = 170_000_000;
 pub const CYCLES_PER_US: u32 = CLOCK_HZ / 1_000_000;
 const _: () = assert!(CYCLES_PER_US * 1_000_000 == CLOCK_HZ);
 
+/// The PLS field of PWR_CR2: the supply has failed below 2.8 V (datasheet), 15 % below its 3.3 V.
+pub const SUPPLY_LEVEL: u8 = 5;
+
 // Power stage ---------------------------------------------------------------------------------
 
 /// Alternate function of the pins that belong to TIM1 (datasheet).
@@ -185,6 +188,26 @@ const fn on_this_board(line: Line) -> Line {
     Line { gain: line.gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), ..line }
 }
 
+/// Phase current beyond which the analog watchdogs trip, A: above the software's limit (4.3 A), below
+/// the end of the sensors' range (4.47 A).
+pub const ANALOG_TRIP_A: f32 = 4.4;
+/// Lowest and highest code of current a that do not trip, both polarities.
+pub const ANALOG_WINDOW_A: (u16, u16) = window(CURRENT_A);
+/// The same of current b.
+pub const ANALOG_WINDOW_B: (u16, u16) = window(CURRENT_B);
+const _: () = {
+    // A converter can still show a current beyond them.
+    assert!(ANALOG_WINDOW_A.0 > 0 && ANALOG_WINDOW_B.0 > 0);
+    assert!(ANALOG_WINDOW_A.1 < ADC_FULL_SCALE && ANALOG_WINDOW_B.1 < ADC_FULL_SCALE);
+};
+
+const fn window(line: Line) -> (u16, u16) {
+    (
+        ((-ANALOG_TRIP_A - line.offset) / line.gain) as u16,
+        ((ANALOG_TRIP_A - line.offset) / line.gain) as u16,
+    )
+}
+
 // Encoder -------------------------------------------------------------------------------------
 
 /// Alternate function of the pins that belong to TIM2 (datasheet).
@@ -294,6 +317,15 @@ mod tests {
     fn the_calibration_follows_the_reference() {
         let zero = -CURRENT_A.offset / CURRENT_A.gain;
         assert!((zero - 2022.0 / 1.1).abs() < 1.0, "zero at {zero}");
+    }
+
+    #[test]
+    fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
+        for (line, (low, high)) in [(CURRENT_A, ANALOG_WINDOW_A), (CURRENT_B, ANALOG_WINDOW_B)] {
+            let software = settings().limits.trip_a;
+            assert!(line.at(high) > software && line.at(low) < -software);
+            assert!(line.at(high + 1) < 4.47 && line.at(low - 1) > -4.47);
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::console::keys::Everything;
 use crate::desk::{Desk, Ends, LastRun};
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::Mailbox;
+use crate::record::Reason;
 use crate::serial::Port;
 use crate::trace::Trace;
 use crate::watchdog::Watchdog;
@@ -78,7 +79,7 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
         adc::Pins { current_a: a.pa0, current_b: c.pc1, dc_link: a.pa1, heat_sink: c.pc2 };
 
     // First of all: the gates are driven low from here on.
-    let pwm = pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU);
+    let pwm = pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU, &chip.SYSCFG);
     let Some(port) = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc) else {
         unreachable!("main runs once")
     };
@@ -112,7 +113,9 @@ fn last_run(rcc: &pac::RCC) -> (LastRun, u32) {
         "reset pin"
     };
     let record = stop::take_record();
-    let unwished = flags.iwdgrstf().is_reset() || (flags.sftrstf().is_reset() && record.is_some());
+    // A fault of the drive resets nothing: after it, a reset by software is the debug probe's.
+    let stopped = record.is_some_and(|record| record.reason != Reason::Drive);
+    let unwished = flags.iwdgrstf().is_reset() || (flags.sftrstf().is_reset() && stopped);
     rcc.csr().modify(|_, w| w.rmvf().clear());
     (LastRun { cause, record }, stop::count_reset(unwished))
 }

@@ -43,6 +43,10 @@ pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) 
         (Source::Internal, PllSrc::HSI, INTERNAL_DIVIDER)
     };
 
+    // The supply is watched; what comes of it goes to the break of TIM1 (`pwm.rs`).
+    // SAFETY: three bits, all of them levels.
+    pwr.cr2().modify(|_, w| unsafe { w.pvdls().bits(board::SUPPLY_LEVEL) }.pvde().set_bit());
+
     let pll =
         PllConfig { mux, m: divider, n: MULTIPLIER, r: Some(OUTPUT_DIVIDER), q: None, p: None };
     // Above 150 MHz the core needs its boosted voltage range.

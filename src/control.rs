@@ -62,6 +62,7 @@ impl Control {
             worst_cycles: 0,
             worst_latency: 0,
             late: Hardware::NONE,
+            over: Hardware::NONE,
             seen: Hardware::NONE,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
@@ -90,6 +91,8 @@ struct Running {
     worst_latency: u32,
     /// Whether the period before took too long.
     late: Hardware,
+    /// Whether an analog watchdog has seen an over-current since the period before.
+    over: Hardware,
     seen: Hardware,
 }
 
@@ -106,6 +109,16 @@ impl Running {
         let Control { drive, pwm, adc, encoder, status, orders, answers, trace } =
             &mut self.control;
 
+        // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
+        // when the current is converted, before the sequence has ended.
+        if adc.take_over_current() {
+            pwm.trip();
+            self.over = Hardware::ANALOG_WATCHDOG;
+        }
+        if !adc.ended() {
+            return;
+        }
+
         // The timer counts down since it was at the top, where the sampling ended.
         let latency = pwm.since_top().saturating_sub(board::SAMPLES_READY_TICKS);
         if latency > self.worst_latency {
@@ -113,7 +126,8 @@ impl Running {
         }
         pwm.clear_updated();
         let codes = adc.read();
-        let mut hardware = self.late;
+        let mut hardware = self.late.and(self.over);
+        self.over = Hardware::NONE;
         if pwm.take_break() {
             hardware = hardware.and(Hardware::BREAK);
         }

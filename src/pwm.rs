@@ -36,7 +36,13 @@ pub struct Pwm {
 
 impl Pwm {
     /// Sets up the timer, with all six switches off and the counter at rest.
-    pub fn new(timer: pac::TIM1, pins: Pins, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Self {
+    pub fn new(
+        timer: pac::TIM1,
+        pins: Pins,
+        rcc: &mut Rcc,
+        debug: &pac::DBGMCU,
+        system: &pac::SYSCFG,
+    ) -> Self {
         // Both names of one register: see board.rs.
         assert!(timer.bdtr().as_ptr() as u32 == board::TIM1_BDTR);
         rcc.apb2enr().modify(|_, w| w.tim1en().enabled());
@@ -69,6 +75,13 @@ impl Pwm {
             w.cc2e().set_bit().cc2ne().set_bit();
             w.cc3e().set_bit().cc3ne().set_bit()
         });
+
+        // To the break as well, until the next reset: lock-up of the core, parity of the RAM, supply
+        // voltage, and errors of the flash that cannot be corrected.
+        rcc.apb2enr().modify(|_, w| w.syscfgen().enabled());
+        system
+            .cfgr2()
+            .modify(|_, w| w.cll().set_bit().spl().set_bit().pvdl().set_bit().eccl().set_bit());
 
         // The break input: pin PA6, not inverted on its way.
         timer.af1().write(|w| w.bkine().set_bit());
@@ -133,8 +146,7 @@ impl Pwm {
     pub fn apply(&mut self, compare: Compare) {
         if !compare.enabled {
             // First of all.
-            self.timer.bdtr().modify(|_, w| w.moe().disabled_idle());
-            self.on = false;
+            self.trip();
         }
         for (leg, value) in [compare.a, compare.b, compare.c].into_iter().enumerate() {
             self.timer.ccr(leg).write(|w| w.ccr().set(u32::from(value)));
@@ -145,6 +157,12 @@ impl Pwm {
             self.timer.bdtr().modify(|_, w| w.moe().enabled());
             self.on = true;
         }
+    }
+
+    /// All six switches off, now.
+    pub fn trip(&mut self) {
+        self.timer.bdtr().modify(|_, w| w.moe().disabled_idle());
+        self.on = false;
     }
 
     /// Whether the power stage has pulled the break input since the last call, or still pulls it.
