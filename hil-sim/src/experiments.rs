@@ -6,6 +6,10 @@ mod bode;
 mod current_step;
 mod dead_time;
 mod filters;
+mod identify_continuous;
+mod identify_discrete;
+mod identify_machine;
+mod identify_recursive;
 mod injection_map;
 mod modulation;
 mod orientation;
@@ -59,6 +63,10 @@ pub const EXPERIMENTS: &[Experiment] = &[
     torque::STEPS,
     torque::RAMP,
     sweep::EXPERIMENT,
+    identify_discrete::EXPERIMENT,
+    identify_continuous::EXPERIMENT,
+    identify_recursive::EXPERIMENT,
+    identify_machine::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.
