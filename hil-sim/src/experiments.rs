@@ -10,6 +10,7 @@ mod identify_continuous;
 mod identify_discrete;
 mod identify_machine;
 mod identify_recursive;
+mod identify_validate;
 mod injection_map;
 mod modulation;
 mod orientation;
@@ -66,6 +67,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,
+    identify_validate::EXPERIMENT,
     identify_machine::EXPERIMENT,
 ];
 
