@@ -6,6 +6,11 @@ mod bode;
 mod current_step;
 mod dead_time;
 mod filters;
+mod identify_continuous;
+mod identify_discrete;
+mod identify_machine;
+mod identify_recursive;
+mod identify_validate;
 mod injection_map;
 mod learn_reference;
 mod modulation;
@@ -68,6 +73,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
     reversal::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    identify_discrete::EXPERIMENT,
+    identify_continuous::EXPERIMENT,
+    identify_recursive::EXPERIMENT,
+    identify_validate::EXPERIMENT,
+    identify_machine::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.

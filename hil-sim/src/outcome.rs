@@ -8,6 +8,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 pub use figure::{Figure, Panel, Series, Style};
 pub use table::{Cell, Table};
 
+use crate::identification::study::Entry;
+
 /// What came out of an experiment.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
@@ -17,6 +19,8 @@ pub struct Outcome {
     pub steps: Option<Vec<Step>>,
     /// Tables, in the order in which they are to be read.
     pub tables: Vec<Table>,
+    /// Printed numbers and ours, one an entry; where there are any they are the `table` of the JSON.
+    pub entries: Vec<Entry>,
     /// Figures, likewise.
     pub figures: Vec<Figure>,
     /// What the reader must know: differences from the source, assumptions, limits.
@@ -81,8 +85,22 @@ struct Json<'a> {
     series: AllSeries<'a>,
     #[serde(skip_serializing_if = "Option::is_none")]
     steps: &'a Option<Vec<Step>>,
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    table: &'a [Table],
+    #[serde(skip_serializing_if = "Rows::is_empty")]
+    table: Rows<'a>,
+}
+
+/// What JSON calls `table`.
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+enum Rows<'a> {
+    Tables(&'a [Table]),
+    Entries(&'a [Entry]),
+}
+
+impl Rows<'_> {
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::Tables([]) | Self::Entries([]))
+    }
 }
 
 struct AllSeries<'a>(&'a [Figure]);
@@ -121,7 +139,10 @@ impl Outcome {
             metrics: &self.metrics,
             series: AllSeries(&self.figures),
             steps: &self.steps,
-            table: &self.tables,
+            table: match self.entries.as_slice() {
+                [] => Rows::Tables(&self.tables),
+                entries => Rows::Entries(entries),
+            },
         })
     }
 }

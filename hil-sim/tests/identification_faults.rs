@@ -7,7 +7,7 @@ use drive_core::rls::{Rls, RlsError, RlsSettings};
 use hil_sim::identification::signals::noise;
 use hil_sim::identification::trial::{Noise, VOLTAGE};
 use hil_sim::identification::{Complex, Parameters, Signal, Trial};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const H: f64 = 50e-6;
@@ -171,4 +171,38 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(RlsSettings { corner: f32::NAN, ..good }), RlsError::Corner);
     assert_eq!(refused(RlsSettings { current_base: 0.0, ..good }), RlsError::Base);
     assert_eq!(refused(RlsSettings { current_limit: f32::INFINITY, ..good }), RlsError::Limit);
+}
+
+#[test]
+fn any_bits_leave_it_finite_and_it_comes_back() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+    let mut rls = Rls::new(RlsSettings::paper(VOLTAGE as f32, CURRENT as f32)).unwrap();
+    for n in 0..500_000u32 {
+        // Any bits, bits of numbers within the limits, and steps between the limits.
+        let mut any = || match n / 50_000 % 3 {
+            0 => f32::from_bits(rng.random()),
+            1 => f32::from_bits(rng.random::<u32>() & 0xC2FF_FFFF),
+            _ => {
+                if rng.random() {
+                    239.0
+                } else {
+                    -239.0
+                }
+            }
+        };
+        let v = AlphaBeta { alpha: any(), beta: any() };
+        let i = AlphaBeta { alpha: any(), beta: any() };
+        rls.step(v, i);
+        let sound = rls.latest().iter().all(|x| x.is_finite()) && rls.uncertainty().is_finite();
+        assert!(sound && rls.misfit().is_finite(), "{n}: {v:?} {i:?}");
+    }
+    let machine = Parameters::PX.at(375.0);
+    let trial = Trial::printed(machine, Signal::Schroeder, H, Noise::NONE);
+    for (v, i) in trial.raw().take(RATE) {
+        let single = |x: Complex| AlphaBeta { alpha: x.re as f32, beta: x.im as f32 };
+        rls.step(single(v), single(i));
+    }
+    let error = f64::from(rls.latest()[0].im) / H - machine.delta(H).g1.im / H;
+    println!("{error} rad/s after 1 s");
+    assert!(rls.is_valid() && error.abs() < 0.1, "{error}");
 }

@@ -1,5 +1,8 @@
 //! General ARX model by least squares (appendix A of Barroso 2017):
-//! `y[k] = -a1 y[k-1] - ... - an y[k-n] + b1 u[k-d-1] + ... + bm u[k-d-m]`.
+//!
+//! ```text
+//! y[k] = -a1 y[k-1] - ... - an y[k-n] + b1 u[k-d-1] + ... + bm u[k-d-m]
+//! ```
 //!
 //! The appendix prints the last row of Eq. A.4 and A.5 one sample too far and Eq. A.8 without the
 //! inverse; here all rows are those for which every term exists.

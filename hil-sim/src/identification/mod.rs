@@ -17,9 +17,12 @@ pub mod arx;
 pub mod batch;
 pub mod model;
 pub mod models;
+pub mod printed;
+pub mod ratios;
 pub mod recursive;
 pub mod signals;
 pub mod structured;
+pub mod study;
 pub mod trial;
 
 pub use batch::{Data, FirstOrderTheta, Regression};

@@ -1,0 +1,181 @@
+//! The tables of the paper: what can be reproduced (T1), and which machine they were made with (T2).
+
+use hil_sim::experiments::{Context, find};
+use hil_sim::identification::Parameters;
+use hil_sim::identification::study::{Entry, Errors, all};
+use hil_sim::identification::trial::Noise;
+use hil_sim::progress::Progress;
+use hil_sim::{Config, Outcome};
+
+const TRIALS: u64 = 60;
+
+fn entries(errors: &[Errors]) -> Vec<Entry> {
+    let both = |e: &Errors| [e.discrete_entries(), e.continuous_entries()].concat();
+    errors.iter().flat_map(both).filter(|e| e.printed_pct.is_some()).collect()
+}
+
+fn share(entries: &[Entry]) -> f64 {
+    entries.iter().filter(|e| e.within(2.0)).count() as f64 / entries.len() as f64
+}
+
+#[test]
+fn t1_tables() {
+    let errors = all(Parameters::PX, Noise::HALF, 1, TRIALS);
+    let entries = entries(&errors);
+    assert_eq!(entries.len(), 186);
+    println!("within a factor 2: {:.3}", share(&entries));
+    assert!(share(&entries) >= 0.55, "{}", share(&entries));
+    for e in &entries {
+        if e.model == "B" && e.h_us > 50.0 && ["tau_r", "l_s"].contains(&e.parameter) {
+            assert!(e.within(1.6), "{e:?}");
+        }
+    }
+}
+
+/// Mean error in %: speed 375 or 61, signal 0 (S_g) or 1 (S_s), period, model B, C, D, S, parameter.
+fn error(
+    errors: &[Errors],
+    fast: bool,
+    signal: usize,
+    period: usize,
+    model: usize,
+    k: usize,
+) -> f64 {
+    errors[if fast { 0 } else { 6 } + 3 * signal + period].continuous[model][k].percent
+}
+
+#[test]
+fn t1_orderings() {
+    const B: usize = 0;
+    const C: usize = 1;
+    for noise in [Noise::HALF, Noise::PRINTED] {
+        let errors = all(Parameters::PX, noise, 1, TRIALS);
+        let at = |fast, signal, period, model, k| error(&errors, fast, signal, period, model, k);
+        for period in 0..3 {
+            for signal in 0..2 {
+                // Model C beats B on tau_r, sigma_l_s and l_s at high speed.
+                for k in 1..4 {
+                    assert!(at(true, signal, period, C, k) < at(true, signal, period, B, k));
+                }
+                // The imaginary part of h_1 is never estimated.
+                for first in [0, 6] {
+                    assert!(errors[first + 3 * signal + period].discrete[5].percent > 100.0);
+                }
+            }
+            // At low speed S_s beats S_g on every parameter.
+            for k in 0..5 {
+                assert!(at(false, 1, period, C, k) < at(false, 0, period, C, k), "{k} {period}");
+            }
+        }
+        // The errors of f_1 and f_0 grow with the period, that of h_1b falls.
+        for first in [0, 3, 6, 9] {
+            for k in [0, 2, 5] {
+                let e = [0, 1, 2].map(|period| errors[first + period].discrete[k].percent);
+                let rising = e[0] < e[1] && e[1] < e[2];
+                let falling = e[0] > e[1] && e[1] > e[2];
+                assert!(if k == 5 { falling } else { rising }, "{first} {k} {e:?}");
+            }
+        }
+        if noise == Noise::HALF {
+            // At low speed and 50 us C is no better than B; r_s is the worst of Model C at 50 and
+            // 100 us, sigma_l_s the best at high speed.
+            for k in [0, 1, 3, 4] {
+                let ratio = at(false, 1, 0, C, k) / at(false, 1, 0, B, k);
+                assert!((0.5..2.0).contains(&ratio), "{k}: {ratio}");
+            }
+            for (fast, signal, period) in
+                [true, false].into_iter().flat_map(|f| [(f, 0, 0), (f, 0, 1), (f, 1, 0), (f, 1, 1)])
+            {
+                for k in 1..5 {
+                    let (r_s, other) =
+                        (at(fast, signal, period, C, 0), at(fast, signal, period, C, k));
+                    assert!(r_s > other, "{fast} {signal} {period} {k}");
+                }
+            }
+            for (signal, period) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)] {
+                for k in [0, 1, 3, 4] {
+                    assert!(at(true, signal, period, C, 2) < at(true, signal, period, C, k));
+                }
+            }
+            // Model S is below half a percent in the speed with S_s, and better than C in the mean.
+            for k in 0..5 {
+                let mean = |model: usize| {
+                    errors.iter().map(|e| e.continuous[model][k].percent).sum::<f64>()
+                };
+                assert!(mean(3) < mean(C), "{k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn t2_the_machine_by_ratios_that_do_not_depend_on_the_noise() {
+    for ratio in hil_sim::identification::ratios::all() {
+        println!("{ratio:.3?}");
+        // |h_0b / h_1b|, (1 - f_11) / 2 and the error of tau_r by Model B, PX within 13, 3 and 10 %.
+        let (px, rbv) = (ratio.px / ratio.printed, ratio.rbv / ratio.printed);
+        let (near, far) = match ratio.quantity {
+            "h_0b / h_1b" => ((px - 1.0).abs() < 0.13, (1.7..2.3).contains(&rbv)),
+            "(1 - f_11) / 2" => ((px - 1.0).abs() < 0.035, (0.7..0.77).contains(&rbv)),
+            _ => ((px - 1.0).abs() < 0.12, (0.6..0.8).contains(&rbv)),
+        };
+        assert!(near && far, "{ratio:?}");
+    }
+}
+
+fn outcome(name: &str, seed: u64) -> Outcome {
+    let config = Config::default();
+    let context = Context { config: &config, seed, seconds: None, progress: Progress::hidden() };
+    (find(name).expect("known").run)(&context).expect("runs")
+}
+
+#[test]
+fn the_json_table_has_one_row_for_every_number() {
+    let text = outcome("identify-continuous", 1).to_json("identify-continuous", 1).expect("JSON");
+    let object: serde_json::Value = serde_json::from_str(&text).expect("one object");
+    let rows = object["table"].as_array().expect("rows");
+    // Twelve columns, four models, five parameters; 90 of them printed.
+    assert_eq!(rows.len(), 240);
+    assert_eq!(rows.iter().filter(|row| row["printed_pct"].is_number()).count(), 90);
+    let row = rows.iter().find(|r| {
+        r["model"] == "C" && r["signal"] == "Ss" && r["speed_rad_s"] == 61.0 && r["h_us"] == 200.0
+    });
+    let row = row.expect("a row of Table 5");
+    assert_eq!((&row["parameter"], &row["printed_pct"]), (&"r_s".into(), &9.706.into()));
+    assert!(row["ours_pct"].is_number());
+    let discrete = outcome("identify-discrete", 1);
+    assert_eq!(discrete.entries.len(), 96);
+    // The seed is what makes the difference.
+    let ours = |outcome: &Outcome| outcome.entries[0].ours_pct;
+    assert_eq!(ours(&discrete), ours(&outcome("identify-discrete", 1)));
+    assert_ne!(ours(&discrete), ours(&outcome("identify-discrete", 2)));
+}
+
+#[test]
+fn the_recursive_experiment_converges_as_the_paper_says() {
+    let outcome = outcome("identify-recursive", 1);
+    let metric = |name: &str| outcome.metrics.get(name).expect("metric");
+    assert!(
+        metric("figure_2_r_s_converges_s") <= 0.2 && metric("figure_2_tau_r_converges_s") <= 0.2
+    );
+    assert!(
+        metric("figure_3_r_s_converges_s") <= 0.8 && metric("figure_3_tau_r_converges_s") <= 0.8
+    );
+    assert!(metric("figure_4_r_s_converges_s") < metric("figure_3_r_s_converges_s"));
+    assert!(metric("figure_3_f32_omega_m_rms_rad_s") < 0.02);
+}
+
+#[test]
+fn estimated_parameters_give_the_current_better_than_the_classical_ones() {
+    let outcome = outcome("identify-validate", 1);
+    let metric = |name: &str| outcome.metrics.get(name).expect("metric");
+    let (estimated, rbv) = (metric("current_error_estimated_pct"), metric("current_error_rbv_pct"));
+    println!("{estimated} {rbv}");
+    assert!(estimated < 5.0 && rbv > 4.0 * estimated);
+    // The noise of section 5 does not explain the 73 % between tau_r with S_s and the classical
+    // tests; with S_g it nearly would.
+    let [sg, ss] =
+        ["sg", "ss"].map(|s| metric(&format!("tau_r_error_of_rbv_{s}_printed_noise_pct")));
+    println!("{sg} {ss}");
+    assert!(ss < 30.0 && ss < sg);
+}
