@@ -134,9 +134,6 @@ pub struct UnitVector {
 }
 
 impl UnitVector {
-    /// The unit vector of angle zero.
-    pub const ZERO_ANGLE: Self = Self { cos: 1.0, sin: 0.0 };
-
     /// This vector turned on by the angle of `other`.
     pub fn turned_by(self, other: Self) -> Self {
         Self {

@@ -39,11 +39,6 @@ impl State {
             Mode::Commissioning => Self::Commissioning,
         }
     }
-
-    /// Whether the current loop is closed.
-    pub const fn regulates(self) -> bool {
-        !matches!(self, Self::Off | Self::Calibrating | Self::Precharge | Self::Fault(_))
-    }
 }
 
 impl fmt::Display for State {
