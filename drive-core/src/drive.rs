@@ -54,8 +54,7 @@ pub struct Drive {
 struct References {
     current: Dq,
     turns: f32,
-    /// Injection axis seen from the flux, as an angle and a unit vector.
-    injection_turn: Angle,
+    /// Injection axis seen from the flux.
     injection_axis: UnitVector,
 }
 
@@ -64,7 +63,6 @@ impl Default for References {
         Self {
             current: Dq::ZERO,
             turns: 0.0,
-            injection_turn: Angle::QUARTER,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
         }
     }
@@ -194,8 +192,6 @@ impl Drive {
 
     fn precharge(&mut self, sample: &Sample) -> Compare {
         if self.elapsed >= self.c.sequence.precharge {
-            self.control = ControlState::default();
-            self.control.estimator.start();
             self.c.position.start(&mut self.control.position, sample.encoder);
             self.enter(State::Magnetising);
         }
@@ -218,19 +214,19 @@ impl Drive {
             }
             AngleSource::Injection => s.estimator.flux(),
         };
-        let theta = FluxAngle { phi: flux.phi + r.injection_turn, step: flux.step };
 
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
         let carrier =
             if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
-        let theta_axis = theta.phi.unit_vector();
+        let phi = flux.phi.unit_vector();
+        let theta_axis = phi.turned_by(r.injection_axis);
         let rest = measured.current - AlphaBeta::along(theta_axis, carrier.sampled);
         let filtered = LPF.step_alpha_beta(&mut s.low_pass, rest);
 
         let lag = c.lag_share * (lpf_lag_samples(flux.step * TAU) + c.current_lag);
-        let seen = (flux.phi - Angle::within_turn(flux.step * lag)).unit_vector();
-        let applied = (flux.phi + Angle::within_turn(flux.step * VOLTAGE_LEAD)).unit_vector();
+        let seen = phi.turned_slightly(-flux.step * lag);
+        let applied = phi.turned_slightly(flux.step * VOLTAGE_LEAD);
 
         // Current loop.
         let current = filtered.to_dq(seen);
@@ -250,7 +246,8 @@ impl Drive {
         // Angles for the next sample.
         if c.demodulate {
             let e = &mut s.estimator;
-            c.estimator.observe(e, measured.current, theta, carrier.index, reference.q);
+            let i_q = reference.q;
+            c.estimator.observe(e, measured.current, theta_axis, flux.step, carrier.index, i_q);
         }
         let rotor_step = match c.source {
             AngleSource::Encoder => {
@@ -367,14 +364,11 @@ impl Drive {
             };
         match phase {
             Phase::Look => {
-                r.injection_turn = SaliencyCheck::LOOK;
                 r.injection_axis = SaliencyCheck::LOOK_AXIS;
                 return Ok(Dq::ZERO);
             }
             Phase::Restore => {
-                let usual = References::default();
-                r.injection_turn = usual.injection_turn;
-                r.injection_axis = usual.injection_axis;
+                r.injection_axis = References::default().injection_axis;
             }
             Phase::Passed => self.enter(State::of_mode(self.mode)),
             Phase::Failed => return Err(Fault::NoSaliency),

@@ -4,7 +4,9 @@
 //! controller, constant reference) and the synchronous one (normalised demodulation, learned
 //! reference, scheduled gain, slip feed-forward).
 
-use crate::angle::Angle;
+use core::f32::consts::FRAC_1_SQRT_2;
+
+use crate::angle::{Angle, UnitVector};
 use crate::demodulator::{Demodulator, DemodulatorState};
 use crate::frames::AlphaBeta;
 use crate::indirect::FluxAngle;
@@ -88,6 +90,9 @@ const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
+/// The dm axis from the injection axis: 45° behind.
+const DM_AXIS: UnitVector = UnitVector { cos: FRAC_1_SQRT_2, sin: -FRAC_1_SQRT_2 };
+
 /// The tracker ran away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost;
@@ -111,28 +116,28 @@ impl EstimatorState {
 }
 
 impl Estimator {
-    /// Demodulates one sample: the current, A; the injection axis and how fast it turns, turns per
+    /// Demodulates one sample: the current, A; the injection axis, and how fast it turns, turns per
     /// period; the number of the sample in the carrier period; the reference of the quadrature
     /// current, A.
     pub fn observe(
         &self,
         state: &mut EstimatorState,
         current: AlphaBeta,
-        theta: FluxAngle,
+        axis: UnitVector,
+        step: f32,
         carrier: usize,
         i_q: f32,
     ) {
-        let dm_axis = |step: f32| {
-            (theta.phi - Angle::EIGHTH - Angle::within_turn(step * self.lag)).unit_vector()
-        };
-        match self.method {
+        // By reference: the schedule is too large to copy in every period.
+        match &self.method {
             Method::Printed { demodulator, .. } => {
-                state.mean_step += FLUX_SMOOTHING * (theta.step - state.mean_step);
-                let axis = dm_axis(state.mean_step);
+                state.mean_step += FLUX_SMOOTHING * (step - state.mean_step);
+                let axis = axis.turned_by(DM_AXIS).turned_slightly(-state.mean_step * self.lag);
                 state.delta_i = demodulator.step(&mut state.printed, current, axis);
             }
             Method::Synchronous { .. } => {
-                state.saliency = state.synchronous.step(current, dm_axis(theta.step), carrier, i_q);
+                let axis = axis.turned_slightly(-step * self.lag);
+                state.saliency = state.synchronous.step(current, axis, carrier, i_q);
             }
         }
     }
@@ -143,7 +148,7 @@ impl Estimator {
     /// # Errors
     /// [`Lost`] when the speed has reached its limit.
     pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
-        let held = match self.method {
+        let held = match &self.method {
             Method::Printed { reference, tracker, .. } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);

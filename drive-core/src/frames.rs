@@ -164,7 +164,8 @@ impl AlphaBeta {
         self.alpha * self.alpha + self.beta * self.beta
     }
 
-    fn seen_from(self, axis: UnitVector) -> (f32, f32) {
+    /// The components along `axis` and across it, 90° ahead.
+    pub fn seen_from(self, axis: UnitVector) -> (f32, f32) {
         (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
     }
 }

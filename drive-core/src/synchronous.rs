@@ -1,14 +1,15 @@
 //! Synchronous demodulation: the saliency the carrier sees, as a pure number.
 //!
-//! The sampled current is rotated into the dm-qm frame, both channels are mixed with the carrier's
-//! own frequency and averaged twice over two carrier periods:
+//! The sampled current is seen along and across the injection axis, both parts are mixed with the
+//! carrier's own frequency and averaged twice over two carrier periods:
 //!
 //! ```text
-//! A = MA20 MA20 ( 2 i_dm e^(-j 2 pi k/10) )       B likewise from i_qm
-//! q = Re( (A - B) conj(A + B) ) / |A + B|^2  =  ( |A|^2 - |B|^2 ) / |A + B|^2
+//! X = MA20 MA20 ( 2 i_along e^(-j 2 pi k/10) )       Y likewise from i_across
+//! q = -Re( Y conj(X) ) / |X|^2
 //! ```
 //!
-//! Dividing by the part along the injection axis takes the amplitude of the injection, the dc link and
+//! which is what the channels of the dm-qm frame, A = (X - Y)/sqrt2 and B = (X + Y)/sqrt2, give as
+//! ( |A|^2 - |B|^2 ) / |A + B|^2. Dividing by the part along the injection axis takes the amplitude of the injection, the dc link and
 //! the leakage inductance out; taking magnitudes takes the phase of the carrier out. The averages have
 //! their zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through
 //! the printed band-pass, is gone. They delay `q` by 19 samples (3.2 ms).
@@ -24,7 +25,7 @@ use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 const LENGTH: usize = 2 * CARRIER_SAMPLES;
 /// Units per ampere. The largest sum, 400 samples of 2 * 4.5 A * sqrt2, is 6.7e8.
 const UNITS: f32 = 131_072.0;
-/// Signals that are averaged: A and B as complex numbers, and the reference current.
+/// Signals that are averaged: X and Y as complex numbers, and the reference current.
 const SIGNALS: usize = 5;
 
 /// One moving average of all signals.
@@ -73,40 +74,39 @@ pub struct Saliency {
 }
 
 impl SynchronousState {
-    /// One sample: the current in A; `dm_axis`, `e^(j (theta - 45°))`, delayed as the current is; the
+    /// One sample: the current in A; the injection axis `e^(j theta)`, delayed as the current is; the
     /// number of the sample in the carrier period; the reference of the quadrature current, A.
     pub fn step(
         &mut self,
         current: AlphaBeta,
-        dm_axis: UnitVector,
+        axis: UnitVector,
         carrier: usize,
         i_q: f32,
     ) -> Saliency {
-        let i = current.to_dm_qm(dm_axis) * (2.0 * UNITS);
+        let (along, across) = current.seen_from(axis);
+        let (along, across) = (along * (2.0 * UNITS), across * (2.0 * UNITS));
         let (c, s) =
             (CARRIER_COS[carrier % CARRIER_SAMPLES], CARRIER_SIN[carrier % CARRIER_SAMPLES]);
         // Saturating casts: not-a-number gives 0, and the drive finds it elsewhere.
-        let mixed = [i.dm * c, -i.dm * s, i.qm * c, -i.qm * s, i_q * UNITS].map(|x| x as i32);
+        let mixed = [along * c, -along * s, across * c, -across * s, i_q * UNITS].map(|x| x as i32);
         let once = self.stages[0].step(self.index, mixed);
         let twice = self.stages[1].step(self.index, once);
         self.index = if self.index >= LENGTH - 1 { 0 } else { self.index + 1 };
 
         const MEAN: f32 = 1.0 / (UNITS * (LENGTH * LENGTH) as f32);
-        let [a_re, a_im, b_re, b_im, i_q] = twice.map(|x| x as f32 * MEAN);
-        let (c_re, c_im) = (a_re + b_re, a_im + b_im);
-        let along = c_re * c_re + c_im * c_im;
-        let difference = (a_re * a_re + a_im * a_im) - (b_re * b_re + b_im * b_im);
-        // sqrt2 times the carrier current is what the two channels have together.
+        let [x_re, x_im, y_re, y_im, i_q] = twice.map(|x| x as f32 * MEAN);
+        let squared = x_re * x_re + x_im * x_im;
+        let product = x_re * y_re + x_im * y_im;
         Saliency {
-            q: if along > LEAST { difference / along } else { 0.0 },
-            carrier_squared: 0.5 * along,
+            q: if squared > LEAST { -product / squared } else { 0.0 },
+            carrier_squared: squared,
             i_q,
         }
     }
 }
 
 /// Square of the carrier current below which there is no saliency to speak of, A^2.
-const LEAST: f32 = 1e-6;
+const LEAST: f32 = 5e-7;
 
 #[cfg(test)]
 mod tests {
@@ -119,7 +119,7 @@ mod tests {
     /// on top of a fundamental of 3 A.
     fn steady(amplitude: f64, turn: f64, phase: f64) -> Saliency {
         let theta = 0.7;
-        let axis = (Angle::from_radians(theta as f32) - Angle::EIGHTH).unit_vector();
+        let axis = Angle::from_radians(theta as f32).unit_vector();
         let mut state = SynchronousState::default();
         let mut last = Saliency::default();
         for k in 0..500 {

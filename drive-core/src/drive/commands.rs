@@ -1,6 +1,6 @@
 //! The commands: what is taken, limited, or refused in which state.
 
-use super::{Drive, References};
+use super::{ControlState, Drive, References};
 use crate::angle::Angle;
 use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};
@@ -65,7 +65,6 @@ impl Drive {
                     return Err(Refused::NeedsEncoder);
                 }
                 let turn = Angle::QUARTER + Angle::from_degrees(degrees);
-                self.references.injection_turn = turn;
                 self.references.injection_axis = turn.unit_vector();
                 Ok(Taken::AsGiven)
             }
@@ -96,6 +95,8 @@ impl Drive {
         self.references =
             References { current: Dq::new(self.c.sequence.i_d, 0.0), ..References::default() };
         self.sensing = SensingState::default();
+        self.control = ControlState::default();
+        self.control.estimator.start();
         self.enter(State::Calibrating);
         Ok(Taken::AsGiven)
     }
