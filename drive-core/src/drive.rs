@@ -11,7 +11,7 @@ use crate::estimator::EstimatorState;
 use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
-use crate::indirect::{FluxAngle, IndirectState};
+use crate::indirect::IndirectState;
 use crate::injection::{Carrier, CarrierPeriod};
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::pi::{DqPiState, ReferenceState};
@@ -247,7 +247,7 @@ impl Drive {
         if c.demodulate {
             let e = &mut s.estimator;
             let i_q = reference.q;
-            c.estimator.observe(e, measured.current, theta_axis, flux.step, carrier.index, i_q);
+            c.estimator.observe(e, measured.current, theta_axis, flux.step, carrier, i_q);
         }
         let rotor_step = match c.source {
             AngleSource::Encoder => {

@@ -10,6 +10,7 @@ use crate::angle::{Angle, UnitVector};
 use crate::demodulator::{Demodulator, DemodulatorState};
 use crate::frames::AlphaBeta;
 use crate::indirect::FluxAngle;
+use crate::injection::CarrierPeriod;
 use crate::schedule::Schedule;
 use crate::synchronous::{Saliency, SynchronousState};
 use crate::tracker::{Pll, Tracker, TrackerState};
@@ -117,15 +118,15 @@ impl EstimatorState {
 
 impl Estimator {
     /// Demodulates one sample: the current, A; the injection axis, and how fast it turns, turns per
-    /// period; the number of the sample in the carrier period; the reference of the quadrature
-    /// current, A.
+    /// period; the carrier; the reference of the quadrature current, A.
+    #[inline]
     pub fn observe(
         &self,
         state: &mut EstimatorState,
         current: AlphaBeta,
         axis: UnitVector,
         step: f32,
-        carrier: usize,
+        carrier: CarrierPeriod,
         i_q: f32,
     ) {
         // By reference: the schedule is too large to copy in every period.
@@ -147,6 +148,7 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Lost`] when the speed has reached its limit.
+    #[inline]
     pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
         let held = match &self.method {
             Method::Printed { reference, tracker, .. } => {

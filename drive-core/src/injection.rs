@@ -29,12 +29,7 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
 /// Coefficients of the injection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
-    /// Voltage along the injection axis in period k of the carrier, V.
-    voltage: [f32; CARRIER_SAMPLES],
-    /// The current this voltage drives, averaged over the period in which it is applied, A.
-    mean_current: [f32; CARRIER_SAMPLES],
-    /// The current that is sampled while the voltage of period k is computed, A.
-    sampled: [f32; CARRIER_SAMPLES],
+    periods: [CarrierPeriod; CARRIER_SAMPLES],
     /// Amplitude of the sampled current, A.
     pub current_amplitude: f32,
 }
@@ -60,12 +55,16 @@ impl Injection {
         let (s_re, s_im) = ((h_re * d_re - h_im * d_im) as f32, (h_re * d_im + h_im * d_re) as f32);
         let (m_re, m_im) = ((h_re * a - h_im * b) as f32, (h_re * b + h_im * a) as f32);
         Self {
-            voltage: CARRIER_COS.map(|c| amplitude_v * c),
-            mean_current: core::array::from_fn(|n| {
-                amplitude_v * (m_re * CARRIER_COS[n] - m_im * CARRIER_SIN[n])
-            }),
-            sampled: core::array::from_fn(|n| {
-                amplitude_v * (s_re * CARRIER_COS[n] - s_im * CARRIER_SIN[n])
+            periods: core::array::from_fn(|index| {
+                let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
+                CarrierPeriod {
+                    voltage: amplitude_v * cos,
+                    mean_current: amplitude_v * (m_re * cos - m_im * sin),
+                    sampled: amplitude_v * (s_re * cos - s_im * sin),
+                    cos,
+                    sin,
+                    index,
+                }
             }),
             current_amplitude: (libm::sqrt(h_re * h_re + h_im * h_im)) as f32 * amplitude_v,
         }
@@ -87,6 +86,10 @@ pub struct CarrierPeriod {
     pub mean_current: f32,
     /// Current expected from it in the sample from which this period is computed, A.
     pub sampled: f32,
+    /// Cosine of its phase.
+    pub cos: f32,
+    /// Sine of its phase.
+    pub sin: f32,
     /// Its number in the carrier period, 0 to 9.
     pub index: usize,
 }
@@ -94,16 +97,10 @@ pub struct CarrierPeriod {
 impl Carrier {
     /// The next PWM period's share.
     pub fn step(&mut self, injection: &Injection) -> CarrierPeriod {
-        // The index is below ten by construction; `% 10` keeps the compiler from a panic path and
-        // a flipped bit from being one.
-        let index = self.index % CARRIER_SAMPLES;
-        self.index = if index == CARRIER_SAMPLES - 1 { 0 } else { index + 1 };
-        CarrierPeriod {
-            voltage: injection.voltage[index],
-            mean_current: injection.mean_current[index],
-            sampled: injection.sampled[index],
-            index,
-        }
+        // Below ten by construction: this is for a flipped bit.
+        let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
+        self.index = index + 1;
+        injection.periods[index]
     }
 }
 
@@ -135,7 +132,7 @@ mod tests {
             let next = plant.p * i + plant.k * f64::from(now.voltage);
             if n > 5000 {
                 assert!((0.5 * (i + next) - f64::from(now.mean_current)).abs() < 1e-5);
-                let one_later = injection.sampled[(now.index + 1) % CARRIER_SAMPLES];
+                let one_later = injection.periods[(now.index + 1) % CARRIER_SAMPLES].sampled;
                 assert!((i - f64::from(one_later)).abs() < 1e-5);
                 peak = peak.max(next.abs());
             }

@@ -50,52 +50,63 @@ impl Modulator {
     /// the power stage takes off again, V per phase, at a dc link of `v_dc` > 0, V.
     ///
     /// A voltage outside the hexagon is shortened without turning its angle.
+    #[inline]
     pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
+        let leg = wanted.to_abc() + compensation;
+        let per_volt = self.top / v_dc;
+        let (low, high) = extremes(leg);
+        // Shortest pulses fit in above and below: nothing to limit. Not-a-number fails the test.
+        if (high - low) * per_volt <= self.top - 2.0 * self.shortest {
+            let counts = self.centred(leg, low + high, per_volt);
+            return Modulated { compare: counts.map(rounded), realised: wanted };
+        }
+        self.limited(wanted, compensation, v_dc)
+    }
+
+    #[inline(never)]
+    fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
         let mut motor = wanted.to_abc();
-        let mut exact = true;
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
         if span > usable {
             motor = motor * (usable / span);
-            exact = false;
         }
-
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
-        let per_volt = self.top / v_dc;
-        let centre = 0.5 * self.top - 0.5 * (low + high) * per_volt;
-        let mut counts =
-            [centre + leg.a * per_volt, centre + leg.b * per_volt, centre + leg.c * per_volt];
-        for count in &mut counts {
-            exact &= self.drop_or_extend(count);
-        }
-
-        let realised = if exact {
-            wanted
-        } else {
-            let volts = v_dc / self.top;
-            let [a, b, c] = counts;
-            (Abc::new(a, b, c) * volts - compensation).to_alpha_beta()
-        };
-        // Saturating casts: not-a-number gives 0.
-        Modulated { compare: counts.map(|c| (c + 0.5) as u16), realised }
+        let counts = self.centred(leg, low + high, self.top / v_dc).map(|c| self.drop_or_extend(c));
+        let volts = v_dc / self.top;
+        let [a, b, c] = counts;
+        let realised = (Abc::new(a, b, c) * volts - compensation).to_alpha_beta();
+        Modulated { compare: counts.map(rounded), realised }
     }
 
-    /// Moves a pulse of either switch that is too short to the nearer of none and the shortest;
-    /// says whether it could stay as it was.
-    fn drop_or_extend(&self, count: &mut f32) -> bool {
-        let from_top = self.top - *count;
-        if *count < self.shortest {
-            *count = if *count < 0.5 * self.shortest { 0.0 } else { self.shortest };
+    /// Counts of the legs, V, with `ends`, the sum of the lowest and the highest of them, at half the
+    /// dc link.
+    #[inline]
+    fn centred(&self, leg: Abc, ends: f32, per_volt: f32) -> [f32; 3] {
+        let centre = 0.5 * (self.top - ends * per_volt);
+        [centre + leg.a * per_volt, centre + leg.b * per_volt, centre + leg.c * per_volt]
+    }
+
+    /// Moves a pulse of either switch that is too short to the nearer of none and the shortest.
+    fn drop_or_extend(&self, count: f32) -> f32 {
+        let from_top = self.top - count;
+        if count < self.shortest {
+            if count < 0.5 * self.shortest { 0.0 } else { self.shortest }
         } else if from_top < self.shortest {
-            *count =
-                if from_top < 0.5 * self.shortest { self.top } else { self.top - self.shortest };
+            if from_top < 0.5 * self.shortest { self.top } else { self.top - self.shortest }
         } else {
-            return true;
+            count
         }
-        false
     }
 }
+
+/// The nearest whole count of a count from 0 to `top`; 0 for not-a-number.
+fn rounded(count: f32) -> u16 {
+    // By way of u32: that cast is one instruction of the core, the saturating one to u16 is twelve.
+    (count + 0.5) as u32 as u16
+}
+
 
 fn extremes(v: Abc) -> (f32, f32) {
     let (low, high) = if v.a < v.b { (v.a, v.b) } else { (v.b, v.a) };

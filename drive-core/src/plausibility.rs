@@ -12,7 +12,7 @@ use core::f32::consts::TAU;
 use crate::angle::UnitVector;
 use crate::fault::Fault;
 use crate::frames::{AlphaBeta, Dq, SQRT_3};
-use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod};
+use crate::injection::{CARRIER_SAMPLES, CarrierPeriod};
 use crate::sensing::Measured;
 use crate::tuning::FirstOrder;
 
@@ -35,6 +35,7 @@ pub struct CarrierWatch {
 impl CarrierWatch {
     /// One sample: phase currents in A, the carrier, the injection axis, and the amplitude of the
     /// carrier current expected along it, A.
+    #[inline]
     pub fn step(
         &mut self,
         measured: &Measured,
@@ -42,18 +43,16 @@ impl CarrierWatch {
         axis: UnitVector,
         expected: f32,
     ) -> Option<Fault> {
-        let (c, s) = (
-            CARRIER_COS[carrier.index % CARRIER_SAMPLES],
-            CARRIER_SIN[carrier.index % CARRIER_SAMPLES],
-        );
         for (sum, i) in self.sums.iter_mut().zip([measured.phases.a, measured.phases.b]) {
-            sum.0 += c * i;
-            sum.1 += s * i;
+            sum.0 += carrier.cos * i;
+            sum.1 += carrier.sin * i;
         }
-        if carrier.index + 1 < CARRIER_SAMPLES {
-            return None;
-        }
+        if carrier.index + 1 < CARRIER_SAMPLES { None } else { self.judge(axis, expected) }
+    }
 
+    /// At the end of a carrier period.
+    #[inline(never)]
+    fn judge(&mut self, axis: UnitVector, expected: f32) -> Option<Fault> {
         // cos(theta) and cos(theta - 120°): what of the injection lies along phases a and b
         let along = [axis.cos, 0.5 * (SQRT_3 * axis.sin - axis.cos)];
         let sums = core::mem::take(&mut self.sums);

@@ -19,7 +19,7 @@
 
 use crate::angle::UnitVector;
 use crate::frames::AlphaBeta;
-use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
+use crate::injection::{CARRIER_SAMPLES, CarrierPeriod};
 
 /// Samples of one moving average: two carrier periods.
 const LENGTH: usize = 2 * CARRIER_SAMPLES;
@@ -36,9 +36,9 @@ struct MovingSum {
 }
 
 impl MovingSum {
-    /// Takes the newest values in at place `index` of the ring; the sum of the last 20.
+    /// Takes the newest values in at place `index` < 20 of the ring; the sum of the last 20.
     fn step(&mut self, index: usize, new: [i32; SIGNALS]) -> [i32; SIGNALS] {
-        let slot = &mut self.ring[index % LENGTH];
+        let slot = &mut self.ring[index];
         for ((sum, old), new) in self.sum.iter_mut().zip(slot.iter()).zip(new) {
             // Wrapping sums are exact as long as the true sum fits, which it does.
             *sum = sum.wrapping_add(new).wrapping_sub(*old);
@@ -75,23 +75,25 @@ pub struct Saliency {
 
 impl SynchronousState {
     /// One sample: the current in A; the injection axis `e^(j theta)`, delayed as the current is; the
-    /// number of the sample in the carrier period; the reference of the quadrature current, A.
+    /// carrier; the reference of the quadrature current, A.
+    #[inline]
     pub fn step(
         &mut self,
         current: AlphaBeta,
         axis: UnitVector,
-        carrier: usize,
+        carrier: CarrierPeriod,
         i_q: f32,
     ) -> Saliency {
         let (along, across) = current.seen_from(axis);
         let (along, across) = (along * (2.0 * UNITS), across * (2.0 * UNITS));
-        let (c, s) =
-            (CARRIER_COS[carrier % CARRIER_SAMPLES], CARRIER_SIN[carrier % CARRIER_SAMPLES]);
+        let (c, s) = (carrier.cos, carrier.sin);
         // Saturating casts: not-a-number gives 0, and the drive finds it elsewhere.
         let mixed = [along * c, -along * s, across * c, -across * s, i_q * UNITS].map(|x| x as i32);
-        let once = self.stages[0].step(self.index, mixed);
-        let twice = self.stages[1].step(self.index, once);
-        self.index = if self.index >= LENGTH - 1 { 0 } else { self.index + 1 };
+        // Below 20 by construction: this is for a flipped bit.
+        let index = if self.index < LENGTH { self.index } else { 0 };
+        self.index = index + 1;
+        let once = self.stages[0].step(index, mixed);
+        let twice = self.stages[1].step(index, once);
 
         const MEAN: f32 = 1.0 / (UNITS * (LENGTH * LENGTH) as f32);
         let [x_re, x_im, y_re, y_im, i_q] = twice.map(|x| x as f32 * MEAN);
@@ -113,7 +115,13 @@ mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
     use crate::angle::Angle;
+    use crate::injection::{CARRIER_COS, CARRIER_SIN};
     use core::f64::consts::TAU;
+
+    fn carrier(k: usize) -> CarrierPeriod {
+        let k = k % CARRIER_SAMPLES;
+        CarrierPeriod { cos: CARRIER_COS[k], sin: CARRIER_SIN[k], ..CarrierPeriod::default() }
+    }
 
     /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
     /// on top of a fundamental of 3 A.
@@ -128,7 +136,7 @@ mod tests {
                 (carrier * (theta + turn).cos() + 2.0) as f32,
                 (carrier * (theta + turn).sin() - 2.2) as f32,
             );
-            last = state.step(i, axis, k as usize % 10, 1.5);
+            last = state.step(i, axis, self::carrier(k as usize), 1.5);
         }
         last
     }
@@ -159,11 +167,11 @@ mod tests {
         for k in 0..600_000_usize {
             x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let noise = (x >> 8) as f32 / 4e6 - 2.0;
-            state.step(AlphaBeta::new(noise, -noise), axis, k % 10, noise);
+            state.step(AlphaBeta::new(noise, -noise), axis, carrier(k), noise);
         }
         let mut rest = Saliency::default();
         for k in 0..40_usize {
-            rest = state.step(AlphaBeta::ZERO, axis, k % 10, 0.0);
+            rest = state.step(AlphaBeta::ZERO, axis, carrier(k), 0.0);
         }
         assert_eq!(rest, Saliency::default());
     }
@@ -173,6 +181,6 @@ mod tests {
         assert_eq!(steady(0.0, 0.0, 0.0).q, 0.0);
         let mut state = SynchronousState::default();
         let nan = AlphaBeta::new(f32::NAN, f32::INFINITY);
-        assert!(state.step(nan, Angle::ZERO.unit_vector(), 77, f32::NAN).q.is_finite());
+        assert!(state.step(nan, Angle::ZERO.unit_vector(), carrier(77), f32::NAN).q.is_finite());
     }
 }
