@@ -10,6 +10,7 @@ pub mod line;
 
 use core::fmt::{self, Write};
 
+use drive_core::decimal::{Fixed, Shortest};
 use drive_core::settings::{PERIOD_S, SettingsError};
 use drive_core::{Coefficients, Refused, State, Taken};
 
@@ -176,7 +177,9 @@ impl Console {
             let answer = machine.order(Order::Stop);
             self.heard_ms = now_ms;
             match answer {
-                Ok(_) => self.reply(|text| write!(text, "stopped: no command for {limit} s")),
+                Ok(_) => {
+                    self.reply(|text| write!(text, "stopped: no command for {} s", Shortest(limit)))
+                }
                 Err(why) => self.reply(|text| write!(text, "error: not stopped: {why}")),
             }
         }
@@ -280,7 +283,9 @@ impl Console {
     fn give(&mut self, order: Order, machine: &mut impl Machine) {
         match machine.order(order) {
             Ok(Taken::AsGiven) => self.reply(|text| text.write_str("ok")),
-            Ok(Taken::Limited(value)) => self.reply(|text| write!(text, "ok: limited to {value}")),
+            Ok(Taken::Limited(value)) => {
+                self.reply(|text| write!(text, "ok: limited to {}", Shortest(value)))
+            }
             Err(why) => self.reply(|text| write!(text, "error: {why}")),
         }
     }
@@ -323,8 +328,8 @@ impl Console {
             }
             List::Trace(i) => match machine.traced(i - 1) {
                 Some(record) => self.one_of_list(List::Trace(i + 1), |text| {
-                    write!(text, "{},{:.2}", i - 1, record.phi_degrees())?;
-                    record.signals.iter().try_for_each(|signal| write!(text, ",{signal:.4}"))
+                    write!(text, "{},{}", i - 1, Fixed::<2>(record.phi_degrees()))?;
+                    record.signals.iter().try_for_each(|x| write!(text, ",{}", Fixed::<4>(*x)))
                 }),
                 None => self.end_list(),
             },
@@ -354,13 +359,13 @@ fn write_status(text: &mut Text, s: &Status, (used, size): (usize, usize)) -> fm
     let t = &s.telemetry;
     write!(
         text,
-        "{}; i_d {:.2} A, i_q {:.2} of {:.2} A, rotor {:.1} rpm electrical, dc link {:.0} V; ",
+        "{}; i_d {} A, i_q {} of {} A, rotor {} rpm electrical, dc link {} V; ",
         s.state,
-        t.current.d,
-        t.current.q,
-        t.reference.q,
-        rpm(t.rotor_step),
-        t.dc_link,
+        Fixed::<2>(t.current.d),
+        Fixed::<2>(t.current.q),
+        Fixed::<2>(t.reference.q),
+        Fixed::<1>(rpm(t.rotor_step)),
+        Fixed::<0>(t.dc_link),
     )?;
     write!(text, "{} of {} cycles, stack {used} of {size}", s.last_cycles, s.worst_cycles)
 }
@@ -378,7 +383,7 @@ fn write_key(text: &mut Text, key: &keys::Key, settings: &Everything) -> fmt::Re
             text.write_str(")")
         }
         _ => match key.range(settings) {
-            Some((min, max)) => write!(text, " ({min} to {max})"),
+            Some((min, max)) => write!(text, " ({} to {})", Shortest(min), Shortest(max)),
             None => Ok(()),
         },
     }

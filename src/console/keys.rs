@@ -5,6 +5,7 @@
 use core::fmt;
 
 use drive_core::Settings;
+use drive_core::decimal::Shortest;
 use drive_core::settings::{AngleSource, CurrentPlant, SettingsError, Tracking};
 
 use super::grammar::number;
@@ -100,7 +101,7 @@ pub enum Value {
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Number(value) => value.fmt(f),
+            Self::Number(value) => Shortest(*value).fmt(f),
             Self::Whole(value) => value.fmt(f),
             Self::Word { word, .. } => f.write_str(word),
         }
