@@ -14,7 +14,9 @@ use drive_core::decimal::{Fixed, Shortest};
 use drive_core::settings::{PERIOD_S, SettingsError};
 use drive_core::{Coefficients, Refused, State, Taken};
 
+use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
+use crate::saved::Failed;
 use crate::trace;
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
@@ -61,7 +63,7 @@ pub trait Machine {
     ///
     /// # Errors
     /// Why not.
-    fn save(&mut self, settings: &Everything) -> Result<(), &'static str>;
+    fn save(&mut self, settings: &Everything) -> Result<(), Failed>;
     /// Starts a trace, if none is being recorded; says whether it did.
     fn begin_trace(&mut self, records: u16, divider: u16) -> bool;
     /// Whether a trace is being recorded.
@@ -300,8 +302,10 @@ impl Console {
             Ok(coefficients) => match machine.order(Order::Configure(coefficients)) {
                 Err(why) => self.reply(|text| write!(text, "error: {why}")),
                 Ok(_) => {
+                    let waits = settings.drive.inverter.dead_time_s
+                        != self.settings.drive.inverter.dead_time_s;
                     self.settings = settings;
-                    self.reply(|text| text.write_str("ok"));
+                    self.reply(|text| text.write_str(if waits { FROM_RESET } else { "ok" }));
                 }
             },
         }
@@ -348,6 +352,8 @@ impl Console {
     }
 }
 
+/// The timer locks its dead time until a reset.
+const FROM_RESET: &str = "ok: the dead time holds from the next reset on, if saved";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
 
 /// Speed in rpm from turns per period.
@@ -367,7 +373,13 @@ fn write_status(text: &mut Text, s: &Status, (used, size): (usize, usize)) -> fm
         Fixed::<1>(rpm(t.rotor_step)),
         Fixed::<0>(t.dc_link),
     )?;
-    write!(text, "{} of {} cycles, stack {used} of {size}", s.last_cycles, s.worst_cycles)
+    write!(
+        text,
+        "{} of {} cycles, latest start {} us, stack {used} of {size}",
+        s.last_cycles,
+        s.worst_cycles,
+        Fixed::<1>(s.worst_latency as f32 / CYCLES_PER_US as f32),
+    )
 }
 
 fn write_key(text: &mut Text, key: &keys::Key, settings: &Everything) -> fmt::Result {

@@ -23,7 +23,9 @@ mod clocks;
 mod control;
 mod desk;
 mod encoder;
+mod flash;
 mod memory;
+mod over_voltage;
 mod pwm;
 mod serial;
 mod stop;
@@ -49,6 +51,9 @@ mod record;
 mod ring;
 #[cfg(any(target_os = "none", test))]
 #[cfg_attr(test, allow(dead_code))]
+mod saved;
+#[cfg(any(target_os = "none", test))]
+#[cfg_attr(test, allow(dead_code))]
 mod trace;
 #[cfg(any(target_os = "none", test))]
 #[cfg_attr(test, allow(dead_code))]
@@ -62,8 +67,8 @@ fn main() -> ! {
 
     memory::paint_stack();
     defmt::info!("induction-drive {}", desk::VERSION);
-    let bring_up::Board { mut port, mut desk } = bring_up::bring_up();
-    let mut console = console::Console::new(console::keys::Everything::of_the_board());
+    let bring_up::Board { settings, mut port, mut desk } = bring_up::bring_up();
+    let mut console = console::Console::new(settings);
     console.greet(&desk);
 
     loop {
