@@ -30,7 +30,8 @@ pub struct Commands {
 const LONGEST_TIMEOUT_S: f32 = 3600.0;
 
 impl Everything {
-    /// What is set in the image.
+    /// What is set in the image. Not inlined: every number of it is an instruction or two.
+    #[inline(never)]
     pub fn of_the_board() -> Self {
         Self { drive: crate::board::settings(), command: Commands::default() }
     }

@@ -65,6 +65,7 @@ pub fn record(settings: &Everything, sequence: u32) -> [u64; WORDS] {
     words
 }
 
+#[inline(never)]
 fn checksum(header: u64, sequence: u32, entries: impl Iterator<Item = u64>) -> u32 {
     let mut digest = CRC.digest();
     digest.update(&header.to_le_bytes());
@@ -80,8 +81,10 @@ fn header(word: u64) -> Option<(u16, usize)> {
     (magic == MAGIC && entries <= SLOT_WORDS - FIRST).then_some((version, entries))
 }
 
-/// What a slot holds that is read by `read`.
-pub fn find(read: &mut impl FnMut(usize) -> Option<u64>) -> Found {
+/// What a slot holds that is read by `read`. (Nothing here is inlined: it is called from several places,
+/// seldom.)
+#[inline(never)]
+pub fn find(read: &mut dyn FnMut(usize) -> Option<u64>) -> Found {
     if let Some((version, sequence)) = whole(read) {
         return Found::Whole { version, sequence };
     }
@@ -92,7 +95,8 @@ pub fn find(read: &mut impl FnMut(usize) -> Option<u64>) -> Found {
     }
 }
 
-fn whole(read: &mut impl FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
+#[inline(never)]
+fn whole(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
     let first = read(0)?;
     let (version, entries) = header(first)?;
     let (sequence, written) = halves(read(COMMIT)?);
@@ -110,8 +114,9 @@ fn whole(read: &mut impl FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
 ///
 /// # Errors
 /// Why they are not used.
+#[inline(never)]
 pub fn settings(
-    read: &mut impl FnMut(usize) -> Option<u64>,
+    read: &mut dyn FnMut(usize) -> Option<u64>,
     defaults: &Everything,
 ) -> Result<Everything, NotUsed> {
     let (version, entries) = read(0).and_then(header).ok_or(NotUsed::Broken)?;
