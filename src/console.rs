@@ -191,12 +191,13 @@ impl Console {
         let request = match self.lines.push(byte) {
             None => return,
             Some(Err(why)) => {
-                self.list = None;
+                (self.list, self.began_ms) = (None, None);
                 return self.reply(|text| write!(text, "error: {why}"));
             }
             Some(Ok(line)) => grammar::parse(line),
         };
-        self.list = None;
+        // The next line has its own time.
+        (self.list, self.began_ms) = (None, None);
         match request {
             Ok(request) => {
                 self.heard_ms = now_ms;

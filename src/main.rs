@@ -30,34 +30,9 @@ mod pwm;
 mod serial;
 mod stop;
 
-// What touches no register is tested on a host.
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod board;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod console;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod link;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod mailbox;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod record;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod ring;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod saved;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod trace;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod watchdog;
+// What touches no register is a library, which a host tests.
+#[cfg(target_os = "none")]
+use induction_drive::{board, console, link, mailbox, record, ring, saved, trace, watchdog};
 
 /// See the top of this file.
 #[cfg(target_os = "none")]

@@ -262,6 +262,17 @@ fn half_lines_are_dropped_in_time() {
 }
 
 #[test]
+fn a_line_has_its_own_time_whatever_came_before() {
+    let mut talk = Talk::new();
+    assert!(talk.say("rubbish").is_empty());
+    // Late, but whole, and the next line begins in the same breath.
+    talk.now_ms += LINE_MS + 1;
+    talk.wire.sent.extend(b"\nst");
+    talk.poll();
+    assert_eq!(talk.say("op\n"), ["error: no such command; `help` lists them", "ok"]);
+}
+
+#[test]
 fn damage_on_the_wire_is_told_and_changes_nothing() {
     let mut talk = Talk::new();
     talk.say("sta");
