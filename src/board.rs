@@ -11,7 +11,7 @@
 //! | PA6 | fault output of the power stage, low = trip | TIM1_BKIN |
 //! | PA0 | current a | ADC1_IN1 |
 //! | PC1 | current b | ADC2_IN7 |
-//! | PA1 | dc link | ADC1_IN2 |
+//! | PA1 | dc link | ADC1_IN2, COMP1 |
 //! | PC2 | heat sink | ADC2_IN8 |
 //! | PA15, PB3 | encoder A, B | TIM2_CH1, CH2 |
 //! | PA2, PA3 | console: transmit, receive (the ST-LINK's serial port) | LPUART1 |
@@ -64,22 +64,29 @@ const _: () = {
     assert!(error < 1e-4 && error > -1e-4);
 };
 
-/// Dead time of the inverter, ns (section 3.9): both switches of a leg are off for this long at
-/// every change.
-pub const DEAD_TIME_NS: u32 = 2200;
-/// Dead time as the timer makes it, in ticks of [`CLOCK_HZ`]: never shorter than asked for.
-pub const DEAD_TIME_TICKS: u32 = dead_time_ticks(DEAD_TIME_CODE);
-/// The same in s, for the compensation in the drive.
-pub const DEAD_TIME_S: f32 = DEAD_TIME_TICKS as f32 / CLOCK_HZ as f32;
-/// The DTG field of TIM1_BDTR.
-pub const DEAD_TIME_CODE: u8 = dead_time_code((DEAD_TIME_NS * CYCLES_PER_US).div_ceil(1000));
-const _: () = {
-    assert!(DEAD_TIME_TICKS * 1000 >= DEAD_TIME_NS * CYCLES_PER_US);
-    // What is added by rounding stays below 1 %.
-    assert!(DEAD_TIME_TICKS * 100_000 <= DEAD_TIME_NS * CYCLES_PER_US * 101);
-    // Two dead times per period are lost; the drive allows for 6 us.
-    assert!(DEAD_TIME_NS >= 500 && DEAD_TIME_NS <= 6000);
-};
+/// Dead time of the inverter, s (section 3.9): both switches of a leg are off for this long at every
+/// change. The default of the setting `inverter.dead_time_s`.
+pub const DEAD_TIME_S: f32 = 2.2e-6;
+/// What may be set, s: what fast and slow power modules need.
+pub const DEAD_TIME_RANGE_S: (f32, f32) = (0.5e-6, 6e-6);
+/// Core clocks per tick of the dead time (TIM1_CR1.CKD = 1): with one, it would end at 5.93 us.
+pub const DEAD_TIME_CLOCKS: u32 = 2;
+// The longest is within reach.
+const _: () = assert!(
+    (dead_time_ticks(u8::MAX) * DEAD_TIME_CLOCKS) as f32 >= DEAD_TIME_RANGE_S.1 * CLOCK_HZ as f32
+);
+
+/// The DTG field of TIM1_BDTR for a dead time in s within [`DEAD_TIME_RANGE_S`], and the dead time that
+/// the timer makes then: never shorter than asked for but by a hundredth of a tick.
+pub fn dead_time(seconds: f32) -> (u8, f32) {
+    let clock_hz = (CLOCK_HZ / DEAD_TIME_CLOCKS) as f32;
+    // Saturating cast. The hundredth is for what single precision makes of a whole number of ticks.
+    let ticks = (seconds * clock_hz + 0.99) as u32;
+    let code = dead_time_code(if ticks > LONGEST_DEAD_TIME { LONGEST_DEAD_TIME } else { ticks });
+    (code, dead_time_ticks(code) as f32 / clock_hz)
+}
+
+const LONGEST_DEAD_TIME: u32 = dead_time_ticks(u8::MAX);
 
 /// The shortest dead time the DTG field can hold that is not below `ticks` (RM0440, TIM1_BDTR).
 pub const fn dead_time_code(ticks: u32) -> u8 {
@@ -106,9 +113,12 @@ pub const fn dead_time_ticks(code: u8) -> u32 {
     }
 }
 
-/// The BKF field of TIM1_BDTR: six samples at half the clock, so a level must hold for 71 ns to trip
-/// or to end a trip. Spikes of the gate drivers are shorter, damage takes microseconds.
+/// The BKF field of TIM1_BDTR: six samples at a quarter of the core clock (half of that of the dead
+/// time), so a level must hold for [`BREAK_FILTER_NS`] to trip or to end a trip. Spikes of the gate
+/// drivers are shorter, damage takes microseconds.
 pub const BREAK_FILTER: u8 = 0b0100;
+/// What that takes, ns.
+pub const BREAK_FILTER_NS: u32 = 6 * 2 * DEAD_TIME_CLOCKS * 1000 / CYCLES_PER_US;
 
 /// Address of TIM1_BDTR, for the handler that cannot rely on anything (RM0440, memory map).
 pub const TIM1_BDTR: u32 = 0x4001_2c44;
@@ -208,6 +218,50 @@ const fn window(line: Line) -> (u16, u16) {
     )
 }
 
+// Reaction times --------------------------------------------------------------------------------
+
+/// The fault input of the power stage, from its edge to the outputs off, ns: the filter, and a few
+/// clocks of the timer. No software.
+pub const BREAK_REACTION_NS: u32 = BREAK_FILTER_NS + 4 * 1000 / CYCLES_PER_US;
+/// An analog watchdog, from an over-current to the outputs off, ns: up to a period until the next
+/// sample, the conversion, and the latest start of the interrupt that is allowed.
+pub const WATCHDOG_REACTION_NS: u32 =
+    (2 * PWM_TOP as u32 + CONVERSION.ticks()) * 1000 / CYCLES_PER_US + LATEST_START_US * 1000;
+/// The software, from an over-current to the outputs off, ns: the same, after the whole sequence, and
+/// the control step.
+pub const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS) * 1000
+    / CYCLES_PER_US
+    + (LATEST_START_US + LONGEST_STEP_US) * 1000;
+/// Latest start of the control interrupt after its samples are ready, us: the log's critical sections
+/// and the other interrupt are shorter. `status` shows the latest there was.
+pub const LATEST_START_US: u32 = 10;
+/// Longest control step that is reckoned with here, us; `status` shows the longest there was, in cycles.
+const LONGEST_STEP_US: u32 = 20;
+const _: () = {
+    assert!(BREAK_REACTION_NS < 200);
+    // Both lines in software end before the next period does.
+    assert!(WATCHDOG_REACTION_NS < SOFTWARE_REACTION_NS);
+    assert!(SOFTWARE_REACTION_NS < 200_000);
+};
+
+// Over-voltage ----------------------------------------------------------------------------------
+
+/// Dc link at which the comparator pulls the break, V: above the drive's own limit (400 V), which is
+/// asked first, below the end of the converter's range.
+pub const OVER_VOLTAGE_V: f32 = 430.0;
+/// The same as the code of a converter with the same reference and 12 bits, which the dc link is
+/// measured with and the level is made with.
+pub const OVER_VOLTAGE_CODE: u16 = ((OVER_VOLTAGE_V - DC_LINK.offset) / DC_LINK.gain) as u16;
+const _: () = assert!(OVER_VOLTAGE_CODE < ADC_FULL_SCALE);
+/// The INMSEL field of COMP1_CSR: DAC3, channel 1 (RM0440, comparator inverting inputs).
+pub const COMP1_INVERTING_DAC3: u8 = 0b100;
+/// The HYST field: 10 mV, which is 1.4 V of the dc link.
+pub const COMP_HYSTERESIS: u8 = 1;
+/// Time until the level stands, us (datasheet: 8 at most to wake up, unbuffered).
+pub const DAC_START_US: u32 = 10;
+/// Time until the comparator compares, us (datasheet: 5 at most).
+pub const COMP_START_US: u32 = 5;
+
 // Encoder -------------------------------------------------------------------------------------
 
 /// Alternate function of the pins that belong to TIM2 (datasheet).
@@ -264,6 +318,46 @@ pub const MOST_RESETS: u32 = 4;
 /// Time without a reset after which they are no longer in a row, ms.
 pub const WELL_AFTER_MS: u32 = 10_000;
 
+// Settings ------------------------------------------------------------------------------------
+
+/// Size of the flash, bytes.
+const FLASH_BYTES: u32 = 512 * 1024;
+const FLASH_ADDRESS: u32 = 0x0800_0000;
+/// Bytes of a page of the flash with two banks, and with one (RM0440, flash module organization).
+const PAGE_BYTES: (u32, u32) = (2048, 4096);
+/// What a set of settings may take, bytes: a page of the smaller kind.
+pub const SETTINGS_SLOT_BYTES: u32 = PAGE_BYTES.0;
+/// Where the two sets of settings are, from the beginning of the flash: the last pages of the larger
+/// kind, so that they stay where they are when the option bit DBANK changes.
+const SETTINGS_OFFSETS: [u32; 2] = [FLASH_BYTES - 2 * PAGE_BYTES.1, FLASH_BYTES - PAGE_BYTES.1];
+// In the second bank; the code is in the first, and runs on while the second is written.
+const _: () = assert!(SETTINGS_OFFSETS[0] >= FLASH_BYTES / 2);
+/// Longest wait for an operation of the flash, us: twice the erasure of a page (datasheet, 24.5 ms).
+pub const FLASH_TIMEOUT_US: u32 = 50_000;
+// A save is two erasures' worth of waiting at most, and the watchdog's long time lasts through it.
+const _: () = assert!(
+    2 * FLASH_TIMEOUT_US < (WATCHDOG_LONG_RELOAD as u32 + 1) * 64 * 1000 / (WATCHDOG_HZ_MAX / 1000)
+);
+
+const fn settings_offset(slot: usize) -> u32 {
+    if slot == 0 { SETTINGS_OFFSETS[0] } else { SETTINGS_OFFSETS[1] }
+}
+
+/// Address of a double word of a set of settings; always inside it.
+pub const fn settings_address(slot: usize, word: usize) -> u32 {
+    let words = SETTINGS_SLOT_BYTES / 8;
+    FLASH_ADDRESS + settings_offset(slot) + 8 * (word as u32 % words)
+}
+
+/// The fields BKER (second bank) and PNB (page in the bank) of FLASH_CR for a set of settings.
+pub const fn settings_page(slot: usize, dual_bank: bool) -> (bool, u8) {
+    if dual_bank {
+        (true, ((settings_offset(slot) - FLASH_BYTES / 2) / PAGE_BYTES.0) as u8)
+    } else {
+        (false, (settings_offset(slot) / PAGE_BYTES.1) as u8)
+    }
+}
+
 // Log -----------------------------------------------------------------------------------------
 
 /// Control periods from one status line to the next: 10 lines a second.
@@ -298,6 +392,33 @@ mod tests {
     }
 
     #[test]
+    fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
+        for ns in 500..=6000 {
+            let wanted = ns as f32 * 1e-9;
+            let made = dead_time(wanted).1;
+            assert!(made > wanted - 0.2e-9 && made < 1.04 * wanted + 12e-9, "{wanted}: {made}");
+            // What the timer makes, asked for again, is the same.
+            assert_eq!(dead_time(made), dead_time(wanted));
+        }
+        // Whatever else is asked for, there is a field.
+        for odd in [f32::NAN, f32::INFINITY, -1.0, 0.0] {
+            let _ = dead_time(odd);
+        }
+    }
+
+    #[test]
+    fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
+        let trip = DC_LINK.at(OVER_VOLTAGE_CODE);
+        assert!(trip > settings().limits.dc_over_v && trip < DC_LINK.at(ADC_FULL_SCALE));
+    }
+
+    #[test]
+    fn reaction_times_are_those_of_the_readme() {
+        let times = [BREAK_REACTION_NS, WATCHDOG_REACTION_NS, SOFTWARE_REACTION_NS];
+        assert_eq!(times, [164, 176_964, 198_376]);
+    }
+
+    #[test]
     fn every_dead_time_code_is_found_again() {
         for code in 0..=u8::MAX {
             let ticks = dead_time_ticks(code);
@@ -308,8 +429,18 @@ mod tests {
     #[test]
     fn the_numbers_are_those_of_the_design() {
         assert_eq!(PWM_TOP, 14_167);
-        assert_eq!((DEAD_TIME_CODE, DEAD_TIME_TICKS), (0xcf, 376)); // 2.21 us
+        let (code, seconds) = dead_time(DEAD_TIME_S);
+        assert_eq!((code, (seconds * 170e6).round()), (0x9e, 376.0)); // 2.21 us
         assert_eq!(SAMPLE_AT, 14_167 - 98);
+    }
+
+    /// An erasure of a page that is not the settings' would be the end of the firmware.
+    #[test]
+    fn the_pages_of_the_settings_are_the_last_with_one_bank_and_with_two() {
+        assert_eq!([0, 1].map(|slot| settings_page(slot, true)), [(true, 124), (true, 126)]);
+        assert_eq!([0, 1].map(|slot| settings_page(slot, false)), [(false, 126), (false, 127)]);
+        let ends = [(0, 0), (0, 255), (1, 0), (1, 255)].map(|(s, w)| settings_address(s, w));
+        assert_eq!(ends, [0x0807_e000, 0x0807_e7f8, 0x0807_f000, 0x0807_f7f8]);
     }
 
     /// 0 A gave 2024 with 3.0 V (Table 4): the same voltage is 1840 of 3.3 V.

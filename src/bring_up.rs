@@ -2,22 +2,27 @@
 #![cfg(target_os = "none")]
 
 use cortex_m::singleton;
-use drive_core::Drive;
+use drive_core::settings::SettingsError;
+use drive_core::{Coefficients, Drive};
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
 use crate::console::keys::Everything;
-use crate::desk::{Desk, Ends, LastRun};
+use crate::desk::{Chip, Desk, Ends};
+use crate::flash::Pages;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::Mailbox;
-use crate::record::Reason;
+use crate::record::{Reason, Record};
+use crate::saved::{Loaded, NotUsed, Saved};
 use crate::serial::Port;
 use crate::trace::Trace;
 use crate::watchdog::Watchdog;
-use crate::{adc, board, clocks, control, encoder, pwm, stop};
+use crate::{adc, board, clocks, control, encoder, memory, over_voltage, pwm, stop};
 
 /// What the main loop works with.
 pub struct Board {
+    /// What is set: what was saved, or the defaults.
+    pub settings: Everything,
     /// The serial port of the console.
     pub port: Port,
     /// The drive.
@@ -49,15 +54,18 @@ pub fn bring_up() -> Board {
 }
 
 fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
-    let (last, resets) = last_run(&chip.RCC);
+    let (cause, record, resets) = last_run(&chip.RCC);
+    let options = chip.FLASH.optr().read();
+    let (options, dual_bank) = (options.bits(), options.dbank().is_dual_bank_mode());
     defmt::info!(
-        "reset by {}, {} unwished in a row; option bytes {:08x}, {} bank(s)",
-        last.cause,
+        "build {=[u8]:02x}, reset by {}, {} unwished in a row; option bytes {:08x}, {} bank(s)",
+        memory::build_id(),
+        cause,
         resets,
-        chip.FLASH.optr().read().bits(),
-        if chip.FLASH.optr().read().dbank().is_dual_bank_mode() { 2 } else { 1 },
+        options,
+        if dual_bank { 2 } else { 1 },
     );
-    if let Some(record) = &last.record {
+    if let Some(record) = &record {
         defmt::error!("the last run ended with {}", defmt::Display2Format(record));
     }
     let (mut rcc, source) = clocks::start(chip.RCC, chip.PWR, &chip.FLASH);
@@ -70,6 +78,9 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
+    let Start { saved, settings, coefficients, not_used } = load(Pages::new(chip.FLASH));
+    let (dead_time_code, dead_time_s) = board::dead_time(settings.drive.inverter.dead_time_s);
+
     let a = chip.GPIOA.split(&mut rcc);
     let b = chip.GPIOB.split(&mut rcc);
     let c = chip.GPIOC.split(&mut rcc);
@@ -79,24 +90,57 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
         adc::Pins { current_a: a.pa0, current_b: c.pc1, dc_link: a.pa1, heat_sink: c.pc2 };
 
     // First of all: the gates are driven low from here on.
-    let pwm = pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU, &chip.SYSCFG);
+    over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc);
+    let pwm =
+        pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let Some(port) = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc) else {
         unreachable!("main runs once")
     };
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     let ends = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, adc_pins, &mut rcc)
         .map_err(NotStarted::Converter)
-        .and_then(|adc| start_control(pwm, adc, encoder, resets));
+        .and_then(|adc| start_control(coefficients, pwm, adc, encoder, resets));
     if let Err(error) = &ends {
         defmt::error!("the drive is not started, outputs stay off: {}", error);
     }
     // Only over a control that runs: without it the outputs stay off.
     let watchdog = ends.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
-    Board { port, desk: Desk::new(ends.ok(), watchdog, last) }
+    let chip = Chip { cause, record, options, dual_bank, saved, not_used, dead_time_s };
+    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip) }
 }
 
-/// What ended the last run, and how many in a row ended so that nobody wished.
-fn last_run(rcc: &pac::RCC) -> (LastRun, u32) {
+/// What the drive starts with.
+struct Start {
+    saved: Saved<Pages>,
+    settings: Everything,
+    coefficients: Result<Coefficients, SettingsError>,
+    /// Why what was saved is not used, if it is not.
+    not_used: Option<NotUsed>,
+}
+
+/// The settings that were saved, or the defaults and why.
+fn load(pages: Pages) -> Start {
+    let defaults = Everything::of_the_board();
+    let (saved, loaded) = Saved::load(pages, &defaults);
+    let (mut settings, mut not_used) = match loaded {
+        Loaded::Settings(settings) => (settings, None),
+        Loaded::NotUsed(why) => (defaults, Some(why)),
+        Loaded::Nothing => (defaults, None),
+    };
+    let mut coefficients = settings.build();
+    if coefficients.is_err() {
+        (settings, not_used) = (defaults, Some(NotUsed::Refused));
+        coefficients = settings.build();
+    }
+    if let Some(why) = not_used {
+        defmt::error!("{}", defmt::Display2Format(&why));
+    }
+    Start { saved, settings, coefficients, not_used }
+}
+
+/// What reset the chip, what the firmware wrote before, and how many in a row ended so that nobody
+/// wished.
+fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     let flags = rcc.csr().read();
     // The cause first that says most: every reset pulls the reset pin as well.
     let cause = if flags.iwdgrstf().is_reset() {
@@ -117,10 +161,11 @@ fn last_run(rcc: &pac::RCC) -> (LastRun, u32) {
     let stopped = record.is_some_and(|record| record.reason != Reason::Drive);
     let unwished = flags.iwdgrstf().is_reset() || (flags.sftrstf().is_reset() && stopped);
     rcc.csr().modify(|_, w| w.rmvf().clear());
-    (LastRun { cause, record }, stop::count_reset(unwished))
+    (cause, record, stop::count_reset(unwished))
 }
 
 fn start_control(
+    coefficients: Result<Coefficients, SettingsError>,
     mut pwm: pwm::Pwm,
     adc: adc::Adc,
     encoder: encoder::Encoder,
@@ -129,7 +174,7 @@ fn start_control(
     if resets > board::MOST_RESETS {
         return Err(NotStarted::Resets);
     }
-    let coefficients = Everything::of_the_board().build().map_err(|error| {
+    let coefficients = coefficients.map_err(|error| {
         defmt::error!("settings: {}", defmt::Display2Format(&error));
         NotStarted::Settings
     })?;

@@ -10,10 +10,13 @@ pub mod line;
 
 use core::fmt::{self, Write};
 
+use drive_core::decimal::{Fixed, Shortest};
 use drive_core::settings::{PERIOD_S, SettingsError};
 use drive_core::{Coefficients, Refused, State, Taken};
 
+use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
+use crate::saved::Failed;
 use crate::trace;
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
@@ -60,7 +63,7 @@ pub trait Machine {
     ///
     /// # Errors
     /// Why not.
-    fn save(&mut self, settings: &Everything) -> Result<(), &'static str>;
+    fn save(&mut self, settings: &Everything) -> Result<(), Failed>;
     /// Starts a trace, if none is being recorded; says whether it did.
     fn begin_trace(&mut self, records: u16, divider: u16) -> bool;
     /// Whether a trace is being recorded.
@@ -176,7 +179,9 @@ impl Console {
             let answer = machine.order(Order::Stop);
             self.heard_ms = now_ms;
             match answer {
-                Ok(_) => self.reply(|text| write!(text, "stopped: no command for {limit} s")),
+                Ok(_) => {
+                    self.reply(|text| write!(text, "stopped: no command for {} s", Shortest(limit)))
+                }
                 Err(why) => self.reply(|text| write!(text, "error: not stopped: {why}")),
             }
         }
@@ -186,12 +191,13 @@ impl Console {
         let request = match self.lines.push(byte) {
             None => return,
             Some(Err(why)) => {
-                self.list = None;
+                (self.list, self.began_ms) = (None, None);
                 return self.reply(|text| write!(text, "error: {why}"));
             }
             Some(Ok(line)) => grammar::parse(line),
         };
-        self.list = None;
+        // The next line has its own time.
+        (self.list, self.began_ms) = (None, None);
         match request {
             Ok(request) => {
                 self.heard_ms = now_ms;
@@ -280,7 +286,9 @@ impl Console {
     fn give(&mut self, order: Order, machine: &mut impl Machine) {
         match machine.order(order) {
             Ok(Taken::AsGiven) => self.reply(|text| text.write_str("ok")),
-            Ok(Taken::Limited(value)) => self.reply(|text| write!(text, "ok: limited to {value}")),
+            Ok(Taken::Limited(value)) => {
+                self.reply(|text| write!(text, "ok: limited to {}", Shortest(value)))
+            }
             Err(why) => self.reply(|text| write!(text, "error: {why}")),
         }
     }
@@ -295,8 +303,10 @@ impl Console {
             Ok(coefficients) => match machine.order(Order::Configure(coefficients)) {
                 Err(why) => self.reply(|text| write!(text, "error: {why}")),
                 Ok(_) => {
+                    let waits = settings.drive.inverter.dead_time_s
+                        != self.settings.drive.inverter.dead_time_s;
                     self.settings = settings;
-                    self.reply(|text| text.write_str("ok"));
+                    self.reply(|text| text.write_str(if waits { FROM_RESET } else { "ok" }));
                 }
             },
         }
@@ -323,8 +333,8 @@ impl Console {
             }
             List::Trace(i) => match machine.traced(i - 1) {
                 Some(record) => self.one_of_list(List::Trace(i + 1), |text| {
-                    write!(text, "{},{:.2}", i - 1, record.phi_degrees())?;
-                    record.signals.iter().try_for_each(|signal| write!(text, ",{signal:.4}"))
+                    write!(text, "{},{}", i - 1, Fixed::<2>(record.phi_degrees()))?;
+                    record.signals.iter().try_for_each(|x| write!(text, ",{}", Fixed::<4>(*x)))
                 }),
                 None => self.end_list(),
             },
@@ -343,6 +353,8 @@ impl Console {
     }
 }
 
+/// The timer locks its dead time until a reset.
+const FROM_RESET: &str = "ok: the dead time holds from the next reset on, if saved";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
 
 /// Speed in rpm from turns per period.
@@ -354,15 +366,21 @@ fn write_status(text: &mut Text, s: &Status, (used, size): (usize, usize)) -> fm
     let t = &s.telemetry;
     write!(
         text,
-        "{}; i_d {:.2} A, i_q {:.2} of {:.2} A, rotor {:.1} rpm electrical, dc link {:.0} V; ",
+        "{}; i_d {} A, i_q {} of {} A, rotor {} rpm electrical, dc link {} V; ",
         s.state,
-        t.current.d,
-        t.current.q,
-        t.reference.q,
-        rpm(t.rotor_step),
-        t.dc_link,
+        Fixed::<2>(t.current.d),
+        Fixed::<2>(t.current.q),
+        Fixed::<2>(t.reference.q),
+        Fixed::<1>(rpm(t.rotor_step)),
+        Fixed::<0>(t.dc_link),
     )?;
-    write!(text, "{} of {} cycles, stack {used} of {size}", s.last_cycles, s.worst_cycles)
+    write!(
+        text,
+        "{} of {} cycles, latest start {} us, stack {used} of {size}",
+        s.last_cycles,
+        s.worst_cycles,
+        Fixed::<1>(s.worst_latency as f32 / CYCLES_PER_US as f32),
+    )
 }
 
 fn write_key(text: &mut Text, key: &keys::Key, settings: &Everything) -> fmt::Result {
@@ -378,7 +396,7 @@ fn write_key(text: &mut Text, key: &keys::Key, settings: &Everything) -> fmt::Re
             text.write_str(")")
         }
         _ => match key.range(settings) {
-            Some((min, max)) => write!(text, " ({min} to {max})"),
+            Some((min, max)) => write!(text, " ({} to {})", Shortest(min), Shortest(max)),
             None => Ok(()),
         },
     }

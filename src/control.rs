@@ -64,6 +64,7 @@ impl Control {
             late: Hardware::NONE,
             over: Hardware::NONE,
             seen: Hardware::NONE,
+            began: 0,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -94,6 +95,8 @@ struct Running {
     /// Whether an analog watchdog has seen an over-current since the period before.
     over: Hardware,
     seen: Hardware,
+    /// Cycle count at the start of the period before.
+    began: u32,
 }
 
 #[interrupt]
@@ -101,6 +104,11 @@ fn ADC1_2() {
     // SAFETY: see `Owned`; written before the interrupt was unmasked, and the reference ends with this
     // function.
     unsafe { (*RUNNING.0.get()).assume_init_mut() }.period();
+}
+
+/// Whether the outputs are off, and stay off until the next order.
+fn is_off(drive: &Drive) -> bool {
+    matches!(drive.state(), State::Off | State::Fault(_))
 }
 
 impl Running {
@@ -119,12 +127,22 @@ impl Running {
             return;
         }
 
-        // The timer counts down since it was at the top, where the sampling ended.
-        let latency = pwm.since_top().saturating_sub(board::SAMPLES_READY_TICKS);
+        // The timer counts down since it was at the top, where the sampling ended and an update came; one
+        // period ago it was there before. Anything else is a period that was skipped, or came late.
+        let since_top = pwm.since_top();
+        let since_last = began.wrapping_sub(core::mem::replace(&mut self.began, began));
+        if self.periods > 0
+            && (!pwm.updated()
+                || since_top > u32::from(board::PWM_TOP)
+                || since_last > 3 * u32::from(board::PWM_TOP))
+        {
+            self.late = Hardware::DEADLINE_MISS;
+        }
+        pwm.clear_updated();
+        let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
         if latency > self.worst_latency {
             self.worst_latency = latency;
         }
-        pwm.clear_updated();
         let codes = adc.read();
         let mut hardware = self.late.and(self.over);
         self.over = Hardware::NONE;
@@ -143,19 +161,24 @@ impl Running {
             hardware,
         };
 
+        let was_off = is_off(drive);
         pwm.apply(drive.step(&sample));
 
-        // The timer has taken over before all compare values were written.
+        // The timer has taken over before all compare values were written, or the next sequence has ended.
         self.late = Hardware::NONE;
-        if pwm.updated() {
+        if pwm.updated() || pwm.since_top() < since_top || adc.ended() {
             self.late = Hardware::DEADLINE_MISS;
+        }
+        // With the outputs off a miss harms nobody, and is only told.
+        let missed = hardware.and(self.late).has(Hardware::DEADLINE_MISS);
+        if missed && !was_off {
+            pwm.trip();
             MISSED.store(true, Ordering::Relaxed);
         }
 
         // An order comes between two steps: it acts from the next one on.
         let answered = orders.take_with(|order| drive.command(order.command()));
-        let is_off = matches!(drive.state(), State::Off | State::Fault(_));
-        IS_OFF.store(is_off, Ordering::Relaxed);
+        IS_OFF.store(is_off(drive), Ordering::Relaxed);
         if let Some(answer) = answered {
             // There is room: the main loop takes the last answer before it sends an order.
             answers.send(answer);

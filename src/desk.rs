@@ -14,14 +14,16 @@ use crate::console::grammar::Level;
 use crate::console::keys::Everything;
 use crate::console::{Machine, NotDone};
 use crate::control;
+use crate::flash::Pages;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::memory;
 use crate::record::{Reason, Record};
+use crate::saved::{Failed, NotUsed, Saved};
 use crate::watchdog::{Rule, Verdict, Watchdog};
 use crate::{pwm, stop, trace};
 
-/// Which firmware this is.
+/// Which firmware this is, in the sources.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
 
 /// The ends of what goes to the control interrupt and comes from it.
@@ -46,16 +48,25 @@ pub struct Desk {
     guard: Option<(Watchdog, Rule)>,
     /// Whether it has run for a while.
     well: bool,
-    last: LastRun,
+    chip: Chip,
 }
 
-/// What ended the last run.
-#[derive(Clone, Copy)]
-pub struct LastRun {
-    /// What reset the chip.
+/// What the desk knows of the chip and of its own start.
+pub struct Chip {
+    /// What reset it.
     pub cause: &'static str,
     /// What the firmware wrote before.
     pub record: Option<Record>,
+    /// Its option bytes.
+    pub options: u32,
+    /// Whether its flash has two banks.
+    pub dual_bank: bool,
+    /// The pages of the settings.
+    pub saved: Saved<Pages>,
+    /// Why what was saved is not used, if it is not.
+    pub not_used: Option<NotUsed>,
+    /// Dead time that the timer makes, s.
+    pub dead_time_s: f32,
 }
 
 /// Milliseconds, from the cycle counter, which wraps every 25 s: read it more often.
@@ -78,11 +89,11 @@ impl Clock {
 
 impl Desk {
     /// A desk; without `ends`, one whose control does not run.
-    pub fn new(ends: Option<Ends>, watchdog: Option<Watchdog>, last: LastRun) -> Self {
+    pub fn new(ends: Option<Ends>, watchdog: Option<Watchdog>, chip: Chip) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
-        Self { ends, status: None, level: Level::Info, clock, guard, well: false, last }
+        Self { ends, status: None, level: Level::Info, clock, guard, well: false, chip }
     }
 
     /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.
@@ -182,14 +193,13 @@ impl Machine for Desk {
     }
 
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
-        match &mut self.guard {
-            Some((watchdog, _)) => watchdog.stretched(|| settings.build()),
-            None => settings.build(),
-        }
+        stretched(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
     }
 
-    fn save(&mut self, _settings: &Everything) -> Result<(), &'static str> {
-        Err("saving is not available yet: the settings hold until the next reset")
+    fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
+        stretched(&mut self.guard, || self.chip.saved.save(settings))?;
+        self.chip.not_used = None;
+        Ok(())
     }
 
     fn begin_trace(&mut self, records: u16, divider: u16) -> bool {
@@ -213,14 +223,34 @@ impl Machine for Desk {
     }
 
     fn version(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        to.write_str(VERSION)
+        to.write_str(VERSION)?;
+        to.write_str(", build ")?;
+        memory::build_id().iter().try_for_each(|byte| write!(to, "{byte:02x}"))?;
+        let banks = if self.chip.dual_bank { 2 } else { 1 };
+        write!(to, "; option bytes {:08x}, {banks} bank(s)", self.chip.options)
     }
 
     fn last_run(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        to.write_str(self.last.cause)?;
-        match &self.last.record {
-            Some(record) => write!(to, ", {record}"),
+        write!(to, "reset by {}", self.chip.cause)?;
+        if let Some(record) = &self.chip.record {
+            write!(to, ", {record}")?;
+        }
+        match &self.chip.not_used {
+            Some(why) => write!(to, "; {why}"),
             None => Ok(()),
         }
+    }
+}
+
+/// Does what takes long, with the time of the watchdog stretched, and lets it count from there: with
+/// one bank of flash the core, and the control with it, waits while the flash is written.
+fn stretched<R>(guard: &mut Option<(Watchdog, Rule)>, work: impl FnOnce() -> R) -> R {
+    match guard {
+        Some((watchdog, rule)) => {
+            let result = watchdog.stretched(work);
+            rule.restart(DWT::cycle_count(), control::PERIODS.load(Ordering::Relaxed));
+            result
+        }
+        None => work(),
     }
 }

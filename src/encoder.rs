@@ -1,4 +1,7 @@
 //! The encoder: TIM2 counts both edges of both tracks, 32 bits, wrapping.
+//!
+//! The index is left out: the flux angle needs no absolute position, and the drive finds a count that
+//! runs away by itself (`Fault::Encoder`, and by the current that does not follow the voltage).
 #![cfg(target_os = "none")]
 
 use stm32g4xx_hal::gpio::{Debugger, PA15, PB3, Pull};

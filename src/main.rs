@@ -23,36 +23,16 @@ mod clocks;
 mod control;
 mod desk;
 mod encoder;
+mod flash;
 mod memory;
+mod over_voltage;
 mod pwm;
 mod serial;
 mod stop;
 
-// What touches no register is tested on a host.
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod board;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod console;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod link;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod mailbox;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod record;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod ring;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod trace;
-#[cfg(any(target_os = "none", test))]
-#[cfg_attr(test, allow(dead_code))]
-mod watchdog;
+// What touches no register is a library, which a host tests.
+#[cfg(target_os = "none")]
+use induction_drive::{board, console, link, mailbox, record, ring, saved, trace, watchdog};
 
 /// See the top of this file.
 #[cfg(target_os = "none")]
@@ -62,8 +42,8 @@ fn main() -> ! {
 
     memory::paint_stack();
     defmt::info!("induction-drive {}", desk::VERSION);
-    let bring_up::Board { mut port, mut desk } = bring_up::bring_up();
-    let mut console = console::Console::new(console::keys::Everything::of_the_board());
+    let bring_up::Board { settings, mut port, mut desk } = bring_up::bring_up();
+    let mut console = console::Console::new(settings);
     console.greet(&desk);
 
     loop {

@@ -35,6 +35,17 @@ unsafe extern "C" fn copy_control_code() {
     )
 }
 
+/// The build id: a hash that the linker makes of the image, so that what runs can be told from what was
+/// built. Behind the note's header (12 bytes) and its name, `GNU`.
+pub fn build_id() -> [u8; 8] {
+    const BEHIND: usize = 16;
+    unsafe extern "C" {
+        static _build_id: u8;
+    }
+    // SAFETY: memory.x puts the note there; it holds a hash of 8 bytes at least, and never changes.
+    unsafe { (&raw const _build_id).add(BEHIND).cast::<[u8; 8]>().read() }
+}
+
 /// What unused stack holds.
 const PAINT: u32 = 0xc5c5_c5c5;
 /// Words above the stack pointer's next use that are left alone, for what calls `paint_stack`.

@@ -42,6 +42,7 @@ impl Pwm {
         rcc: &mut Rcc,
         debug: &pac::DBGMCU,
         system: &pac::SYSCFG,
+        dead_time_code: u8,
     ) -> Self {
         // Both names of one register: see board.rs.
         assert!(timer.bdtr().as_ptr() as u32 == board::TIM1_BDTR);
@@ -83,10 +84,11 @@ impl Pwm {
             .cfgr2()
             .modify(|_, w| w.cll().set_bit().spl().set_bit().pvdl().set_bit().eccl().set_bit());
 
-        // The break input: pin PA6, not inverted on its way.
-        timer.af1().write(|w| w.bkine().set_bit());
+        // The break inputs: pin PA6, low trips like the break itself; the comparator of the dc link, high
+        // trips, so inverted.
+        timer.af1().write(|w| w.bkine().set_bit().bkcmp1e().set_bit().bkcmp1p().set_bit());
         timer.bdtr().write(|w| {
-            w.dtg().set(board::DEAD_TIME_CODE);
+            w.dtg().set(dead_time_code);
             // Off means driven to the idle level, which is low (CR2.OISx = 0): not floating.
             w.ossi().idle_level().ossr().idle_level();
             // A low fault input trips. Nothing but software switches the outputs on again.
@@ -100,7 +102,8 @@ impl Pwm {
         // comes when the counter first reaches the top; from there on every other one, always at
         // the top.
         timer.rcr().write(|w| w.rep().set(0));
-        timer.cr1().write(|w| w.arpe().enabled().cms().center_aligned1());
+        // See board::DEAD_TIME_CLOCKS.
+        timer.cr1().write(|w| w.arpe().enabled().cms().center_aligned1().ckd().div2());
         timer.egr().write(|w| w.ug().update());
         timer.rcr().write(|w| w.rep().set(board::PWM_UPDATES_LEFT_OUT));
 

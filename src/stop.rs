@@ -14,7 +14,7 @@ use defmt::Display2Format;
 use stm32g4xx_hal::pac;
 
 use crate::record::{Reason, Record, WORDS};
-use crate::{board, pwm};
+use crate::{board, flash, pwm};
 
 /// RAM that keeps its contents over a reset.
 struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
@@ -136,8 +136,13 @@ extern "C" fn after_hard_fault(program_counter: u32, link: u32) -> ! {
 
 /// The crystal has stopped, or the flash has an error that cannot be corrected. After the reset the
 /// firmware runs from the internal oscillator, if the crystal does not come back.
+///
+/// A double word of the settings that a power failure has torn is no reason to stop.
 #[exception]
-unsafe fn NonMaskableInt() -> ! {
+unsafe fn NonMaskableInt() {
+    if flash::forgive_torn() {
+        return;
+    }
     pwm::outputs_off();
     // SAFETY: reads two registers; nothing else runs any more.
     let (rcc, flash) = unsafe { (&*pac::RCC::ptr(), &*pac::FLASH::ptr()) };

@@ -43,6 +43,11 @@ impl Rule {
         Self { cycles, periods, refused: false }
     }
 
+    /// Counts anew from here, but what was refused stays refused.
+    pub const fn restart(&mut self, cycles: u32, periods: u32) {
+        (self.cycles, self.periods) = (cycles, periods);
+    }
+
     /// Once refused, it stays so.
     pub fn judge(&mut self, cycles: u32, periods: u32, missed: bool) -> Verdict {
         let elapsed = cycles.wrapping_sub(self.cycles);
@@ -143,6 +148,16 @@ mod tests {
         let mut rule = Rule::new(0, 0);
         assert!(matches!(rule.judge(10, 0, true), Verdict::Refuse { .. }));
         assert!(matches!(rule.judge(FEED_CYCLES, 12, false), Verdict::Refuse { .. }));
+    }
+
+    #[test]
+    fn a_pause_that_was_meant_is_not_counted_but_heals_nothing() {
+        let mut rule = Rule::new(0, 0);
+        rule.restart(50 * FEED_CYCLES, 3);
+        assert_eq!(rule.judge(51 * FEED_CYCLES, 15, false), Verdict::Feed);
+        assert!(matches!(rule.judge(51 * FEED_CYCLES, 15, true), Verdict::Refuse { .. }));
+        rule.restart(60 * FEED_CYCLES, 15);
+        assert!(matches!(rule.judge(61 * FEED_CYCLES, 27, false), Verdict::Refuse { .. }));
     }
 
     #[test]

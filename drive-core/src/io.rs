@@ -10,6 +10,8 @@
 //! * a voltage takes effect one period after the sample it was computed from, and
 //! * its mean acts at `(k + 1.5) T`.
 
+use crate::decimal::Shortest;
+
 /// What the converters and the encoder read at the instant `k T` of one PWM period.
 ///
 /// Plain register values: scaling is the drive's work, so that there is one place for it.
@@ -160,6 +162,7 @@ impl core::fmt::Display for Refused {
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
+                let (min, max) = (Shortest(*min), Shortest(*max));
                 write!(f, "the value is outside the allowed range {min} to {max}")
             }
         }

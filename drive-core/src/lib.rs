@@ -55,6 +55,7 @@ pub mod tuning;
 
 pub use angle::{Angle, UnitVector};
 pub use drive::{Drive, Telemetry};
+pub use drive_design::decimal;
 pub use fault::Fault;
 pub use frames::{Abc, AlphaBeta, DmQm, Dq};
 pub use io::{Command, Compare, Hardware, Mode, Refused, Sample, Taken};

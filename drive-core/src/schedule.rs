@@ -9,6 +9,8 @@
 
 use core::fmt;
 
+use crate::decimal::Shortest;
+
 /// Points of the tables, from i_q = 0 on.
 const POINTS: usize = 16;
 /// Their distance, A.
@@ -41,7 +43,10 @@ impl fmt::Display for TableError {
             Self::TooShort => write!(f, "a table needs two points at least"),
             Self::NotOdd => write!(f, "point 0 must be 0 at 0 A: the table is odd"),
             Self::NotIncreasing(n) => write!(f, "point {n}: the currents must increase strictly"),
-            Self::TooLarge(n, q) => write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}"),
+            Self::TooLarge(n, q) => {
+                let (q, largest) = (Shortest(*q), Shortest(LARGEST));
+                write!(f, "point {n}: {q} is outside -{largest} to {largest}")
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ mod coefficients;
 
 use core::fmt;
 
+use crate::decimal::Shortest;
 use crate::schedule::ReferenceTable;
 use crate::sensing::Line;
 use crate::tuning::{FirstOrder, TuningError};
@@ -376,6 +377,7 @@ impl fmt::Display for SettingsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Range { name, value, min, max } => {
+                let [value, min, max] = [value, min, max].map(|x| Shortest(*x));
                 write!(f, "{name} = {value}: allowed is {min} to {max}")
             }
             Self::Tuning(error) => write!(f, "current controllers: {error}"),

@@ -5,7 +5,8 @@
 use core::fmt;
 
 use drive_core::Settings;
-use drive_core::settings::{AngleSource, CurrentPlant, SettingsError, Tracking};
+use drive_core::decimal::Shortest;
+use drive_core::settings::{AngleSource, CurrentPlant, Inverter, SettingsError, Tracking};
 
 use super::grammar::number;
 
@@ -29,7 +30,8 @@ pub struct Commands {
 const LONGEST_TIMEOUT_S: f32 = 3600.0;
 
 impl Everything {
-    /// What is set in the image.
+    /// What is set in the image. Not inlined: every number of it is an instruction or two.
+    #[inline(never)]
     pub fn of_the_board() -> Self {
         Self { drive: crate::board::settings(), command: Commands::default() }
     }
@@ -39,12 +41,38 @@ impl Everything {
     /// # Errors
     /// The first value outside, or the rule of design that cannot be met.
     pub fn build(&self) -> Result<drive_core::Coefficients, SettingsError> {
-        let value = self.command.timeout_s;
-        if !(0.0..=LONGEST_TIMEOUT_S).contains(&value) {
-            let (name, min, max) = ("command.timeout_s", 0.0, LONGEST_TIMEOUT_S);
-            return Err(SettingsError::Range { name, value, min, max });
+        self.check()?;
+        self.drive_with(crate::board::dead_time(self.drive.inverter.dead_time_s).1).build()
+    }
+
+    /// The drive's settings, for a timer that makes this dead time, s.
+    fn drive_with(&self, dead_time_s: f32) -> Settings {
+        let inverter = Inverter { dead_time_s, ..self.drive.inverter };
+        Settings { inverter, ..self.drive }
+    }
+
+    /// The same as [`build`](Self::build) for a timer that makes another dead time than is set, because
+    /// it takes a new one at a reset only, s.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn build_for(&self, dead_time_s: f32) -> Result<drive_core::Coefficients, SettingsError> {
+        self.check()?;
+        self.drive_with(dead_time_s).build()
+    }
+
+    /// What the firmware asks of settings beside the drive.
+    fn check(&self) -> Result<(), SettingsError> {
+        let (shortest, longest) = crate::board::DEAD_TIME_RANGE_S;
+        for (name, value, min, max) in [
+            ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
+            ("inverter.dead_time_s", self.drive.inverter.dead_time_s, shortest, longest),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(SettingsError::Range { name, value, min, max });
+            }
         }
-        self.drive.build()
+        Ok(())
     }
 }
 
@@ -100,7 +128,7 @@ pub enum Value {
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Number(value) => value.fmt(f),
+            Self::Number(value) => Shortest(*value).fmt(f),
             Self::Whole(value) => value.fmt(f),
             Self::Word { word, .. } => f.write_str(word),
         }
@@ -169,7 +197,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 43] = [
+pub static KEYS: [Key; 44] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -177,6 +205,7 @@ pub static KEYS: [Key; 43] = [
     number!("motor.l_m", "H", drive.motor.l_m),
     whole!("motor.pole_pairs", u8, checked = true, drive.motor.pole_pairs),
     number!("motor.inertia", "kg m2", drive.motor.inertia),
+    number!("inverter.dead_time_s", "s", drive.inverter.dead_time_s),
     word!("inverter.compensate", |s| s.drive.inverter.compensate,
         "no" = false => false, "yes" = true => true),
     number!("inverter.full_compensation_a", "A", drive.inverter.full_compensation_a),
@@ -224,6 +253,16 @@ pub static KEYS: [Key; 43] = [
     number!("position.i_q_limit_a", "A", drive.position.i_q_limit_a),
     number!("command.timeout_s", "s", command.timeout_s),
 ];
+
+/// The setting with this [number](Key::id).
+pub fn find_id(id: u32) -> Option<&'static Key> {
+    KEYS.iter().find(|key| key.id() == id)
+}
+
+/// FNV-1a: a number for a word.
+fn number_of(word: &str) -> u32 {
+    word.bytes().fold(0x811c_9dc5, |hash, b| (hash ^ u32::from(b)).wrapping_mul(0x0100_0193))
+}
 
 /// The setting of this name.
 pub fn find(name: &str) -> Option<&'static Key> {
@@ -273,6 +312,35 @@ impl Key {
         }
     }
 
+    /// A number made of its name, by which the flash knows it.
+    pub fn id(&self) -> u32 {
+        number_of(self.name)
+    }
+
+    /// What is set, as it is kept in the flash.
+    pub fn to_bits(&self, settings: &Everything) -> u32 {
+        match self.get(settings) {
+            Value::Number(value) => value.to_bits(),
+            Value::Whole(value) => value,
+            Value::Word { word, .. } => number_of(word),
+        }
+    }
+
+    /// Sets what [`to_bits`](Self::to_bits) gave; `None` if it is no value of this setting. Whether it
+    /// is in range, [`Everything::build`] says.
+    pub fn set_bits(&self, settings: &mut Everything, bits: u32) -> Option<()> {
+        let value = match self.access {
+            Access::Number(_) => Value::Number(f32::from_bits(bits)),
+            Access::Whole { max, .. } => Value::Whole(Some(bits).filter(|bits| *bits <= max)?),
+            Access::Word { words, .. } => {
+                let index = words.iter().position(|word| number_of(word) == bits)?;
+                Value::Word { index: u8::try_from(index).ok()?, word: words.get(index)? }
+            }
+        };
+        self.set(settings, value);
+        Some(())
+    }
+
     /// What may be set beside the present settings, where a range says it.
     pub fn range(&self, settings: &Everything) -> Option<(f32, f32)> {
         let mut probe = *settings;
@@ -309,6 +377,7 @@ mod tests {
     fn names_are_unique_and_found() {
         for key in &KEYS {
             assert!(core::ptr::eq(find(key.name).unwrap(), key), "{}", key.name);
+            assert!(core::ptr::eq(find_id(key.id()).unwrap(), key), "{}", key.name);
         }
         assert!(find("motor").is_none());
     }

@@ -90,7 +90,7 @@ impl Lines {
 
 /// A line on its way out. What does not fit is cut off.
 #[derive(Clone, Copy)]
-pub struct Text<const N: usize = 160> {
+pub struct Text<const N: usize = 240> {
     bytes: [u8; N],
     length: usize,
 }

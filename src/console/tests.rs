@@ -11,12 +11,21 @@ struct Desk {
     running: bool,
     trace: Vec<trace::Record>,
     orders: Vec<Order>,
+    saved: Option<Everything>,
+    worn_out: bool,
 }
 
 impl Desk {
     fn new() -> Self {
         let drive = Drive::new(Everything::of_the_board().build().unwrap());
-        Self { drive, running: true, trace: Vec::new(), orders: Vec::new() }
+        Self {
+            drive,
+            running: true,
+            trace: Vec::new(),
+            orders: Vec::new(),
+            saved: None,
+            worn_out: false,
+        }
     }
 }
 
@@ -46,8 +55,12 @@ impl Machine for Desk {
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         settings.build()
     }
-    fn save(&mut self, _: &Everything) -> Result<(), &'static str> {
-        Err("not available")
+    fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
+        if self.worn_out {
+            return Err(Failed::Erase(0x10));
+        }
+        self.saved = Some(*settings);
+        Ok(())
     }
     fn begin_trace(&mut self, records: u16, _: u16) -> bool {
         let record = trace::Record::of(&Telemetry::default());
@@ -163,7 +176,10 @@ fn a_session() {
     assert!(talk.ask("save").starts_with("error: the drive must be off"));
     assert!(talk.ask("status").starts_with("calibrating; i_d 0.00 A"));
     assert_eq!(talk.ask("stop"), "ok");
-    assert_eq!(talk.ask("save"), "error: not available");
+    assert_eq!(talk.ask("save"), "ok");
+    assert_eq!(talk.desk.saved.unwrap().drive.motor.r_s, 5.5);
+    talk.desk.worn_out = true;
+    assert_eq!(talk.ask("save"), "error: the flash was not erased, status 0x10");
     assert_eq!(talk.ask("start position"), "ok");
     assert_eq!(talk.ask("position 2.5"), "ok");
     assert_eq!(talk.ask("stop"), "ok");
@@ -243,6 +259,17 @@ fn half_lines_are_dropped_in_time() {
     assert_eq!(talk.say(""), ["error: the line was not finished"]);
     assert_eq!(talk.say("\n"), [""; 0]);
     assert!(talk.desk.orders.is_empty());
+}
+
+#[test]
+fn a_line_has_its_own_time_whatever_came_before() {
+    let mut talk = Talk::new();
+    assert!(talk.say("rubbish").is_empty());
+    // Late, but whole, and the next line begins in the same breath.
+    talk.now_ms += LINE_MS + 1;
+    talk.wire.sent.extend(b"\nst");
+    talk.poll();
+    assert_eq!(talk.say("op\n"), ["error: no such command; `help` lists them", "ok"]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
 
 mod control;
+mod fuzz;
 mod image;
 mod run;
 mod toolchain;
@@ -19,6 +20,7 @@ Usage: cargo xtask <task>
             gets what is missing from the system, or says what to type
   firmware  builds the image for the board (also: cargo firmware)
   flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
+  fuzz [S]  fuzzes console and saved settings, S seconds each (300)
   size      shows what the image takes of each memory, and fails above the limits";
 
 fn main() -> ExitCode {
@@ -27,6 +29,10 @@ fn main() -> ExitCode {
     let result = match arguments[..] {
         ["test"] => test(),
         ["firmware"] => image::build().map(|elf| println!("{}", elf.display())),
+        ["fuzz"] => fuzz::fuzz(300),
+        ["fuzz", seconds] if seconds.parse::<u32>().is_ok() => {
+            fuzz::fuzz(seconds.parse().unwrap_or_default())
+        }
         ["flash"] => image::flash(),
         ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
         [] | ["help" | "-h" | "--help"] => {

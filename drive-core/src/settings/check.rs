@@ -2,6 +2,8 @@
 
 use super::{PERIOD_S, Settings, SettingsError};
 
+/// Not inlined: it is called forty times, and never in a hurry.
+#[inline(never)]
 fn check(name: &'static str, value: f32, min: f32, max: f32) -> Result<f32, SettingsError> {
     // Not-a-number fails the test.
     if value >= min && value <= max {

@@ -1,6 +1,6 @@
 //! Roots of a small real polynomial.
 
-use crate::sos::Complex;
+use crate::complex::Complex;
 
 /// Roots of the monic polynomial z^N + c\[0\] z^(N-1) + … + c\[N-1\], by Durand and Kerner's
 /// simultaneous iteration; `None` where it does not converge (coefficients that are not finite).
@@ -56,7 +56,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex; N]> {
     // A multiple root creeps; take it if it has come to rest as far as rounding lets it.
     let close = |r: &Complex| {
         let value = c.iter().fold(Complex::ONE, |v, c| v * *r + Complex::new(*c, 0.0));
-        value.abs() <= 1e-10 * libm::pow(bound, N as f64)
+        value.abs() <= 1e-10 * (0..N).fold(1.0, |power, _| power * bound)
     };
     roots.iter().all(close).then_some(roots)
 }

@@ -1,0 +1,14 @@
+//! What of the firmware touches no register: tested on a host, fuzzed there, and linked into the image.
+//!
+//! Start reading at `main.rs`.
+#![cfg_attr(not(test), no_std)]
+
+pub mod board;
+pub mod console;
+pub mod link;
+pub mod mailbox;
+pub mod record;
+pub mod ring;
+pub mod saved;
+pub mod trace;
+pub mod watchdog;

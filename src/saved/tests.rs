@@ -1,0 +1,289 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::console::keys::{KEYS, Value};
+
+/// Flash that loses power, with what a power failure leaves drawn from random bits.
+#[derive(Clone, Debug)]
+struct Fake {
+    /// `None` is torn.
+    words: [[Option<u64>; SLOT_WORDS]; SLOTS],
+    /// Operations until the power fails.
+    left: Option<usize>,
+    random: u64,
+}
+
+impl Fake {
+    fn new() -> Self {
+        Self { words: [[Some(u64::MAX); SLOT_WORDS]; SLOTS], left: None, random: 1 }
+    }
+
+    /// Splitmix64.
+    fn next(&mut self) -> u64 {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.random ^ self.random >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// Whether the power fails in this operation.
+    fn fails(&mut self) -> bool {
+        match &mut self.left {
+            None => false,
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+        }
+    }
+
+    /// Of `old` and `new`, what a power failure leaves.
+    fn left_of(&mut self, old: Option<u64>, new: u64) -> Option<u64> {
+        match self.next() % 4 {
+            0 => old,
+            1 => Some(new),
+            _ => None,
+        }
+    }
+}
+
+impl Flash for &mut Fake {
+    fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
+        self.words[slot][word]
+    }
+    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+        let fails = self.fails();
+        for word in 0..SLOT_WORDS {
+            let old = self.words[slot][word];
+            self.words[slot][word] =
+                if fails { self.left_of(old, u64::MAX) } else { Some(u64::MAX) };
+        }
+        if fails { Err(Failed::Erase(0)) } else { Ok(()) }
+    }
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+        let old = self.words[slot][word];
+        assert_eq!(old, Some(u64::MAX), "double word {word} is not erased");
+        let fails = self.fails();
+        self.words[slot][word] = if fails { self.left_of(old, value) } else { Some(value) };
+        if fails { Err(Failed::Program(0)) } else { Ok(()) }
+    }
+}
+
+fn board() -> Everything {
+    Everything::of_the_board()
+}
+
+fn with_r_s(r_s: f32) -> Everything {
+    let mut settings = board();
+    settings.drive.motor.r_s = r_s;
+    settings
+}
+
+fn load(fake: &mut Fake) -> Loaded {
+    Saved::load(fake, &board()).1
+}
+
+fn save(fake: &mut Fake, settings: &Everything) -> Result<(), Failed> {
+    Saved::load(fake, &board()).0.save(settings)
+}
+
+#[test]
+fn an_erased_flash_holds_nothing() {
+    assert_eq!(load(&mut Fake::new()), Loaded::Nothing);
+}
+
+#[test]
+fn what_is_saved_is_loaded_and_the_slots_take_turns() {
+    let mut fake = Fake::new();
+    let mut erased = Vec::new();
+    for n in 1..7 {
+        let before = fake.words;
+        save(&mut fake, &with_r_s(n as f32)).unwrap();
+        erased.push([0, 1].map(|slot| fake.words[slot] != before[slot]));
+        assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(n as f32)));
+    }
+    let turns = [[true, false], [false, true]];
+    assert_eq!(erased, [turns, turns, turns].concat());
+    // The same without a reset between.
+    let (mut saved, _) = Saved::load(&mut fake, &board());
+    for n in 7..10 {
+        saved.save(&with_r_s(n as f32)).unwrap();
+    }
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(9.0)));
+}
+
+#[test]
+fn sequence_numbers_wrap() {
+    let mut fake = Fake::new();
+    for (slot, sequence) in [(0, u32::MAX), (1, 0)] {
+        let record = codec::record(&with_r_s(slot as f32 + 1.0), sequence);
+        for (word, value) in record.into_iter().enumerate() {
+            fake.words[slot][word] = Some(value);
+        }
+    }
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(2.0)));
+    save(&mut fake, &with_r_s(3.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+}
+
+/// Power fails in every operation of a save, and again in every operation of the next one.
+#[test]
+fn whenever_the_power_fails_the_old_or_the_new_set_is_there() {
+    let operations = codec::WORDS + 1;
+    for seed in 0..20 {
+        for first in 0..=operations {
+            let mut fake = Fake::new();
+            fake.random = seed * 1000 + first as u64;
+            save(&mut fake, &with_r_s(1.0)).unwrap();
+            save(&mut fake, &with_r_s(2.0)).unwrap();
+            fake.left = Some(first);
+            let done = save(&mut fake, &with_r_s(3.0)).is_ok();
+            assert_eq!(done, first == operations);
+            let Loaded::Settings(now) = load(&mut fake) else { panic!("none left at {first}") };
+            let r_s = now.drive.motor.r_s;
+            assert!(r_s == 3.0 || (r_s == 2.0 && !done), "{r_s} at {first}");
+
+            let second = (first * 7 + seed as usize) % operations;
+            fake.left = Some(second);
+            assert!(save(&mut fake, &with_r_s(4.0)).is_err());
+            let Loaded::Settings(then) = load(&mut fake) else { panic!("{first}, then {second}") };
+            let next = then.drive.motor.r_s;
+            assert!(next == r_s || next == 4.0, "{next} at {first}, then {second}");
+            fake.left = None;
+            save(&mut fake, &with_r_s(5.0)).unwrap();
+            assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(5.0)));
+        }
+    }
+}
+
+#[test]
+fn a_failed_save_leaves_the_set_before_and_says_why() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(1.0)).unwrap();
+    fake.left = Some(0);
+    assert_eq!(save(&mut fake, &with_r_s(2.0)), Err(Failed::Erase(0)));
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+}
+
+#[test]
+fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(1.0)).unwrap();
+    let mut record = codec::record(&with_r_s(2.0), 1);
+    record[0] += 1 << 32;
+    // As a later firmware computes it.
+    let bytes: Vec<u8> = [record[0].to_le_bytes().to_vec(), 1_u32.to_le_bytes().to_vec()]
+        .into_iter()
+        .chain(record[2..].iter().map(|word| word.to_le_bytes().to_vec()))
+        .flatten()
+        .collect();
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
+    record[1] = 1 | u64::from(checksum) << 32;
+    for (word, value) in record.into_iter().enumerate() {
+        fake.words[1][word] = Some(value);
+    }
+    let kept = fake.words[1];
+    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Newer(2)));
+    save(&mut fake, &with_r_s(3.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    assert_eq!(fake.words[1], kept);
+}
+
+#[test]
+fn keys_may_come_and_go() {
+    let mut record = codec::record(&with_r_s(7.0), 3);
+    // The second key is one that this firmware does not know.
+    record[3] ^= 1;
+    let mut fake = Fake::new();
+    for (word, value) in resealed(record).into_iter().enumerate() {
+        fake.words[0][word] = Some(value);
+    }
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+}
+
+#[test]
+fn a_value_that_nobody_knows_is_named() {
+    let place = KEYS.iter().position(|key| key.name == "angle_source").unwrap();
+    let mut record = codec::record(&board(), 3);
+    record[2 + place] ^= 1 << 40;
+    let mut fake = Fake::new();
+    for (word, value) in resealed(record).into_iter().enumerate() {
+        fake.words[0][word] = Some(value);
+    }
+    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("angle_source")));
+}
+
+/// The record with its checksum made right again.
+fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
+    let mut bytes = record[0].to_le_bytes().to_vec();
+    bytes.extend((record[1] as u32).to_le_bytes());
+    bytes.extend(record[2..].iter().flat_map(|word| word.to_le_bytes()));
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
+    record[1] = record[1] & 0xffff_ffff | u64::from(checksum) << 32;
+    record
+}
+
+#[test]
+fn numbers_of_settings_follow_those_of_the_records() {
+    let all = [NotUsed::Broken, NotUsed::Newer(2), NotUsed::Value("x"), NotUsed::Refused];
+    assert_eq!(all.map(NotUsed::code), [70, 71, 72, 73]);
+    assert!(all.iter().all(|why| why.to_string().starts_with("7")));
+}
+
+proptest! {
+    #[test]
+    fn every_value_of_every_key_survives(bits: u32, i in 0..KEYS.len()) {
+        let mut settings = board();
+        let key = &KEYS[i];
+        let text = match key.get(&settings) {
+            Value::Number(_) => f32::from_bits(bits).to_string(),
+            Value::Whole(_) => bits.to_string(),
+            Value::Word { .. } => key.words()[bits as usize % key.words().len()].to_owned(),
+        };
+        if let Ok(value) = key.parse(&text) {
+            key.set(&mut settings, value);
+        }
+        let mut fake = Fake::new();
+        save(&mut fake, &settings).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+    }
+
+    #[test]
+    fn a_flipped_bit_is_found_and_the_set_before_counts(
+        word in 0..codec::WORDS, bit in 0_u32..64, both: bool,
+    ) {
+        let mut fake = Fake::new();
+        save(&mut fake, &with_r_s(1.0)).unwrap();
+        save(&mut fake, &with_r_s(2.0)).unwrap();
+        let flip = |value: &mut Option<u64>| *value = value.map(|value| value ^ 1 << bit);
+        flip(&mut fake.words[1][word]);
+        if both {
+            flip(&mut fake.words[0][word]);
+            prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+        } else {
+            prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+        }
+    }
+
+    #[test]
+    fn any_contents_are_looked_at_without_harm(
+        seed: u64, torn in 0_u64..4, header: bool, entries: u16,
+    ) {
+        let mut fake = Fake::new();
+        fake.random = seed;
+        for slot in 0..SLOTS {
+            for word in 0..SLOT_WORDS {
+                let value = fake.next();
+                fake.words[slot][word] = (fake.next() % 4 >= torn).then_some(value);
+            }
+            if header {
+                let record = codec::record(&board(), 0);
+                fake.words[slot][0] = Some(record[0] & 0xffff_ffff_ffff | u64::from(entries) << 48);
+            }
+        }
+        prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+        save(&mut fake, &with_r_s(3.0)).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    }
+}
