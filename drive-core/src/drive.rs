@@ -100,7 +100,7 @@ pub struct Telemetry {
     pub current: Dq,
     /// Wanted voltage without the carrier, V.
     pub voltage: Dq,
-    /// Current difference of the printed demodulation, A.
+    /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
     /// Saliency that the synchronous demodulation sees.
     pub saliency: f32,
@@ -195,7 +195,7 @@ impl Drive {
     fn precharge(&mut self, sample: &Sample) -> Compare {
         if self.elapsed >= self.c.sequence.precharge {
             self.control = ControlState::default();
-            self.control.estimator.start();
+            self.c.estimator.start(&mut self.control.estimator);
             self.c.position.start(&mut self.control.position, sample.encoder);
             self.enter(State::Magnetising);
         }
@@ -250,7 +250,7 @@ impl Drive {
         // Angles for the next sample.
         if c.demodulate {
             let e = &mut s.estimator;
-            c.estimator.observe(e, measured.current, theta, carrier.index, reference.q);
+            c.estimator.observe(e, measured.current, theta, carrier, reference.q);
         }
         let rotor_step = match c.source {
             AngleSource::Encoder => {

@@ -13,12 +13,11 @@
 //! their zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through
 //! the printed band-pass, is gone. They delay `q` by 19 samples (3.2 ms).
 //!
-//! The sums are integers (2^-17 A a unit): they hold their value for ever, where a running sum of
-//! floats would drift.
+//! The averages are sums of integers, 2^-17 A a unit; see [`crate::moving_sum`].
 
-use crate::angle::UnitVector;
-use crate::frames::AlphaBeta;
+use crate::demodulator::{CarrierSample, Demodulate};
 use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
+use crate::moving_sum::MovingSum;
 
 /// Samples of one moving average: two carrier periods.
 const LENGTH: usize = 2 * CARRIER_SAMPLES;
@@ -27,37 +26,16 @@ const UNITS: f32 = 131_072.0;
 /// Signals that are averaged: A and B as complex numbers, and the reference current.
 const SIGNALS: usize = 5;
 
-/// One moving average of all signals.
-#[derive(Clone, Copy, Debug)]
-struct MovingSum {
-    ring: [[i32; SIGNALS]; LENGTH],
-    sum: [i32; SIGNALS],
-}
-
-impl MovingSum {
-    /// Takes the newest values in at place `index` of the ring; the sum of the last 20.
-    fn step(&mut self, index: usize, new: [i32; SIGNALS]) -> [i32; SIGNALS] {
-        let slot = &mut self.ring[index % LENGTH];
-        for ((sum, old), new) in self.sum.iter_mut().zip(slot.iter()).zip(new) {
-            // Wrapping sums are exact as long as the true sum fits, which it does.
-            *sum = sum.wrapping_add(new).wrapping_sub(*old);
-        }
-        *slot = new;
-        self.sum
-    }
-}
-
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug)]
 pub struct SynchronousState {
     index: usize,
-    stages: [MovingSum; 2],
+    stages: [MovingSum<SIGNALS, LENGTH>; 2],
 }
 
 impl Default for SynchronousState {
     fn default() -> Self {
-        let empty = MovingSum { ring: [[0; SIGNALS]; LENGTH], sum: [0; SIGNALS] };
-        Self { index: 0, stages: [empty; 2] }
+        Self { index: 0, stages: [MovingSum::default(); 2] }
     }
 }
 
@@ -72,21 +50,17 @@ pub struct Saliency {
     pub i_q: f32,
 }
 
-impl SynchronousState {
-    /// One sample: the current in A; `dm_axis`, `e^(j (theta - 45°))`, delayed as the current is; the
-    /// number of the sample in the carrier period; the reference of the quadrature current, A.
-    pub fn step(
-        &mut self,
-        current: AlphaBeta,
-        dm_axis: UnitVector,
-        carrier: usize,
-        i_q: f32,
-    ) -> Saliency {
-        let i = current.to_dm_qm(dm_axis) * (2.0 * UNITS);
-        let (c, s) =
-            (CARRIER_COS[carrier % CARRIER_SAMPLES], CARRIER_SIN[carrier % CARRIER_SAMPLES]);
+impl Demodulate for SynchronousState {
+    type Seen = Saliency;
+
+    #[inline]
+    fn step(&mut self, sample: &CarrierSample) -> Saliency {
+        let i = sample.current.to_dm_qm(sample.dm_axis) * (2.0 * UNITS);
+        let k = sample.carrier.index % CARRIER_SAMPLES;
+        let (c, s) = (CARRIER_COS[k], CARRIER_SIN[k]);
         // Saturating casts: not-a-number gives 0, and the drive finds it elsewhere.
-        let mixed = [i.dm * c, -i.dm * s, i.qm * c, -i.qm * s, i_q * UNITS].map(|x| x as i32);
+        let mixed =
+            [i.dm * c, -i.dm * s, i.qm * c, -i.qm * s, sample.i_q * UNITS].map(|x| x as i32);
         let once = self.stages[0].step(self.index, mixed);
         let twice = self.stages[1].step(self.index, once);
         self.index = if self.index >= LENGTH - 1 { 0 } else { self.index + 1 };
@@ -113,13 +87,21 @@ mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
     use crate::angle::Angle;
+    use crate::frames::AlphaBeta;
+    use crate::injection::CarrierPeriod;
     use core::f64::consts::TAU;
+
+    /// Sample `k` of a current, dm along `axis`.
+    fn sample(current: AlphaBeta, axis: Angle, k: usize, i_q: f32) -> CarrierSample {
+        let carrier = CarrierPeriod { index: k % 10, ..CarrierPeriod::default() };
+        CarrierSample { current, dm_axis: axis.unit_vector(), carrier, i_q }
+    }
 
     /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
     /// on top of a fundamental of 3 A.
     fn steady(amplitude: f64, turn: f64, phase: f64) -> Saliency {
         let theta = 0.7;
-        let axis = (Angle::from_radians(theta as f32) - Angle::EIGHTH).unit_vector();
+        let axis = Angle::from_radians(theta as f32) - Angle::EIGHTH;
         let mut state = SynchronousState::default();
         let mut last = Saliency::default();
         for k in 0..500 {
@@ -128,7 +110,7 @@ mod tests {
                 (carrier * (theta + turn).cos() + 2.0) as f32,
                 (carrier * (theta + turn).sin() - 2.2) as f32,
             );
-            last = state.step(i, axis, k as usize % 10, 1.5);
+            last = state.step(&sample(i, axis, k as usize, 1.5));
         }
         last
     }
@@ -154,16 +136,16 @@ mod tests {
 
     #[test]
     fn the_sums_do_not_drift() {
-        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO.unit_vector());
+        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
         let mut x = 1_u32;
         for k in 0..600_000_usize {
             x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let noise = (x >> 8) as f32 / 4e6 - 2.0;
-            state.step(AlphaBeta::new(noise, -noise), axis, k % 10, noise);
+            state.step(&sample(AlphaBeta::new(noise, -noise), axis, k, noise));
         }
         let mut rest = Saliency::default();
         for k in 0..40_usize {
-            rest = state.step(AlphaBeta::ZERO, axis, k % 10, 0.0);
+            rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
         }
         assert_eq!(rest, Saliency::default());
     }
@@ -173,6 +155,6 @@ mod tests {
         assert_eq!(steady(0.0, 0.0, 0.0).q, 0.0);
         let mut state = SynchronousState::default();
         let nan = AlphaBeta::new(f32::NAN, f32::INFINITY);
-        assert!(state.step(nan, Angle::ZERO.unit_vector(), 77, f32::NAN).q.is_finite());
+        assert!(state.step(&sample(nan, Angle::ZERO, 77, f32::NAN)).q.is_finite());
     }
 }

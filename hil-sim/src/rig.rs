@@ -278,10 +278,13 @@ pub fn drive_settings(config: &Config) -> Settings {
             demodulator: match config.injection.demodulator {
                 config::Demodulator::Literal => Tracking::Literal,
                 config::Demodulator::Rectified => Tracking::Rectified,
+                config::Demodulator::RmsImpedance => Tracking::RmsImpedance,
+                config::Demodulator::Envelope => Tracking::Envelope,
                 config::Demodulator::Synchronous => Tracking::Synchronous,
             },
             printed: PrintedChain {
                 reference_a: config.injection.reference_a as f32,
+                rms_samples: config.injection.rms_samples.try_into().unwrap_or(u8::MAX),
                 ..base.injection.printed
             },
             synchronous: SynchronousTracking {
