@@ -33,11 +33,10 @@ pub use printed::{Literal, Rectified};
 pub use rms_impedance::{LONGEST, RmsImpedance, SHORTEST};
 
 use crate::angle::UnitVector;
-use crate::filters::BPF;
+use crate::filters::{BPF, BpfState, PP, PpState};
 use crate::frames::{AlphaBeta, DmQm};
 use crate::injection::CarrierPeriod;
 use crate::settings::Tracking;
-use crate::sos::SosState;
 use crate::synchronous::{Saliency, SynchronousState};
 
 /// What a demodulation is given at each sample.
@@ -102,18 +101,35 @@ impl From<Saliency> for f32 {
     }
 }
 
-/// Rotation into the dm-qm frame, then the band-pass on either channel, as in Figure 9. In this order
-/// the band-pass delays what is seen and not the angle under which it is seen, and does not know how
-/// fast the frame turns.
+/// The band-pass on two signals. (Neither it nor the next is inlined: four demodulations share them,
+/// and the one in a hurry does without.)
 #[derive(Clone, Copy, Debug, Default)]
-struct Channels([SosState<2>; 2]);
+struct BandPass(BpfState);
 
-impl Channels {
-    /// The carrier currents of the two channels, A.
-    #[inline(never)] // for two demodulators, neither of them in a hurry
-    fn step(&mut self, sample: &CarrierSample) -> DmQm {
+impl BandPass {
+    #[inline(never)]
+    fn step(&mut self, x: AlphaBeta) -> AlphaBeta {
+        BPF.step_alpha_beta(&mut self.0, x)
+    }
+
+    /// Behind the rotation, as in Figure 9: the carrier currents of the two channels, A. In this order
+    /// the filter delays what is seen and not the angle under which it is seen, and does not know how
+    /// fast the frame turns.
+    fn step_rotated(&mut self, sample: &CarrierSample) -> DmQm {
         let i = sample.current.to_dm_qm(sample.dm_axis);
-        DmQm { dm: BPF.step(&mut self.0[0], i.dm), qm: BPF.step(&mut self.0[1], i.qm) }
+        let carrier = self.step(AlphaBeta { alpha: i.dm, beta: i.qm });
+        DmQm { dm: carrier.alpha, qm: carrier.beta }
+    }
+}
+
+/// The post-processing filter.
+#[derive(Clone, Copy, Debug, Default)]
+struct Post(PpState);
+
+impl Post {
+    #[inline(never)]
+    fn step(&mut self, x: f32) -> f32 {
+        PP.step(&mut self.0, x)
     }
 }
 

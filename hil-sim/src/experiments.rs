@@ -5,6 +5,7 @@ mod anti_windup;
 mod bode;
 mod current_step;
 mod dead_time;
+mod demodulators;
 mod filters;
 mod identify_continuous;
 mod identify_discrete;
@@ -65,6 +66,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    demodulators::EXPERIMENT,
     learn_reference::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,

@@ -14,7 +14,7 @@
 //! 1200 Hz (the "spurious oscillations" of section 5.2), where this average has its zeros. So no
 //! post-processing filter is needed, and its 24 samples of delay are saved.
 
-use super::{CarrierSample, Channels, Demodulate};
+use super::{BandPass, CarrierSample, Demodulate};
 use crate::frames::DmQm;
 use crate::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::moving_sum::MovingSum;
@@ -27,7 +27,7 @@ const UNITS: f32 = 131_072.0;
 /// The difference of the envelopes of i_dm and i_qm, A.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Envelope {
-    channels: Channels,
+    band_pass: BandPass,
     before: [DmQm; APART],
     index: usize,
     sum: MovingSum<1, CARRIER_SAMPLES>,
@@ -37,7 +37,7 @@ impl Demodulate for Envelope {
     type Seen = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
-        let now = self.channels.step(sample);
+        let now = self.band_pass.step_rotated(sample);
         let [last, before] = self.before;
         self.before = [now, last];
         let difference = envelope(now.dm, before.dm) - envelope(now.qm, before.qm);

@@ -1,8 +1,7 @@
 //! The chain of section 3.4 (Figure 20): band-pass, rotation into the dm-qm frame, difference,
 //! post-processing low-pass.
 
-use super::{CarrierSample, Demodulate};
-use crate::filters::{BPF, BpfState, PP, PpState};
+use super::{BandPass, CarrierSample, Demodulate, Post};
 use crate::frames::DmQm;
 
 /// `i_dm - i_qm`, A, as printed. The post-processing filter takes the 600 Hz out again (-76 dB):
@@ -19,14 +18,14 @@ pub struct Rectified(Chain);
 /// State of the filters.
 #[derive(Clone, Copy, Debug, Default)]
 struct Chain {
-    band_pass: BpfState,
-    post: PpState,
+    band_pass: BandPass,
+    post: Post,
 }
 
 impl Chain {
     fn step(&mut self, sample: &CarrierSample, difference: impl Fn(DmQm) -> f32) -> f32 {
-        let carrier = BPF.step_alpha_beta(&mut self.band_pass, sample.current);
-        PP.step(&mut self.post, difference(carrier.to_dm_qm(sample.dm_axis)))
+        let carrier = self.band_pass.step(sample.current);
+        self.post.step(difference(carrier.to_dm_qm(sample.dm_axis)))
     }
 }
 

@@ -15,8 +15,7 @@
 //! the inverse of an rms value, so large steps are answered unevenly; within a few degrees the delay
 //! is that of band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::{CarrierSample, Channels, Demodulate};
-use crate::filters::{PP, PpState};
+use super::{BandPass, CarrierSample, Demodulate, Post};
 use crate::moving_sum::MovingSum;
 
 /// Least and largest length of the rms filters, samples. One sample alone may lie on a zero of the
@@ -38,22 +37,22 @@ const LEAST: i32 = 5;
 /// current.
 #[derive(Clone, Copy, Debug)]
 pub struct RmsImpedance {
-    channels: Channels,
+    band_pass: BandPass,
     squares: MovingSum<3, { LONGEST as usize }>,
     length: u8,
     index: u8,
-    f3: PpState,
+    f3: Post,
 }
 
 impl RmsImpedance {
     /// With rms filters of this many samples, taken as [`SHORTEST`] to [`LONGEST`].
     pub fn new(samples: u8) -> Self {
         Self {
-            channels: Channels::default(),
+            band_pass: BandPass::default(),
             squares: MovingSum::default(),
             length: samples.clamp(SHORTEST, LONGEST),
             index: 0,
-            f3: PpState::default(),
+            f3: Post::default(),
         }
     }
 }
@@ -62,7 +61,7 @@ impl Demodulate for RmsImpedance {
     type Seen = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
-        let i = self.channels.step(sample);
+        let i = self.band_pass.step_rotated(sample);
         // The carrier's voltage lies on the bisector: the same share in both channels.
         let v = sample.carrier.voltage * (core::f32::consts::FRAC_1_SQRT_2 / VOLTS);
         let squares = [i.dm, i.qm, v].map(|x| {
@@ -79,6 +78,6 @@ impl Demodulate for RmsImpedance {
         } else {
             0.0
         };
-        PP.step(&mut self.f3, difference)
+        self.f3.step(difference)
     }
 }

@@ -187,6 +187,10 @@ keys! {
         demodulator: Demodulator = Demodulator::Synchronous, [Demodulator], "";
         /// Reference of the current difference of all but synchronous (section 3.3).
         reference_a: f64 = 0.010, [-1 .. 1], "A";
+        /// Gain k_s of the PII controller behind all but synchronous (Eq. 3.44).
+        k_s: f64 = 0.132546, [0 .. 100], "rad/A";
+        /// Zero z_s of that controller.
+        z_s: f64 = 0.9, [0 .. 1], "";
         /// Length of the rms filters of rms-impedance, in samples.
         rms_samples: u32 = 20, [2 .. 60], "";
         /// Whether a start with synchronous checks that the motor has a saliency.
