@@ -1,6 +1,7 @@
 //! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
 
 mod adc_calibration;
+mod angle_identification;
 mod anti_windup;
 mod bode;
 mod current_step;
@@ -67,6 +68,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
     demodulators::EXPERIMENT,
+    angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,
