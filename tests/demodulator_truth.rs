@@ -6,21 +6,27 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use common::{IDEAL, ISOTROPIC, all, config, regulating, regulating_with};
-use drive_core::demodulator::{Demodulator, DemodulatorState};
+use drive_core::demodulator::{CarrierSample, Demodulate, Literal, Rectified};
+use drive_core::injection::CarrierPeriod;
 use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings, wrapped_degrees};
 
+/// One step of a chain, dm along `axis`.
+fn step(chain: &mut impl Demodulate<Seen = f32>, current: AlphaBeta, axis: Angle) -> f32 {
+    let axis = (axis + Angle::EIGHTH).unit_vector();
+    chain.step(&CarrierSample { current, axis, carrier: CarrierPeriod::default(), i_q: 0.0 })
+}
+
 /// Mean output, A, of a chain fed with the true current, its injection axis at phi2 - theta = `x`
 /// rad.
-fn delta_i(rig: &mut Rig, demodulator: Demodulator, x: f64) -> f64 {
-    let mut state = DemodulatorState::default();
+fn delta_i(rig: &mut Rig, mut chain: impl Demodulate<Seen = f32>, x: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for k in 0..1500 {
         let i = rig.plant.current();
         let theta = rig.plant.rotor_flux_angle() - x;
         let axis = Angle::from_radians(theta as f32) - Angle::EIGHTH;
         let current = AlphaBeta::new(i.re as f32, i.im as f32);
-        let out = demodulator.step(&mut state, current, axis.unit_vector());
+        let out = step(&mut chain, current, axis);
         // Settled after 50 ms; then whole carrier periods.
         if k >= 300 {
             sum += f64::from(out);
@@ -52,7 +58,7 @@ fn encoder_rig(iq: f64, amplitude_v: f64, parts: &[&[&'static str]]) -> Rig {
 fn the_printed_chain_shows_the_fundamental_leaking() {
     for iq in [0.5, 1.0, 2.0, 3.0] {
         let mut rig = encoder_rig(iq, 50.0, &[&IDEAL, &ISOTROPIC]);
-        let mut at = |x: f64| delta_i(&mut rig, Demodulator::Literal, x);
+        let mut at = |x: f64| delta_i(&mut rig, Literal::default(), x);
 
         // theta - phi2 = +90°: sqrt2 * 0.01 * i_d whatever i_q.
         let here = at(-FRAC_PI_2);
@@ -84,7 +90,7 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
 fn the_printed_chain_does_not_see_the_injection() {
     let out = |amplitude_v| {
         let mut rig = encoder_rig(1.0, amplitude_v, &[&IDEAL, &ISOTROPIC]);
-        delta_i(&mut rig, Demodulator::Literal, -FRAC_PI_2)
+        delta_i(&mut rig, Literal::default(), -FRAC_PI_2)
     };
     let difference = out(50.0) - out(0.0);
     println!("in the motor {:.3} uA", difference * 1e6);
@@ -92,12 +98,12 @@ fn the_printed_chain_does_not_see_the_injection() {
 
     // 0.7 A along d, 1 A along q, flux at rest, 0.26 A of carrier along theta = phi + 90°.
     let given = |carrier: f64| {
-        let (mut state, mut sum) = (DemodulatorState::default(), 0.0);
-        let axis = (Angle::QUARTER - Angle::EIGHTH).unit_vector();
+        let (mut chain, mut sum) = (Literal::default(), 0.0);
+        let axis = Angle::QUARTER - Angle::EIGHTH;
         for k in 0..1500 {
             let beta = 1.0 + carrier * (std::f64::consts::TAU * f64::from(k) / 10.0).sin();
             let current = AlphaBeta::new(0.7, beta as f32);
-            let out = Demodulator::Literal.step(&mut state, current, axis);
+            let out = step(&mut chain, current, axis);
             sum += if k >= 900 { f64::from(out) } else { 0.0 };
         }
         sum / 600.0
@@ -160,8 +166,8 @@ fn the_bias_of_the_rectified_chain_is_the_delay_of_the_band_pass() {
     for iq in [1.0, 3.0] {
         let mut rig = encoder_rig(iq, 50.0, &[&IDEAL, &ISOTROPIC]);
         let slip = iq / 0.7 * 1.1 / 0.2047 / RATE_HZ;
-        let undelayed = delta_i(&mut rig, Demodulator::Rectified, FRAC_PI_2) * 1e3;
-        let delayed = delta_i(&mut rig, Demodulator::Rectified, FRAC_PI_2 + 8.83 * slip) * 1e3;
+        let undelayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2) * 1e3;
+        let delayed = delta_i(&mut rig, Rectified::default(), FRAC_PI_2 + 8.83 * slip) * 1e3;
         println!("iq {iq}: {undelayed:.2} mA, from the delayed axis {delayed:.2} mA");
         // An independent study found 2.84 mA per ampere with the carrier put 1.5 samples behind.
         let expected = 2.84 * iq * 8.83 / (8.83 + 1.5);

@@ -98,7 +98,7 @@ pub struct Telemetry {
     pub current: Dq,
     /// Wanted voltage without the carrier, V.
     pub voltage: Dq,
-    /// Current difference of the printed demodulation, A.
+    /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
     /// Saliency that the synchronous demodulation sees.
     pub saliency: f32,
@@ -368,7 +368,7 @@ impl Drive {
                 return Ok(Dq::ZERO);
             }
             Phase::Restore => {
-                r.injection_axis = References::default().injection_axis;
+                r.injection_axis = self.c.injection_axis;
             }
             Phase::Passed => self.enter(State::of_mode(self.mode)),
             Phase::Failed => return Err(Fault::NoSaliency),

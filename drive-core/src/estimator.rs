@@ -1,18 +1,17 @@
 //! The flux angle from the injected carrier: demodulation, reference, tracking.
 //!
-//! One type for the two ways of doing it: the chain of the dissertation (filters, difference, PII
-//! controller, constant reference) and the synchronous one (normalised demodulation, learned
-//! reference, scheduled gain, slip feed-forward).
-
-use core::f32::consts::FRAC_1_SQRT_2;
+//! Any of the [demodulations](crate::demodulator) feeds one of two loops: that of the dissertation (a
+//! reference of the current difference and the PII controller) or, behind the synchronous one, a
+//! learned reference, scheduled gain and slip feed-forward.
 
 use crate::angle::{Angle, UnitVector};
-use crate::demodulator::{Demodulator, DemodulatorState};
+use crate::demodulator::{CarrierSample, Demodulate, Demodulator};
 use crate::frames::AlphaBeta;
 use crate::indirect::FluxAngle;
 use crate::injection::CarrierPeriod;
 use crate::schedule::Schedule;
-use crate::synchronous::{Saliency, SynchronousState};
+use crate::settings::Tracking;
+use crate::synchronous::Saliency;
 use crate::tracker::{Pll, Tracker, TrackerState};
 
 /// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
@@ -39,20 +38,37 @@ impl ConstantReference {
     }
 }
 
-/// How the angle is found.
+/// What the current difference is compared with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// Sections 3.4 and 3.11.
-    Printed {
-        /// How the difference is taken.
-        demodulator: Demodulator,
-        /// What it is compared with.
-        reference: ConstantReference,
+pub enum Reference {
+    /// Section 3.3.
+    Constant(ConstantReference),
+    /// Learned, A; its share is not used.
+    Learned(Schedule),
+}
+
+impl Reference {
+    /// Reference of the current difference, A.
+    fn at(&self, i_q: f32) -> f32 {
+        match self {
+            Self::Constant(constant) => constant.at(i_q),
+            Self::Learned(table) => table.at(i_q).0,
+        }
+    }
+}
+
+/// How the axis is turned by what was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AngleLoop {
+    /// Section 3.11.
+    Pii {
+        /// What the current difference is compared with.
+        reference: Reference,
         /// What turns the axis.
         tracker: Tracker,
     },
-    /// See [`crate::synchronous`].
-    Synchronous {
+    /// Behind the synchronous demodulation.
+    Pll {
         /// What the saliency is compared with.
         schedule: Schedule,
         /// What turns the axis.
@@ -63,9 +79,15 @@ pub enum Method {
 /// Coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimator {
-    /// How the angle is found.
-    pub method: Method,
-    /// Samples by which the current that is demodulated lags the injection axis.
+    /// What is made of the carrier current.
+    pub demodulator: Tracking,
+    /// Length of the rms filters of Ha and Sul, samples.
+    pub rms_samples: u8,
+    /// Current difference that an impedance difference of theirs stands for, A/ohm.
+    pub ampere_per_ohm: f32,
+    /// How the axis is turned by it.
+    pub angle_loop: AngleLoop,
+    /// Samples by which the current that is rotated lags the injection axis.
     pub lag: f32,
 }
 
@@ -73,14 +95,13 @@ pub struct Estimator {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EstimatorState {
     tracker: TrackerState,
-    printed: DemodulatorState,
-    synchronous: SynchronousState,
+    demodulator: Demodulator,
     /// Mean speed of the flux, turns per period, for the lag of the printed chain: the present one
     /// would feed the tracker's own steps back to it.
     mean_step: f32,
     /// Electrical speed of the rotor, turns per period.
     pub rotor_step: f32,
-    /// Current difference of the printed chain, A.
+    /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
     /// What the synchronous demodulation sees.
     pub saliency: Saliency,
@@ -91,20 +112,11 @@ const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
-/// The dm axis from the injection axis: 45° behind.
-const DM_AXIS: UnitVector = UnitVector { cos: FRAC_1_SQRT_2, sin: -FRAC_1_SQRT_2 };
-
 /// The tracker ran away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost;
 
 impl EstimatorState {
-    /// Starts with the flux along phase a: the injection axis 90° ahead.
-    pub fn start(&mut self) {
-        *self = Self::default();
-        self.tracker.angle = Angle::QUARTER;
-    }
-
     /// The flux angle at the present sample.
     pub fn flux(&self) -> FluxAngle {
         FluxAngle { phi: self.tracker.angle - Angle::QUARTER, step: self.tracker.step }
@@ -117,6 +129,14 @@ impl EstimatorState {
 }
 
 impl Estimator {
+    /// Starts with the flux along phase a.
+    pub fn start(&self, state: &mut EstimatorState) {
+        *state = EstimatorState::default();
+        state.demodulator = Demodulator::new(self.demodulator, self.rms_samples);
+        // The tracker turns the axis of section 3.4, 90° ahead of the flux.
+        state.tracker.angle = Angle::QUARTER;
+    }
+
     /// Demodulates one sample: the current, A; the injection axis, and how fast it turns, turns per
     /// period; the carrier; the reference of the quadrature current, A.
     #[inline]
@@ -129,17 +149,23 @@ impl Estimator {
         carrier: CarrierPeriod,
         i_q: f32,
     ) {
-        // By reference: the schedule is too large to copy in every period.
-        match &self.method {
-            Method::Printed { demodulator, .. } => {
-                state.mean_step += FLUX_SMOOTHING * (step - state.mean_step);
-                let axis = axis.turned_by(DM_AXIS).turned_slightly(-state.mean_step * self.lag);
-                state.delta_i = demodulator.step(&mut state.printed, current, axis);
+        let seen_at = |step: f32| {
+            let axis = axis.turned_slightly(-step * self.lag);
+            CarrierSample { current, axis, carrier, i_q }
+        };
+        let mean_step = &mut state.mean_step;
+        let mut seen_late = || {
+            *mean_step += FLUX_SMOOTHING * (step - *mean_step);
+            seen_at(*mean_step)
+        };
+        match &mut state.demodulator {
+            Demodulator::Literal(d) => state.delta_i = d.step(&seen_late()),
+            Demodulator::Rectified(d) => state.delta_i = d.step(&seen_late()),
+            Demodulator::RmsImpedance(d) => {
+                state.delta_i = self.ampere_per_ohm * d.step(&seen_at(step));
             }
-            Method::Synchronous { .. } => {
-                let axis = axis.turned_slightly(-step * self.lag);
-                state.saliency = state.synchronous.step(current, axis, carrier, i_q);
-            }
+            Demodulator::Envelope(d) => state.delta_i = d.step(&seen_at(step)),
+            Demodulator::Synchronous(d) => state.saliency = d.step(&seen_at(step)),
         }
     }
 
@@ -150,15 +176,16 @@ impl Estimator {
     /// [`Lost`] when the speed has reached its limit.
     #[inline]
     pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
-        let held = match &self.method {
-            Method::Printed { reference, tracker, .. } => {
+        // By reference: the schedule is too large to copy in every period.
+        let held = match &self.angle_loop {
+            AngleLoop::Pii { reference, tracker } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);
                 let rotor_step = state.tracker.step - slip_step;
                 state.rotor_step += ROTOR_SMOOTHING * (rotor_step - state.rotor_step);
                 held
             }
-            Method::Synchronous { schedule, pll } => {
+            AngleLoop::Pll { schedule, pll } => {
                 let (reference, share) = schedule.at(state.saliency.i_q);
                 let error = schedule.per_saliency * (reference - state.saliency.q);
                 pll.step(&mut state.tracker, &mut state.rotor_step, error, share, slip_step)

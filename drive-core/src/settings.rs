@@ -162,17 +162,20 @@ impl Default for CurrentPlant {
 /// How the carrier is demodulated and the angle tracked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tracking {
-    /// The chain of the dissertation as printed; see [`Demodulator::Literal`](crate::demodulator::Demodulator::Literal). It cannot track.
+    /// The chain of the dissertation as printed; see [`crate::demodulator::Literal`]. It cannot track.
     Literal,
-    /// The same with a rectifier; see
-    /// [`Demodulator::Rectified`](crate::demodulator::Demodulator::Rectified).
+    /// The same with a rectifier; see [`crate::demodulator::Rectified`].
     Rectified,
+    /// Ha and Sul, with the carrier along the flux; see [`crate::demodulator::RmsImpedance`].
+    RmsImpedance,
+    /// Difference of envelopes; see [`crate::demodulator::Envelope`].
+    Envelope,
     /// Synchronous demodulation with a learned reference; see [`crate::synchronous`].
     #[default]
     Synchronous,
 }
 
-/// The chain of sections 3.4 and 3.11.
+/// The loop of sections 3.4 and 3.11: behind all demodulations but the synchronous one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrintedChain {
     /// `ref_delta_i`, A (section 3.3): reference of the current difference from
@@ -185,12 +188,24 @@ pub struct PrintedChain {
     pub k_s: f32,
     /// Zero z_s of the tracker (Eq. 3.44).
     pub z_s: f32,
+    /// Reference of the current difference over the torque current, A, learned with the shaft locked;
+    /// takes the place of the constant one.
+    pub learned: Option<ReferenceTable>,
+    /// Length of the rms filters of [`Tracking::RmsImpedance`], samples.
+    pub rms_samples: u8,
 }
 
 impl Default for PrintedChain {
-    /// Sections 3.3 and 3.11.
+    /// Sections 3.3 and 3.11; two carrier periods.
     fn default() -> Self {
-        Self { reference_a: 0.010, full_reference_iq_a: 1.0, k_s: 0.132_546, z_s: 0.90 }
+        Self {
+            reference_a: 0.010,
+            full_reference_iq_a: 1.0,
+            k_s: 0.132_546,
+            z_s: 0.90,
+            learned: None,
+            rms_samples: 20,
+        }
     }
 }
 

@@ -14,12 +14,11 @@
 //! their zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through
 //! the printed band-pass, is gone. They delay `q` by 19 samples (3.2 ms).
 //!
-//! The sums are integers (2^-17 A a unit): they hold their value for ever, where a running sum of
-//! floats would drift.
+//! The averages are sums of integers, 2^-17 A a unit; see [`crate::moving_sum`].
 
-use crate::angle::UnitVector;
-use crate::frames::AlphaBeta;
-use crate::injection::{CARRIER_SAMPLES, CarrierPeriod};
+use crate::demodulator::{CarrierSample, Demodulate};
+use crate::injection::CARRIER_SAMPLES;
+use crate::moving_sum::MovingSum;
 
 /// Samples of one moving average: two carrier periods.
 const LENGTH: usize = 2 * CARRIER_SAMPLES;
@@ -28,37 +27,16 @@ const UNITS: f32 = 131_072.0;
 /// Signals that are averaged: X and Y as complex numbers, and the reference current.
 const SIGNALS: usize = 5;
 
-/// One moving average of all signals.
-#[derive(Clone, Copy, Debug)]
-struct MovingSum {
-    ring: [[i32; SIGNALS]; LENGTH],
-    sum: [i32; SIGNALS],
-}
-
-impl MovingSum {
-    /// Takes the newest values in at place `index` < 20 of the ring; the sum of the last 20.
-    fn step(&mut self, index: usize, new: [i32; SIGNALS]) -> [i32; SIGNALS] {
-        let slot = &mut self.ring[index];
-        for ((sum, old), new) in self.sum.iter_mut().zip(slot.iter()).zip(new) {
-            // Wrapping sums are exact as long as the true sum fits, which it does.
-            *sum = sum.wrapping_add(new).wrapping_sub(*old);
-        }
-        *slot = new;
-        self.sum
-    }
-}
-
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug)]
 pub struct SynchronousState {
     index: usize,
-    stages: [MovingSum; 2],
+    stages: [MovingSum<SIGNALS, LENGTH>; 2],
 }
 
 impl Default for SynchronousState {
     fn default() -> Self {
-        let empty = MovingSum { ring: [[0; SIGNALS]; LENGTH], sum: [0; SIGNALS] };
-        Self { index: 0, stages: [empty; 2] }
+        Self { index: 0, stages: [MovingSum::default(); 2] }
     }
 }
 
@@ -73,22 +51,17 @@ pub struct Saliency {
     pub i_q: f32,
 }
 
-impl SynchronousState {
-    /// One sample: the current in A; the injection axis `e^(j theta)`, delayed as the current is; the
-    /// carrier; the reference of the quadrature current, A.
+impl Demodulate for SynchronousState {
+    type Seen = Saliency;
+
     #[inline]
-    pub fn step(
-        &mut self,
-        current: AlphaBeta,
-        axis: UnitVector,
-        carrier: CarrierPeriod,
-        i_q: f32,
-    ) -> Saliency {
-        let (along, across) = current.seen_from(axis);
+    fn step(&mut self, sample: &CarrierSample) -> Saliency {
+        let (along, across) = sample.current.seen_from(sample.axis);
         let (along, across) = (along * (2.0 * UNITS), across * (2.0 * UNITS));
-        let (c, s) = (carrier.cos, carrier.sin);
+        let (c, s) = (sample.carrier.cos, sample.carrier.sin);
         // Saturating casts: not-a-number gives 0, and the drive finds it elsewhere.
-        let mixed = [along * c, -along * s, across * c, -across * s, i_q * UNITS].map(|x| x as i32);
+        let mixed =
+            [along * c, -along * s, across * c, -across * s, sample.i_q * UNITS].map(|x| x as i32);
         // Below 20 by construction: this is for a flipped bit.
         let index = if self.index < LENGTH { self.index } else { 0 };
         self.index = index + 1;
@@ -115,19 +88,23 @@ mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
     use crate::angle::Angle;
-    use crate::injection::{CARRIER_COS, CARRIER_SIN};
+    use crate::frames::AlphaBeta;
+    use crate::injection::{CARRIER_COS, CARRIER_SIN, CarrierPeriod};
     use core::f64::consts::TAU;
 
-    fn carrier(k: usize) -> CarrierPeriod {
+    /// Sample `k` of a current, injected along `axis`.
+    fn sample(current: AlphaBeta, axis: Angle, k: usize, i_q: f32) -> CarrierSample {
         let k = k % CARRIER_SAMPLES;
-        CarrierPeriod { cos: CARRIER_COS[k], sin: CARRIER_SIN[k], ..CarrierPeriod::default() }
+        let carrier =
+            CarrierPeriod { cos: CARRIER_COS[k], sin: CARRIER_SIN[k], ..CarrierPeriod::default() };
+        CarrierSample { current, axis: axis.unit_vector(), carrier, i_q }
     }
 
     /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
     /// on top of a fundamental of 3 A.
     fn steady(amplitude: f64, turn: f64, phase: f64) -> Saliency {
         let theta = 0.7;
-        let axis = Angle::from_radians(theta as f32).unit_vector();
+        let axis = Angle::from_radians(theta as f32);
         let mut state = SynchronousState::default();
         let mut last = Saliency::default();
         for k in 0..500 {
@@ -136,7 +113,7 @@ mod tests {
                 (carrier * (theta + turn).cos() + 2.0) as f32,
                 (carrier * (theta + turn).sin() - 2.2) as f32,
             );
-            last = state.step(i, axis, self::carrier(k as usize), 1.5);
+            last = state.step(&sample(i, axis, k as usize, 1.5));
         }
         last
     }
@@ -162,16 +139,16 @@ mod tests {
 
     #[test]
     fn the_sums_do_not_drift() {
-        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO.unit_vector());
+        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
         let mut x = 1_u32;
         for k in 0..600_000_usize {
             x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let noise = (x >> 8) as f32 / 4e6 - 2.0;
-            state.step(AlphaBeta::new(noise, -noise), axis, carrier(k), noise);
+            state.step(&sample(AlphaBeta::new(noise, -noise), axis, k, noise));
         }
         let mut rest = Saliency::default();
         for k in 0..40_usize {
-            rest = state.step(AlphaBeta::ZERO, axis, carrier(k), 0.0);
+            rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
         }
         assert_eq!(rest, Saliency::default());
     }
@@ -181,6 +158,6 @@ mod tests {
         assert_eq!(steady(0.0, 0.0, 0.0).q, 0.0);
         let mut state = SynchronousState::default();
         let nan = AlphaBeta::new(f32::NAN, f32::INFINITY);
-        assert!(state.step(nan, Angle::ZERO.unit_vector(), carrier(77), f32::NAN).q.is_finite());
+        assert!(state.step(&sample(nan, Angle::ZERO, 77, f32::NAN)).q.is_finite());
     }
 }

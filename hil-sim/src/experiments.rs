@@ -1,10 +1,12 @@
 //! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
 
 mod adc_calibration;
+mod angle_identification;
 mod anti_windup;
 mod bode;
 mod current_step;
 mod dead_time;
+mod demodulators;
 mod filters;
 mod identify_continuous;
 mod identify_discrete;
@@ -65,6 +67,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    demodulators::EXPERIMENT,
+    angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,

@@ -1,5 +1,6 @@
-//! Learning the reference of the synchronous demodulation with the shaft locked.
+//! Learning the reference of a demodulation with the shaft locked.
 
+use drive_core::schedule::ReferenceTable;
 use drive_core::{Command, Mode};
 
 use crate::config::{AngleSource, Config, Demodulator, LoadMode};
@@ -20,7 +21,7 @@ const AVERAGE_S: f64 = 0.5;
 pub struct Learned {
     /// Current on the quadrature axis, A.
     pub i_q: f64,
-    /// The saliency seen at the right angle.
+    /// What is seen at the right angle: the saliency, or the current difference in A.
     pub q: f64,
     /// How much it scattered, rms.
     pub scatter: f64,
@@ -32,10 +33,32 @@ pub struct Learned {
 /// # Errors
 /// When the configuration is refused or the drive stops.
 pub fn reference(config: &Config, seed: u64) -> Result<Vec<Learned>, Error> {
+    reference_of(Demodulator::Synchronous, config, seed)
+}
+
+/// The table that the points make; odd, so without the first.
+///
+/// # Errors
+/// When a value is beyond belief.
+pub fn table(learned: &[Learned]) -> Result<ReferenceTable, Error> {
+    let later = learned.iter().skip(1).map(|point| (point.i_q as f32, point.q as f32));
+    let points: Vec<_> = std::iter::once((0.0, 0.0)).chain(later).collect();
+    ReferenceTable::new(&points).map_err(|error| Error::Refused(error.to_string()))
+}
+
+/// The same for any demodulation.
+///
+/// # Errors
+/// As [`reference`].
+pub fn reference_of(
+    demodulator: Demodulator,
+    config: &Config,
+    seed: u64,
+) -> Result<Vec<Learned>, Error> {
     let mut config = config.clone();
     config.angle.source = AngleSource::Encoder;
     config.load.mode = LoadMode::Locked;
-    config.injection.demodulator = Demodulator::Synchronous;
+    config.injection.demodulator = demodulator;
     let mut drive = crate::rig::drive_settings(&config);
     drive.injection.beside_encoder = true;
     let mut rig = Rig::new(&crate::rig::plant_settings(&config), &drive, seed)?;
@@ -47,7 +70,7 @@ pub fn reference(config: &Config, seed: u64) -> Result<Vec<Learned>, Error> {
         rig.command(Command::Torque(i_q as f32))?;
         rig.run(SETTLE_S, |_| {});
         let mut q = Stats::default();
-        rig.run(AVERAGE_S, |p| q.push(p.saliency));
+        rig.run(AVERAGE_S, |p| q.push(p.signal()));
         table.push(Learned { i_q, q: q.mean(), scatter: q.deviation() });
     }
     Ok(table)

@@ -60,6 +60,14 @@ pub struct Point {
     pub turns: f64,
 }
 
+impl Point {
+    /// What the demodulation in use gives: a current difference in A or, with the synchronous one, a
+    /// saliency. (The other of the two rests at zero.)
+    pub fn signal(&self) -> f64 {
+        self.delta_i + self.saliency
+    }
+}
+
 impl Rig {
     /// A drive that is off, connected to a motor at rest.
     ///
@@ -278,10 +286,15 @@ pub fn drive_settings(config: &Config) -> Settings {
             demodulator: match config.injection.demodulator {
                 config::Demodulator::Literal => Tracking::Literal,
                 config::Demodulator::Rectified => Tracking::Rectified,
+                config::Demodulator::RmsImpedance => Tracking::RmsImpedance,
+                config::Demodulator::Envelope => Tracking::Envelope,
                 config::Demodulator::Synchronous => Tracking::Synchronous,
             },
             printed: PrintedChain {
                 reference_a: config.injection.reference_a as f32,
+                k_s: config.injection.k_s as f32,
+                z_s: config.injection.z_s as f32,
+                rms_samples: config.injection.rms_samples.try_into().unwrap_or(u8::MAX),
                 ..base.injection.printed
             },
             synchronous: SynchronousTracking {

@@ -64,7 +64,7 @@ impl Drive {
                 if self.c.source != AngleSource::Encoder {
                     return Err(Refused::NeedsEncoder);
                 }
-                let turn = Angle::QUARTER + Angle::from_degrees(degrees);
+                let turn = self.c.injection_turn + Angle::from_degrees(degrees);
                 self.references.injection_axis = turn.unit_vector();
                 Ok(Taken::AsGiven)
             }
@@ -92,11 +92,14 @@ impl Drive {
             (state, _) => return Err(Refused::State(state)),
         }
         self.mode = mode;
-        self.references =
-            References { current: Dq::new(self.c.sequence.i_d, 0.0), ..References::default() };
+        self.references = References {
+            current: Dq::new(self.c.sequence.i_d, 0.0),
+            injection_axis: self.c.injection_axis,
+            ..References::default()
+        };
         self.sensing = SensingState::default();
         self.control = ControlState::default();
-        self.control.estimator.start();
+        self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
         Ok(Taken::AsGiven)
     }

@@ -1,6 +1,7 @@
 //! The range of every setting.
 
 use super::{PERIOD_S, Settings, SettingsError};
+use crate::demodulator::{LONGEST, SHORTEST};
 
 /// Not inlined: it is called forty times, and never in a hurry.
 #[inline(never)]
@@ -48,6 +49,8 @@ impl Settings {
         check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0)?;
         check("injection.k_s", t.k_s, 0.0, 100.0)?;
         check("injection.z_s", t.z_s, 0.0, 1.0)?;
+        let (shortest, longest) = (f32::from(SHORTEST), f32::from(LONGEST));
+        check("injection.rms_samples", f32::from(t.rms_samples), shortest, longest)?;
         let t = &inj.synchronous;
         check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0)?;
         // Towards zero the loop would have no gain; positive, the current's part would work against

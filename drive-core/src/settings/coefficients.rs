@@ -1,9 +1,9 @@
 //! From settings to what the control step works with.
 
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
+use crate::angle::{Angle, UnitVector};
 use crate::dead_time::DeadTime;
-use crate::demodulator::Demodulator;
-use crate::estimator::{ConstantReference, Estimator, Method};
+use crate::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 use crate::indirect::Indirect;
 use crate::injection::Injection;
 use crate::modulation::Modulator;
@@ -31,6 +31,9 @@ pub struct Coefficients {
     /// Demodulate and, with the injection as source, track.
     pub(crate) demodulate: bool,
     pub(crate) injection: Injection,
+    /// Injection axis seen from the flux, as an angle and a unit vector.
+    pub(crate) injection_turn: Angle,
+    pub(crate) injection_axis: UnitVector,
     pub(crate) estimator: Estimator,
     /// The check of a sensorless start, if it is wanted.
     pub(crate) saliency_check: Option<SaliencyCheck>,
@@ -141,6 +144,11 @@ impl Settings {
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
+        let injection = Injection::new(inj.amplitude_v, motor_plant, current_lag);
+        let (injection_turn, injection_axis) = match inj.demodulator {
+            Tracking::RmsImpedance => (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 }),
+            _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
+        };
 
         Ok(Coefficients {
             sensing: Sensing {
@@ -163,9 +171,15 @@ impl Settings {
             ),
             inject: injecting && inj.amplitude_v > 0.0,
             demodulate: injecting,
-            injection: Injection::new(inj.amplitude_v, motor_plant, current_lag),
+            injection,
+            injection_turn,
+            injection_axis,
             saliency_check: self.saliency_check(),
-            estimator: self.estimator(lag_share, turns_per_step(self.limits.speed_rpm)),
+            estimator: self.estimator(
+                lag_share,
+                turns_per_step(self.limits.speed_rpm),
+                injection.current_amplitude,
+            ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
                 ReferenceFilter::new(designs[0].p_f),
@@ -222,37 +236,53 @@ impl Settings {
         checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.t_sec(), PERIOD_S))
     }
 
-    fn estimator(&self, lag_share: f32, speed_limit: f32) -> Estimator {
+    /// `carrier_a` is the amplitude of the carrier current, A.
+    fn estimator(&self, lag_share: f32, speed_limit: f32, carrier_a: f32) -> Estimator {
         let analog = self.scales.current_delay_s / PERIOD_S;
         let limit = 1.5 * speed_limit;
-        let (p, t) = (&self.injection.printed, &self.injection.synchronous);
-        let printed = |demodulator| Estimator {
-            method: Method::Printed {
-                demodulator,
-                reference: ConstantReference {
-                    full: p.reference_a,
-                    slope: p.reference_a / p.full_reference_iq_a,
-                    from: p.full_reference_iq_a,
+        let inj = &self.injection;
+        let (p, t) = (&inj.printed, &inj.synchronous);
+        let angle_loop = match inj.demodulator {
+            Tracking::Synchronous => AngleLoop::Pll {
+                schedule: Schedule::new(
+                    &t.reference,
+                    t.flux_saliency,
+                    t.current_saliency,
+                    self.sequence.i_d,
+                ),
+                pll: Pll::new(t.bandwidth_hz, PERIOD_S, limit),
+            },
+            _ => AngleLoop::Pii {
+                reference: match &p.learned {
+                    Some(table) => {
+                        let a = t.flux_saliency;
+                        Reference::Learned(Schedule::new(table, a, 0.0, self.sequence.i_d))
+                    }
+                    None => Reference::Constant(ConstantReference {
+                        full: p.reference_a,
+                        slope: p.reference_a / p.full_reference_iq_a,
+                        from: p.full_reference_iq_a,
+                    }),
                 },
                 tracker: Tracker::new(p.k_s, p.z_s, limit),
             },
-            lag: lag_share * (BPF_GROUP_DELAY + analog),
         };
-        match self.injection.demodulator {
-            Tracking::Literal => printed(Demodulator::Literal),
-            Tracking::Rectified => printed(Demodulator::Rectified),
-            Tracking::Synchronous => Estimator {
-                method: Method::Synchronous {
-                    schedule: Schedule::new(
-                        &t.reference,
-                        t.flux_saliency,
-                        t.current_saliency,
-                        self.sequence.i_d,
-                    ),
-                    pll: Pll::new(t.bandwidth_hz, PERIOD_S, limit),
-                },
-                lag: lag_share * analog,
+        Estimator {
+            demodulator: inj.demodulator,
+            rms_samples: p.rms_samples,
+            // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
+            ampere_per_ohm: if inj.amplitude_v > 0.0 {
+                carrier_a * carrier_a / inj.amplitude_v * core::f32::consts::FRAC_1_SQRT_2
+            } else {
+                0.0
             },
+            angle_loop,
+            lag: lag_share
+                * match inj.demodulator {
+                    // They rotate behind the band-pass.
+                    Tracking::Literal | Tracking::Rectified => BPF_GROUP_DELAY + analog,
+                    _ => analog,
+                },
         }
     }
 }

@@ -22,6 +22,10 @@ words! {
         Literal = "literal",
         /// The difference of their magnitudes, filtered.
         Rectified = "rectified",
+        /// Ha and Sul: carrier along the flux, difference of the impedances from rms values.
+        RmsImpedance = "rms-impedance",
+        /// Difference of the envelopes of the two channels, averaged over a carrier period.
+        Envelope = "envelope",
         /// Mixed with the carrier, averaged and normalised; compared with a learned reference.
         Synchronous = "synchronous",
     }
@@ -181,8 +185,14 @@ keys! {
         amplitude_v: f64 = 50.0, [0 .. 150], "V";
         /// How the angle error is taken from the carrier current.
         demodulator: Demodulator = Demodulator::Synchronous, [Demodulator], "";
-        /// Reference of the current difference of literal and rectified (section 3.3).
+        /// Reference of the current difference of all but synchronous (section 3.3).
         reference_a: f64 = 0.010, [-1 .. 1], "A";
+        /// Gain k_s of the PII controller behind all but synchronous (Eq. 3.44).
+        k_s: f64 = 0.132546, [0 .. 100], "rad/A";
+        /// Zero z_s of that controller.
+        z_s: f64 = 0.9, [0 .. 1], "";
+        /// Length of the rms filters of rms-impedance, in samples.
+        rms_samples: u32 = 20, [2 .. 60], "";
         /// Whether a start with synchronous checks that the motor has a saliency.
         check: bool = true, [switch], "";
         /// Natural frequency of the loop behind synchronous.

@@ -29,14 +29,14 @@ const AVERAGE_S: f64 = 0.05;
 
 /// One family of curves.
 #[derive(Clone, Copy)]
-struct Variant {
-    name: &'static str,
-    title: &'static str,
-    demodulator: Demodulator,
-    saliency: bool,
-    inject: bool,
+pub(super) struct Variant {
+    pub name: &'static str,
+    pub title: &'static str,
+    pub demodulator: Demodulator,
+    pub saliency: bool,
+    pub inject: bool,
     /// Whether the delay of the demodulation is compensated.
-    compensate: bool,
+    pub compensate: bool,
 }
 
 const LITERAL: Variant = Variant {
@@ -92,8 +92,8 @@ const VARIANTS: [Variant; 7] = [
     },
 ];
 
-/// delta_i in mA over phi2 - theta in degrees.
-type Curve = Vec<(f64, f64)>;
+/// delta_i in mA (of the synchronous demodulation: thousandths) over phi2 - theta in degrees.
+pub(super) type Curve = Vec<(f64, f64)>;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(Variant, f64)> =
@@ -143,8 +143,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// Sweeps the injection angle with the encoder as angle source and the shaft locked.
-fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
+/// Sweeps the injection angle with the encoder as angle source and the shaft locked. Where the carrier
+/// belongs along the flux, theta is counted from 90° ahead of it.
+pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
     let mut config = config.clone();
     config.angle.source = AngleSource::Encoder;
     config.load.mode = LoadMode::Locked;
@@ -169,7 +170,7 @@ fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve,
         rig.run(SETTLE_S, |_| {});
         let (mut delta_i, mut error) = (Stats::default(), Stats::default());
         rig.run(AVERAGE_S, |p| {
-            delta_i.push(p.delta_i * 1e3);
+            delta_i.push(p.signal() * 1e3);
             error.push(p.angle_error_deg);
         });
         curve.push((f64::from(x) + error.mean(), delta_i.mean()));

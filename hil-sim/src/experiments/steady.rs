@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode, Settings, State};
 
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::plant::Load;
-use crate::rig::Rig;
+use crate::rig::{Rig, drive_settings, plant_settings};
 use crate::stats::Stats;
 
 /// Where, and with which noise.
@@ -42,10 +42,23 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn steady_run(config: &Config, case: Case, seconds: f64) -> Result<SteadyRun, Error> {
+    steady_run_of(&drive_settings(config), config, case, seconds)
+}
+
+/// The same with a drive that is set otherwise than the configuration says.
+///
+/// # Errors
+/// As [`steady_run`].
+pub fn steady_run_of(
+    drive: &Settings,
+    config: &Config,
+    case: Case,
+    seconds: f64,
+) -> Result<SteadyRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
-    let mut rig = Rig::from_config(&config, case.seed)?;
+    let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
     rig.start(Mode::Torque)?;
     rig.command(Command::Torque(case.iq as f32))?;
     rig.run(0.5, |_| {});

@@ -1,0 +1,138 @@
+//! The demodulations that are compared, and the drives that use them.
+
+use drive_core::Settings;
+use drive_core::schedule::ReferenceTable;
+
+use crate::config::{Config, Demodulator};
+use crate::error::Error;
+use crate::learn;
+use crate::rig::drive_settings;
+
+/// A demodulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject {
+    /// How the configuration names it.
+    pub name: &'static str,
+    /// How a key or a metric names it.
+    pub key: &'static str,
+    /// Which.
+    pub demodulator: Demodulator,
+    /// How much larger its signal is than that of the rectified chain for the same saliency, by the
+    /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
+    pub gain: f64,
+    /// Constant reference, A: the printed 10 mA, times the gain. Ha and Sul compare with zero.
+    pub constant_a: f64,
+}
+
+/// Gains at 600 Hz of the band-pass, at dc of the post-processing filter, and of a rectifier.
+const BPF: f64 = 0.9452;
+const PP: f64 = 0.944_061;
+const RECTIFIER: f64 = std::f64::consts::FRAC_2_PI;
+/// Of the rectified chain.
+const RECTIFIED: f64 = BPF * RECTIFIER * PP;
+const PRINTED_REFERENCE_A: f64 = 0.010;
+
+/// All of them.
+pub const SUBJECTS: [Subject; 5] = [
+    Subject {
+        name: "literal",
+        key: "literal",
+        demodulator: Demodulator::Literal,
+        gain: 1.0,
+        constant_a: PRINTED_REFERENCE_A,
+    },
+    Subject {
+        name: "rectified",
+        key: "rectified",
+        demodulator: Demodulator::Rectified,
+        gain: 1.0,
+        constant_a: PRINTED_REFERENCE_A,
+    },
+    Subject {
+        name: "rms-impedance",
+        key: "rms_impedance",
+        demodulator: Demodulator::RmsImpedance,
+        gain: PP / BPF / RECTIFIED,
+        constant_a: 0.0,
+    },
+    Subject {
+        name: "envelope",
+        key: "envelope",
+        demodulator: Demodulator::Envelope,
+        gain: BPF / RECTIFIED,
+        constant_a: PRINTED_REFERENCE_A * BPF / RECTIFIED,
+    },
+    Subject {
+        name: "synchronous",
+        key: "synchronous",
+        demodulator: Demodulator::Synchronous,
+        gain: 1.0,
+        constant_a: 0.0,
+    },
+];
+
+impl Subject {
+    /// The configuration with this demodulation.
+    pub fn config(&self, config: &Config) -> Config {
+        let mut config = config.clone();
+        config.injection.demodulator = self.demodulator;
+        // A motor without saliency is to be looked at, not refused.
+        config.injection.check = false;
+        config
+    }
+
+    /// Unit of what it gives, a thousand times.
+    pub fn unit(&self) -> &'static str {
+        if self.demodulator == Demodulator::Synchronous { "10^-3" } else { "mA" }
+    }
+
+    /// The reference that it learns on this motor.
+    ///
+    /// # Errors
+    /// When the learning drive is refused, or stops.
+    pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
+        let config = self.config(config);
+        learn::table(&learn::reference_of(self.demodulator, &config, seed)?)
+    }
+
+    /// The drive of this kind, if the demodulation has one.
+    pub fn drive(&self, kind: Kind, config: &Config, learned: ReferenceTable) -> Option<Settings> {
+        let mut drive = drive_settings(&self.config(config));
+        if self.demodulator == Demodulator::Synchronous {
+            drive.injection.synchronous.reference = learned;
+            return (kind == Kind::Retuned).then_some(drive);
+        }
+        let printed = &mut drive.injection.printed;
+        if kind == Kind::Constant {
+            printed.reference_a = self.constant_a as f32;
+        } else {
+            printed.learned = Some(learned);
+        }
+        if kind == Kind::Retuned {
+            (printed.k_s, printed.z_s) = RETUNED;
+        }
+        printed.k_s /= self.gain as f32;
+        Some(drive)
+    }
+}
+
+/// What the signal is compared with, and the controller behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A constant and the gains of the configuration (as printed).
+    Constant,
+    /// A learned table and the same gains.
+    Learned,
+    /// A learned table and a controller that leaves more phase; of the synchronous demodulation its
+    /// own loop.
+    Retuned,
+}
+
+/// All kinds, and what tables and metrics call them.
+pub const KINDS: [(Kind, &str); 3] =
+    [(Kind::Constant, "constant"), (Kind::Learned, "learned"), (Kind::Retuned, "retuned")];
+
+/// k_s in rad/A of the rectified chain's current difference, and z_s. With the printed zero, 0.90, the
+/// gain above some 100 Hz is ten times what it is at the crossover: enough to oscillate with the
+/// longer delay of the rms filters, or without the low-pass.
+const RETUNED: (f32, f32) = (0.1, 0.995);

@@ -1,0 +1,71 @@
+//! What the drive makes of it without a position sensor.
+
+use drive_core::injection::CARRIER_SAMPLES;
+use drive_core::{Command, Mode, Settings, State};
+
+use super::super::steady::{Case, SteadyRun, steady_run_of};
+use super::super::torque::LOST_DEG;
+use crate::config::{Config, LoadMode};
+use crate::error::Error;
+use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::stats::Stats;
+
+/// Levels of Figure 38, A, and the time at each, s.
+const LEVELS_A: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+const LEVEL_S: f64 = 0.6;
+/// Not judged after the first level, s: the angle settles from the magnetising position.
+const SETTLING_S: f64 = 0.5;
+
+/// A run through the torque steps.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    /// Angle error, degrees, over time, s: means over a carrier period.
+    pub error: Vec<(f64, f64)>,
+    /// Angle error after settling, degrees.
+    pub stats: Stats,
+    /// Whether it went beyond 45°, or the drive stopped itself.
+    pub lost: bool,
+}
+
+/// Torque steps with the shaft locked.
+pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<Steps, Error> {
+    let mut config = config.clone();
+    config.load.mode = LoadMode::Locked;
+    let mut rig = Rig::new(&plant_settings(&config), drive, seed)?;
+    rig.start(Mode::Torque)?;
+    let start = rig.time();
+    let (mut error, mut stats) = (Vec::new(), Stats::default());
+    for iq in LEVELS_A {
+        if matches!(rig.drive.state(), State::Fault(_)) {
+            break;
+        }
+        rig.command(Command::Torque(iq as f32))?;
+        for _ in 0..(LEVEL_S * RATE_HZ) as usize / CARRIER_SAMPLES {
+            let t = rig.time() - start;
+            let mut mean = Stats::default();
+            rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {
+                mean.push(p.angle_error_deg);
+                if t >= SETTLING_S {
+                    stats.push(p.angle_error_deg);
+                }
+            });
+            error.push((t, mean.mean()));
+        }
+    }
+    let lost = stats.largest() > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
+    Ok(Steps { error, stats, lost })
+}
+
+/// One second at constant speed and torque.
+pub fn turning(
+    drive: &Settings,
+    config: &Config,
+    rpm: f64,
+    iq: f64,
+    seed: u64,
+) -> Result<Option<SteadyRun>, Error> {
+    match steady_run_of(drive, config, Case { rpm, iq, seed }, 1.0) {
+        Ok(run) => Ok((!run.lost).then_some(run)),
+        Err(error) => Err(error),
+    }
+}
