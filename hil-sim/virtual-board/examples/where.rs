@@ -1,17 +1,23 @@
-//! w
+//! Runs lines at the console: boot <elf> <line> <periods> ...
 use std::path::Path;
+use std::time::Instant;
 use virtual_board::*;
-use virtual_board::cpu::*;
 fn main() -> anyhow::Result<()> {
-    let elf = std::env::args().nth(1).unwrap();
-    let n: u64 = std::env::args().nth(2).unwrap().parse()?;
-    let image = image::Image::open(Path::new(&elf))?;
-    let mut board = Board::new(image, Options::new(&hil_sim::Config::default(), 1))?;
-    for k in 0..n {
-        let r = board.run_ticks(28334);
-        let (now, ins, act) = (board.chip().now, board.chip().instructions, board.chip().scs.active.clone()); let at = board.chip().at; let pc = board.cpu().get(Register::Pc);
-        println!("{k} now {} insns {} at {} pc {pc:#x} active {:?}", now, ins, board.image().location(at), act);
-        for x in board.logged()? { println!("LOG {x}"); }
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let image = image::Image::open(Path::new(&args[0]))?;
+    let mut options = Options::new(&hil_sim::Config::default(), 1);
+    options.counting.cycles = std::env::var("NOCOUNT").is_err();
+    let mut board = Board::new(image, options)?;
+    let mut before = 0;
+    for pair in args[1..].chunks(2) {
+        board.type_line(&pair[0]);
+        let t = Instant::now();
+        let r = board.run_periods(pair[1].parse()?);
+        let n = board.periods().count();
+        let ins = board.chip().instructions;
+        println!("{:.6} > {}: {:?}; {} interrupts, {} flash instructions, wall {:?} resets {:?}", board.time(), pair[0], board.heard(), n, ins - before, t.elapsed(), board.resets);
+        before = ins;
+        for x in board.logged()?.iter().rev().take(4).rev() { println!("   LOG {x}"); }
         r?;
     }
     Ok(())

@@ -10,14 +10,13 @@ use hil_sim::plant::{MeasurementSettings, Plant, PlantSettings};
 
 use crate::board as numbers;
 use crate::chip::{Block, Chip, IRQ_ADC1_2, Reset, TICKS_PER_S, Unknown};
-use crate::cost::Costs;
 use crate::cpu::{Cpu, Fault, Register, Stop};
 use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
 use crate::periph::tim1::{BadGates, GateLimits};
 use crate::scs;
-use crate::unicorn::UnicornCpu;
+use crate::unicorn::{Counting, UnicornCpu};
 
 /// What a board is made with.
 pub struct Options {
@@ -25,8 +24,8 @@ pub struct Options {
     pub plant: PlantSettings,
     /// Seed of the sensors' noise.
     pub seed: u64,
-    /// Whether the cycles of the control interrupt are counted.
-    pub count: bool,
+    /// What is counted.
+    pub counting: Counting,
     /// What the gates must respect.
     pub gates: GateLimits,
 }
@@ -51,7 +50,7 @@ impl Options {
             // A microsecond, less what rounding to counts takes.
             pulse: us - 2,
         };
-        Self { plant: Self::plant(config), seed, count: true, gates }
+        Self { plant: Self::plant(config), seed, counting: Counting { cycles: true, every_instruction: false }, gates }
     }
 }
 
@@ -159,8 +158,7 @@ impl Board {
     /// What is wrong with the image or the plant.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
-        let costs = options.count.then(Costs::default);
-        let mut cpu = UnicornCpu::new(Chip::new(), costs).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let mut cpu = UnicornCpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
             if segment.address < memory::FLASH || end > memory::BANK_2 {
@@ -193,7 +191,7 @@ impl Board {
             preempt_at: None,
         };
         board.see();
-        board.cpu.chip_mut().keep_blocks = options.count;
+        board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.reset(memory::FLASH);
         Ok(board)
     }
@@ -201,6 +199,16 @@ impl Board {
     /// The core.
     pub fn cpu(&mut self) -> &mut UnicornCpu {
         &mut self.cpu
+    }
+
+    /// A word of memory.
+    pub fn word(&self, address: u32) -> Option<u32> {
+        self.cpu.word(address)
+    }
+
+    /// The stack pointer.
+    pub fn cpu_sp(&self) -> u32 {
+        self.cpu.get(Register::Sp)
     }
 
     /// The chip.
@@ -507,8 +515,11 @@ impl Board {
     /// The outputs as they are now hold from now on.
     fn see_outputs(&mut self) {
         let chip = self.cpu.chip();
-        let (on, now) = (chip.tim1.outputs_on() && chip.gates_connected(), chip.now);
+        let (on, now) = (chip.tim1.outputs_on(), chip.now);
         if on != self.outputs {
+            if on && !chip.gates_connected() {
+                return; // the pins are not the timer's
+            }
             self.advance_plant(now);
             self.outputs = on;
         }

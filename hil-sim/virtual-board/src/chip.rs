@@ -186,12 +186,11 @@ impl Chip {
         self.attention || self.now >= self.deadline
     }
 
-    /// An instruction from the flash is about to be executed.
+    /// Instructions from the flash are about to be executed.
     #[inline]
-    pub fn instruction(&mut self) {
-        let ticks = self.rcc.ticks_per_cycle();
-        self.now += ticks;
-        self.instructions += 1;
+    pub fn instructions(&mut self, count: u64) {
+        self.now += self.rcc.ticks_per_cycle() * count;
+        self.instructions += count;
         self.last_block = None;
     }
 

@@ -12,36 +12,35 @@ pub const EXCEPTION: u32 = 12 + 12 + 18 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
 
-const CODE: u32 = crate::memory::CCM;
-
-/// Costs of blocks in CCM, learnt when they are first executed.
+/// Costs of blocks of a memory, learnt when they are first executed.
 #[derive(Debug)]
 pub struct Costs {
-    /// By half-words of the memory: size in bytes and cycles.
+    base: u32,
+    of: fn(Instruction) -> u32,
+    /// By half-words of the memory: size in bytes and cost.
     blocks: Vec<(u16, u16)>,
 }
 
-impl Default for Costs {
-    fn default() -> Self {
-        Self { blocks: vec![(0, 0); crate::memory::CCM_SIZE as usize / 2] }
-    }
-}
-
 impl Costs {
-    /// Cycles of a block that was learnt with this size.
+    /// Costs of a memory of `size` bytes from `base` on, by the cost `of` an instruction.
+    pub fn new(base: u32, size: u32, of: fn(Instruction) -> u32) -> Self {
+        Self { base, of, blocks: vec![(0, 0); size as usize / 2] }
+    }
+
+    /// Cost of a block that was learnt with this size.
     #[inline]
     pub fn known(&self, address: u32, size: u32) -> Option<u32> {
-        let (known, cycles) = *self.blocks.get((address.wrapping_sub(CODE) / 2) as usize)?;
-        (u32::from(known) == size && size > 0).then_some(u32::from(cycles))
+        let (known, cost) = *self.blocks.get((address.wrapping_sub(self.base) / 2) as usize)?;
+        (u32::from(known) == size && size > 0).then_some(u32::from(cost))
     }
 
     /// Counts a block.
     pub fn learn(&mut self, address: u32, code: &[u8]) -> u32 {
-        let cycles = instructions(code).map(|instruction| instruction.cycles).sum();
-        if let Some(place) = self.blocks.get_mut((address.wrapping_sub(CODE) / 2) as usize) {
-            *place = (code.len() as u16, cycles as u16);
+        let cost = instructions(code).map(self.of).sum();
+        if let Some(place) = self.blocks.get_mut((address.wrapping_sub(self.base) / 2) as usize) {
+            *place = (code.len() as u16, cost as u16);
         }
-        cycles
+        cost
     }
 }
 
@@ -182,36 +181,4 @@ fn float(w: u16, v: u16, before: &mut Before) -> u32 {
     let compares = operation == 0xb && (more == 4 || more == 5);
     *before = Before { memory: false, result: (!compares).then_some(vd) };
     cycles
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cycles(code: &[u16]) -> Vec<u32> {
-        let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-        instructions(&bytes).map(|instruction| instruction.cycles).collect()
-    }
-
-    #[test]
-    fn the_table_of_the_manual() {
-        // ldr r0,[r1]; ldr r2,[r3]; str r0,[r1]; adds r0,r0,r1
-        assert_eq!(cycles(&[0x6808, 0x681a, 0x6008, 0x1840]), [2, 1, 1, 1]);
-        // push {r4-r7,lr}; pop {r4-r7,pc}
-        assert_eq!(cycles(&[0xb5f0, 0xbdf0]), [6, 6]);
-        // vmul.f32 s0,s0,s1; vadd.f32 s2,s0,s1 (waits); vdiv.f32 s4,s2,s3 (waits); vsqrt.f32 s0,s1
-        assert_eq!(
-            cycles(&[0xee20, 0x0a20, 0xee30, 0x1a20, 0xee81, 0x2a21, 0xeeb1, 0x0ae0]),
-            [1, 2, 15, 14]
-        );
-        // vmla.f32 s0,s1,s2; vldr s0,[r0]; vstr s0,[r0]; vmrs; udiv r0,r1,r2
-        assert_eq!(
-            cycles(&[
-                0xee00, 0x0a81, 0xed90, 0x0a00, 0xed80, 0x0a00, 0xeef1, 0xfa10, 0xfbb1, 0xf0f2
-            ]),
-            [3, 2, 2, 1, 6]
-        );
-        // vpush {s16-s19}; ldrd r0,r1,[r2]; bl
-        assert_eq!(cycles(&[0xed2d, 0x8a04, 0xe9d2, 0x0100, 0xf000, 0xf800]), [5, 3, 1]);
-    }
 }

@@ -43,3 +43,4 @@ mod trace;
 
 pub use bench::{Board, Failure, Options, Period};
 pub use shadow::Shadow;
+pub use unicorn::Counting;

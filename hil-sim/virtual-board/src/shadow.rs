@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Compare, Drive};
+use drive_core::{Command, Drive, Settings};
 
 use crate::bench::Period;
 use crate::console::grammar::{self, Request};
@@ -30,6 +30,11 @@ impl Shadow {
         let settings = Everything::of_the_board();
         let drive = Drive::new(settings.build()?);
         Ok(Self { drive, settings, orders: VecDeque::new(), compared: 0 })
+    }
+
+    /// Its settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings.drive
     }
 
     /// A line that was typed at the console of the board.
@@ -64,8 +69,7 @@ impl Shadow {
     /// The compare values differ.
     pub fn follow(&mut self, period: &Period) -> Result<()> {
         let compare = self.drive.step(&period.sample);
-        // Off, the board's compare values are those of `Compare::OFF`.
-        if !same(compare, period.compare) {
+        if compare != period.compare {
             bail!(
                 "control interrupt {} while {}: {compare:?} on the host, {:?} on the board",
                 self.compared,
@@ -81,8 +85,4 @@ impl Shadow {
         }
         Ok(())
     }
-}
-
-fn same(host: Compare, board: Compare) -> bool {
-    host == board
 }

@@ -28,6 +28,15 @@ const FPCA: u64 = 1 << 2;
 const BASIC: [R; 8] = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC, R::XPSR];
 const FLOAT: [R; 9] = [R::D0, R::D1, R::D2, R::D3, R::D4, R::D5, R::D6, R::D7, R::FPSCR];
 
+/// What is counted, at the price of speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counting {
+    /// Cycles of what runs in CCM. Without, nothing is called while it runs, and it takes no time.
+    pub cycles: bool,
+    /// The core can be stopped at every instruction in the flash, not only where a block begins.
+    pub every_instruction: bool,
+}
+
 /// The emulated core.
 pub struct UnicornCpu {
     uc: Unicorn<'static, Chip>,
@@ -35,9 +44,8 @@ pub struct UnicornCpu {
 }
 
 impl UnicornCpu {
-    /// A core with this chip around it and the memory of the STM32G474RE. `costs` count the cycles
-    /// of what runs in CCM; without, nothing is called while it runs, and it takes no time.
-    pub fn new(chip: Chip, costs: Option<Costs>) -> Result<Self, uc_error> {
+    /// A core with this chip around it and the memory of the STM32G474RE.
+    pub fn new(chip: Chip, counting: Counting) -> Result<Self, uc_error> {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, chip)?;
         uc.ctl_set_cpu_model(CORTEX_M4)?;
         for region in memory::MAP {
@@ -76,34 +84,34 @@ impl UnicornCpu {
             }),
         )?;
 
-        // Main loop and slow interrupts run from the flash: a cycle per instruction, and a stop at
-        // any instruction.
-        let flash = u64::from(memory::FLASH)..=u64::from(memory::FLASH + memory::FLASH_SIZE - 1);
-        uc.add_code_hook(*flash.start(), *flash.end(), |uc, address, _| {
-            let chip = uc.get_data_mut();
-            chip.at = address as u32;
-            chip.instruction();
-            if chip.wants_attention() {
-                uc.emu_stop().ok();
-            }
-        })?;
-        if let Some(mut costs) = costs {
-            let ccm = u64::from(memory::CCM)..=u64::from(memory::CCM + memory::CCM_SIZE - 1);
-            uc.add_block_hook(*ccm.start(), *ccm.end(), move |uc, address, size| {
-                let cycles = match costs.known(address as u32, size) {
-                    Some(cycles) => cycles,
-                    None => {
-                        let mut code = vec![0; size as usize];
-                        uc.mem_read(address, &mut code).ok();
-                        costs.learn(address as u32, &code)
-                    }
-                };
+        // Main loop and slow interrupts run from the flash: a cycle per instruction.
+        let flash = (u64::from(memory::FLASH), u64::from(memory::BANK_2 - 1));
+        if counting.every_instruction {
+            uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
+                let chip = uc.get_data_mut();
+                chip.at = address as u32;
+                chip.instructions(1);
+                stop_if_asked(uc);
+            })?;
+        } else {
+            let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
+            uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
+                let instructions = cost_of(&mut lengths, uc, address as u32, size);
+                let chip = uc.get_data_mut();
+                chip.at = address as u32;
+                chip.instructions(u64::from(instructions));
+                stop_if_asked(uc);
+            })?;
+        }
+        if counting.cycles {
+            let mut costs = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
+            let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
+            uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
+                let cycles = cost_of(&mut costs, uc, address as u32, size);
                 let chip = uc.get_data_mut();
                 chip.at = address as u32;
                 chip.block(address as u32, size, cycles);
-                if chip.wants_attention() {
-                    uc.emu_stop().ok();
-                }
+                stop_if_asked(uc);
             })?;
         }
         uc.add_intr_hook(|uc, _| {
@@ -128,6 +136,27 @@ impl UnicornCpu {
         write(R::IPSR, u64::from(xpsr & 0x1ff)).ok();
         // This write tells the translator about handler mode.
         write(R::APSR_NZCV, u64::from(xpsr & 0xf000_0000)).ok();
+    }
+}
+
+/// Stops the core where the chip wants attention.
+#[inline]
+fn stop_if_asked(uc: &mut Unicorn<Chip>) {
+    if uc.get_data().wants_attention() {
+        uc.emu_stop().ok();
+    }
+}
+
+/// What a block costs.
+#[inline]
+fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
+    match costs.known(address, size) {
+        Some(cost) => cost,
+        None => {
+            let mut code = vec![0; size as usize];
+            uc.mem_read(u64::from(address), &mut code).ok();
+            costs.learn(address, &code)
+        }
     }
 }
 
