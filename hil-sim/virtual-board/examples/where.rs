@@ -5,7 +5,7 @@ use virtual_board::*;
 fn main() -> anyhow::Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let image = image::Image::open(Path::new(&args[0]))?;
-    let mut options = Options::new(&hil_sim::Config::default(), 1);
+    let mut c = hil_sim::Config::default(); if std::env::var("FREE").is_ok() { c.load.mode = hil_sim::config::LoadMode::Free; } let mut options = Options::new(&c, 1);
     options.counting.cycles = std::env::var("NOCOUNT").is_err();
     let mut board = Board::new(image, options)?;
     let mut before = 0;
@@ -13,7 +13,7 @@ fn main() -> anyhow::Result<()> {
         board.type_line(&pair[0]);
         let t = Instant::now();
         let r = board.run_periods(pair[1].parse()?);
-        let n = board.periods().count();
+        let mut n = 0; while board.next_period().is_some() { n += 1; }
         let ins = board.chip().instructions;
         println!("{:.6} > {}: {:?}; {} interrupts, {} flash instructions, wall {:?} resets {:?}", board.time(), pair[0], board.heard(), n, ins - before, t.elapsed(), board.resets);
         before = ins;

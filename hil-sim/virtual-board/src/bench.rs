@@ -206,11 +206,6 @@ impl Board {
         self.cpu.word(address)
     }
 
-    /// The stack pointer.
-    pub fn cpu_sp(&self) -> u32 {
-        self.cpu.get(Register::Sp)
-    }
-
     /// The chip.
     pub fn chip(&mut self) -> &mut Chip {
         self.cpu.chip_mut()
@@ -260,9 +255,9 @@ impl Board {
         Ok(())
     }
 
-    /// Control interrupts that have ended since the last call.
-    pub fn periods(&mut self) -> impl Iterator<Item = Period> + '_ {
-        self.periods.drain(..)
+    /// The oldest control interrupt that has ended and was not asked for yet.
+    pub fn next_period(&mut self) -> Option<Period> {
+        self.periods.pop_front()
     }
 
     /// Level of the break pin: low trips.
@@ -526,11 +521,13 @@ impl Board {
     }
 
     fn advance_plant(&mut self, to: u64) {
-        let ticks = to.saturating_sub(self.plant_at);
-        if ticks > 0 {
-            let compare = if self.outputs { Compare { enabled: true, ..self.applied } } else { Compare::OFF };
+        let compare =
+            if self.outputs { Compare { enabled: true, ..self.applied } } else { Compare::OFF };
+        while self.plant_at < to {
+            // The plant's steps are fractions of what it is given: a period at most.
+            let ticks = (to - self.plant_at).min(2 * u64::from(numbers::PWM_TOP));
             self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
-            self.plant_at = to;
+            self.plant_at += ticks;
         }
     }
 

@@ -74,6 +74,8 @@ pub struct Chip {
     pub now: u64,
     /// Time up to which the core may run.
     pub deadline: u64,
+    /// The core has just been let go.
+    pub first: bool,
     /// Something to be done before the core goes on.
     pub attention: bool,
     /// The first access nobody knows.
@@ -129,6 +131,7 @@ impl Chip {
         Self {
             now: 0,
             deadline: 0,
+            first: false,
             attention: false,
             unknown: None,
             reset: None,
@@ -178,6 +181,13 @@ impl Chip {
         self.adc.inputs = old.adc.inputs;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
+    }
+
+    /// Whether the core is to stop before the block that begins here; never before the first of a run, so
+    /// that each run gets on.
+    #[inline]
+    pub fn stops_here(&mut self) -> bool {
+        !std::mem::take(&mut self.first) && self.wants_attention()
     }
 
     /// Whether the core is to stop.

@@ -3,13 +3,19 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use gimli::{EndianArcSlice, Reader as _, RunTimeEndian};
 use object::{Object, ObjectSection, ObjectSymbol};
 
 type Slice = EndianArcSlice<RunTimeEndian>;
+
+/// Environment variable that names the ELF.
+pub const ELF: &str = "INDUCTION_DRIVE_ELF";
+/// Where `cargo firmware` puts it in the target directory, with rustup's and with Debian's compiler.
+const PLACES: [&str; 2] = ["", "debian"];
+const INSIDE: &str = "thumbv7em-none-eabihf/firmware/induction-drive";
 
 /// A segment of the flash.
 #[derive(Clone, Debug)]
@@ -46,6 +52,22 @@ impl Image {
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
         Self::parse(bytes).with_context(|| path.display().to_string())
+    }
+
+    /// The image that `cargo firmware` built last, or the one that the environment names.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn built() -> Result<Self> {
+        if let Some(path) = std::env::var_os(ELF) {
+            return Self::open(Path::new(&path));
+        }
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
+        let places = PLACES.map(|place| target.join(place).join(INSIDE));
+        let age = |path: PathBuf| Some((path.metadata().ok()?.modified().ok()?, path));
+        let newest = places.into_iter().filter_map(age).max();
+        Self::open(&newest.context("no firmware image: type `cargo firmware`")?.1)
     }
 
     /// Understands the contents of an ELF file.

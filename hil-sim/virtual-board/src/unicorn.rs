@@ -142,7 +142,7 @@ impl UnicornCpu {
 /// Stops the core where the chip wants attention.
 #[inline]
 fn stop_if_asked(uc: &mut Unicorn<Chip>) {
-    if uc.get_data().wants_attention() {
+    if uc.get_data_mut().stops_here() {
         uc.emu_stop().ok();
     }
 }
@@ -171,6 +171,7 @@ impl Cpu for UnicornCpu {
 
     fn run(&mut self) -> Stop {
         self.faulted.set(None);
+        self.chip_mut().first = true;
         let pc = self.get(Register::Pc);
         let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
         let pc = self.get(Register::Pc);

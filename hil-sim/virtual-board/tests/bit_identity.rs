@@ -3,7 +3,6 @@
 mod common;
 
 use anyhow::Result;
-use common::Pair;
 use drive_core::State;
 use hil_sim::Config;
 
@@ -11,7 +10,7 @@ use hil_sim::Config;
 /// control interrupt is compared where it is written (see `Shadow::follow`).
 #[test]
 fn sixty_thousand_interrupts_of_a_sensorless_run_are_the_same() -> Result<()> {
-    let mut pair = Pair::new(&Config::default(), 11)?;
+    let mut pair = common::pair(&Config::default(), 11)?;
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
     for i_q in ["1", "1.25", "1.5", "1.75", "2", "-1", "-2", "0.5"] {
@@ -31,7 +30,7 @@ fn sixty_thousand_interrupts_of_a_sensorless_run_are_the_same() -> Result<()> {
 fn a_drive_that_was_configured_at_the_console_is_the_same() -> Result<()> {
     let mut config = Config::default();
     config.load.mode = hil_sim::config::LoadMode::Free;
-    let mut pair = Pair::new(&config, 12)?;
+    let mut pair = common::pair(&config, 12)?;
     pair.order("angle encoder")?;
     pair.order("set motor.r_r 5.1")?;
     pair.order("start position")?;
