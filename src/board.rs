@@ -307,10 +307,11 @@ pub const WATCHDOG_RELOAD: u16 = 35;
 pub const WATCHDOG_US: u32 = (WATCHDOG_RELOAD as u32 + 1) * 4 * 1000 / (WATCHDOG_HZ_MAX / 1000);
 // At most 5 ms, with the slowest clock.
 const _: () = assert!((WATCHDOG_RELOAD as u32 + 1) * 4 * 1000 <= 5 * WATCHDOG_HZ);
-/// The PR field while the outputs are off and something takes long: divided by 64.
-pub const WATCHDOG_LONG_PRESCALER: u8 = 4;
-/// Counts less one: a second.
-pub const WATCHDOG_LONG_RELOAD: u16 = 499;
+/// The PR field while the outputs are off and something takes long: divided by 256.
+pub const WATCHDOG_LONG_PRESCALER: u8 = 6;
+/// Counts less one: ten seconds. The design of the control takes more than one: it is in double
+/// precision, which the core computes in software.
+pub const WATCHDOG_LONG_RELOAD: u16 = 1249;
 /// Longest wait for the watchdog to take both over, us: six of its longest clocks, 12 ms.
 pub const WATCHDOG_SET_US: u32 = 15_000;
 /// Unwished resets in a row after which the drive is not started any more.

@@ -1,0 +1,184 @@
+//! What instructions cost on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
+//! DDI0439).
+//!
+//! A static count of a block: an instruction that its IT condition skips counts as executed, an
+//! integer division as 6, and a floating-point result that the next instruction needs costs one
+//! more. An estimate: no board has confirmed it.
+
+/// More cycles for a branch that is taken: the pipeline fills again.
+pub const TAKEN: u32 = 2;
+/// Exception entry and exit with the saving and restoring of the floating-point registers.
+pub const EXCEPTION: u32 = 12 + 12 + 18 + 17;
+/// More cycles for an access to a peripheral register: its bus.
+pub const BUS: u32 = 3;
+
+/// Costs of blocks of a memory, learnt when they are first executed.
+#[derive(Debug)]
+pub struct Costs {
+    base: u32,
+    of: fn(Instruction) -> u32,
+    /// By half-words of the memory: size in bytes and cost.
+    blocks: Vec<(u16, u16)>,
+}
+
+impl Costs {
+    /// Costs of a memory of `size` bytes from `base` on, by the cost `of` an instruction.
+    pub fn new(base: u32, size: u32, of: fn(Instruction) -> u32) -> Self {
+        Self { base, of, blocks: vec![(0, 0); size as usize / 2] }
+    }
+
+    /// Cost of a block that was learnt with this size.
+    #[inline]
+    pub fn known(&self, address: u32, size: u32) -> Option<u32> {
+        let (known, cost) = *self.blocks.get((address.wrapping_sub(self.base) / 2) as usize)?;
+        (u32::from(known) == size && size > 0).then_some(u32::from(cost))
+    }
+
+    /// Counts a block.
+    pub fn learn(&mut self, address: u32, code: &[u8]) -> u32 {
+        let cost = instructions(code).map(self.of).sum();
+        if let Some(place) = self.blocks.get_mut((address.wrapping_sub(self.base) / 2) as usize) {
+            *place = (code.len() as u16, cost as u16);
+        }
+        cost
+    }
+}
+
+/// One instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instruction {
+    /// Bytes from the beginning of the block.
+    pub offset: u32,
+    /// Cycles, with a branch not taken.
+    pub cycles: u32,
+}
+
+/// The instructions of a block.
+pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
+    let mut at = 0;
+    let mut before = Before::default();
+    std::iter::from_fn(move || {
+        let half = |at: usize| Some(u16::from_le_bytes([*code.get(at)?, *code.get(at + 1)?]));
+        let first = half(at)?;
+        let offset = at as u32;
+        let cycles = if first >> 11 >= 0b11101 {
+            let second = half(at + 2)?;
+            at += 4;
+            long(first, second, &mut before)
+        } else {
+            at += 2;
+            short(first, &mut before)
+        };
+        Some(Instruction { offset, cycles })
+    })
+}
+
+/// What of the last instruction matters for the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Before {
+    memory: bool,
+    /// Single-precision register that it computed.
+    result: Option<u16>,
+}
+
+/// A load takes one cycle when it follows a load or a store.
+fn load(before: &mut Before) -> u32 {
+    let cycles = if before.memory { 1 } else { 2 };
+    *before = Before { memory: true, result: None };
+    cycles
+}
+
+fn store(before: &mut Before) -> u32 {
+    *before = Before { memory: true, result: None };
+    1
+}
+
+fn many(registers: u32, before: &mut Before) -> u32 {
+    *before = Before::default();
+    1 + registers
+}
+
+fn plain(cycles: u32, before: &mut Before) -> u32 {
+    *before = Before::default();
+    cycles
+}
+
+fn short(w: u16, before: &mut Before) -> u32 {
+    let low = u32::from(w & 0xff);
+    match w >> 8 {
+        0x48..=0x4f => load(before),
+        0x50..=0x55 => store(before),
+        0x56..=0x5f => load(before),
+        0x60..=0x9f if w & 0x0800 != 0 => load(before),
+        0x60..=0x9f => store(before),
+        // PUSH, POP, with the link register or the program counter.
+        0xb4 | 0xbc => many(low.count_ones(), before),
+        0xb5 | 0xbd => many(low.count_ones() + 1, before),
+        0xc0..=0xcf => many(low.count_ones(), before),
+        _ => plain(1, before),
+    }
+}
+
+fn long(w: u16, v: u16, before: &mut Before) -> u32 {
+    let is_load = w & 0x10 != 0;
+    match w >> 8 {
+        0xe8 | 0xe9 if w & 0x40 == 0 => many(u32::from(v).count_ones(), before),
+        // Table branch.
+        0xe8 if w & 0xfff0 == 0xe8d0 && v & 0xffe0 == 0xf000 => plain(2, before),
+        // LDREX, STREX and their like.
+        0xe8 if w & 0x0120 == 0 && is_load => load(before),
+        0xe8 if w & 0x0120 == 0 => store(before),
+        0xe8 | 0xe9 => many(2, before),
+        0xec..=0xee => float(w, v, before),
+        0xf8 | 0xf9 if is_load => load(before),
+        0xf8 | 0xf9 => store(before),
+        // SDIV, UDIV.
+        0xfb if w & 0xffd0 == 0xfb90 => plain(6, before),
+        _ => plain(1, before),
+    }
+}
+
+fn float(w: u16, v: u16, before: &mut Before) -> u32 {
+    let double = v >> 8 & 1 != 0;
+    let vd = (v >> 12 & 15) << 1 | w >> 6 & 1;
+    let vn = (w & 15) << 1 | v >> 7 & 1;
+    let vm = (v & 15) << 1 | v >> 5 & 1;
+    let needed = before.result;
+    let waits = |sources: &[u16]| u32::from(needed.is_some_and(|r| sources.contains(&r)));
+    if w >> 8 != 0xee {
+        if w & 0xffe0 == 0xec40 {
+            return plain(2, before);
+        }
+        if w & 0x0120 != 0x0100 {
+            return many(u32::from(v & 0xff), before);
+        }
+        // VLDR, VSTR.
+        if w & 0x10 == 0 {
+            let cycles = 2 + u32::from(double) + waits(&[vd]);
+            store(before);
+            return cycles;
+        }
+        load(before);
+        return 2 + u32::from(double);
+    }
+    // A move between the register files.
+    if v & 0x10 != 0 {
+        let cycles = 1 + waits(&[vn]);
+        return plain(cycles, before);
+    }
+    let (operation, more) = (w >> 4 & 0xb, w & 0xf);
+    let (cycles, sources): (u32, &[u16]) = match operation {
+        0x0 | 0x1 | 0x9 | 0xa => (3, &[vd, vn, vm]),
+        0x2 | 0x3 => (1, &[vn, vm]),
+        0x8 => (14, &[vn, vm]),
+        0xb if more == 1 && v >> 6 & 3 == 3 => (14, &[vm]),
+        // A compare reads its first operand.
+        0xb if more == 4 || more == 5 => (1, &[vd, vm]),
+        0xb if v & 0x40 == 0 => (1, &[]),
+        _ => (1, &[vm]),
+    };
+    let cycles = cycles + waits(sources);
+    let compares = operation == 0xb && (more == 4 || more == 5);
+    *before = Before { memory: false, result: (!compares).then_some(vd) };
+    cycles
+}

@@ -1,0 +1,192 @@
+//! What the control interrupt costs: its longest path over whole runs, block by block.
+//!
+//! A block is what [`drive_core::Drive::step`] is made of; an instruction belongs to the outermost of the
+//! functions it was inlined into that is one of them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use anyhow::{Context, Result, bail};
+use drive_core::State;
+use hil_sim::Config;
+use hil_sim::config::LoadMode;
+
+use crate::bench::{Options, Worst};
+use crate::cost::{BUS, EXCEPTION, TAKEN, instructions};
+use crate::image::Image;
+use crate::pair::Pair;
+
+/// Blocks, and the paths of functions that belong to them; the first that fits counts.
+const BLOCKS: [(&str, &[&str]); 9] = [
+    ("sensing", &["drive_core::sensing", "induction_drive::adc", "induction_drive::encoder"]),
+    ("protection", &["Drive>::protect", "drive_core::plausibility"]),
+    ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
+    ("tracker", &["drive_core::tracker"]),
+    ("estimator", &["drive_core::estimator", "drive_core::synchronous", "drive_core::demodulator", "drive_core::schedule", "drive_core::indirect", "drive_core::position"]),
+    ("current loop", &["drive_core::pi"]),
+    ("modulation", &["drive_core::modulation", "drive_core::dead_time"]),
+    ("frames, filters", &["drive_core::frames", "drive_core::filters", "drive_core::sos", "drive_core::angle", "idsp::"]),
+    ("sequence", &["drive_core::drive"]),
+];
+/// What belongs to none: timer, mailboxes, report.
+const REST: &str = "firmware";
+/// Entry, exit, registers; and waiting for the bus of the peripherals.
+const ENTRY: [&str; 2] = ["exception", "bus"];
+/// How much a line of the table may rise before it is refused.
+const TOLERANCE: f64 = 1.05;
+
+/// A line of the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// `sensored` or `sensorless`.
+    pub name: &'static str,
+    /// Instructions on the longest path.
+    pub instructions: u32,
+    /// Estimated cycles of it.
+    pub cycles: u32,
+    /// Estimated cycles of the interrupt in the middle of all while the drive regulates.
+    pub median: u32,
+    /// Cycles by block.
+    pub blocks: BTreeMap<&'static str, u32>,
+}
+
+/// Runs whole scenarios on the board: start, magnetising, torque steps, a reversal, the current limit, stop,
+/// with the console busy.
+///
+/// # Errors
+/// The board cannot go on, or does not compute what the host computes.
+pub fn measure(image: impl Fn() -> Result<Image>) -> Result<[Line; 2]> {
+    Ok([sensored(image()?)?, sensorless(image()?)?])
+}
+
+fn sensorless(image: Image) -> Result<Line> {
+    let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    regulate(&mut pair, "sensorless", &["torque 1", "torque 2", "torque -2", "torque 9", "torque 0"])
+}
+
+fn sensored(image: Image) -> Result<Line> {
+    let mut config = Config::default();
+    config.load.mode = LoadMode::Free;
+    let mut pair = Pair::new(image, Options::new(&config, 1))?;
+    pair.order("angle encoder")?;
+    pair.order("start position")?;
+    pair.until_state(State::Position)?;
+    regulate(&mut pair, "sensored", &["position 2", "position -1", "position 0"])
+}
+
+/// Gives the orders, a second each, and judges the run from its start to off.
+fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line> {
+    let mut cycles = Vec::new();
+    for line in orders {
+        // Taken, or taken as far as the limits allow.
+        pair.say(line)?;
+        pair.board.type_line("trace 500 2");
+        pair.run(6000, |_, period| cycles.push(period.cycles))?;
+    }
+    pair.board.send(b"\n");
+    pair.run(60, |_, _| {})?;
+    pair.say("stop")?;
+    pair.until_state(State::Off)?;
+    cycles.sort_unstable();
+    let median = *cycles.get(cycles.len() / 2).context("no control interrupts")?;
+    let worst = std::mem::take(&mut pair.board.worst);
+    attribute(name, pair.board.image(), &worst, median, |address, bytes| {
+        pair_read(pair, address, bytes)
+    })
+}
+
+fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
+    for (n, byte) in bytes.iter_mut().enumerate() {
+        let at = address + n as u32;
+        let word = pair.board.word(at & !3).unwrap_or(0);
+        *byte = (word >> (8 * (at & 3))) as u8;
+    }
+}
+
+fn attribute(
+    name: &'static str,
+    image: &Image,
+    worst: &Worst,
+    median: u32,
+    read: impl Fn(u32, &mut [u8]),
+) -> Result<Line> {
+    let mut blocks = BTreeMap::from([(ENTRY[0], EXCEPTION), (ENTRY[1], worst.accesses * BUS)]);
+    let mut belongs: BTreeMap<u32, &'static str> = BTreeMap::new();
+    let mut count = 0;
+    for block in &worst.blocks {
+        let mut code = vec![0; block.size as usize];
+        read(block.address, &mut code);
+        let mut last = REST;
+        for instruction in instructions(&code) {
+            let at = block.address + instruction.offset;
+            last = belongs.entry(at).or_insert_with(|| block_of(image, at));
+            *blocks.entry(last).or_default() += instruction.cycles;
+            count += 1;
+        }
+        if block.taken {
+            *blocks.entry(last).or_default() += TAKEN;
+        }
+    }
+    let cycles: u32 = blocks.values().sum();
+    if cycles != worst.cycles {
+        bail!("{cycles} cycles by blocks, but {} counted", worst.cycles);
+    }
+    Ok(Line { name, instructions: count, cycles, median, blocks })
+}
+
+fn block_of(image: &Image, address: u32) -> &'static str {
+    let frames = image.frames(address);
+    // From the outermost inwards; what no other block claims is the sequence's.
+    let (named, sequence) = BLOCKS.split_at(BLOCKS.len() - 1);
+    let find = |blocks: &[(&'static str, &[&str])]| {
+        frames.iter().rev().find_map(|frame| {
+            let fits = |part: &&str| frame.function.contains(*part);
+            blocks.iter().find(|(_, parts)| parts.iter().any(|part| fits(&part))).map(|b| b.0)
+        })
+    };
+    find(named).or_else(|| find(sequence)).unwrap_or(REST)
+}
+
+/// The lines as a table.
+pub fn table(lines: &[Line]) -> String {
+    let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(ENTRY);
+    let mut text = format!("{:<12}{:>14}{:>8}{:>8}", "line", "instructions", "cycles", "median");
+    blocks().for_each(|block| {
+        let _ = write!(text, "{block:>17}");
+    });
+    text.push('\n');
+    for line in lines {
+        let (i, c, m) = (line.instructions, line.cycles, line.median);
+        let _ = write!(text, "{:<12}{i:>14}{c:>8}{m:>8}", line.name);
+        for block in blocks() {
+            let _ = write!(text, "{:>17}", line.blocks.get(block).copied().unwrap_or(0));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Compares with a table that [`table`] wrote before.
+///
+/// # Errors
+/// A line needs over 5 % more instructions or cycles than it did, or is not there.
+pub fn compare(lines: &[Line], before: &str) -> Result<()> {
+    for line in lines {
+        let words: Vec<&str> = before
+            .lines()
+            .map(|text| text.split_whitespace().collect::<Vec<_>>())
+            .find(|words| words.first() == Some(&line.name))
+            .with_context(|| format!("the table has no line {}", line.name))?;
+        for (what, place, now) in
+            [("instructions", 1, line.instructions), ("cycles", 2, line.cycles)]
+        {
+            let was: u32 = words.get(place).context("the table is cut off")?.parse()?;
+            if f64::from(now) > TOLERANCE * f64::from(was) {
+                bail!("{}: {now} {what}, {was} before: more than 5 % more", line.name);
+            }
+        }
+    }
+    Ok(())
+}

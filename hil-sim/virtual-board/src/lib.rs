@@ -1,0 +1,50 @@
+//! Runs the flashed ELF on an emulated Cortex-M4F with modelled STM32G474 registers, and closes the loop
+//! with the simulated inverter, motor and sensors of `hil-sim`.
+//!
+//! The emulator is Unicorn, behind [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
+//! shipped links it, and its binaries are never distributed.
+//!
+//! # What is modelled, and what is not
+//! * Registers that the firmware uses ([`periph`], [`scs`]); an access to any other fails the run with the
+//!   address and the place in the source.
+//! * Time: an instruction in the flash takes one cycle (no wait states), what runs in CCM as
+//!   [`cost`] says. Exceptions are taken between instructions in the flash and at the end of the
+//!   control interrupt's blocks; entry and exit take no time.
+//! * Exceptions with priorities, nesting and masks; one stack; no MPU, no traps for unaligned accesses and
+//!   divisions by zero. Bus faults are taken at once and become hard faults, as in the firmware.
+//! * Oscillators, PLL, converters' calibration and references are ready at once.
+//! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
+//!   take effect when they do, with the mean voltage of the period until then.
+
+pub mod bench;
+pub mod chip;
+pub mod cost;
+pub mod cpu;
+pub mod cycles;
+pub mod image;
+pub mod log;
+pub mod memory;
+pub mod pair;
+pub mod periph;
+pub mod scs;
+pub mod shadow;
+pub mod unicorn;
+
+// The firmware's own board, settings and console: one source for both sides.
+#[allow(dead_code, missing_docs)]
+#[path = "../../../src/board.rs"]
+mod board;
+#[allow(dead_code, missing_docs)]
+mod console;
+#[allow(dead_code, missing_docs)]
+#[path = "../../../src/link.rs"]
+mod link;
+#[allow(dead_code, missing_docs)]
+#[path = "../../../src/trace.rs"]
+mod trace;
+
+pub use bench::{Board, Failure, Options, Period};
+pub use image::Image;
+pub use pair::Pair;
+pub use shadow::Shadow;
+pub use unicorn::Counting;

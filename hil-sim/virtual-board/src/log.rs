@@ -1,0 +1,72 @@
+//! The log: defmt frames from the up-buffer of RTT in RAM.
+
+use anyhow::{Context, Result, anyhow};
+use defmt_decoder::{DecodeError, Table};
+
+use crate::cpu::Cpu;
+use crate::image::Image;
+
+/// Up-buffer 0 in the control block: after its ID and two counts.
+const BUFFER: u32 = 0x18;
+
+/// Reads and decodes the log.
+pub struct Log {
+    table: Table,
+    control_block: u32,
+    bytes: Vec<u8>,
+}
+
+impl Log {
+    /// The log of an image.
+    ///
+    /// # Errors
+    /// The image has none.
+    pub fn new(image: &Image) -> Result<Self> {
+        let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
+        let table = table.context("the image has no defmt log")?;
+        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.0, bytes: Vec::new() })
+    }
+
+    /// What the firmware has logged since the last call.
+    ///
+    /// # Errors
+    /// It cannot be decoded.
+    pub fn take(&mut self, cpu: &mut impl Cpu) -> Result<Vec<String>> {
+        let at = self.control_block + BUFFER;
+        let word = |cpu: &mut dyn FnMut(u32) -> Option<u32>, n: u32| cpu(at + 4 * n);
+        let mut read = |address| cpu.word(address);
+        let (Some(buffer), Some(size), Some(written), Some(mut next)) =
+            (word(&mut read, 1), word(&mut read, 2), word(&mut read, 3), word(&mut read, 4))
+        else {
+            return Ok(Vec::new());
+        };
+        if size == 0 {
+            return Ok(Vec::new()); // not set up yet
+        }
+        while next != written {
+            let end = if written > next { written } else { size };
+            let mut part = vec![0; (end - next) as usize];
+            if !cpu.read(buffer + next, &mut part) {
+                break;
+            }
+            self.bytes.extend(part);
+            next = end % size;
+        }
+        cpu.write(at + 16, &next.to_le_bytes());
+        self.decode()
+    }
+
+    fn decode(&mut self) -> Result<Vec<String>> {
+        let mut lines = Vec::new();
+        let mut decoder = self.table.new_stream_decoder();
+        decoder.received(&self.bytes);
+        self.bytes.clear();
+        loop {
+            match decoder.decode() {
+                Ok(frame) => lines.push(frame.display(false).to_string()),
+                Err(DecodeError::UnexpectedEof) => return Ok(lines),
+                Err(DecodeError::Malformed) => lines.push("(malformed)".into()),
+            }
+        }
+    }
+}

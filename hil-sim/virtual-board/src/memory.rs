@@ -1,0 +1,70 @@
+//! The memory map of the STM32G474RE (RM0440, section 2.2), as far as it is modelled.
+
+/// What lies behind an address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Backing {
+    /// Read and executed; written by its controller only.
+    Flash,
+    /// Memory.
+    Ram,
+    /// Read and written through [`crate::chip::Chip`].
+    Registers,
+}
+
+/// A region.
+#[derive(Clone, Copy, Debug)]
+pub struct Region {
+    /// First address.
+    pub base: u32,
+    /// Bytes.
+    pub size: u32,
+    /// What is there.
+    pub backing: Backing,
+}
+
+/// First address of the flash.
+pub const FLASH: u32 = 0x0800_0000;
+/// Flash in both banks, bytes.
+pub const FLASH_SIZE: u32 = 512 * 1024;
+/// The second bank. It goes through the model of the flash, so that what is half written there can
+/// be told from data. No code lies in it.
+pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
+/// First address of SRAM1 and SRAM2.
+pub const RAM: u32 = 0x2000_0000;
+/// SRAM1 and SRAM2, bytes.
+pub const RAM_SIZE: u32 = 96 * 1024;
+/// CCM SRAM.
+pub const CCM: u32 = 0x1000_0000;
+/// Its other address.
+pub const CCM_ALIAS: u32 = RAM + RAM_SIZE;
+/// CCM SRAM, bytes.
+pub const CCM_SIZE: u32 = 32 * 1024;
+/// Where single bits of peripheral registers appear as words.
+pub const BIT_BAND: u32 = 0x4200_0000;
+/// Peripheral registers that have such an alias.
+pub const PERIPHERALS: u32 = 0x4000_0000;
+
+/// All regions but the alias of CCM.
+pub const MAP: [Region; 9] = [
+    Region { base: FLASH, size: FLASH_SIZE / 2, backing: Backing::Flash },
+    Region { base: BANK_2, size: FLASH_SIZE / 2, backing: Backing::Registers },
+    Region { base: RAM, size: RAM_SIZE, backing: Backing::Ram },
+    Region { base: CCM, size: CCM_SIZE, backing: Backing::Ram },
+    Region { base: PERIPHERALS, size: 0x3_0000, backing: Backing::Registers },
+    Region { base: BIT_BAND, size: 0x60_0000, backing: Backing::Registers },
+    Region { base: 0x4800_0000, size: 0x2000, backing: Backing::Registers },
+    Region { base: 0x5000_0000, size: 0x6_1000, backing: Backing::Registers },
+    Region { base: 0xe000_0000, size: 0x10_0000, backing: Backing::Registers },
+];
+
+/// Whether the chip has nothing at an address, so that an access is a fault of the processor. (Not:
+/// registers that exist but are not modelled.)
+pub fn is_reserved(address: u32) -> bool {
+    let inside = |base: u32, size: u32| (base..base + size).contains(&address);
+    let memories = MAP.iter().any(|region| inside(region.base, region.size));
+    // System memory and one-time programmable bytes, option bytes of both banks.
+    let system = inside(0x1fff_0000, 0x8000) || inside(0x1fff_f800, 0x100);
+    // Peripherals with their alias, external memories, the core's own registers.
+    let registers = inside(0x4000_0000, 0x2000_0000) || inside(0x6000_0000, 0x4000_0000);
+    !(memories || inside(CCM_ALIAS, CCM_SIZE) || system || registers || address >= 0xe000_0000)
+}

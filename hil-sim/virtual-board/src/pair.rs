@@ -1,0 +1,105 @@
+//! A board beside its shadow: what the one does is checked against the other, and the shadow knows what
+//! state the drive is in.
+
+use anyhow::{Result, bail};
+use drive_core::State;
+
+use crate::bench::{Board, Options, Period};
+use crate::image::Image;
+use crate::shadow::Shadow;
+
+/// Longest that the firmware takes from reset to its greeting, or to an answer, periods.
+const LONGEST_ANSWER: u64 = 30_000;
+/// Longest from a start to regulating, or from a stop to off, periods.
+const LONGEST_START: u64 = 60_000;
+
+/// A board and its shadow.
+pub struct Pair {
+    /// The board.
+    pub board: Board,
+    /// The drive on the host.
+    pub shadow: Shadow,
+}
+
+impl Pair {
+    /// A board that has started and waits for orders.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub fn new(image: Image, options: Options) -> Result<Self> {
+        let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
+        pair.until("the greeting", LONGEST_ANSWER, |pair, _| pair.board.heard().ends_with('\n'))?;
+        Ok(pair)
+    }
+
+    /// Goes on for some periods; `look` is called after each control interrupt.
+    ///
+    /// # Errors
+    /// What the board cannot go on with; compare values that differ.
+    pub fn run(&mut self, periods: u64, mut look: impl FnMut(&Self, &Period)) -> Result<()> {
+        for _ in 0..periods {
+            self.board.run_periods(1)?;
+            while let Some(period) = self.board.next_period() {
+                self.shadow.follow(&period)?;
+                look(self, &period);
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on until something is so, for `periods` at most.
+    ///
+    /// # Errors
+    /// As [`Pair::run`]; it never is.
+    pub fn until(
+        &mut self,
+        what: &str,
+        periods: u64,
+        mut done: impl FnMut(&mut Self, State) -> bool,
+    ) -> Result<()> {
+        for _ in 0..periods {
+            self.run(1, |_, _| {})?;
+            let state = self.shadow.drive.state();
+            if done(self, state) {
+                return Ok(());
+            }
+        }
+        let log = self.board.logged()?;
+        bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
+    }
+
+    /// Types a line and waits for its answer.
+    ///
+    /// # Errors
+    /// As [`Pair::until`].
+    pub fn say(&mut self, line: &str) -> Result<String> {
+        self.board.heard();
+        self.board.type_line(line);
+        self.shadow.type_line(line)?;
+        let mut answer = String::new();
+        self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
+            answer += &pair.board.heard();
+            answer.ends_with('\n')
+        })?;
+        Ok(answer.trim_end().to_owned())
+    }
+
+    /// Types a line that must be taken.
+    ///
+    /// # Errors
+    /// As [`Pair::until`]; the answer is not `ok`.
+    pub fn order(&mut self, line: &str) -> Result<()> {
+        match self.say(line)?.as_str() {
+            "ok" => Ok(()),
+            answer => bail!("{line:?}: {answer}"),
+        }
+    }
+
+    /// Goes on until the drive is in this state.
+    ///
+    /// # Errors
+    /// As [`Pair::until`].
+    pub fn until_state(&mut self, wanted: State) -> Result<()> {
+        self.until(&wanted.to_string(), LONGEST_START, |_, state| state == wanted)
+    }
+}

@@ -1,0 +1,62 @@
+//! TIM2 as counter of the encoder (RM0440, section 30): counts with the plant's, from 0 at its start,
+//! in encoder mode 3 only.
+
+use super::{Effect, Plain, Store};
+
+const ALL: u32 = u32::MAX;
+const KNOWN: &[Plain] = &[
+    (0x00, 0, 0xfff), (0x04, 0, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x10, 0, 0), (0x18, 0, ALL),
+    (0x1c, 0, ALL), (0x20, 0, ALL), (0x24, 0, 0), (0x28, 0, ALL), (0x2c, ALL, ALL),
+];
+const CR1: u32 = 0x00;
+const SMCR: u32 = 0x08;
+const CNT: u32 = 0x24;
+
+/// The timer.
+#[derive(Clone, Debug)]
+pub struct EncoderTimer {
+    store: Store,
+    position: u32,
+    from: u32,
+    held: u32,
+}
+
+impl Default for EncoderTimer {
+    fn default() -> Self {
+        Self { store: Store::new(KNOWN), position: 0, from: 0, held: 0 }
+    }
+}
+
+impl EncoderTimer {
+    fn counting(&self) -> bool {
+        self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3
+    }
+
+    /// The encoder is here, counts.
+    pub fn set_position(&mut self, position: u32) {
+        self.position = position;
+    }
+
+    /// Where the encoder is.
+    pub fn position(&self) -> u32 {
+        self.position
+    }
+
+    /// The counter.
+    pub fn count(&self) -> u32 {
+        if self.counting() { self.position.wrapping_sub(self.from) } else { self.held }
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32) -> Option<u32> {
+        if offset == CNT { Some(self.count()) } else { self.store.read(offset) }
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
+        self.held = if offset == CNT { value } else { self.count() };
+        self.store.write(offset, value)?;
+        self.from = self.position.wrapping_sub(self.held);
+        Some(Effect::None)
+    }
+}

@@ -1,0 +1,213 @@
+//! The flash (RM0440, section 3): two banks, programmed by double words, erased by pages of 2 KiB.
+//!
+//! Only the second bank can be written: code lies in the first. A double word that was being written
+//! when the power went has a wrong check code: reading it raises the NMI. A page whose erasure was cut
+//! short holds such words too.
+
+use super::{Effect, Plain, Store};
+use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
+
+const ALL: u32 = u32::MAX;
+const KNOWN: &[Plain] = &[
+    (ACR, 0x0004_0600, ALL), (0x04, 0, ALL), (KEYR, 0, 0), (0x0c, 0, ALL), (SR, 0, 0), (CR, 0xc000_0000, ALL),
+    (ECCR, 0, 0), (OPTR, 0xffef_f8aa, 0), (0x24, 0, 0), (0x2c, 0, 0), (0x30, 0, 0),
+];
+const ACR: u32 = 0x00;
+const KEYR: u32 = 0x08;
+const SR: u32 = 0x10;
+const CR: u32 = 0x14;
+const ECCR: u32 = 0x18;
+const OPTR: u32 = 0x20;
+
+const PG: u32 = 1;
+const PER: u32 = 1 << 1;
+const BKER: u32 = 1 << 11;
+const STRT: u32 = 1 << 16;
+const LOCK: u32 = 1 << 31;
+const EOP: u32 = 1;
+const PROGERR: u32 = 1 << 3;
+const PGSERR: u32 = 1 << 7;
+const SIZERR: u32 = 1 << 6;
+const BSY: u32 = 1 << 16;
+const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+const ECCD: u32 = 1 << 31;
+
+const PAGE: usize = 2048;
+/// Typical times, ticks: a double word 82 us, a page 22 ms (datasheet).
+const PROGRAM: u64 = 82 * 170;
+const ERASE: u64 = 22_000 * 170;
+
+/// The flash.
+#[derive(Clone, Debug)]
+pub struct Flash {
+    store: Store,
+    status: u32,
+    eccr: u32,
+    keys: usize,
+    busy_until: u64,
+    /// Lower half of a double word that is being programmed.
+    half: Option<(u32, u32)>,
+    bytes: Vec<u8>,
+    /// Double words whose check code is wrong.
+    torn: Vec<bool>,
+    /// Operations since the beginning: double words programmed, pages erased.
+    pub operations: u64,
+    /// The power goes in this operation, counted from 1; what it was to write is torn.
+    pub power_loss_at: Option<u64>,
+    /// The power has gone.
+    pub power_lost: bool,
+}
+
+impl Flash {
+    /// Erased.
+    pub fn new() -> Self {
+        let size = (FLASH + FLASH_SIZE - BANK_2) as usize;
+        Self {
+            store: Store::new(KNOWN),
+            status: 0,
+            eccr: 0,
+            keys: 0,
+            busy_until: 0,
+            half: None,
+            bytes: vec![0xff; size],
+            torn: vec![false; size / 8],
+            operations: 0,
+            power_loss_at: None,
+            power_lost: false,
+        }
+    }
+
+    /// The same contents after a reset.
+    pub fn after_reset(self) -> Self {
+        Self { bytes: self.bytes, torn: self.torn, operations: self.operations, ..Self::new() }
+    }
+
+    /// Contents of the second bank.
+    pub fn contents(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Flips a bit of the second bank, or two of a double word: with one the check code corrects it,
+    /// with two it is torn.
+    pub fn tear(&mut self, address: u32) {
+        if let Some(torn) = self.torn.get_mut(((address - BANK_2) / 8) as usize) {
+            *torn = true;
+        }
+    }
+
+    /// A word of the second bank, and whether its check code is wrong.
+    pub fn load(&mut self, address: u32) -> (u32, bool) {
+        let at = (address - BANK_2) as usize & !3;
+        let word = self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let torn = self.torn.get(at / 8) == Some(&true);
+        if torn {
+            self.eccr = ECCD | 1 << 21 | (at as u32 / 8) & 0x7_ffff;
+        }
+        (word, torn)
+    }
+
+    /// Whether the operation that begins now is the one in which the power goes.
+    fn power_goes(&mut self) -> bool {
+        self.operations += 1;
+        if self.power_loss_at == Some(self.operations) {
+            self.power_lost = true;
+        }
+        self.power_lost
+    }
+
+    /// Programs a word: two make an operation. `None` is a write that is not 32 bits wide or not allowed.
+    pub fn store(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
+        let cr = self.store.get(CR);
+        if self.power_lost {
+            return Some(Effect::None);
+        }
+        if cr & (PG | LOCK) != PG || now < self.busy_until {
+            self.status |= PGSERR;
+            return Some(Effect::None);
+        }
+        match self.half.take() {
+            None if address % 8 == 0 => self.half = Some((address, value)),
+            Some((at, low)) if address == at + 4 => self.program(at, low, value, now),
+            _ => self.status |= PGSERR | SIZERR,
+        }
+        Some(if self.power_lost { Effect::Look } else { Effect::None })
+    }
+
+    fn program(&mut self, address: u32, low: u32, high: u32, now: u64) {
+        let at = (address - BANK_2) as usize;
+        let new = u64::from(low) | u64::from(high) << 32;
+        let Some(place) = self.bytes.get_mut(at..at + 8) else { return };
+        let old = u64::from_le_bytes([
+            place[0], place[1], place[2], place[3], place[4], place[5], place[6], place[7],
+        ]);
+        // Only erased double words, or all zeros over anything.
+        if old != u64::MAX && new != 0 {
+            self.status |= PROGERR;
+            return;
+        }
+        place.copy_from_slice(&(old & new).to_le_bytes());
+        self.torn[at / 8] = false;
+        if self.power_goes() {
+            self.torn[at / 8] = true;
+        }
+        self.busy_until = now + PROGRAM;
+        self.status |= EOP;
+    }
+
+    fn erase(&mut self, cr: u32, now: u64) {
+        self.busy_until = now + ERASE;
+        let (page, second) = ((cr >> 3 & 0x7f) as usize, cr & BKER != 0);
+        if !second {
+            // That is the code.
+            self.status |= PROGERR;
+            return;
+        }
+        let lost = self.power_goes();
+        let range = page * PAGE..(page + 1) * PAGE;
+        self.bytes[range.clone()].fill(0xff);
+        self.torn[range.start / 8..range.end / 8].fill(lost);
+        self.status |= EOP;
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
+        Some(match offset {
+            SR => self.status | if now < self.busy_until { BSY } else { 0 },
+            ECCR => self.eccr,
+            _ => return self.store.read(offset),
+        })
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        let cr = self.store.get(CR);
+        match offset {
+            KEYR => {
+                self.keys = if KEYS.get(self.keys) == Some(&value) { self.keys + 1 } else { 0 };
+                if self.keys == 2 {
+                    self.store.write(CR, cr & !LOCK);
+                    self.keys = 0;
+                }
+            }
+            SR => self.status &= !value,
+            ECCR => self.eccr &= !value,
+            // Locked: only the lock itself may be set again.
+            CR if cr & LOCK != 0 => {}
+            CR => {
+                self.store.write(CR, value & !STRT);
+                self.half = None;
+                if value & (STRT | PER) == STRT | PER && !self.power_lost {
+                    self.erase(value, now);
+                }
+            }
+            _ => return self.store.write(offset, value),
+        }
+        Some(if self.power_lost { Effect::Look } else { Effect::None })
+    }
+}
+
+impl Default for Flash {
+    fn default() -> Self {
+        Self::new()
+    }
+}

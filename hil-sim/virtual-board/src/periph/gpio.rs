@@ -1,0 +1,77 @@
+//! Pins (RM0440, section 9). Inputs are as they are pulled.
+
+use super::{Effect, Plain, Store};
+
+const ALL: u32 = u32::MAX;
+const KNOWN: &[Plain] = &[
+    (0x00, ALL, ALL), (0x04, 0, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x10, 0, 0), (0x14, 0, 0xffff),
+    (0x18, 0, 0), (0x1c, 0, ALL), (0x20, 0, ALL), (0x24, 0, ALL), (0x28, 0, 0),
+];
+const MODER: u32 = 0x00;
+const PUPDR: u32 = 0x0c;
+const IDR: u32 = 0x10;
+const ODR: u32 = 0x14;
+const BSRR: u32 = 0x18;
+const AFRL: u32 = 0x20;
+const BRR: u32 = 0x28;
+
+/// A port.
+#[derive(Clone, Debug)]
+pub struct Gpio {
+    store: Store,
+    /// Levels from outside: pins driven, and their levels.
+    pub driven: (u16, u16),
+}
+
+impl Gpio {
+    /// Port A is 0.
+    pub fn new(port: usize) -> Self {
+        let mut store = Store::new(KNOWN);
+        // The debug port's pins.
+        match port {
+            0 => {
+                store.write(MODER, 0xabff_ffff);
+                store.write(PUPDR, 0x6400_0000);
+            }
+            1 => {
+                store.write(MODER, 0xffff_febf);
+                store.write(PUPDR, 0x0000_0100);
+            }
+            _ => {}
+        }
+        Self { store, driven: (0, 0) }
+    }
+
+    /// The alternate function of a pin, if that is what it is set to.
+    pub fn alternate(&self, pin: u32) -> Option<u32> {
+        let mode = self.store.get(MODER) >> (2 * pin) & 3;
+        (mode == 2).then(|| self.store.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15)
+    }
+
+    /// Whether a pin is analog.
+    pub fn analog(&self, pin: u32) -> bool {
+        self.store.get(MODER) >> (2 * pin) & 3 == 3
+    }
+
+    fn levels(&self) -> u32 {
+        let pulls = self.store.get(PUPDR);
+        let up = (0..16).fold(0, |w, n| w | u32::from(pulls >> (2 * n) & 3 == 1) << n);
+        let (driven, levels) = (u32::from(self.driven.0), u32::from(self.driven.1));
+        up & !driven | levels & driven
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32) -> Option<u32> {
+        if offset == IDR { Some(self.levels()) } else { self.store.read(offset) }
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
+        let odr = self.store.get(ODR);
+        match offset {
+            BSRR => self.store.write(ODR, odr & !(value >> 16) | value & 0xffff),
+            BRR => self.store.write(ODR, odr & !value),
+            _ => self.store.write(offset, value),
+        }
+    }
+}

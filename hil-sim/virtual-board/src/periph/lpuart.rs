@@ -1,0 +1,167 @@
+//! LPUART1 (RM0440, section 38), 8N1, without its FIFO; the wire to the console.
+
+use std::collections::VecDeque;
+
+use super::{Effect, Plain, Store};
+use crate::chip::NEVER;
+
+const ALL: u32 = u32::MAX;
+const KNOWN: &[Plain] = &[
+    (CR1, 0, ALL), (0x04, 0, ALL), (CR3, 0, ALL), (BRR, 0, 0xf_ffff), (0x18, 0, 0), (ISR, 0, 0), (ICR, 0, 0),
+    (RDR, 0, 0), (TDR, 0, 0), (0x2c, 0, ALL),
+];
+const CR1: u32 = 0x00;
+const CR3: u32 = 0x08;
+const BRR: u32 = 0x0c;
+const ISR: u32 = 0x1c;
+const ICR: u32 = 0x20;
+const RDR: u32 = 0x24;
+const TDR: u32 = 0x28;
+
+const UE: u32 = 1;
+const RE: u32 = 1 << 2;
+const TE: u32 = 1 << 3;
+const FE: u32 = 1 << 1;
+const ORE: u32 = 1 << 3;
+const RXNE: u32 = 1 << 5;
+const TC: u32 = 1 << 6;
+const TXE: u32 = 1 << 7;
+const FIFOEN: u32 = 1 << 29;
+/// Start bit, eight data bits, stop bit.
+const BITS: u64 = 10;
+
+/// What travels between the port and the console.
+#[derive(Clone, Debug, Default)]
+pub struct Wire {
+    /// To the chip; `None` is a byte damaged on its way.
+    pub to_chip: VecDeque<Option<u8>>,
+    /// From the chip.
+    pub from_chip: Vec<u8>,
+}
+
+/// The port.
+#[derive(Clone, Debug)]
+pub struct Lpuart {
+    store: Store,
+    status: u32,
+    received: u8,
+    to_send: Option<u8>,
+    shifting: Option<u8>,
+    sent_at: u64,
+    arrives_at: u64,
+    /// Its other end.
+    pub wire: Wire,
+}
+
+impl Default for Lpuart {
+    fn default() -> Self {
+        Self {
+            store: Store::new(KNOWN),
+            status: TXE | TC,
+            received: 0,
+            to_send: None,
+            shifting: None,
+            sent_at: NEVER,
+            arrives_at: NEVER,
+            wire: Wire::default(),
+        }
+    }
+}
+
+impl Lpuart {
+    fn on(&self, which: u32) -> bool {
+        self.store.get(CR1) & (UE | which) == UE | which
+    }
+
+    /// Ticks per byte.
+    fn byte(&self) -> u64 {
+        BITS * u64::from(self.store.get(BRR).max(0x300)) / 256
+    }
+
+    /// A byte was put on the wire.
+    pub fn wake(&mut self, now: u64) {
+        if self.arrives_at == NEVER && !self.wire.to_chip.is_empty() {
+            self.arrives_at = now + self.byte();
+        }
+    }
+
+    /// When a byte has arrived or left.
+    pub fn next_event(&self) -> u64 {
+        self.sent_at.min(self.arrives_at)
+    }
+
+    /// Lets bytes arrive and leave.
+    pub fn happen(&mut self, now: u64) {
+        if self.arrives_at <= now {
+            self.arrives_at = NEVER;
+            if let Some(byte) = self.wire.to_chip.pop_front()
+                && self.on(RE)
+            {
+                if self.status & RXNE != 0 {
+                    self.status |= ORE;
+                } else {
+                    self.status |= RXNE | if byte.is_none() { FE } else { 0 };
+                    self.received = byte.unwrap_or(0xff);
+                }
+            }
+            self.wake(now);
+        }
+        if self.sent_at <= now {
+            self.sent_at = NEVER;
+            self.wire.from_chip.extend(self.shifting.take());
+            self.shift(now);
+        }
+    }
+
+    fn shift(&mut self, now: u64) {
+        if self.shifting.is_some() {
+            return;
+        }
+        self.shifting = self.to_send.take();
+        if self.shifting.is_some() {
+            self.status = self.status & !TC | TXE;
+            self.sent_at = now + self.byte();
+        } else {
+            self.status |= TC;
+        }
+    }
+
+    /// Whether any enabled event asks for the interrupt.
+    pub fn requests(&self) -> bool {
+        let (cr1, cr3) = (self.store.get(CR1), self.store.get(CR3));
+        let asked = cr1 & (RXNE | TC | TXE);
+        let errors = if cr3 & 1 != 0 { FE | ORE } else { 0 } | if cr1 & RXNE != 0 { ORE } else { 0 };
+        cr1 & UE != 0 && self.status & (asked | errors) != 0
+    }
+
+    /// Reads a register, with what that does.
+    pub fn read(&mut self, offset: u32) -> Option<u32> {
+        match offset {
+            ISR => Some(self.status | self.store.get(CR1) << 18 & 1 << 22 | self.store.get(CR1) << 18 & 1 << 21),
+            RDR => {
+                self.status &= !RXNE;
+                Some(u32::from(self.received))
+            }
+            _ => self.store.read(offset),
+        }
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        match offset {
+            CR1 if value & FIFOEN != 0 => return None,
+            ICR => self.status &= !(value & (FE | ORE | 1 | 1 << 2)),
+            TDR => {
+                if self.on(TE) {
+                    self.to_send = Some(value as u8);
+                    self.status &= !(TXE | TC);
+                    self.shift(now);
+                }
+            }
+            _ => {
+                self.store.write(offset, value)?;
+            }
+        }
+        Some(Effect::Look)
+    }
+}

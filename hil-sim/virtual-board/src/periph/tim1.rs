@@ -1,0 +1,395 @@
+//! TIM1 in centre-aligned mode, as the timer of a power stage (RM0440, section 28).
+//!
+//! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
+//! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
+
+use super::{Effect, Plain, Store};
+use crate::chip::NEVER;
+
+const ALL: u32 = u32::MAX;
+const KNOWN: &[Plain] = &[
+    (CR1, 0, 0xbff), (CR2, 0, ALL), (0x08, 0, ALL), (DIER, 0, ALL), (SR, 0, 0), (EGR, 0, 0),
+    (CCMR1, 0, ALL), (CCMR2, 0, ALL), (CCER, 0, ALL), (CNT, 0, 0), (PSC, 0, ALL), (ARR, 0xffff, 0xf_ffff),
+    (RCR, 0, 0xffff), (CCR1, 0, 0xf_ffff), (0x38, 0, 0xf_ffff), (0x3c, 0, 0xf_ffff), (CCR4, 0, 0xf_ffff),
+    (BDTR, 0, ALL), (0x48, 0, ALL), (0x4c, 0, ALL), (0x50, 0, ALL), (0x54, 0, ALL), (AF1, 1, ALL), (0x64, 1, ALL),
+];
+const CR1: u32 = 0x00;
+const CR2: u32 = 0x04;
+const DIER: u32 = 0x0c;
+const SR: u32 = 0x10;
+const EGR: u32 = 0x14;
+const CCMR1: u32 = 0x18;
+const CCMR2: u32 = 0x1c;
+const CCER: u32 = 0x20;
+const CNT: u32 = 0x24;
+const PSC: u32 = 0x28;
+const ARR: u32 = 0x2c;
+const RCR: u32 = 0x30;
+const CCR1: u32 = 0x34;
+const CCR4: u32 = 0x40;
+const BDTR: u32 = 0x44;
+const AF1: u32 = 0x60;
+
+const UIF: u32 = 1;
+const BIF: u32 = 1 << 7;
+const SBIF: u32 = 1 << 13;
+const MOE: u32 = 1 << 15;
+const BKE: u32 = 1 << 12;
+const BKP: u32 = 1 << 13;
+
+/// Longest and shortest that a leg's gates must respect, ticks: the dead time of the inverter, and the
+/// shortest pulse that its gate drives pass on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GateLimits {
+    /// Dead time between the switches of a leg.
+    pub dead_time: u32,
+    /// Shortest time that a switch is on.
+    pub pulse: u32,
+}
+
+/// Why a gate pattern is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BadGates {
+    /// The switches of leg `leg` may be on together: the dead time in ticks.
+    Short {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Dead time that is programmed.
+        dead_time: u32,
+    },
+    /// A switch of leg `leg` is on for too short a time.
+    Pulse {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Ticks.
+        ticks: u32,
+    },
+    /// A switch is on although nobody switched the outputs on, or with a wrong polarity.
+    NotComplementary,
+}
+
+/// What has happened at one end of the count, or between.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Event {
+    /// The converters are triggered at this time.
+    pub trigger: Option<u64>,
+    /// When it was.
+    pub at: u64,
+    /// The counter is at its top.
+    pub crest: bool,
+}
+
+/// The timer.
+#[derive(Clone, Debug)]
+pub struct Tim1 {
+    store: Store,
+    /// Counter at rest.
+    held: u32,
+    /// When the counter was last at 0, on its way up.
+    from: u64,
+    top: u32,
+    active: [u32; 4],
+    repetitions: u32,
+    status: u32,
+    /// Next end of the count, and whether it is the top.
+    next_end: u64,
+    at_top_next: bool,
+    trigger_at: u64,
+    /// Level of the break pin.
+    pub fault_pin_high: bool,
+    /// Updates to be left out: compare values are not taken over, no flag is set.
+    pub drop_update: u32,
+}
+
+impl Default for Tim1 {
+    fn default() -> Self {
+        Self {
+            store: Store::new(KNOWN),
+            held: 0,
+            from: 0,
+            top: 0xffff,
+            active: [0; 4],
+            repetitions: 0,
+            status: 0,
+            next_end: NEVER,
+            at_top_next: true,
+            trigger_at: NEVER,
+            fault_pin_high: true,
+            drop_update: 0,
+        }
+    }
+}
+
+impl Tim1 {
+    fn counting(&self) -> bool {
+        self.store.get(CR1) & 1 != 0
+    }
+
+    /// Counter, and whether it counts down.
+    fn count(&self, now: u64) -> (u32, bool) {
+        if !self.counting() {
+            return (self.held, false);
+        }
+        let phase = ((now.saturating_sub(self.from)) % u64::from(2 * self.top)) as u32;
+        if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
+    }
+
+    /// Compare values in force.
+    pub fn in_force(&self) -> [u32; 3] {
+        [self.active[0], self.active[1], self.active[2]]
+    }
+
+    /// Compare values written last.
+    pub fn written(&self) -> [u32; 3] {
+        std::array::from_fn(|leg| self.store.get(CCR1 + 4 * leg as u32))
+    }
+
+    /// Where the counter turns round.
+    pub fn top(&self) -> u32 {
+        self.top
+    }
+
+    /// Whether the outputs are on.
+    pub fn outputs_on(&self) -> bool {
+        self.store.get(BDTR) & MOE != 0
+    }
+
+    /// Whether a break has been seen and not cleared.
+    pub fn broken(&self) -> bool {
+        self.status & (BIF | SBIF) != 0
+    }
+
+    /// Dead time, ticks.
+    pub fn dead_time(&self) -> u32 {
+        let code = self.store.get(BDTR) & 0xff;
+        match code >> 5 {
+            0..=3 => code,
+            4 | 5 => 2 * (64 + (code & 0x3f)),
+            6 => 8 * (32 + (code & 0x1f)),
+            _ => 16 * (32 + (code & 0x1f)),
+        }
+    }
+
+    /// Looks at the gates of the period with the compare values in force.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn check_gates(&self, limits: GateLimits) -> Result<(), BadGates> {
+        if !self.outputs_on() {
+            return Ok(());
+        }
+        // Both outputs of three legs, active high, PWM mode 1: nothing else is known to be safe.
+        let modes = [self.store.get(CCMR1) >> 4, self.store.get(CCMR1) >> 12, self.store.get(CCMR2) >> 4];
+        if self.store.get(CCER) & 0xfff != 0x555 || modes.iter().any(|mode| mode & 7 != 6) {
+            return Err(BadGates::NotComplementary);
+        }
+        let dead_time = self.dead_time();
+        for (leg, compare) in self.in_force().into_iter().enumerate() {
+            if dead_time < limits.dead_time {
+                return Err(BadGates::Short { leg, dead_time });
+            }
+            let compare = compare.min(self.top);
+            for on in [2 * compare, 2 * (self.top - compare)] {
+                let ticks = on.saturating_sub(dead_time);
+                // A whole period has no edges and so no dead time; a vanished pulse is none.
+                if on != 2 * self.top && ticks > 0 && ticks < limits.pulse {
+                    return Err(BadGates::Pulse { leg, ticks });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// When the next event is.
+    pub fn next_event(&self) -> u64 {
+        self.next_end.min(self.trigger_at)
+    }
+
+    /// Lets the next event happen.
+    pub fn happen(&mut self) -> Event {
+        if self.trigger_at <= self.next_end {
+            let at = std::mem::replace(&mut self.trigger_at, NEVER);
+            return Event { trigger: Some(at), at, crest: false };
+        }
+        let crest = self.at_top_next;
+        self.at_top_next = !crest;
+        if !crest {
+            self.from = self.next_end;
+        }
+        let end = self.next_end;
+        if self.repetitions == 0 {
+            self.update(true);
+        } else {
+            self.repetitions -= 1;
+        }
+        self.next_end = end + u64::from(self.top);
+        if !crest {
+            self.plan_trigger();
+        }
+        Event { trigger: None, at: end, crest }
+    }
+
+    /// OC4REF rises on the way up where the counter reaches its compare value.
+    fn plan_trigger(&mut self) {
+        let mode = self.store.get(CCMR2) >> 12 & 7;
+        let rises = mode == 7 && self.active[3] > 0 && self.active[3] <= self.top;
+        let is_trigger = self.store.get(CR2) >> 20 & 0xf == 7;
+        self.trigger_at =
+            if rises && is_trigger { self.from + u64::from(self.active[3]) } else { NEVER };
+    }
+
+    fn update(&mut self, flag: bool) {
+        if self.drop_update > 0 {
+            self.drop_update -= 1;
+            return;
+        }
+        self.top = self.store.get(ARR).max(1);
+        for channel in 0..4 {
+            self.active[channel] = self.store.get(CCR1 + 4 * channel as u32);
+        }
+        self.repetitions = self.store.get(RCR);
+        if flag {
+            self.status |= UIF;
+        }
+    }
+
+    fn preloads(&self, channel: usize) -> bool {
+        let register = self.store.get([CCMR1, CCMR2][channel / 2]);
+        register >> (3 + 8 * (channel % 2)) & 1 != 0
+    }
+
+    /// A fault inside the chip: clock, supply, memory, lock-up.
+    pub fn system_break(&mut self) {
+        if self.store.get(BDTR) & BKE != 0 {
+            self.status |= SBIF;
+            self.clear_moe();
+        }
+    }
+
+    /// A comparator that is routed to the break says so.
+    pub fn comparator_break(&mut self, comparator: usize) {
+        if self.store.get(AF1) >> (1 + comparator) & 1 != 0 {
+            self.pull();
+        }
+    }
+
+    /// Level of the break pin, from now on.
+    pub fn set_fault_pin(&mut self, high: bool) {
+        self.fault_pin_high = high;
+        self.look_at_pin();
+    }
+
+    fn pin_active(&self) -> bool {
+        let bdtr = self.store.get(BDTR);
+        let inverted = self.store.get(AF1) >> 9 & 1 != 0;
+        let level = self.fault_pin_high != inverted;
+        self.store.get(AF1) & 1 != 0 && bdtr & BKE != 0 && level == (bdtr & BKP != 0)
+    }
+
+    fn look_at_pin(&mut self) {
+        if self.pin_active() {
+            self.pull();
+        }
+    }
+
+    fn pull(&mut self) {
+        if self.store.get(BDTR) & BKE != 0 {
+            self.status |= BIF;
+            self.clear_moe();
+        }
+    }
+
+    fn clear_moe(&mut self) {
+        let bdtr = self.store.get(BDTR);
+        self.store.write(BDTR, bdtr & !MOE);
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
+        let (count, down) = self.count(now);
+        Some(match offset {
+            CR1 => self.store.get(CR1) & !(1 << 4) | u32::from(down) << 4,
+            CNT => count,
+            SR => self.status,
+            _ => return self.store.read(offset),
+        })
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        let old = self.store.read(offset)?;
+        match offset {
+            SR => {
+                self.status &= value;
+                self.look_at_pin();
+                return Some(Effect::Look);
+            }
+            EGR => {
+                if value & 1 != 0 {
+                    self.held = 0;
+                    self.update(self.store.get(CR1) & 4 == 0);
+                    if self.counting() {
+                        self.start(now);
+                    }
+                }
+                if value & 1 << 7 != 0 {
+                    self.pull();
+                }
+                return Some(Effect::Look);
+            }
+            BDTR => {
+                self.store.write(BDTR, self.locked(old, value));
+                self.look_at_pin();
+                return Some(Effect::None);
+            }
+            // Locked with levels 2 and 3.
+            CCER if self.lock() >= 2 => return self.store.write(CCER, value & !0xaaaa | old & 0xaaaa),
+            CCMR1 | CCMR2 if self.lock() >= 3 => return Some(Effect::None),
+            PSC if value != 0 => return None,
+            CR1 if value & 1 != 0 && value >> 5 & 3 == 0 => return None,
+            _ => {}
+        }
+        self.store.write(offset, value)?;
+        match offset {
+            CR1 if value & !old & 1 != 0 => self.start(now),
+            CR1 if old & !value & 1 != 0 => {
+                self.held = self.count(now).0;
+                self.next_end = NEVER;
+                self.trigger_at = NEVER;
+            }
+            ARR if self.store.get(CR1) & 1 << 7 == 0 => self.top = value.max(1),
+            CCR1..=CCR4 => {
+                let channel = ((offset - CCR1) / 4) as usize;
+                if !self.preloads(channel) {
+                    self.active[channel] = value;
+                }
+                return Some(Effect::None);
+            }
+            _ => {}
+        }
+        Some(Effect::Look)
+    }
+
+    fn start(&mut self, now: u64) {
+        self.from = now - u64::from(self.held.min(self.top));
+        self.next_end = self.from + u64::from(self.top);
+        self.at_top_next = true;
+        self.plan_trigger();
+    }
+
+    fn lock(&self) -> u32 {
+        self.store.get(BDTR) >> 8 & 3
+    }
+
+    fn locked(&self, old: u32, new: u32) -> u32 {
+        let mut kept = if self.lock() == 0 { 0 } else { 0x0300 };
+        if self.lock() >= 1 {
+            // Dead time, break enable, polarity and filters, automatic output.
+            kept |= 0x0fff_f0ff & !MOE;
+        }
+        if self.lock() >= 2 {
+            kept |= 0x0c00;
+        }
+        old & kept | new & !kept
+    }
+}

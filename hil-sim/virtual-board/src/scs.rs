@@ -1,0 +1,331 @@
+//! The core's own registers: NVIC, SCB, SysTick, cycle counter (ARMv7-M, chapter B3; Cortex-M4 TRM).
+
+use crate::periph::Effect;
+
+/// Exception numbers.
+pub const NMI: u16 = 2;
+/// See [`NMI`].
+pub const HARD_FAULT: u16 = 3;
+/// See [`NMI`].
+pub const SV_CALL: u16 = 11;
+/// See [`NMI`].
+pub const PEND_SV: u16 = 14;
+/// See [`NMI`].
+pub const SYSTICK: u16 = 15;
+/// Exceptions with those of the peripherals.
+const EXCEPTIONS: usize = 16 + 102;
+/// The priority of a core that runs no exception.
+pub const THREAD: i16 = 256;
+
+/// SysTick on the core clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SysTick {
+    control: u32,
+    reload: u32,
+    expires: u64,
+}
+
+impl SysTick {
+    /// When it next counts to zero.
+    pub fn next_event(&self) -> u64 {
+        if self.control & 1 != 0 { self.expires } else { u64::MAX }
+    }
+
+    /// Counts; whether it asks for its exception.
+    pub fn happen(&mut self, now: u64) -> bool {
+        if now < self.next_event() {
+            return false;
+        }
+        self.expires += u64::from(self.reload) + 1;
+        self.control |= 1 << 16;
+        self.control & 2 != 0
+    }
+}
+
+/// The registers.
+#[derive(Clone, Debug)]
+pub struct Scs {
+    pending: [bool; EXCEPTIONS],
+    enabled: [bool; EXCEPTIONS],
+    line: [bool; EXCEPTIONS],
+    priority: [u8; EXCEPTIONS],
+    /// Exceptions being served, innermost last.
+    pub active: Vec<u16>,
+    any_pending: bool,
+    vtor: u32,
+    grouping: u32,
+    /// Reasons of faults.
+    pub cfsr: u32,
+    /// Likewise.
+    pub hfsr: u32,
+    /// Address of a bus fault.
+    pub bfar: u32,
+    plain: [u32; 8],
+    demcr: u32,
+    dwt_control: u32,
+    /// The cycle counter is this less than time.
+    cycles_from: u64,
+    cycles_held: u32,
+    /// SysTick.
+    pub systick: SysTick,
+}
+
+impl Default for Scs {
+    fn default() -> Self {
+        Self {
+            pending: [false; EXCEPTIONS],
+            enabled: std::array::from_fn(|n| n < 16),
+            line: [false; EXCEPTIONS],
+            priority: [0; EXCEPTIONS],
+            active: Vec::new(),
+            any_pending: false,
+            vtor: 0x0800_0000,
+            grouping: 0,
+            cfsr: 0,
+            hfsr: 0,
+            bfar: 0,
+            plain: [0x200, 0, 0, 0, 0, 0, 0, 0xc000_0000],
+            demcr: 0,
+            dwt_control: 0,
+            cycles_from: 0,
+            cycles_held: 0,
+            systick: SysTick::default(),
+        }
+    }
+}
+
+/// Indices of registers that only hold what is written: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR,
+/// FPCAR, FPCCR.
+const PLAIN: [u32; 8] = [
+    0xe000_ed14, 0xe000_ed24, 0xe000_ed88, 0xe000_ed10, 0xe000_ed34, 0xe000_ed3c, 0xe000_ef38,
+    0xe000_ef34,
+];
+
+impl Scs {
+    /// The vector of an exception.
+    pub fn vector(&self, exception: u16) -> u32 {
+        self.vtor + 4 * u32::from(exception)
+    }
+
+    /// Makes an exception pending.
+    pub fn pend(&mut self, exception: u16) {
+        if let Some(pending) = self.pending.get_mut(usize::from(exception)) {
+            *pending = true;
+            self.any_pending = true;
+        }
+    }
+
+    /// The level of a peripheral's request: pending while high and not being served.
+    pub fn set_line(&mut self, irq: u16, high: bool) {
+        let exception = irq + 16;
+        let n = usize::from(exception);
+        self.line[n] = high;
+        if high && !self.active.contains(&exception) {
+            self.pend(exception);
+        }
+    }
+
+    fn priority_of(&self, exception: u16) -> i16 {
+        match exception {
+            1 => -3,
+            NMI => -2,
+            HARD_FAULT => -1,
+            // Four bits are there.
+            _ => i16::from(self.priority[usize::from(exception)] & 0xf0),
+        }
+    }
+
+    /// Part of a priority that decides about preemption.
+    fn group(&self, priority: i16) -> i16 {
+        if priority < 0 { priority } else { priority >> (self.grouping + 1) << (self.grouping + 1) }
+    }
+
+    /// The priority that the core runs at, without its masks.
+    pub fn running(&self) -> i16 {
+        self.active.iter().map(|e| self.group(self.priority_of(*e))).min().unwrap_or(THREAD)
+    }
+
+    /// The exception that is due next with these masks.
+    pub fn due(&self, primask: u32, basepri: u32) -> Option<u16> {
+        if !self.any_pending {
+            return None;
+        }
+        let (best, priority) = self.best()?;
+        let mut running = self.running();
+        if basepri != 0 {
+            running = running.min(self.group((basepri & 0xf0) as i16));
+        }
+        if primask & 1 != 0 {
+            running = running.min(0);
+        }
+        (self.group(priority) < running).then_some(best)
+    }
+
+    /// Whether something is pending that would wake the core, whatever PRIMASK says.
+    pub fn wakes(&self) -> bool {
+        self.best().is_some_and(|(_, priority)| self.group(priority) < self.running())
+    }
+
+    /// Whether something enabled is pending that only a mask keeps out.
+    pub fn waits(&self) -> bool {
+        self.any_pending && self.wakes()
+    }
+
+    fn best(&self) -> Option<(u16, i16)> {
+        (0..EXCEPTIONS)
+            .filter(|n| self.pending[*n] && self.enabled[*n])
+            .map(|n| (n as u16, self.priority_of(n as u16)))
+            .min_by_key(|(n, priority)| (*priority, *n))
+    }
+
+    /// The core takes an exception.
+    pub fn begin(&mut self, exception: u16) {
+        self.pending[usize::from(exception)] = false;
+        self.active.push(exception);
+        self.any_pending = self.pending.contains(&true);
+    }
+
+    /// The core returns from the innermost exception.
+    pub fn end(&mut self) -> Option<u16> {
+        let exception = self.active.pop()?;
+        if self.line[usize::from(exception)] {
+            self.pend(exception);
+        }
+        Some(exception)
+    }
+
+    /// The cycle counter.
+    pub fn cycles(&self, now: u64) -> u32 {
+        if self.counting() { now.wrapping_sub(self.cycles_from) as u32 } else { self.cycles_held }
+    }
+
+    fn counting(&self) -> bool {
+        self.dwt_control & 1 != 0 && self.demcr & 1 << 24 != 0
+    }
+
+    /// Reads a register; `None` if it is not known.
+    pub fn read(&self, address: u32, now: u64) -> Option<u32> {
+        let bits = |flags: &[bool; EXCEPTIONS], from: u32| {
+            let first = 16 + 8 * (address - from) as usize;
+            (0..32).fold(0, |word, n| word | u32::from(flags.get(first + n) == Some(&true)) << n)
+        };
+        if let Some(place) = PLAIN.iter().position(|known| *known == address) {
+            return Some(self.plain[place]);
+        }
+        Some(match address {
+            0xe000_e010 => self.systick.control,
+            0xe000_e014 => self.systick.reload,
+            0xe000_e018 => (self.systick.expires.saturating_sub(now)) as u32 & 0xff_ffff,
+            0xe000_e01c => 0,
+            0xe000_e100..0xe000_e110 => bits(&self.enabled, 0xe000_e100),
+            0xe000_e180..0xe000_e190 => bits(&self.enabled, 0xe000_e180),
+            0xe000_e200..0xe000_e210 => bits(&self.pending, 0xe000_e200),
+            0xe000_e280..0xe000_e290 => bits(&self.pending, 0xe000_e280),
+            0xe000_e300..0xe000_e310 => {
+                let first = 16 + 8 * (address - 0xe000_e300) as u16;
+                (0..32).fold(0, |w, n| w | u32::from(self.active.contains(&(first + n))) << n)
+            }
+            0xe000_e400..0xe000_e468 => self.priorities(16 + (address - 0xe000_e400) as usize),
+            0xe000_ed18..0xe000_ed24 => self.priorities(4 + (address - 0xe000_ed18) as usize),
+            0xe000_ed00 => 0x410f_c241,
+            0xe000_ed04 => {
+                let active = self.active.last().map_or(0, |e| u32::from(*e));
+                let pending = self.best().map_or(0, |(e, _)| u32::from(e));
+                active
+                    | pending << 12
+                    | u32::from(self.pending[usize::from(PEND_SV)]) << 28
+                    | u32::from(self.pending[usize::from(SYSTICK)]) << 26
+            }
+            0xe000_ed08 => self.vtor,
+            0xe000_ed0c => 0xfa05_0000 | self.grouping << 8,
+            0xe000_ed28 => self.cfsr,
+            0xe000_ed2c => self.hfsr,
+            0xe000_ed38 => self.bfar,
+            0xe000_edf0 => 0,
+            0xe000_edfc => self.demcr,
+            0xe000_1000 => 0x4000_0000 | self.dwt_control,
+            0xe000_1004 => self.cycles(now),
+            _ => return None,
+        })
+    }
+
+    fn priorities(&self, first: usize) -> u32 {
+        (0..4).fold(0, |w, n| w | u32::from(self.priority.get(first + n).copied().unwrap_or(0)) << (8 * n))
+    }
+
+    /// Writes a register; `None` if it is not known.
+    pub fn write(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
+        if let Some(place) = PLAIN.iter().position(|known| *known == address) {
+            self.plain[place] = value;
+            return Some(Effect::None);
+        }
+        let set = |flags: &mut [bool; EXCEPTIONS], from: u32, to: bool| {
+            let first = 16 + 8 * (address - from) as usize;
+            for n in (0..32).filter(|n| value & 1 << n != 0) {
+                if let Some(flag) = flags.get_mut(first + n) {
+                    *flag = to;
+                }
+            }
+        };
+        match address {
+            0xe000_e010 => {
+                let was = self.systick.control;
+                self.systick.control = value & 7;
+                if value & !was & 1 != 0 {
+                    self.systick.expires = now + u64::from(self.systick.reload) + 1;
+                }
+            }
+            0xe000_e014 => self.systick.reload = value & 0xff_ffff,
+            0xe000_e018 => self.systick.expires = now + u64::from(self.systick.reload) + 1,
+            0xe000_e100..0xe000_e110 => set(&mut self.enabled, 0xe000_e100, true),
+            0xe000_e180..0xe000_e190 => set(&mut self.enabled, 0xe000_e180, false),
+            0xe000_e200..0xe000_e210 => set(&mut self.pending, 0xe000_e200, true),
+            0xe000_e280..0xe000_e290 => set(&mut self.pending, 0xe000_e280, false),
+            0xe000_e400..0xe000_e468 => self.set_priorities(16 + (address - 0xe000_e400) as usize, value),
+            0xe000_ed18..0xe000_ed24 => self.set_priorities(4 + (address - 0xe000_ed18) as usize, value),
+            0xe000_ed04 => {
+                for (bit, exception, to) in [
+                    (31, NMI, true), (28, PEND_SV, true), (27, PEND_SV, false),
+                    (26, SYSTICK, true), (25, SYSTICK, false),
+                ] {
+                    if value & 1 << bit != 0 {
+                        self.pending[usize::from(exception)] = to;
+                    }
+                }
+            }
+            0xe000_ed08 => self.vtor = value & !0x1ff,
+            // Only with the key.
+            0xe000_ed0c if value >> 16 == 0x05fa => {
+                self.grouping = value >> 8 & 7;
+                if value & 1 << 2 != 0 {
+                    return Some(Effect::Reset);
+                }
+            }
+            0xe000_ed28 => self.cfsr &= !value,
+            0xe000_ed2c => self.hfsr &= !value,
+            0xe000_edfc | 0xe000_1000 => {
+                let cycles = self.cycles(now);
+                if address == 0xe000_edfc { self.demcr = value } else { self.dwt_control = value & 1 }
+                self.cycles_held = cycles;
+                self.cycles_from = now.wrapping_sub(u64::from(cycles));
+                return Some(Effect::None);
+            }
+            0xe000_1004 => {
+                self.cycles_held = value;
+                self.cycles_from = now.wrapping_sub(u64::from(value));
+                return Some(Effect::None);
+            }
+            _ => return None,
+        }
+        self.any_pending = self.pending.contains(&true);
+        Some(Effect::Look)
+    }
+
+    fn set_priorities(&mut self, first: usize, value: u32) {
+        for n in 0..4 {
+            if let Some(priority) = self.priority.get_mut(first + n) {
+                *priority = (value >> (8 * n)) as u8;
+            }
+        }
+    }
+}

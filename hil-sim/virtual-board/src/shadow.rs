@@ -1,0 +1,88 @@
+//! The drive on the host beside the one on the board: given the same samples and commands, it must put
+//! out the same compare values.
+
+use std::collections::VecDeque;
+
+use anyhow::{Result, bail};
+use drive_core::{Command, Drive, Settings};
+
+use crate::bench::Period;
+use crate::console::grammar::{self, Request};
+use crate::console::keys::Everything;
+use crate::link::Order;
+
+/// A drive with the settings of the board.
+pub struct Shadow {
+    /// The drive.
+    pub drive: Drive,
+    settings: Everything,
+    orders: VecDeque<Order>,
+    /// Control interrupts compared so far.
+    pub compared: u64,
+}
+
+impl Shadow {
+    /// The drive that the image starts with.
+    ///
+    /// # Errors
+    /// Its settings make no drive.
+    pub fn new() -> Result<Self> {
+        let settings = Everything::of_the_board();
+        let drive = Drive::new(settings.build()?);
+        Ok(Self { drive, settings, orders: VecDeque::new(), compared: 0 })
+    }
+
+    /// Its settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings.drive
+    }
+
+    /// A line that was typed at the console of the board.
+    ///
+    /// # Errors
+    /// It is not one that gives an order.
+    pub fn type_line(&mut self, line: &str) -> Result<()> {
+        let order = match grammar::parse(line) {
+            Ok(Request::Start(mode)) => Order::Start(mode),
+            Ok(Request::Stop) => Order::Stop,
+            Ok(Request::Clear) => Order::Clear,
+            Ok(Request::Torque(i_q)) => Order::Torque(i_q),
+            Ok(Request::Position(turns)) => Order::Position(turns),
+            Ok(Request::Angle(source)) => {
+                self.settings.drive.angle_source = source;
+                Order::Configure(self.settings.build()?)
+            }
+            Ok(Request::Set(key, value)) => {
+                key.set(&mut self.settings, value);
+                Order::Configure(self.settings.build()?)
+            }
+            Ok(_) => return Ok(()), // no order to the drive
+            Err(why) => bail!("{line}: {why}"),
+        };
+        self.orders.push_back(order);
+        Ok(())
+    }
+
+    /// Follows a control interrupt of the board.
+    ///
+    /// # Errors
+    /// The compare values differ.
+    pub fn follow(&mut self, period: &Period) -> Result<()> {
+        let compare = self.drive.step(&period.sample);
+        if compare != period.compare {
+            bail!(
+                "control interrupt {} while {}: {compare:?} on the host, {:?} on the board",
+                self.compared,
+                self.drive.state(),
+                period.compare
+            );
+        }
+        self.compared += 1;
+        if period.took_order {
+            let Some(order) = self.orders.pop_front() else { bail!("an order nobody gave") };
+            let command: Command<'_> = order.command();
+            let _ = self.drive.command(command);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,299 @@
+//! The core by Unicorn 2.1.3.
+//!
+//! What to know of it: the mode is THUMB without MCLASS and the model is set to Cortex-M4 (with MCLASS
+//! it would be an M33). Handler mode is known to the translator only after a write to the flags
+//! that follows the write to IPSR. Hooks stop the core before the instruction they are called for. The
+//! model of a register must not stop the core: it would do its access again.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
+use unicorn_engine::{RegisterARM as R, Unicorn};
+
+use crate::chip::Chip;
+use crate::cost::Costs;
+use crate::cpu::{Cpu, Fault, Register, Stop};
+use crate::memory::{self, Backing};
+
+/// Index of the Cortex-M4 among the emulator's 32-bit models.
+const CORTEX_M4: i32 = 9;
+/// Program counters from here on are EXC_RETURN.
+const EXC_RETURN: u32 = 0xffff_ffe0;
+/// Bit of EXC_RETURN: a frame without floating-point registers.
+const BASIC_FRAME: u32 = 1 << 4;
+/// Bit of CONTROL: floating-point registers are in use.
+const FPCA: u64 = 1 << 2;
+
+const BASIC: [R; 8] = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC, R::XPSR];
+const FLOAT: [R; 9] = [R::D0, R::D1, R::D2, R::D3, R::D4, R::D5, R::D6, R::D7, R::FPSCR];
+
+/// What is counted, at the price of speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counting {
+    /// Cycles of what runs in CCM. Without, nothing is called while it runs, and it takes no time.
+    pub cycles: bool,
+    /// The core can be stopped at every instruction in the flash, not only where a block begins.
+    pub every_instruction: bool,
+}
+
+/// The emulated core.
+pub struct UnicornCpu {
+    uc: Unicorn<'static, Chip>,
+    faulted: Rc<Cell<Option<u32>>>,
+}
+
+impl UnicornCpu {
+    /// A core with this chip around it and the memory of the STM32G474RE.
+    pub fn new(chip: Chip, counting: Counting) -> Result<Self, uc_error> {
+        let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, chip)?;
+        uc.ctl_set_cpu_model(CORTEX_M4)?;
+        for region in memory::MAP {
+            let (base, size) = (u64::from(region.base), region.size as usize);
+            match region.backing {
+                Backing::Flash => uc.mem_map(base, size, Permission::READ | Permission::EXEC)?,
+                Backing::Ram => uc.mem_map(base, size, Permission::ALL)?,
+                Backing::Registers => {
+                    uc.mmio_map(
+                        base,
+                        size,
+                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize| {
+                            let address = (base + offset) as u32;
+                            u64::from(uc.get_data_mut().read(address, size as u8))
+                        }),
+                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
+                            let address = (base + offset) as u32;
+                            uc.get_data_mut().write(address, size as u8, value as u32);
+                        }),
+                    )?;
+                }
+            }
+        }
+        // CCM appears twice.
+        uc.mmio_map(
+            u64::from(memory::CCM_ALIAS),
+            memory::CCM_SIZE as usize,
+            Some(|uc: &mut Unicorn<Chip>, offset: u64, size: usize| {
+                let mut bytes = [0; 8];
+                uc.mem_read(u64::from(memory::CCM) + offset, &mut bytes[..size]).ok();
+                u64::from_le_bytes(bytes)
+            }),
+            Some(|uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
+                let bytes = value.to_le_bytes();
+                uc.mem_write(u64::from(memory::CCM) + offset, &bytes[..size]).ok();
+            }),
+        )?;
+
+        // Main loop and slow interrupts run from the flash: a cycle per instruction.
+        let flash = (u64::from(memory::FLASH), u64::from(memory::BANK_2 - 1));
+        if counting.every_instruction {
+            uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
+                let chip = uc.get_data_mut();
+                chip.at = address as u32;
+                chip.instructions(1);
+                stop_if_asked(uc);
+            })?;
+        } else {
+            let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
+            uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
+                let instructions = cost_of(&mut lengths, uc, address as u32, size);
+                let chip = uc.get_data_mut();
+                chip.at = address as u32;
+                chip.instructions(u64::from(instructions));
+                stop_if_asked(uc);
+            })?;
+        }
+        if counting.cycles {
+            let mut costs = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
+            let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
+            uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
+                let cycles = cost_of(&mut costs, uc, address as u32, size);
+                let chip = uc.get_data_mut();
+                chip.at = address as u32;
+                chip.block(address as u32, size, cycles);
+                stop_if_asked(uc);
+            })?;
+        }
+        uc.add_intr_hook(|uc, _| {
+            uc.emu_stop().ok();
+        })?;
+        let faulted = Rc::new(Cell::new(None));
+        let note = Rc::clone(&faulted);
+        uc.add_mem_hook(HookType::MEM_INVALID, 0, u64::MAX, move |_, _, address, _, _| {
+            note.set(Some(address as u32));
+            false
+        })?;
+        Ok(Self { uc, faulted })
+    }
+
+    fn control(&self) -> u64 {
+        self.uc.reg_read(R::CONTROL).unwrap_or(0)
+    }
+
+    fn set_exception(&mut self, xpsr: u32) {
+        let mut write = |register, value| self.uc.reg_write(register, value);
+        write(R::XPSR, u64::from(xpsr)).ok();
+        write(R::IPSR, u64::from(xpsr & 0x1ff)).ok();
+        // This write tells the translator about handler mode.
+        write(R::APSR_NZCV, u64::from(xpsr & 0xf000_0000)).ok();
+    }
+}
+
+/// Stops the core where the chip wants attention.
+#[inline]
+fn stop_if_asked(uc: &mut Unicorn<Chip>) {
+    if uc.get_data_mut().stops_here() {
+        uc.emu_stop().ok();
+    }
+}
+
+/// What a block costs.
+#[inline]
+fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
+    match costs.known(address, size) {
+        Some(cost) => cost,
+        None => {
+            let mut code = vec![0; size as usize];
+            uc.mem_read(u64::from(address), &mut code).ok();
+            costs.learn(address, &code)
+        }
+    }
+}
+
+impl Cpu for UnicornCpu {
+    fn chip(&self) -> &Chip {
+        self.uc.get_data()
+    }
+
+    fn chip_mut(&mut self) -> &mut Chip {
+        self.uc.get_data_mut()
+    }
+
+    fn run(&mut self) -> Stop {
+        self.faulted.set(None);
+        self.chip_mut().first = true;
+        let pc = self.get(Register::Pc);
+        let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
+        let pc = self.get(Register::Pc);
+        if pc >= EXC_RETURN {
+            return Stop::Return(pc | 1);
+        }
+        match result {
+            Ok(()) if self.chip().wants_attention() => Stop::Asked,
+            Ok(()) => Stop::Wait,
+            Err(_) => Stop::Fault(self.faulted.get().map_or(Fault::Instruction, Fault::Access)),
+        }
+    }
+
+    fn get(&self, register: Register) -> u32 {
+        self.uc.reg_read(number(register)).unwrap_or(0) as u32
+    }
+
+    fn set(&mut self, register: Register, value: u32) {
+        self.uc.reg_write(number(register), u64::from(value)).ok();
+    }
+
+    fn enter(&mut self, exception: u16, handler: u32) -> bool {
+        let float = self.control() & FPCA != 0;
+        let before = self.get(Register::Sp);
+        let sp = before.wrapping_sub(if float { 0x68 } else { 0x20 }) & !7;
+        let mut frame = [0; 0x68];
+        let basic = self.uc.reg_read_batch(&BASIC, 8).unwrap_or_default();
+        for (place, value) in frame.chunks_exact_mut(4).zip(&basic) {
+            place.copy_from_slice(&(*value as u32).to_le_bytes());
+        }
+        // The stacked status says Thumb, and whether the stack was moved for its alignment.
+        let xpsr = basic.get(7).map_or(0, |x| *x as u32) & !(1 << 9) | 1 << 24 | (before & 4) << 7;
+        frame[0x1c..0x20].copy_from_slice(&xpsr.to_le_bytes());
+        let size = if float {
+            let values = self.uc.reg_read_batch(&FLOAT, 9).unwrap_or_default();
+            for (place, value) in frame[0x20..0x68].chunks_exact_mut(8).zip(&values) {
+                place.copy_from_slice(&value.to_le_bytes());
+            }
+            self.uc.reg_write(R::CONTROL, self.control() & !FPCA).ok();
+            0x68
+        } else {
+            0x20
+        };
+        let stacked = self.uc.mem_write(u64::from(sp), &frame[..size]).is_ok();
+        let from_handler = xpsr & 0x1ff != 0;
+        let exc_return = 0xffff_ffe1
+            | if from_handler { 0 } else { 8 }
+            | if float { 0 } else { BASIC_FRAME };
+        self.set(Register::Sp, sp);
+        self.set(Register::Lr, exc_return);
+        self.set_exception(1 << 24 | u32::from(exception));
+        self.set(Register::Pc, handler);
+        stacked
+    }
+
+    fn leave(&mut self, exc_return: u32) -> bool {
+        let sp = self.get(Register::Sp);
+        let float = exc_return & BASIC_FRAME == 0;
+        let mut frame = [0; 0x68];
+        let size = if float { 0x68 } else { 0x20 };
+        if self.uc.mem_read(u64::from(sp), &mut frame[..size]).is_err() {
+            return false;
+        }
+        let word = |at: usize| {
+            let bytes = [frame[at], frame[at + 1], frame[at + 2], frame[at + 3]];
+            u64::from(u32::from_le_bytes(bytes))
+        };
+        let xpsr = word(0x1c) as u32;
+        self.set_exception(xpsr & !(1 << 9));
+        if float {
+            let values: [u64; 9] =
+                std::array::from_fn(|k| word(0x20 + 8 * k) | word(0x24 + 8 * k) << 32);
+            let values = values.map(|v| v);
+            self.uc.reg_write_batch(&FLOAT, &values, 9).ok();
+        }
+        let control = self.control() & !FPCA | if float { FPCA } else { 0 };
+        self.uc.reg_write(R::CONTROL, control).ok();
+        let basic: [u64; 7] = std::array::from_fn(|k| word(4 * k));
+        self.uc.reg_write_batch(&BASIC[..6], &basic[..6], 6).ok();
+        let sp = sp.wrapping_add(size as u32).wrapping_add(xpsr >> 9 & 1).wrapping_add(3 * (xpsr >> 9 & 1));
+        self.set(Register::Sp, sp);
+        self.set(Register::Pc, basic[6] as u32);
+        true
+    }
+
+    fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.uc.mem_read(u64::from(address), bytes).is_ok()
+    }
+
+    fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
+        let done = self.uc.mem_write(u64::from(address), bytes).is_ok();
+        // Code may have been written.
+        let end = u64::from(address) + bytes.len() as u64;
+        self.uc.ctl_remove_cache(u64::from(address), end).ok();
+        done
+    }
+
+    fn reset(&mut self, vectors: u32) {
+        for register in BASIC.into_iter().take(6) {
+            self.uc.reg_write(register, 0).ok();
+        }
+        for register in [R::CONTROL, R::PRIMASK, R::BASEPRI, R::FAULTMASK, R::FPSCR] {
+            self.uc.reg_write(register, 0).ok();
+        }
+        self.set_exception(1 << 24);
+        let (sp, pc) = (self.word(vectors), self.word(vectors + 4));
+        self.set(Register::Sp, sp.unwrap_or(0));
+        self.set(Register::Pc, pc.unwrap_or(0) & !1);
+    }
+}
+
+fn number(register: Register) -> R {
+    const GENERAL: [R; 13] = [
+        R::R0, R::R1, R::R2, R::R3, R::R4, R::R5, R::R6, R::R7, R::R8, R::R9, R::R10, R::R11, R::R12,
+    ];
+    match register {
+        Register::R(n) => GENERAL[usize::from(n.min(12))],
+        Register::Sp => R::SP,
+        Register::Lr => R::LR,
+        Register::Pc => R::PC,
+        Register::Xpsr => R::XPSR,
+        Register::Primask => R::PRIMASK,
+        Register::Basepri => R::BASEPRI,
+    }
+}
