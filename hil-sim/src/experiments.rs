@@ -13,6 +13,7 @@ mod identify_recursive;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
+mod lock_explore;
 mod modulation;
 mod monte_carlo;
 mod orientation;
@@ -66,6 +67,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
     learn_reference::EXPERIMENT,
+    lock_explore::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,
     torque::STEPS,
