@@ -401,7 +401,8 @@ impl Drive {
                 r.injection_axis = usual.injection_axis;
             }
             Phase::Passed => {
-                let next = self.c.lock_monitor.map_or(State::of_mode(self.mode), |_| State::Verifying);
+                let next =
+                    self.c.lock_monitor.map_or(State::of_mode(self.mode), |_| State::Verifying);
                 self.enter(next);
             }
             Phase::Failed => return Err(Fault::NoSaliency),

@@ -99,13 +99,6 @@ impl EstimatorState {
         self.tracker.angle = Angle::QUARTER;
     }
 
-    /// Starts afresh from the present angle, at standstill.
-    pub fn hold(&mut self) {
-        let angle = self.tracker.angle;
-        *self = Self::default();
-        self.tracker.angle = angle;
-    }
-
     /// The flux angle at the present sample.
     pub fn flux(&self) -> FluxAngle {
         FluxAngle { phi: self.tracker.angle - Angle::QUARTER, step: self.tracker.step }

@@ -127,7 +127,12 @@ impl Carrier {
     ///
     /// # Errors
     /// [`NoRoom`] when less than half of it fits.
-    pub fn fit(&mut self, injection: &Injection, fundamental: Dq, largest: f32) -> Result<(), NoRoom> {
+    pub fn fit(
+        &mut self,
+        injection: &Injection,
+        fundamental: Dq,
+        largest: f32,
+    ) -> Result<(), NoRoom> {
         let used = fundamental.length_squared();
         let fits = |share: f32| {
             let room = largest - share * injection.amplitude;

@@ -348,7 +348,8 @@ mod tests {
             (ready(&monitor), f32::INFINITY),
             (LockMonitorState::default(), 0.27),
         ] {
-            let mut steps = (0..600).map(|_| monitor.step(&mut state, &seen(carrier, 0.0), 1.0, false));
+            let mut steps =
+                (0..600).map(|_| monitor.step(&mut state, &seen(carrier, 0.0), 1.0, false));
             assert!(steps.any(|result| result == Err(Fault::LostLock)), "{carrier}");
         }
     }

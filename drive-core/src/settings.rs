@@ -206,7 +206,8 @@ pub struct SynchronousTracking {
     pub current_saliency: f32,
     /// Reference of the saliency over the torque current, learned with the shaft locked.
     pub reference: ReferenceTable,
-    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]).
+    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]). Without
+    /// it a start trusts that it has, and that the shaft stands still.
     pub check: bool,
     /// Whether the lock is verified at a start and watched (see [`crate::lock_monitor`]).
     pub monitor: bool,

@@ -13,7 +13,7 @@ mod identify_recursive;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
-mod lock_explore;
+mod lock_monitor;
 mod modulation;
 mod monte_carlo;
 mod orientation;
@@ -67,7 +67,6 @@ pub const EXPERIMENTS: &[Experiment] = &[
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
     learn_reference::EXPERIMENT,
-    lock_explore::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,
     torque::STEPS,
@@ -75,6 +74,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     reversal::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    lock_monitor::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,

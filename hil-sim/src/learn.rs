@@ -53,12 +53,7 @@ pub fn reference(config: &Config, seed: u64) -> Result<Vec<Learned>, Error> {
             q.push(p.saliency);
             carrier.push(p.carrier);
         });
-        table.push(Learned {
-            i_q,
-            q: q.mean(),
-            scatter: q.deviation(),
-            carrier: carrier.mean(),
-        });
+        table.push(Learned { i_q, q: q.mean(), scatter: q.deviation(), carrier: carrier.mean() });
     }
     Ok(table)
 }

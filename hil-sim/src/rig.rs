@@ -145,8 +145,10 @@ impl Rig {
         self.command(Command::Start(mode))?;
         for _ in 0..(30.0 * RATE_HZ) as u32 {
             self.step();
-            if self.drive.state() == State::of_mode(mode) {
-                return Ok(());
+            match self.drive.state() {
+                State::Fault(_) => break,
+                state if state == State::of_mode(mode) => return Ok(()),
+                _ => {}
             }
         }
         Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))

@@ -102,7 +102,7 @@ impl Drive {
         Ok(Taken::AsGiven)
     }
 
-    /// Magnetises again along the present axis, at standstill of the axis.
+    /// Magnetises again along phase a, as a start does, with the current flowing on.
     fn relock(&mut self) -> Result<Taken, Refused> {
         match self.state {
             State::Fault(fault) => return Err(Refused::Fault(fault)),
@@ -110,9 +110,11 @@ impl Drive {
             state if state == State::of_mode(self.mode) => {}
             state => return Err(Refused::State(state)),
         }
-        self.references =
-            References { current: Dq::new(self.references.current.d, 0.0), ..References::default() };
-        self.control.estimator.hold();
+        self.references = References {
+            current: Dq::new(self.references.current.d, 0.0),
+            ..References::default()
+        };
+        self.control.estimator.start();
         self.control.lock = LockMonitorState::default();
         self.enter(State::Magnetising);
         Ok(Taken::AsGiven)
