@@ -179,8 +179,9 @@ impl Default for LockMonitorState {
 
 /// Time constant of the mean of the baseline, s: noise of 5 mA makes 0.1 % of it, 0.03 in the loss.
 const BASELINE_S: f32 = 0.1;
-/// Share of the expected carrier current below which there is too little: as for a single channel.
-const LEAST_CARRIER: f32 = 0.25;
+/// Share of the expected carrier current below which there is too little. An open phase leaves the
+/// square of the cosine between the axis and what is left to flow along.
+const LEAST_CARRIER: f32 = 0.5;
 /// Carrier periods in a row until that is a fault. The averages of the demodulation take four to fill.
 const WEAK_PERIODS: u8 = 8;
 
@@ -339,7 +340,7 @@ mod tests {
         let mut result = Ok(());
         for n in 0..WEAK_PERIODS {
             assert_eq!(result, Ok(()), "{n}");
-            result = monitor.step(&mut state, &seen(0.06, 0.0), 1.0, true);
+            result = monitor.step(&mut state, &seen(0.12, 0.0), 1.0, true);
         }
         assert_eq!(result, Err(Fault::CarrierWeak));
         // A number that is not finite, and a baseline that was never taken.
