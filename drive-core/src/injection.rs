@@ -133,6 +133,7 @@ impl Carrier {
         fundamental: Dq,
         largest: f32,
     ) -> Result<(), NoRoom> {
+        let at_most_all = |share: f32| if share < 1.0 { share } else { 1.0 };
         let used = fundamental.length_squared();
         let fits = |share: f32| {
             let room = largest - share * injection.amplitude;
@@ -140,9 +141,8 @@ impl Carrier {
         };
         let share = if !fits(self.share) {
             self.share - SHARE_DOWN
-        } else if self.share < 1.0 && fits(self.share + SHARE_MARGIN) {
-            let up = self.share + SHARE_UP;
-            if up < 1.0 { up } else { 1.0 }
+        } else if self.share < 1.0 && fits(at_most_all(self.share + SHARE_MARGIN)) {
+            at_most_all(self.share + SHARE_UP)
         } else {
             self.share
         };
