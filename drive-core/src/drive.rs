@@ -12,8 +12,9 @@ use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
-use crate::injection::{Carrier, CarrierPeriod};
+use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
 use crate::io::{Compare, Hardware, Mode, Sample};
+use crate::lock_monitor::LockMonitorState;
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
 use crate::position::PositionState;
@@ -81,6 +82,7 @@ struct ControlState {
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
+    lock: LockMonitorState,
 }
 
 /// What the drive saw and did in the last step.
@@ -102,6 +104,12 @@ pub struct Telemetry {
     pub delta_i: f32,
     /// Saliency that the synchronous demodulation sees.
     pub saliency: f32,
+    /// Square of the carrier current along the injection axis, A^2.
+    pub carrier_squared: f32,
+    /// Share of the carrier that is put out: below 1 where the fundamental leaves too little voltage.
+    pub carrier_share: f32,
+    /// Share of the flux-fixed saliency that the lock monitor misses; 1 is a flux that is gone.
+    pub saliency_loss: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
     /// Position in mechanical turns from the start.
@@ -201,6 +209,7 @@ impl Drive {
     /// Regulates the current. This is the control law, top to bottom.
     fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
         let wanted = self.reference(sample)?;
+        let held = self.state == State::Magnetising;
         let (c, r, s) = (&self.c, &self.references, &mut self.control);
         let reference = Dq {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
@@ -259,7 +268,7 @@ impl Drive {
                 // error back.
                 c.indirect.update(&mut s.indirect, reference);
                 // The flux is held still until it stands.
-                if self.state != State::Magnetising
+                if !held
                     && c.estimator
                         .track(&mut s.estimator, reference.q, s.indirect.slip_step)
                         .is_err()
@@ -279,6 +288,9 @@ impl Drive {
             voltage,
             delta_i: s.estimator.delta_i,
             saliency: s.estimator.saliency.q,
+            carrier_squared: s.estimator.saliency.carrier_squared,
+            carrier_share: s.carrier.share,
+            saliency_loss: s.lock.loss,
             dc_link: measured.dc_link,
             turns: c.position.turns(&s.position, sample.encoder),
         };
@@ -301,9 +313,19 @@ impl Drive {
             return Err(Fault::OverSpeed);
         }
         if c.inject {
-            let amplitude = c.injection.current_amplitude;
+            let amplitude = s.carrier.share * c.injection.current_amplitude;
             if let Some(fault) = s.carrier_watch.step(measured, carrier, theta_axis, amplitude) {
                 return Err(fault);
+            }
+            // Once a carrier period: does the carrier fit, and is it the flux that is tracked?
+            if carrier.index + 1 == CARRIER_SAMPLES {
+                let largest = c.modulator.circle(measured.dc_link);
+                if s.carrier.fit(&c.injection, voltage, largest).is_err() {
+                    return Err(Fault::CarrierNoRoom);
+                }
+                if let (Some(monitor), true) = (&c.lock_monitor, s.carrier.is_settled()) {
+                    monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
+                }
             }
         }
         let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
@@ -328,6 +350,7 @@ impl Drive {
         let r = &mut self.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
+            State::Verifying => return self.verify(),
             State::Position => {
                 let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
                 r.current.q = i_q;
@@ -368,12 +391,29 @@ impl Drive {
                 return Ok(Dq::ZERO);
             }
             Phase::Restore => {
+                s.lock.share = s.saliency_check.share;
                 r.injection_axis = self.c.injection_axis;
             }
-            Phase::Passed => self.enter(State::of_mode(self.mode)),
+            Phase::Passed => {
+                let next =
+                    self.c.lock_monitor.map_or(State::of_mode(self.mode), |_| State::Verifying);
+                self.enter(next);
+            }
             Phase::Failed => return Err(Fault::NoSaliency),
         }
         Ok(magnetising)
+    }
+
+    /// The current while the lock is verified, A: the axis is tracked for a while without torque.
+    fn verify(&mut self) -> Result<Dq, Fault> {
+        if self.elapsed >= self.c.sequence.verify {
+            let step = self.control.estimator.rotor_step;
+            if self.c.lock_monitor.is_some_and(|monitor| !monitor.stands(step)) {
+                return Err(Fault::LostLock);
+            }
+            self.enter(State::of_mode(self.mode));
+        }
+        Ok(Dq { d: self.references.current.d, q: 0.0 })
     }
 
     /// Which of settings, references and state is to blame when a result is not finite.

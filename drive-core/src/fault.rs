@@ -53,6 +53,9 @@ faults! {
     ConverterOverrun = 23, "a conversion was lost";
     ClockFailure = 24, "the clock failed";
     NoSaliency = 25, "the motor shows too little saliency for the injection";
+    LostLock = 26, "the flux is not where the tracked angle says";
+    CarrierWeak = 29, "too little carrier current: open phase, or the inverter does not put it out";
+    CarrierNoRoom = 30, "the voltage left by the fundamental is too small for the carrier";
 }
 
 impl Fault {
@@ -106,6 +109,9 @@ mod tests {
             (23, Fault::ConverterOverrun),
             (24, Fault::ClockFailure),
             (25, Fault::NoSaliency),
+            (26, Fault::LostLock),
+            (29, Fault::CarrierWeak),
+            (30, Fault::CarrierNoRoom),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

@@ -1,6 +1,7 @@
 //! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 
+use crate::frames::Dq;
 use crate::tuning::FirstOrder;
 
 /// Samples per period of the carrier.
@@ -30,6 +31,8 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
     periods: [CarrierPeriod; CARRIER_SAMPLES],
+    /// Amplitude of the voltage, V.
+    amplitude: f32,
     /// Amplitude of the sampled current, A.
     pub current_amplitude: f32,
 }
@@ -55,6 +58,7 @@ impl Injection {
         let (s_re, s_im) = ((h_re * d_re - h_im * d_im) as f32, (h_re * d_im + h_im * d_re) as f32);
         let (m_re, m_im) = ((h_re * a - h_im * b) as f32, (h_re * b + h_im * a) as f32);
         Self {
+            amplitude: amplitude_v,
             periods: core::array::from_fn(|index| {
                 let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
                 CarrierPeriod {
@@ -71,11 +75,37 @@ impl Injection {
     }
 }
 
-/// Where in its period the carrier is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Where in its period the carrier is, and how much of it is put out.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carrier {
     index: usize,
+    /// Share of the amplitude that is put out: 1 unless the fundamental leaves less.
+    pub share: f32,
+    /// Carrier periods since the share changed.
+    unchanged: u8,
 }
+
+impl Default for Carrier {
+    /// At its beginning, all of it.
+    fn default() -> Self {
+        Self { index: 0, share: 1.0, unchanged: u8::MAX }
+    }
+}
+
+/// There is too little voltage left for the carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoRoom;
+
+/// By how much the share of the carrier goes down in a carrier period, and up again: quickly, since a
+/// voltage that does not fit is shortened, which turns the carrier; slowly back.
+const SHARE_DOWN: f32 = 1.0 / 16.0;
+const SHARE_UP: f32 = 1.0 / 64.0;
+/// Room that must be there beyond the next step up, as a share: without it the share would hunt.
+const SHARE_MARGIN: f32 = 0.125;
+/// Least share: noise makes twice the angle error there.
+const LEAST_SHARE: f32 = 0.5;
+/// Carrier periods until the demodulation has forgotten a change: 40 samples.
+const FORGOTTEN: u8 = 4;
 
 /// The carrier during one PWM period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -95,12 +125,52 @@ pub struct CarrierPeriod {
 }
 
 impl Carrier {
+    /// Fits the carrier, once a carrier period, into what the `fundamental` voltage, V, leaves of the
+    /// `largest` vector that can be put out in every direction, V.
+    ///
+    /// # Errors
+    /// [`NoRoom`] when less than half of it fits.
+    pub fn fit(
+        &mut self,
+        injection: &Injection,
+        fundamental: Dq,
+        largest: f32,
+    ) -> Result<(), NoRoom> {
+        let at_most_all = |share: f32| if share < 1.0 { share } else { 1.0 };
+        let used = fundamental.length_squared();
+        let fits = |share: f32| {
+            let room = largest - share * injection.amplitude;
+            room > 0.0 && used <= room * room
+        };
+        let share = if !fits(self.share) {
+            self.share - SHARE_DOWN
+        } else if self.share < 1.0 && fits(at_most_all(self.share + SHARE_MARGIN)) {
+            at_most_all(self.share + SHARE_UP)
+        } else {
+            self.share
+        };
+        self.unchanged = if share == self.share { self.unchanged.saturating_add(1) } else { 0 };
+        self.share = share;
+        if share < LEAST_SHARE { Err(NoRoom) } else { Ok(()) }
+    }
+
+    /// Whether what is demodulated is of the present share throughout.
+    pub fn is_settled(&self) -> bool {
+        self.unchanged > FORGOTTEN
+    }
+
     /// The next PWM period's share.
     pub fn step(&mut self, injection: &Injection) -> CarrierPeriod {
         // Below ten by construction: this is for a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
-        injection.periods[index]
+        let full = &injection.periods[index];
+        CarrierPeriod {
+            voltage: self.share * full.voltage,
+            mean_current: self.share * full.mean_current,
+            sampled: self.share * full.sampled,
+            ..*full
+        }
     }
 }
 

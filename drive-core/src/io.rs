@@ -105,6 +105,9 @@ pub enum Command<'a> {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, then regulate as `Mode`
     /// says.
     Start(Mode),
+    /// While regulating with the injection: no torque, magnetise again, verify that the flux is
+    /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
+    Relock,
     /// Take the torque to zero, then switch off.
     Stop,
     /// Forget the latched fault and be off.
@@ -142,6 +145,8 @@ pub enum Refused {
     ModeNotAvailable(Mode),
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
+    /// The injection is needed as angle source.
+    NeedsInjection,
     /// A fault is latched; clear it first.
     Fault(crate::Fault),
     /// The value is outside the allowed range.
@@ -160,6 +165,7 @@ impl core::fmt::Display for Refused {
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
             Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
+            Self::NeedsInjection => write!(f, "this needs the injection as angle source"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
                 let (min, max) = (Shortest(*min), Shortest(*max));

@@ -38,6 +38,7 @@ pub mod frames;
 pub mod indirect;
 pub mod injection;
 pub mod io;
+pub mod lock_monitor;
 pub mod modulation;
 pub mod moving_sum;
 pub mod pi;

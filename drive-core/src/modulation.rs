@@ -5,7 +5,7 @@
 //! voltage is put at half the dc link: no sectors, no tables. A test compares it with the on-times
 //! of Table 2.
 
-use crate::frames::{Abc, AlphaBeta};
+use crate::frames::{Abc, AlphaBeta, SQRT_3};
 
 /// Pulses shorter than the dead time plus this much are dropped or extended, s.
 const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
@@ -44,6 +44,12 @@ impl Modulator {
             shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / period_s) * f32::from(top),
             usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
         }
+    }
+
+    /// The largest vector that can be put out in every direction at a dc link of `v_dc`, V peak: the
+    /// circle inside the hexagon.
+    pub fn circle(&self, v_dc: f32) -> f32 {
+        self.usable * v_dc * (1.0 / SQRT_3)
     }
 
     /// Compare values for a `wanted` mean voltage, V peak, and a `compensation` of the dead time that

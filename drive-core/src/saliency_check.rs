@@ -22,12 +22,16 @@ pub struct SaliencyCheck {
     restore: u32,
     /// Least mean saliency, signed as it must be.
     least: f32,
+    /// Mean saliency of a motor that has what is expected.
+    expected: f32,
 }
 
 /// State of the check.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SaliencyCheckState {
     sum: f32,
+    /// Saliency of the motor as a share of the expected one, as the last check saw it.
+    pub share: f32,
 }
 
 /// What the drive is to do in this period of the check.
@@ -46,8 +50,9 @@ pub enum Phase {
 /// Time to settle and to average, s; together well below the rotor time constant.
 const SETTLE_S: f32 = 0.020;
 const AVERAGE_S: f32 = 0.060;
-/// Least share of the expected saliency. The mean over the decaying flux, seen at 60°, is 0.64 of what
-/// is expected, 0.32 with half of it, 0.065 with a tenth and 0 with none, each ±0.034 rms by noise of
+/// The mean over the decaying flux, seen at 60°, is 0.64 of what is expected.
+const EXPECTED_SHARE: f32 = 0.64;
+/// Least share of the expected saliency. The mean is 0.64 with all of it, 0.32 with half of it, 0.065 with a tenth and 0 with none, each ±0.034 rms by noise of
 /// 5 mA: the limit lies in the middle between a tenth and half.
 const LEAST_SHARE: f32 = 0.194;
 
@@ -60,6 +65,7 @@ impl SaliencyCheck {
             average: periods(AVERAGE_S),
             restore: periods(2.0 * t_sec),
             least: LEAST_SHARE * flux_saliency,
+            expected: EXPECTED_SHARE * flux_saliency,
         }
     }
 
@@ -81,6 +87,7 @@ impl SaliencyCheck {
             let mean = state.sum / self.average as f32;
             // Beyond the least, on its side of zero. Not-a-number is not.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
+            state.share = mean / self.expected;
             if enough { Phase::Restore } else { Phase::Failed }
         } else {
             Phase::Passed

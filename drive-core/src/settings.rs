@@ -10,6 +10,7 @@ mod coefficients;
 use core::fmt;
 
 use crate::decimal::Shortest;
+use crate::lock_monitor::CarrierTable;
 use crate::schedule::ReferenceTable;
 use crate::sensing::Line;
 use crate::tuning::{FirstOrder, TuningError};
@@ -221,8 +222,19 @@ pub struct SynchronousTracking {
     pub current_saliency: f32,
     /// Reference of the saliency over the torque current, learned with the shaft locked.
     pub reference: ReferenceTable,
-    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]).
+    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]). Without
+    /// it a start trusts that it has, and that the shaft stands still.
     pub check: bool,
+    /// Whether the lock is verified at a start and watched (see [`crate::lock_monitor`]).
+    pub monitor: bool,
+    /// Carrier current over the torque current, learned with the shaft locked; for the monitor.
+    pub carrier: CarrierTable,
+    /// Share of the flux-fixed saliency that may be missing; 1 is a flux that is gone.
+    pub allowed_loss: f32,
+    /// Time constant of the mean of that share, s.
+    pub loss_s: f32,
+    /// Speed of the rotor that trips, rpm: as far as the angle is tracked.
+    pub tracked_rpm: f32,
 }
 
 impl Default for SynchronousTracking {
@@ -234,6 +246,11 @@ impl Default for SynchronousTracking {
             current_saliency: 0.0338,
             reference: ReferenceTable::default(),
             check: true,
+            monitor: true,
+            carrier: CarrierTable::default(),
+            allowed_loss: 0.55,
+            loss_s: 0.08,
+            tracked_rpm: 700.0,
         }
     }
 }

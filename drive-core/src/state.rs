@@ -15,6 +15,8 @@ pub enum State {
     Precharge,
     /// Current on the direct axis only, until the flux stands.
     Magnetising,
+    /// Flux built up, tracking without torque: is it the flux that is tracked?
+    Verifying,
     /// Regulating torque.
     Torque,
     /// Regulating speed.
@@ -48,6 +50,7 @@ impl fmt::Display for State {
             Self::Calibrating => "calibrating",
             Self::Precharge => "precharging",
             Self::Magnetising => "magnetising",
+            Self::Verifying => "verifying the lock",
             Self::Torque => "regulating torque",
             Self::Speed => "regulating speed",
             Self::Position => "regulating position",

@@ -15,6 +15,7 @@ mod identify_recursive;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
+mod lock_monitor;
 mod modulation;
 mod monte_carlo;
 mod orientation;
@@ -77,6 +78,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     reversal::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    lock_monitor::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,

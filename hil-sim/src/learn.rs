@@ -25,6 +25,8 @@ pub struct Learned {
     pub q: f64,
     /// How much it scattered, rms.
     pub scatter: f64,
+    /// Carrier current along the injection axis, A.
+    pub carrier: f64,
 }
 
 /// The saliency over the torque current, 0 A first: shaft locked, field orientation by the slip
@@ -69,9 +71,12 @@ pub fn reference_of(
         let i_q = n as f64 * STEP_A;
         rig.command(Command::Torque(i_q as f32))?;
         rig.run(SETTLE_S, |_| {});
-        let mut q = Stats::default();
-        rig.run(AVERAGE_S, |p| q.push(p.signal()));
-        table.push(Learned { i_q, q: q.mean(), scatter: q.deviation() });
+        let (mut q, mut carrier) = (Stats::default(), Stats::default());
+        rig.run(AVERAGE_S, |p| {
+            q.push(p.signal());
+            carrier.push(p.carrier);
+        });
+        table.push(Learned { i_q, q: q.mean(), scatter: q.deviation(), carrier: carrier.mean() });
     }
     Ok(table)
 }

@@ -50,6 +50,10 @@ pub struct Point {
     pub delta_i: f64,
     /// Saliency that the synchronous demodulation sees.
     pub saliency: f64,
+    /// Carrier current along the injection axis, A.
+    pub carrier: f64,
+    /// Share of the flux-fixed saliency that the lock monitor misses.
+    pub loss: f64,
     /// Speed of the rotor, rpm.
     pub speed_rpm: f64,
     /// Rotor speed as the drive estimates it, rpm.
@@ -132,6 +136,8 @@ impl Rig {
             point.iq = telemetry.current.q.into();
             point.delta_i = telemetry.delta_i.into();
             point.saliency = telemetry.saliency.into();
+            point.loss = telemetry.saliency_loss.into();
+            point.carrier = f64::from(telemetry.carrier_squared).sqrt();
             point.speed_estimate_rpm = rpm(telemetry.rotor_step);
             let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
             point.angle_error_deg = wrapped_degrees(error);
@@ -147,8 +153,10 @@ impl Rig {
         self.command(Command::Start(mode))?;
         for _ in 0..(30.0 * RATE_HZ) as u32 {
             self.step();
-            if self.drive.state() == State::of_mode(mode) {
-                return Ok(());
+            match self.drive.state() {
+                State::Fault(_) => break,
+                state if state == State::of_mode(mode) => return Ok(()),
+                _ => {}
             }
         }
         Err(Error::Refused(format!("the drive does not start: it is {}", self.drive.state())))
@@ -300,6 +308,10 @@ pub fn drive_settings(config: &Config) -> Settings {
             synchronous: SynchronousTracking {
                 bandwidth_hz: config.injection.bandwidth_hz as f32,
                 check: config.injection.check,
+                monitor: config.injection.monitor,
+                allowed_loss: config.injection.allowed_loss as f32,
+                loss_s: config.injection.loss_s as f32,
+                tracked_rpm: config.injection.tracked_rpm as f32,
                 ..base.injection.synchronous
             },
             ..base.injection

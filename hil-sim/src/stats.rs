@@ -46,9 +46,37 @@ impl Stats {
     }
 }
 
+/// The rate, per trial, that `events` in `trials` leave possible at 95 % confidence: the largest for
+/// which so few would be seen in 5 % of all cases. With none it is 3 / trials.
+pub fn upper_bound_95(events: u64, trials: u64) -> f64 {
+    let at_most = |mean: f64| {
+        let mut term = (-mean).exp();
+        let mut sum = term;
+        for k in 1..=events {
+            term *= mean / k as f64;
+            sum += term;
+        }
+        sum
+    };
+    let (mut low, mut high) = (0.0, 10.0 + 3.0 * events as f64);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if at_most(middle) > 0.05 { low = middle } else { high = middle }
+    }
+    high / trials as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_of_a_rate() {
+        // Exact Poisson limits: 2.996, 4.744, 6.296, 16.962.
+        for (events, mean) in [(0, 2.9957), (1, 4.7439), (2, 6.2958), (10, 16.962)] {
+            assert!((upper_bound_95(events, 1000) * 1e3 - mean).abs() < 1e-3, "{events}");
+        }
+    }
 
     #[test]
     fn of_a_few_values() {

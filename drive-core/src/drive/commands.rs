@@ -4,6 +4,7 @@ use super::{ControlState, Drive, References};
 use crate::angle::Angle;
 use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};
+use crate::lock_monitor::LockMonitorState;
 use crate::sensing::SensingState;
 use crate::settings::{AngleSource, LARGEST_POSITION};
 use crate::state::State;
@@ -19,6 +20,7 @@ impl Drive {
     pub fn command(&mut self, command: Command) -> Result<Taken, Refused> {
         match command {
             Command::Start(mode) => self.start(mode),
+            Command::Relock => self.relock(),
             Command::Stop => {
                 match self.state {
                     State::Off | State::Fault(_) | State::Stopping => {}
@@ -101,6 +103,25 @@ impl Drive {
         self.control = ControlState::default();
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
+        Ok(Taken::AsGiven)
+    }
+
+    /// Magnetises again along phase a, as a start does, with the current flowing on.
+    fn relock(&mut self) -> Result<Taken, Refused> {
+        match self.state {
+            State::Fault(fault) => return Err(Refused::Fault(fault)),
+            _ if self.c.source != AngleSource::Injection => return Err(Refused::NeedsInjection),
+            state if state == State::of_mode(self.mode) => {}
+            state => return Err(Refused::State(state)),
+        }
+        self.references = References {
+            current: Dq::new(self.references.current.d, 0.0),
+            injection_axis: self.c.injection_axis,
+            ..References::default()
+        };
+        self.c.estimator.start(&mut self.control.estimator);
+        self.control.lock = LockMonitorState::default();
+        self.enter(State::Magnetising);
         Ok(Taken::AsGiven)
     }
 

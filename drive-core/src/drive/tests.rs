@@ -14,11 +14,13 @@ struct Load {
     current: AlphaBeta,
     pending: Compare,
     v_dc: f32,
+    /// The only direction in which a current can flow when a phase is open.
+    only: Option<UnitVector>,
 }
 
 impl Load {
     fn new() -> Self {
-        Self { current: AlphaBeta::ZERO, pending: Compare::OFF, v_dc: 311.0 }
+        Self { current: AlphaBeta::ZERO, pending: Compare::OFF, v_dc: 311.0, only: None }
     }
 
     fn sample(&self) -> Sample {
@@ -37,6 +39,10 @@ impl Load {
         let duty = |c: u16| f32::from(c) / 14_167.0 * self.v_dc;
         let v = Abc::new(duty(p.a), duty(p.b), duty(p.c)).to_alpha_beta();
         self.current = self.current * 0.980_053 + v * 0.003_205_2;
+        if let Some(axis) = self.only {
+            let along = self.current.alpha * axis.cos + self.current.beta * axis.sin;
+            self.current = AlphaBeta::along(axis, along);
+        }
         self.pending = compare;
     }
 }
@@ -217,6 +223,97 @@ fn a_silent_channel_is_found_by_its_carrier() {
         // Three carrier periods, and up to one to the end of the running one.
         assert!((120..=150).contains(&periods), "{periods}");
     }
+}
+
+/// A sensorless drive on this load, which has no saliency.
+fn sensorless() -> Settings {
+    let mut settings = settings();
+    settings.angle_source = AngleSource::Injection;
+    settings.injection.synchronous.check = false;
+    settings
+}
+
+#[test]
+fn an_open_phase_does_not_get_past_the_start() {
+    // Open a: across phase a; open b, c: along the other two in series; all open: nowhere.
+    let axis = |degrees: f32| Some(Angle::from_degrees(degrees).unit_vector());
+    let nothing = Some(UnitVector { cos: 0.0, sin: 0.0 });
+    for (name, only) in [("a", axis(90.0)), ("b", axis(30.0)), ("c", axis(-30.0)), ("all", nothing)]
+    {
+        let mut drive = Drive::new(sensorless().build().unwrap());
+        let mut load = Load { only, ..Load::new() };
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(!run_to(&mut drive, &mut load, State::Torque), "{name}");
+        let State::Fault(fault) = drive.state() else { panic!("{name}: {}", drive.state()) };
+        println!("{name}: {fault:?}");
+        let named = [
+            Fault::CarrierMissingA,
+            Fault::CarrierMissingB,
+            Fault::CarrierWeak,
+            Fault::CurrentNotAsPredicted,
+        ];
+        assert!(named.contains(&fault), "{name}: {fault:?}");
+    }
+}
+
+#[test]
+fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
+    // 206 V leave 119 V in every direction: 100 V of carrier fit beside little, 150 V never.
+    for (amplitude, shares) in [(100.0, (0.8, 0.99)), (150.0, (0.5, 0.7))] {
+        let mut settings = settings();
+        settings.injection.beside_encoder = true;
+        settings.injection.amplitude_v = amplitude;
+        let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+        load.v_dc = 206.0;
+        drive.command(Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        // 6.2 ohm times 3.2 A are 20 V.
+        drive.command(Command::Torque(3.1)).unwrap();
+        let mut current = 0.0;
+        for _ in 0..1200 {
+            let compare = drive.step(&load.sample());
+            load.advance(compare);
+            current = drive.telemetry().current.q;
+        }
+        let share = drive.telemetry().carrier_share;
+        assert_eq!(drive.state(), State::Torque);
+        assert!(share > shares.0 && share < shares.1, "{amplitude} V: {share}");
+        assert!((current - 3.1).abs() < 0.05, "{current}");
+        // All of it comes back with the room.
+        load.v_dc = 311.0;
+        for _ in 0..1200 {
+            let compare = drive.step(&load.sample());
+            load.advance(compare);
+        }
+        assert_eq!(drive.telemetry().carrier_share, 1.0);
+    }
+    let mut settings = settings();
+    settings.injection.beside_encoder = true;
+    settings.injection.amplitude_v = 150.0;
+    settings.limits.dc_under_v = 50.0;
+    let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+    load.v_dc = 120.0; // 69 V
+    drive.command(Command::Start(Mode::Torque)).unwrap();
+    assert!(!run_to(&mut drive, &mut load, State::Torque));
+    assert_eq!(drive.state(), State::Fault(Fault::CarrierNoRoom));
+}
+
+#[test]
+fn a_relock_is_for_a_sensorless_drive_that_runs() {
+    let (mut encoder, _) = running();
+    assert_eq!(encoder.command(Command::Relock), Err(Refused::NeedsInjection));
+    assert_eq!(encoder.state(), State::Torque);
+    let (mut drive, mut load) = (Drive::new(sensorless().build().unwrap()), Load::new());
+    assert_eq!(drive.command(Command::Relock), Err(Refused::State(State::Off)));
+    drive.command(Command::Start(Mode::Torque)).unwrap();
+    assert_eq!(drive.command(Command::Relock), Err(Refused::State(State::Calibrating)));
+    assert!(run_to(&mut drive, &mut load, State::Torque));
+    drive.command(Command::Torque(1.0)).unwrap();
+    assert_eq!(drive.command(Command::Relock), Ok(Taken::AsGiven));
+    assert_eq!(drive.state(), State::Magnetising);
+    assert_eq!(drive.references.current, Dq::new(0.7, 0.0));
+    assert!(run_to(&mut drive, &mut load, State::Verifying));
+    assert!(run_to(&mut drive, &mut load, State::Torque));
 }
 
 #[test]

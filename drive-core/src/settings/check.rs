@@ -57,6 +57,9 @@ impl Settings {
         // the flux's.
         check("injection.flux_saliency", t.flux_saliency, -0.3, -0.001)?;
         check("injection.current_saliency", t.current_saliency, -0.3, 0.3)?;
+        check("injection.allowed_loss", t.allowed_loss, 0.3, 0.9)?;
+        check("injection.loss_s", t.loss_s, 0.01, 1.0)?;
+        check("injection.tracked_rpm", t.tracked_rpm, 1.0, 20_000.0)?;
 
         let l = &self.limits;
         // The nearest end of either sensor's range: a trip beyond it would never come.
@@ -73,7 +76,11 @@ impl Settings {
         let q = &self.sequence;
         check("sequence.calibrate_s", q.calibrate_s, 0.001, 10.0)?;
         check("sequence.precharge_s", q.precharge_s, 0.0, 10.0)?;
-        check("sequence.magnetise_s", q.magnetise_s, 0.0, 60.0)?;
+        // The lock monitor takes its baseline while the flux is built up; the saliency check leaves it
+        // another time to do so.
+        let synchronous = &inj.synchronous;
+        let needs_baseline = synchronous.monitor && !synchronous.check;
+        check("sequence.magnetise_s", q.magnetise_s, if needs_baseline { 0.5 } else { 0.0 }, 60.0)?;
         check("sequence.i_d", q.i_d, 0.01, l.current_a)?;
         check("sequence.stop_a_per_s", q.stop_a_per_s, 0.1, 1e5)?;
         check("position.i_q_limit_a", self.position.i_q_limit_a, 0.01, l.current_a)?;

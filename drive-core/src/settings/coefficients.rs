@@ -5,7 +5,8 @@ use crate::angle::{Angle, UnitVector};
 use crate::dead_time::DeadTime;
 use crate::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 use crate::indirect::Indirect;
-use crate::injection::Injection;
+use crate::injection::{CARRIER_SAMPLES, Injection};
+use crate::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
@@ -19,6 +20,11 @@ use crate::tuning::{self, CurrentLoopDesign};
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
 const BPF_GROUP_DELAY: f32 = 8.83;
+
+/// Time for which the lock is verified, s: the tracking loop settles in a third of it.
+const VERIFY_S: f32 = 0.3;
+/// Speed up to which the shaft counts as standing when the lock is verified, rpm.
+const STANDING_RPM: f32 = 30.0;
 
 /// Everything the control step needs, made from [`Settings`] outside the interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +43,8 @@ pub struct Coefficients {
     pub(crate) estimator: Estimator,
     /// The check of a sensorless start, if it is wanted.
     pub(crate) saliency_check: Option<SaliencyCheck>,
+    /// The watch on the lock, if it is wanted.
+    pub(crate) lock_monitor: Option<LockMonitor>,
     pub(crate) current_loop: DqPi,
     pub(crate) reference_filter: [ReferenceFilter; 2],
     /// Delay of the measured current beside the filter, samples.
@@ -97,6 +105,7 @@ pub(crate) struct Protection {
 pub(crate) struct SequenceSteps {
     pub precharge: u32,
     pub magnetise: u32,
+    pub verify: u32,
     pub i_d: f32,
     /// A per period.
     pub stop_ramp: f32,
@@ -141,6 +150,14 @@ impl Settings {
             t_sec: m.t_sec(),
             period_s: PERIOD_S,
         };
+        let synchronous = self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == Tracking::Synchronous;
+        let t = &self.injection.synchronous;
+        let highest_rpm = if synchronous && t.tracked_rpm < self.limits.speed_rpm {
+            t.tracked_rpm
+        } else {
+            self.limits.speed_rpm
+        };
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
@@ -150,6 +167,19 @@ impl Settings {
             _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
         };
 
+        let lock_monitor = (synchronous && t.monitor).then(|| {
+            LockMonitor::new(
+                &t.carrier,
+                &LockMonitorSettings {
+                    flux_saliency: t.flux_saliency,
+                    smoothing_s: t.loss_s,
+                    allowed: t.allowed_loss,
+                    carrier_a: injection.current_amplitude,
+                    standing_step: turns_per_step(STANDING_RPM),
+                    period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
+                },
+            )
+        });
         Ok(Coefficients {
             sensing: Sensing {
                 current_a: self.scales.current_a,
@@ -174,6 +204,7 @@ impl Settings {
             injection,
             injection_turn,
             injection_axis,
+            lock_monitor,
             saliency_check: self.saliency_check(),
             estimator: self.estimator(
                 lag_share,
@@ -214,12 +245,13 @@ impl Settings {
                 trip_a: self.limits.trip_a,
                 dc_over: self.limits.dc_over_v,
                 dc_under: self.limits.dc_under_v,
-                rotor_step: turns_per_step(self.limits.speed_rpm),
+                rotor_step: turns_per_step(highest_rpm),
                 current_squared: self.limits.current_a * self.limits.current_a,
             },
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.sequence.magnetise_s),
+                verify: periods(VERIFY_S),
                 i_d: self.sequence.i_d,
                 stop_ramp: self.sequence.stop_a_per_s * PERIOD_S,
             },

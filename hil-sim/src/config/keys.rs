@@ -195,6 +195,14 @@ keys! {
         rms_samples: u32 = 20, [2 .. 60], "";
         /// Whether a start with synchronous checks that the motor has a saliency.
         check: bool = true, [switch], "";
+        /// Whether the lock is verified at a start and watched, with synchronous.
+        monitor: bool = true, [switch], "";
+        /// Share of the flux-fixed saliency that may be missing to the lock monitor.
+        allowed_loss: f64 = 0.55, [0.3 .. 0.9], "";
+        /// Time constant of the mean of that share.
+        loss_s: f64 = 0.08, [0.01 .. 1], "s";
+        /// Speed of the rotor at which a sensorless drive with synchronous switches off.
+        tracked_rpm: f64 = 700.0, [1 .. 20000], "rpm";
         /// Natural frequency of the loop behind synchronous.
         bandwidth_hz: f64 = 4.0, [0.1 .. 30], "Hz";
     }

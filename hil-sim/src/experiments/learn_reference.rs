@@ -17,16 +17,18 @@ pub const EXPERIMENT: Experiment = Experiment {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let learned = learn::reference(context.config, context.seed)?;
     let mut outcome = Outcome::default();
-    let mut table =
-        Table::new("Reference of the synchronous demodulation", &["iq (A)", "q", "scatter"]).note(
-            "q is the saliency that the carrier sees at the right angle; the table is odd in iq.",
-        );
+    let heads = ["iq (A)", "q", "scatter", "carrier ratio"];
+    let mut table = Table::new("Reference of the synchronous demodulation", &heads).note(
+        "q is the saliency that the carrier sees at the right angle; the table is odd in iq. The \
+             carrier current, as a ratio to that at 0 A, is even.",
+    );
     let mut scatter = 0.0_f64;
     for point in &learned {
         table.row([
             Cell::fixed(point.i_q, 2),
             Cell::fixed(point.q, 5),
             Cell::fixed(point.scatter, 5),
+            Cell::fixed(point.carrier / learned[0].carrier, 5),
         ]);
         scatter = scatter.max(point.scatter);
     }

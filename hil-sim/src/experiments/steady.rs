@@ -34,10 +34,36 @@ pub struct SteadyRun {
 }
 
 /// How fast the dynamometer gets up to speed, rpm/s. While it does, the angle lags by the electrical
-/// acceleration over the square of the tracking loop's natural frequency: 11° at 4 Hz.
+/// acceleration over the square of the tracking loop's natural frequency: 11° at 4 Hz. Against a torque
+/// of the drive that takes most of the flux away, and the lock monitor stops it: so without torque.
 const RAMP_RPM_PER_S: f64 = 600.0;
 
-/// Torque at standstill, up to speed, one second to settle, then `seconds` of judging.
+/// A drive that has been started, brought up to speed without torque, and given its torque.
+///
+/// # Errors
+/// When the configuration is refused or the drive does not start.
+pub fn at_speed(config: &Config, case: Case) -> Result<Rig, Error> {
+    at_speed_of(&drive_settings(config), config, case)
+}
+
+fn at_speed_of(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Error> {
+    let mut config = config.clone();
+    config.load.mode = LoadMode::Speed;
+    config.load.speed_rpm = 0.0;
+    let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
+    rig.start(Mode::Torque)?;
+    let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
+    for n in 1..=steps {
+        let speed = case.rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
+        rig.set_load(Load::Speed { speed })?;
+        rig.run(0.01, |_| {});
+    }
+    rig.run(0.3, |_| {});
+    rig.command(Command::Torque(case.iq as f32))?;
+    Ok(rig)
+}
+
+/// At speed and torque, one second to settle, then `seconds` of judging.
 ///
 /// # Errors
 /// When the configuration is refused or the drive does not start.
@@ -55,19 +81,7 @@ pub fn steady_run_of(
     case: Case,
     seconds: f64,
 ) -> Result<SteadyRun, Error> {
-    let mut config = config.clone();
-    config.load.mode = LoadMode::Speed;
-    config.load.speed_rpm = 0.0;
-    let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
-    rig.start(Mode::Torque)?;
-    rig.command(Command::Torque(case.iq as f32))?;
-    rig.run(0.5, |_| {});
-    let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
-    for n in 1..=steps {
-        let speed = case.rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
-        rig.set_load(Load::Speed { speed })?;
-        rig.run(0.01, |_| {});
-    }
+    let mut rig = at_speed_of(drive, config, case)?;
     rig.run(1.0, |_| {});
     let (mut error, mut torque) = (Stats::default(), Stats::default());
     rig.run(seconds, |p| {

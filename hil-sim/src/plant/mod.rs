@@ -266,6 +266,14 @@ impl Plant {
         Ok(())
     }
 
+    /// Turns the rotor flux by an angle, electrical rad, at once: from then on everything that follows
+    /// the flux is off by as much.
+    pub fn turn_rotor_flux(&mut self, angle: f64) {
+        let turn = Complex::new(angle.cos(), angle.sin());
+        let electrical = &mut self.motor.state.electrical;
+        electrical.psi = electrical.psi * turn;
+    }
+
     /// Makes a current channel faulty, or sound again.
     pub fn set_current_fault(&mut self, channel: Channel, fault: CurrentFault) {
         self.sensors.set_fault(channel, fault);

@@ -1,0 +1,271 @@
+//! Does the drive notice a lost or false lock, and only that?
+
+mod trials;
+
+use rayon::prelude::*;
+
+use self::trials::{Forced, Healthy, KINDS, OVER_SPEED_S, OverSpeed, Start};
+use super::torque::assumptions;
+use super::{Context, Experiment};
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::stats::upper_bound_95;
+
+/// Not in the source: it has no monitor.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "lock-monitor",
+    stands_for: "what section 5.2 leaves open",
+    about: "The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.",
+    run,
+};
+
+/// Trials of each forced offset; ten times as many runs are looked at for false alarms.
+const RUNS: u32 = 100;
+const HEALTHY_PER_RUN: u64 = 10;
+/// Forced offsets, degrees, and their names in the metrics.
+const OFFSETS: [(f64, &str); 5] =
+    [(90.0, "p90"), (-90.0, "m90"), (120.0, "p120"), (-120.0, "m120"), (180.0, "180")];
+/// Speeds of the forced offsets, rpm.
+const SPEED_RPM: f64 = 300.0;
+/// How far the speed estimate may be off, rpm: 5° of angle error are that much slip at 3 A.
+const ESTIMATE_RPM: f64 = 50.0;
+/// Speeds of the starts, rpm: beyond the highest the flux does not get to 10 % of its length.
+const START_RPM: [f64; 11] = [0.0, 5.0, -5.0, 15.0, -15.0, 30.0, -50.0, 80.0, 150.0, -150.0, 300.0];
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let runs = u64::from(context.config.extent.runs.unwrap_or(RUNS));
+    let work = Work { context, runs };
+    let mut outcome = Outcome::default();
+    work.forced(&mut outcome)?;
+    work.healthy(&mut outcome)?;
+    work.over_speed(&mut outcome)?;
+    work.starts(&mut outcome)?;
+    outcome.metrics.set("runs", runs as f64);
+    outcome.remarks = assumptions(context.config);
+    outcome.remarks.push(format!(
+        "The angle is forced off by turning the rotor flux of the motor. In time: on with an error \
+         of 15° or more for at most 0.5 s (1.5 s at 0.5 A), watched for 2 s. Speeds within \
+         ±{SPEED_RPM} rpm."
+    ));
+    Ok(outcome)
+}
+
+/// All that the parts share.
+struct Work<'a> {
+    context: &'a Context<'a>,
+    runs: u64,
+}
+
+impl Work<'_> {
+    /// `count` trials on all cores, each with a seed of its own.
+    fn all<T: Send>(
+        &self,
+        name: &str,
+        part: u64,
+        count: u64,
+        trial: impl Fn(u64, u64) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let bar = self.context.progress.bar(name, count);
+        let first = self.context.seed.wrapping_mul(1_000_003).wrapping_add(part << 40);
+        (0..count)
+            .into_par_iter()
+            .map(|n| {
+                let result = trial(n, first.wrapping_add(n));
+                bar.advance(1);
+                result
+            })
+            .collect()
+    }
+
+    fn forced(&self, outcome: &mut Outcome) -> Result<(), Error> {
+        let heads = [
+            "forced by (°)",
+            "trials",
+            "stopped",
+            "recovered",
+            "median (s)",
+            "99 % (s)",
+            "longest (s)",
+            "not in time",
+        ];
+        let mut table = Table::new("Angle forced off: how long it stays wrong", &heads);
+        let mut late = Table::new(
+            "Not in time",
+            &["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"],
+        );
+        let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
+        let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
+        for (number, (degrees, name)) in OFFSETS.into_iter().enumerate() {
+            let trials: Vec<Forced> = self.all(
+                &format!("forced by {degrees}°"),
+                number as u64,
+                self.runs,
+                |_, seed| {
+                    trials::forced(self.context.config, trials::case(seed, SPEED_RPM), degrees)
+                },
+            )?;
+            let mut wrong: Vec<f64> = trials.iter().map(|t| t.wrong_s).collect();
+            wrong.sort_by(f64::total_cmp);
+            let at = |share: f64| {
+                wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
+            };
+            let stopped = trials.iter().filter(|t| t.fault.is_some()).count();
+            let missed: Vec<&Forced> = trials.iter().filter(|t| !t.is_in_time()).collect();
+            let count = |n: usize| Cell::fixed(n as f64, 0);
+            table.row([
+                Cell::fixed(degrees, 0),
+                count(trials.len()),
+                count(stopped),
+                count(trials.len() - stopped),
+                Cell::fixed(at(0.5), 3),
+                Cell::fixed(at(0.99), 3),
+                Cell::fixed(at(1.0), 3),
+                count(missed.len()),
+            ]);
+            for t in &missed {
+                late.row([
+                    Cell::fixed(degrees, 0),
+                    Cell::from(t.case.seed.to_string()),
+                    Cell::fixed(t.case.iq, 3),
+                    Cell::fixed(t.case.rpm, 1),
+                    Cell::fixed(t.wrong_s, 3),
+                ]);
+            }
+            let m = &mut outcome.metrics;
+            m.set(format!("not_in_time_{name}"), missed.len() as f64);
+            m.set(format!("stopped_{name}"), stopped as f64);
+            m.set(format!("wrong_longest_{name}_s"), at(1.0));
+            let label = format!("{degrees}°");
+            let points = trials.iter().map(|t| (t.case.iq, t.wrong_s)).collect();
+            times = times.with(Series::points(label.clone(), points));
+            losses = losses.with(Series::line(label, trials[0].loss.clone()));
+        }
+        outcome.tables.push(table);
+        if !late.rows.is_empty() {
+            outcome.tables.push(late);
+        }
+        outcome
+            .figures
+            .push(Figure::new("forced", "Angle forced off", "").panel(times).panel(losses));
+        Ok(())
+    }
+
+    fn healthy(&self, outcome: &mut Outcome) -> Result<(), Error> {
+        let runs: Vec<Healthy> =
+            self.all("false alarms", 10, HEALTHY_PER_RUN * self.runs, |n, seed| {
+                let kind = KINDS[n as usize % KINDS.len()];
+                trials::healthy(self.context.config, seed, kind)
+            })?;
+        let alarms: Vec<&Healthy> = runs.iter().filter(|r| r.fault.is_some()).collect();
+        let largest = |of: fn(&Healthy) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let bound = upper_bound_95(alarms.len() as u64, runs.len() as u64);
+        let m = &mut outcome.metrics;
+        m.set("false_alarms", alarms.len() as f64);
+        m.set("false_alarm_runs", runs.len() as f64);
+        m.set("false_alarm_rate_95", bound);
+        m.set("healthy_loss_max", largest(|r| r.largest_loss));
+        m.set("healthy_error_max_deg", largest(|r| r.largest_error));
+        let heads = ["runs", "false alarms", "rate per run, 95 % bound", "largest loss seen"];
+        let mut table = Table::new("False alarms", &heads).note(
+            "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
+             within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
+        );
+        table.row([
+            Cell::fixed(runs.len() as f64, 0),
+            Cell::fixed(alarms.len() as f64, 0),
+            Cell::significant(bound, 2),
+            Cell::fixed(largest(|r| r.largest_loss), 2),
+        ]);
+        outcome.tables.push(table);
+        if !alarms.is_empty() {
+            let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
+            let mut table = Table::new("Every false alarm", &heads);
+            for r in alarms {
+                table.row([
+                    Cell::from(r.case.seed.to_string()),
+                    Cell::from(format!("{:?}", r.kind)),
+                    Cell::fixed(r.case.iq, 3),
+                    Cell::fixed(r.case.rpm, 1),
+                    Cell::from(r.fault.map(|f| f.to_string()).unwrap_or_default()),
+                ]);
+            }
+            outcome.tables.push(table);
+        }
+        let mut panel = Panel::new("quadrature current (A)", "largest saliency loss in the run");
+        for kind in KINDS {
+            let of_kind = runs.iter().filter(|r| r.kind == kind);
+            let points = of_kind.map(|r| (r.case.iq, r.largest_loss)).collect();
+            panel = panel.with(Series::points(format!("{kind:?}"), points));
+        }
+        outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
+        Ok(())
+    }
+
+    fn over_speed(&self, outcome: &mut Outcome) -> Result<(), Error> {
+        let limit = self.context.config.injection.tracked_rpm + ESTIMATE_RPM;
+        let trials: Vec<OverSpeed> = self.all("over-speed", 11, self.runs, |_, seed| {
+            trials::over_speed(self.context.config, seed, limit)
+        })?;
+        let late: Vec<&OverSpeed> =
+            trials.iter().filter(|t| t.fault.is_none() || t.late_s > OVER_SPEED_S).collect();
+        let latest = trials.iter().map(|t| t.late_s).fold(0.0, f64::max);
+        let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
+        outcome.metrics.set("over_speed_late", late.len() as f64);
+        outcome.metrics.set("over_speed_latest_s", latest);
+        let heads =
+            ["limit (rpm)", "trials", "off before the limit", "latest after it (s)", "not in time"];
+        let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &heads)
+            .note("The drive goes by its estimate, injection.tracked_rpm, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
+        table.row([
+            Cell::fixed(limit, 0),
+            Cell::fixed(trials.len() as f64, 0),
+            Cell::fixed(before as f64, 0),
+            Cell::fixed(latest, 3),
+            Cell::fixed(late.len() as f64, 0),
+        ]);
+        outcome.tables.push(table);
+        if !late.is_empty() {
+            let mut table = Table::new("Over-speed not in time", &["seed", "iq (A)", "rpm/s"]);
+            for t in late {
+                let seed = Cell::from(t.case.seed.to_string());
+                table.row([seed, Cell::fixed(t.case.iq, 3), Cell::fixed(t.rpm_per_s, 0)]);
+            }
+            outcome.tables.push(table);
+        }
+        Ok(())
+    }
+
+    fn starts(&self, outcome: &mut Outcome) -> Result<(), Error> {
+        let each = self.runs.div_ceil(5);
+        let heads = ["speed (rpm)", "of each", "starts", "relocks", "accepted at a wrong angle"];
+        let mut table = Table::new("Starts and relocks accepted on a turning shaft", &heads);
+        let (mut wrong_all, mut refused_at_rest) = (0, 0);
+        for (number, rpm) in START_RPM.into_iter().enumerate() {
+            let of_kind = |relock: bool| {
+                let part = 20 + 2 * number as u64 + u64::from(relock);
+                self.all("starts", part, each, |_, seed| {
+                    trials::start(self.context.config, rpm, seed, relock)
+                })
+            };
+            let (starts, relocks) = (of_kind(false)?, of_kind(true)?);
+            let accepted = |all: &[Start]| all.iter().filter(|s| s.accepted).count();
+            let wrong = starts.iter().chain(&relocks).filter(|s| !s.is_honest()).count();
+            if rpm == 0.0 {
+                refused_at_rest = 2 * each as usize - accepted(&starts) - accepted(&relocks);
+            }
+            let count = |n: usize| Cell::fixed(n as f64, 0);
+            table.row([
+                Cell::fixed(rpm, 0),
+                count(each as usize),
+                count(accepted(&starts)),
+                count(accepted(&relocks)),
+                count(wrong),
+            ]);
+            wrong_all += wrong;
+        }
+        outcome.metrics.set("refused_at_rest", refused_at_rest as f64);
+        outcome.metrics.set("wrong_starts", wrong_all as f64);
+        outcome.tables.push(table);
+        Ok(())
+    }
+}

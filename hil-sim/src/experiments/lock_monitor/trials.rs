@@ -1,0 +1,260 @@
+//! The trials of the experiment, each from a seed alone.
+
+use std::f64::consts::TAU;
+
+use drive_core::{Command, Fault, Mode, State};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::config::{Config, LoadMode};
+use crate::error::Error;
+use crate::experiments::steady::{Case, at_speed};
+use crate::plant::Load;
+use crate::rig::{Point, Rig};
+
+/// An error below this, degrees, counts as locked.
+pub const LOCKED_DEG: f64 = 15.0;
+/// Least and largest torque current, A.
+const IQ_A: (f64, f64) = (0.5, 3.0);
+/// How long a trial is watched after the angle was forced off, s.
+const WATCH_S: f64 = 2.0;
+
+/// Why the drive stopped itself, if it did.
+pub fn fault(rig: &Rig) -> Option<Fault> {
+    match rig.drive.state() {
+        State::Fault(fault) => Some(fault),
+        _ => None,
+    }
+}
+
+/// A random operating point: speeds within ±`bound` rpm.
+pub fn case(seed: u64, bound: f64) -> Case {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+    // Every fifth at the least current, where the torque that a wrong angle makes is least.
+    let least = random.random_range(0..5) == 0;
+    let length = if least { IQ_A.0 } else { random.random_range(IQ_A.0..=IQ_A.1) };
+    Case { rpm: random.random_range(-bound..=bound), iq: sign * length, seed }
+}
+
+/// A trial with the angle forced off.
+#[derive(Clone, Debug)]
+pub struct Forced {
+    /// Where.
+    pub case: Case,
+    /// The last moment, s after the angle was forced off, at which the drive was on with an error of
+    /// 15° or more.
+    pub wrong_s: f64,
+    /// What it stopped with.
+    pub fault: Option<Fault>,
+    /// Loss of saliency over time.
+    pub loss: Vec<(f64, f64)>,
+}
+
+impl Forced {
+    /// Time within which the drive must be right or off, s.
+    pub fn deadline(&self) -> f64 {
+        if self.case.iq.abs() > IQ_A.0 { 0.5 } else { 1.5 }
+    }
+
+    /// Whether it was.
+    pub fn is_in_time(&self) -> bool {
+        self.wrong_s <= self.deadline()
+    }
+}
+
+/// Turns the rotor flux by `degrees` at a random moment.
+pub fn forced(config: &Config, case: Case, degrees: f64) -> Result<Forced, Error> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(case.seed ^ 0x5eed);
+    let mut rig = at_speed(config, case)?;
+    rig.run(0.8 + random.random_range(0.0..0.2), |_| {});
+    if let Some(fault) = fault(&rig) {
+        return Err(Error::Refused(format!(
+            "seed {}: fault {} before the angle was forced off",
+            case.seed,
+            fault.code()
+        )));
+    }
+    rig.plant.turn_rotor_flux(degrees.to_radians());
+    let (start, mut wrong_s, mut loss) = (rig.time(), 0.0, Vec::new());
+    while rig.time() < start + WATCH_S && fault(&rig).is_none() {
+        // As long as a carrier period: what the drive does of its own is no finer.
+        rig.run(1.0 / 600.0, |p| {
+            if p.angle_error_deg.abs() >= LOCKED_DEG {
+                wrong_s = p.t - start;
+            }
+            loss.push((p.t - start, p.loss));
+        });
+    }
+    loss.truncate(loss.len() - loss.len() % 10);
+    let loss = loss.chunks(10).map(|c| c[9]).collect();
+    Ok(Forced { case, wrong_s, fault: fault(&rig), loss })
+}
+
+/// What happens in a run that the drive must not stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Nothing, within 150 rpm.
+    Slow,
+    /// Nothing, within 300 rpm.
+    Fast,
+    /// The torque reversed, within 150 rpm.
+    Reversal,
+    /// A free shaft, its speed regulated, loaded with 0.6 Nm.
+    LoadStep,
+}
+
+/// All of them.
+pub const KINDS: [Kind; 4] = [Kind::Slow, Kind::Fast, Kind::Reversal, Kind::LoadStep];
+
+/// A run that the drive must not stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Healthy {
+    /// Where.
+    pub case: Case,
+    /// What happened in it.
+    pub kind: Kind,
+    /// Largest loss that the monitor saw.
+    pub largest_loss: f64,
+    /// Largest angle error, degrees.
+    pub largest_error: f64,
+    /// What it stopped with nevertheless.
+    pub fault: Option<Fault>,
+}
+
+/// Two seconds, after 0.3 s to settle, in which something happens after one.
+pub fn healthy(config: &Config, seed: u64, kind: Kind) -> Result<Healthy, Error> {
+    let case = case(seed, if kind == Kind::Fast { 300.0 } else { 150.0 });
+    let mut result = Healthy { case, kind, largest_loss: 0.0, largest_error: 0.0, fault: None };
+    let mut look = |p: &Point| {
+        result.largest_loss = result.largest_loss.max(p.loss);
+        result.largest_error = result.largest_error.max(p.angle_error_deg.abs());
+    };
+    let mut rig = if kind == Kind::LoadStep {
+        load_step(config, case, &mut look)?
+    } else {
+        let mut rig = at_speed(config, case)?;
+        rig.run(1.3, &mut look);
+        if kind == Kind::Reversal && fault(&rig).is_none() {
+            rig.command(Command::Torque(-case.iq as f32))?;
+        }
+        rig
+    };
+    rig.run(1.0, &mut look);
+    result.fault = fault(&rig);
+    Ok(result)
+}
+
+/// Speed loop of the load steps: its crossover, rad/s, well below the tracking loop's.
+const SPEED_LOOP: f64 = 4.4;
+/// Load, Nm.
+const LOAD_NM: f64 = 0.6;
+
+/// Speed regulated on the estimate of the drive, the load coming on after one second of two.
+fn load_step(config: &Config, case: Case, look: &mut impl FnMut(&Point)) -> Result<Rig, Error> {
+    let mut rig = at_speed(config, Case { iq: 0.0, ..case })?;
+    let motor = &crate::rig::drive_settings(config).motor;
+    let per_ampere = f64::from(motor.torque_per_ampere(config.reference.id_a as f32));
+    let k_p = f64::from(motor.inertia) * SPEED_LOOP / per_ampere;
+    let (mut integral, mut estimate) = (0.0, case.rpm);
+    rig.set_load(Load::Free { torque: 0.0 })?;
+    let pace = 1.0 / 600.0;
+    for n in 0..1380 {
+        if fault(&rig).is_some() {
+            break;
+        }
+        if n == 600 {
+            rig.set_load(Load::Free { torque: LOAD_NM * case.iq.signum() })?;
+        }
+        let error = (case.rpm - estimate) * TAU / 60.0;
+        integral += k_p * SPEED_LOOP / 4.0 * error * pace;
+        let i_q = (k_p * error + integral).clamp(-IQ_A.1, IQ_A.1);
+        rig.command(Command::Torque(i_q as f32))?;
+        rig.run(pace, |p| {
+            estimate = p.speed_estimate_rpm;
+            look(p);
+        });
+    }
+    Ok(rig)
+}
+
+/// A shaft that is driven past the limit.
+#[derive(Clone, Copy, Debug)]
+pub struct OverSpeed {
+    /// Where it began.
+    pub case: Case,
+    /// Acceleration, rpm/s.
+    pub rpm_per_s: f64,
+    /// Time from the limit to off, s; not more than zero when it stopped before.
+    pub late_s: f64,
+    /// What it stopped with.
+    pub fault: Option<Fault>,
+}
+
+/// Time for which a drive beyond the limit is watched, s.
+pub const OVER_SPEED_S: f64 = 0.5;
+
+/// From 70 % of `limit` rpm at a random acceleration past it.
+pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeed, Error> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x0ff);
+    let mut case = case(seed, limit);
+    case.rpm = 0.7 * limit.copysign(case.rpm);
+    let rpm_per_s = 10.0_f64.powf(random.random_range(1.7..3.3));
+    let mut rig = at_speed(config, case)?;
+    rig.run(0.5, |_| {});
+    let (mut rpm, mut late_s) = (case.rpm.abs(), 0.0);
+    while fault(&rig).is_none() && late_s < OVER_SPEED_S {
+        rpm += rpm_per_s * 0.001;
+        rig.set_load(Load::Speed { speed: rpm.copysign(case.rpm) * TAU / 60.0 })?;
+        rig.run(0.001, |_| {});
+        late_s = (rpm - limit) / rpm_per_s;
+    }
+    Ok(OverSpeed { case, rpm_per_s, late_s, fault: fault(&rig) })
+}
+
+/// A start on a shaft that turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    /// Whether the drive went on.
+    pub accepted: bool,
+    /// Largest angle error in the half second after that, degrees.
+    pub error_deg: f64,
+}
+
+impl Start {
+    /// Whether it was refused, or right.
+    pub fn is_honest(&self) -> bool {
+        !self.accepted || self.error_deg < LOCKED_DEG
+    }
+}
+
+/// A start, or a relock of a drive that runs, at `rpm`.
+pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start, Error> {
+    let mut result = Start { accepted: false, error_deg: 0.0 };
+    let mut rig = if relock {
+        let mut rig = at_speed(config, Case { rpm, iq: 1.0, seed })?;
+        rig.run(0.5, |_| {});
+        rig.command(Command::Relock)?;
+        while !matches!(rig.drive.state(), State::Torque | State::Fault(_)) {
+            rig.step();
+        }
+        rig
+    } else {
+        let mut config = config.clone();
+        config.load.mode = LoadMode::Speed;
+        config.load.speed_rpm = rpm;
+        let mut rig = Rig::from_config(&config, seed)?;
+        let started = rig.start(Mode::Torque);
+        if fault(&rig).is_none() {
+            started?;
+        }
+        rig
+    };
+    if fault(&rig).is_none() {
+        result.accepted = true;
+        rig.run(0.5, |p| result.error_deg = result.error_deg.max(p.angle_error_deg.abs()));
+        // One that notices by itself has not gone on.
+        result.accepted = fault(&rig).is_none();
+    }
+    Ok(result)
+}

@@ -1,0 +1,113 @@
+//! Procedure: throw the sensorless drive off its flux, and see whether it notices; see whether it
+//! leaves a sound one alone.
+
+mod common;
+
+use common::{config, regulating};
+use drive_core::{Command, Fault, Mode, State};
+use hil_sim::Outcome;
+use hil_sim::experiments::{self, Context};
+use hil_sim::progress::Progress;
+use hil_sim::rig::Rig;
+
+fn run(changes: &[&str], seed: u64) -> Outcome {
+    let outcome = (experiments::find("lock-monitor").unwrap().run)(&Context {
+        config: &config(changes),
+        seed,
+        seconds: None,
+        progress: Progress::hidden(),
+    })
+    .unwrap();
+    println!("{changes:?}: {:?}", outcome.metrics);
+    outcome
+}
+
+/// A share of what `cargo sim run lock-monitor --set runs=1000` shows.
+#[test]
+fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
+    let outcome = run(&["runs=16"], 31);
+    for metric in [
+        "not_in_time_p90",
+        "not_in_time_m90",
+        "not_in_time_p120",
+        "not_in_time_m120",
+        "not_in_time_180",
+        "false_alarms",
+        "over_speed_late",
+        "wrong_starts",
+        "refused_at_rest",
+    ] {
+        assert_eq!(outcome.metrics.get(metric), Some(0.0), "{metric}");
+    }
+    // 0.24 is the most of 10 000 runs; the limit is 0.55.
+    assert!(outcome.metrics.get("healthy_loss_max").unwrap() < 0.35);
+}
+
+/// Without the monitor the same trials end in false locks.
+#[test]
+fn without_the_monitor_a_false_lock_stays() {
+    let outcome = run(&["runs=8", "injection.monitor=false"], 32);
+    let missed = ["p120", "m120", "180"].map(|n| outcome.metrics.get(&format!("not_in_time_{n}")));
+    assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");
+}
+
+/// Largest angle error of the next second, degrees.
+fn worst(rig: &mut Rig) -> f64 {
+    let mut worst = 0.0_f64;
+    rig.run(1.0, |p| worst = worst.max(p.angle_error_deg.abs()));
+    worst
+}
+
+#[test]
+fn a_lost_lock_is_found_again_after_a_clear_and_a_start() {
+    for (seed, i_q) in [(1, 1.0), (2, -2.0), (3, 0.5)] {
+        let mut rig = regulating(&config(&[]), seed, i_q, 1.0);
+        rig.plant.turn_rotor_flux(std::f64::consts::PI);
+        rig.run(1.5, |_| {});
+        assert_eq!(rig.drive.state(), State::Fault(Fault::LostLock));
+        rig.command(Command::Clear).unwrap();
+        rig.start(Mode::Torque).unwrap();
+        rig.command(Command::Torque(i_q)).unwrap();
+        rig.run(0.5, |_| {});
+        let worst = worst(&mut rig);
+        assert!(worst < 12.0, "seed {seed}: {worst}");
+    }
+}
+
+#[test]
+fn a_relock_on_request_goes_on_without_torque() {
+    for (seed, i_q) in [(4, 3.0), (5, -1.0)] {
+        let mut rig = regulating(&config(&[]), seed, i_q, 1.0);
+        rig.command(Command::Relock).unwrap();
+        assert!(
+            matches!(rig.command(Command::Relock), Err(error) if error.to_string().contains("magnetising"))
+        );
+        let mut verified = false;
+        for _ in 0..12_000 {
+            rig.step();
+            verified |= rig.drive.state() == State::Verifying;
+            if rig.drive.state() == State::Torque {
+                break;
+            }
+        }
+        assert!(verified && rig.drive.state() == State::Torque, "{}", rig.drive.state());
+        assert_eq!(rig.drive.telemetry().reference.q, 0.0);
+        rig.command(Command::Torque(i_q)).unwrap();
+        rig.run(0.5, |_| {});
+        let worst = worst(&mut rig);
+        assert!(worst < 12.0, "seed {seed}: {worst}");
+    }
+}
+
+/// A dc link that has no room for all of the carrier: it is made smaller, and the angle stays right.
+#[test]
+fn a_carrier_that_does_not_fit_is_made_smaller_and_the_angle_stays_right() {
+    let low = config(&["inverter.vdc=203", "injection.amplitude_v=103"]);
+    let mut rig = regulating(&low, 6, 2.5, 1.0);
+    let worst = worst(&mut rig);
+    let share = rig.drive.telemetry().carrier_share;
+    println!("share {share}, worst {worst}");
+    assert_eq!(rig.drive.state(), State::Torque);
+    assert!(share < 1.0 && share > 0.8, "{share}");
+    assert!(worst < 12.0, "{worst}");
+}
