@@ -6,17 +6,17 @@ mod tests;
 
 use core::f32::consts::TAU;
 
-use crate::angle::{Angle, UnitVector};
+use crate::angle::Angle;
 use crate::estimator::EstimatorState;
 use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::{FluxAngle, IndirectState};
-use crate::injection::{Carrier, CarrierPeriod};
+use crate::injection::{Carrier, CarrierPeriod, InjectionAxis};
 use crate::io::{Compare, Hardware, Mode, Sample};
+use crate::motion::{Goal, MotionState, RotorCount};
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
-use crate::position::PositionState;
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
@@ -53,20 +53,16 @@ pub struct Drive {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct References {
     current: Dq,
+    /// Mechanical turns/s.
+    speed: f32,
+    /// Mechanical turns.
     turns: f32,
-    /// Injection axis seen from the flux, as an angle and a unit vector.
-    injection_turn: Angle,
-    injection_axis: UnitVector,
+    injection: InjectionAxis,
 }
 
 impl Default for References {
     fn default() -> Self {
-        Self {
-            current: Dq::ZERO,
-            turns: 0.0,
-            injection_turn: Angle::QUARTER,
-            injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
-        }
+        Self { current: Dq::ZERO, speed: 0.0, turns: 0.0, injection: InjectionAxis::QUADRATURE }
     }
 }
 
@@ -79,7 +75,8 @@ struct ControlState {
     carrier: Carrier,
     reference: [ReferenceState; 2],
     current_loop: DqPiState,
-    position: PositionState,
+    rotor: RotorCount,
+    motion: MotionState,
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
@@ -106,7 +103,8 @@ pub struct Telemetry {
     pub saliency: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
-    /// Position in mechanical turns from the start.
+    /// Position in mechanical turns from the start; without the encoder it drifts, see
+    /// [`motion`](crate::motion).
     pub turns: f32,
 }
 
@@ -196,7 +194,8 @@ impl Drive {
         if self.elapsed >= self.c.sequence.precharge {
             self.control = ControlState::default();
             self.control.estimator.start();
-            self.c.position.start(&mut self.control.position, sample.encoder);
+            let count = self.rotor_count(sample);
+            self.c.motion.start(&mut self.control.motion, count);
             self.enter(State::Magnetising);
         }
         Compare::LOW_SIDES_ON
@@ -204,7 +203,8 @@ impl Drive {
 
     /// Regulates the current. This is the control law, top to bottom.
     fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        let wanted = self.reference(sample)?;
+        let rotor_count = self.rotor_count(sample);
+        let wanted = self.reference(rotor_count)?;
         let (c, r, s) = (&self.c, &self.references, &mut self.control);
         let reference = Dq {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
@@ -218,7 +218,7 @@ impl Drive {
             }
             AngleSource::Injection => s.estimator.flux(),
         };
-        let theta = FluxAngle { phi: flux.phi + r.injection_turn, step: flux.step };
+        let theta = FluxAngle { phi: flux.phi + r.injection.turn, step: flux.step };
 
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
@@ -237,7 +237,7 @@ impl Drive {
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current);
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
-        let axis = applied.turned_by(r.injection_axis);
+        let axis = applied.turned_by(r.injection.unit);
         let total = voltage.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.voltage);
 
         // Dead time: the sign of the current that is going to flow decides.
@@ -283,7 +283,7 @@ impl Drive {
             delta_i: s.estimator.delta_i,
             saliency: s.estimator.saliency.q,
             dc_link: measured.dc_link,
-            turns: c.position.turns(&s.position, sample.encoder),
+            turns: c.motion.turns(&s.motion, rotor_count),
         };
 
         // What was computed must make sense before it is put out.
@@ -326,15 +326,28 @@ impl Drive {
         Ok(Compare { a, b, c, enabled: true })
     }
 
+    /// Where the rotor is, counted as by an encoder: by the encoder, or by the flux less the slip.
+    #[inline]
+    fn rotor_count(&mut self, sample: &Sample) -> u32 {
+        let s = &mut self.control;
+        match self.c.source {
+            AngleSource::Encoder => sample.encoder,
+            AngleSource::Injection => s.rotor.follow(s.estimator.flux().phi - s.indirect.slip),
+        }
+    }
+
     /// The current to regulate in this state, A; moves on to the next state where it is time.
-    fn reference(&mut self, sample: &Sample) -> Result<Dq, Fault> {
+    fn reference(&mut self, rotor_count: u32) -> Result<Dq, Fault> {
         let r = &mut self.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
-            State::Position => {
-                let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
-                r.current.q = i_q;
-                i_q
+            State::Speed | State::Position => {
+                let goal = match self.mode {
+                    Mode::Speed => Goal::Speed(r.speed),
+                    _ => Goal::Position(r.turns),
+                };
+                r.current.q = self.c.motion.step(&mut self.control.motion, goal, rotor_count);
+                r.current.q
             }
             State::Stopping => {
                 let ramp = self.c.sequence.stop_ramp;
@@ -367,15 +380,10 @@ impl Drive {
             };
         match phase {
             Phase::Look => {
-                r.injection_turn = SaliencyCheck::LOOK;
-                r.injection_axis = SaliencyCheck::LOOK_AXIS;
+                r.injection = SaliencyCheck::LOOK;
                 return Ok(Dq::ZERO);
             }
-            Phase::Restore => {
-                let usual = References::default();
-                r.injection_turn = usual.injection_turn;
-                r.injection_axis = usual.injection_axis;
-            }
+            Phase::Restore => r.injection = InjectionAxis::QUADRATURE,
             Phase::Passed => self.enter(State::of_mode(self.mode)),
             Phase::Failed => return Err(Fault::NoSaliency),
         }
@@ -387,7 +395,7 @@ impl Drive {
         let r = &self.references;
         if !self.c.is_finite() {
             Some(Fault::NonFiniteSettings)
-        } else if !(r.current.is_finite() && r.turns.is_finite()) {
+        } else if !(r.current.is_finite() && (r.speed + r.turns).is_finite()) {
             Some(Fault::NonFiniteCommand)
         } else if !self.control.estimator.is_finite() {
             Some(Fault::NonFiniteState)

@@ -1,6 +1,7 @@
 //! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 
+use crate::angle::{Angle, UnitVector};
 use crate::tuning::FirstOrder;
 
 /// Samples per period of the carrier.
@@ -25,6 +26,27 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
     -0.951_056_5,
     -0.587_785_24,
 ];
+
+/// The injection axis seen from the flux, as an angle and as a unit vector of that angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InjectionAxis {
+    /// The angle.
+    pub turn: Angle,
+    /// The same, for rotations.
+    pub unit: UnitVector,
+}
+
+impl InjectionAxis {
+    /// The quadrature axis, where the injection belongs.
+    pub const QUADRATURE: Self =
+        Self { turn: Angle::QUARTER, unit: UnitVector { cos: 0.0, sin: 1.0 } };
+
+    /// Turned by an angle from the quadrature axis.
+    pub fn turned(angle: Angle) -> Self {
+        let turn = Angle::QUARTER + angle;
+        Self { turn, unit: turn.unit_vector() }
+    }
+}
 
 /// Coefficients of the injection.
 #[derive(Clone, Copy, Debug, PartialEq)]

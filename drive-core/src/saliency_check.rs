@@ -10,6 +10,7 @@
 
 use crate::angle::{Angle, UnitVector};
 use crate::frames::SQRT_3;
+use crate::injection::InjectionAxis;
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +64,11 @@ impl SaliencyCheck {
         }
     }
 
-    /// Angle of the injection axis from the flux while looking.
-    pub const LOOK: Angle = Angle::from_bits(715_827_883); // a sixth of a turn
-    /// The same as a unit vector.
-    pub const LOOK_AXIS: UnitVector = UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 };
+    /// The injection axis while looking: a sixth of a turn from the flux.
+    pub const LOOK: InjectionAxis = InjectionAxis {
+        turn: Angle::from_bits(715_827_883),
+        unit: UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 },
+    };
 
     /// Period `elapsed` of the check, with the saliency seen in it.
     pub fn step(&self, state: &mut SaliencyCheckState, elapsed: u32, q: f32) -> Phase {

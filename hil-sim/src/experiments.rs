@@ -20,6 +20,7 @@ mod pi_design;
 mod position;
 mod reversal;
 mod saliency_check;
+mod sensorless_position;
 mod steady;
 mod sweep;
 mod torque;
@@ -68,6 +69,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     learn_reference::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,
+    sensorless_position::EXPERIMENT,
     torque::STEPS,
     torque::RAMP,
     reversal::EXPERIMENT,

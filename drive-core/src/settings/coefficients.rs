@@ -1,5 +1,7 @@
 //! From settings to what the control step works with.
 
+use core::f32::consts::TAU;
+
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::dead_time::DeadTime;
 use crate::demodulator::Demodulator;
@@ -7,9 +9,9 @@ use crate::estimator::{ConstantReference, Estimator, Method};
 use crate::indirect::Indirect;
 use crate::injection::Injection;
 use crate::modulation::Modulator;
+use crate::motion::{self, Motion};
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
-use crate::position::Position;
 use crate::saliency_check::SaliencyCheck;
 use crate::schedule::Schedule;
 use crate::sensing::Sensing;
@@ -43,7 +45,7 @@ pub struct Coefficients {
     pub(crate) modulator: Modulator,
     pub(crate) dead_time: DeadTime,
     pub(crate) prediction: Prediction,
-    pub(crate) position: Position,
+    pub(crate) motion: Motion,
     pub(crate) protection: Protection,
     pub(crate) sequence: SequenceSteps,
     /// What the design of the current controllers came to, d and q.
@@ -69,8 +71,8 @@ impl Coefficients {
             + self.current_lag
             + self.reference_filter[0].one_minus_p
             + self.reference_filter[1].one_minus_p
-            + self.position.pi.k_c
-            + self.position.damping
+            + self.motion.pi.k_c
+            + self.motion.limit
             + self.sequence.i_d
             + self.sequence.stop_ramp;
         sum.is_finite()
@@ -189,13 +191,7 @@ impl Settings {
                 DeadTime::NONE
             },
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
-            position: Position::new(
-                m.torque_per_ampere(self.sequence.i_d) / m.inertia,
-                self.scales.encoder_counts,
-                self.position.guard_rpm / 60.0,
-                self.position.i_q_limit_a,
-                PERIOD_S,
-            ),
+            motion: self.motion()?,
             protection: Protection {
                 trip_a: self.limits.trip_a,
                 dc_over: self.limits.dc_over_v,
@@ -211,6 +207,26 @@ impl Settings {
             },
             designs,
         })
+    }
+
+    fn motion(&self) -> Result<Motion, SettingsError> {
+        let (m, v) = (&self.motor, &self.speed);
+        let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
+        let (counts, tracking_hz) = match self.angle_source {
+            AngleSource::Encoder => (self.scales.encoder_counts, None),
+            AngleSource::Injection => (
+                motion::COUNTS_PER_TURN * u32::from(m.pole_pairs),
+                Some(f64::from(self.injection.synchronous.bandwidth_hz)),
+            ),
+        };
+        let design = tuning::design_motion_loops(
+            f64::from(acceleration),
+            tracking_hz,
+            f64::from(v.phase_margin_deg),
+            f64::from(PERIOD_S) * f64::from(motion::DIVIDER),
+        )?;
+        let (limit, ramp) = (v.limit_rpm / 60.0, v.ramp_rpm_per_s / 60.0);
+        Ok(Motion::new(&design, counts, limit, ramp, v.i_q_limit_a))
     }
 
     /// Only a sensorless start with the synchronous demodulation is checked.
