@@ -67,6 +67,8 @@ pub struct MotionState {
     pi: PiState,
     /// Ramped reference of the speed, turns/s.
     reference: f32,
+    /// How fast it changes, turns/s per control period.
+    pub acceleration: f32,
     origin: u32,
     last: Option<u32>,
     phase: u8,
@@ -121,6 +123,7 @@ impl Motion {
         };
         let step = limited(limited(wanted, self.limit) - state.reference, self.ramp);
         state.reference += step;
+        state.acceleration = step * (1.0 / DIVIDER as f32);
 
         let wanted = self.pi.step(&mut state.pi, state.reference - speed) + self.forward * step;
         state.output = limited(wanted, self.i_q_limit);

@@ -16,6 +16,7 @@ mod learn_reference;
 mod modulation;
 mod monte_carlo;
 mod orientation;
+mod perturbation;
 mod pi_design;
 mod position;
 mod reversal;
@@ -73,6 +74,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     torque::STEPS,
     torque::RAMP,
     reversal::EXPERIMENT,
+    perturbation::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     identify_discrete::EXPERIMENT,
