@@ -22,9 +22,11 @@ mod position;
 mod reversal;
 mod saliency_check;
 mod sensorless_position;
+mod speed_profile;
 mod steady;
 mod sweep;
 mod torque;
+mod tracking;
 
 use crate::config::Config;
 use crate::error::{Error, nearest};
@@ -75,8 +77,10 @@ pub const EXPERIMENTS: &[Experiment] = &[
     torque::RAMP,
     reversal::EXPERIMENT,
     perturbation::EXPERIMENT,
+    speed_profile::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,
