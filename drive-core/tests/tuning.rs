@@ -216,9 +216,11 @@ fn motion_loops_have_the_margins_asked_for() {
             assert!(speed.stable && position.stable);
             assert!((speed.phase_margin_deg - margin).abs() < 1e-3);
             assert_close("crossover", speed.crossover_hz, c.crossover / TAU, 1e-6);
-            assert!(position.phase_margin_deg > margin - 14.0);
+            // The position's share takes atan 1/4 = 14° at an unchanged crossover; the current that
+            // is fed forward moves the crossover up a little.
+            assert!(position.phase_margin_deg > margin - 16.0);
             if margin >= 60.0 {
-                assert!(speed.ms < 1.6 && position.ms < 1.8 && speed.gain_margin > 2.5);
+                assert!(speed.ms < 1.6 && position.ms < 1.8 && position.gain_margin > 2.5);
             }
         }
     }

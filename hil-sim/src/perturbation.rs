@@ -133,15 +133,16 @@ impl Linear {
         let (mut filtered, mut current, mut error) = (0.0, 0.0, 0.0);
         let (mut voltage, mut acting) = (0.0, 0.0);
         let (mut e, mut m, mut w, mut w_i) = (0.0, 0.0, 0.0, 0.0);
-        let (mut moved, mut speed_error) = (0.0, 0.0);
+        let (mut moved, mut speed, mut speed_error) = (0.0, 0.0, 0.0);
         for k in 0..(seconds / t).round() as usize {
             response.angle_deg.push(e * 360.0 / TAU);
             response.speed_rpm.push(w * 60.0 / TAU / self.pole_pairs);
             if free && k % usize::from(motion::DIVIDER) == 0 {
                 // turns/s, like the controller
-                let seen = -moved / (TAU * self.pole_pairs * self.speed.period_s);
-                reference += self.speed.k_c * (seen - self.speed.z_c * speed_error);
-                (speed_error, moved) = (seen, 0.0);
+                let now = moved / (TAU * self.pole_pairs * self.speed.period_s);
+                speed += self.speed.smoothing * (now - speed);
+                reference -= self.speed.k_c * (speed - self.speed.z_c * speed_error);
+                (speed_error, moved) = (speed, 0.0);
             }
 
             // Current loop.

@@ -155,6 +155,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("drift_deg_per_min_a", base);
     m.set("drift_deg_per_min_a_per_pct_rr", per_ampere(WARMER[1]) - base);
     m.set("wander_deg", held[0].wander());
+    let rest = without.iter().filter(|p| p.t > 4.0);
+    m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
     m.set("stopped_runs", held.iter().filter(|h| h.stopped).count() as f64);
 
     let heads = [
