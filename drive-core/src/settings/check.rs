@@ -76,7 +76,7 @@ impl Settings {
         check("speed.i_q_limit_a", v.i_q_limit_a, 0.01, l.current_a)?;
         check("speed.limit_rpm", v.limit_rpm, 1.0, l.speed_rpm)?;
         check("speed.ramp_rpm_per_s", v.ramp_rpm_per_s, 1.0, 1e5)?;
-        // Below 45° the position loop, which has some 10° less, rings; the zero leaves 76° at most.
+        // Below 45° the position loop, which has some 12° less, rings; the zero leaves 76° at most.
         check("speed.phase_margin_deg", v.phase_margin_deg, 45.0, 70.0)?;
         Ok(())
     }

@@ -47,12 +47,12 @@ const CORNER: f64 = 2.0;
 /// the speed through a low-pass with its corner at 2 w_n.
 ///
 /// The position gain is a quarter of the crossover. Broken at the current, the loop of the position
-/// mode then has some 10° less; see [`MotionDesign::margins`].
+/// mode then has some 8° less; see [`MotionDesign::margins`].
 ///
 /// | | crossover | margin, speed | margin, position |
 /// |---|---|---|---|
-/// | encoder, 60°, 10 ms | 4.4 Hz | 60.0° | 50.9° |
-/// | 4 Hz tracking loop, 60°, 10 ms | 2.0 Hz | 60.0° | 49.2° |
+/// | encoder, 60°, 10 ms | 4.4 Hz | 60.0° | 52.1° |
+/// | 4 Hz tracking loop, 60°, 10 ms | 1.4 Hz | 60.0° | 52.2° |
 ///
 /// # Errors
 /// A value out of range.
