@@ -261,7 +261,7 @@ impl Drive {
                 // The slip of what is asked for: that of the measured current would feed the angle
                 // error back.
                 c.indirect.update(&mut s.indirect, reference);
-                // The acceleration that is asked for is known: the angle need not lag by it.
+                // The acceleration that is asked for is known: the angle does not lag by it.
                 s.estimator.rotor_step += c.step_per_speed * s.motion.acceleration;
                 // The flux is held still until it stands.
                 if self.state != State::Magnetising

@@ -16,7 +16,14 @@
 //! `theta_r = phi - (1/T_sec) ∫ i_q/i_d dt`, Eq. 2.10 solved for the other angle. The injection
 //! observes the flux, and nothing observes the rotor inside it: a cage looks the same from everywhere.
 //! An error of the slip is therefore an error of the speed, and its integral one of the position
-//! that nothing takes back. See the experiment `sensorless-position` for how much that is.
+//! that nothing takes back. Measured on the simulated motor (experiment `sensorless-position`),
+//! mechanical: a step of five turns ends within 15°, a position held for a minute moves by some 10°
+//! without a load, and under load by 130° per ampere and percent of error of the rotor resistance.
+//! Learning the reference of the saliency with the shaft locked takes that error out until the
+//! rotor's temperature changes.
+//!
+//! The acceleration that is asked for is fed to the tracking loop, too: it would lag by the
+//! acceleration over the square of its natural frequency.
 
 use crate::angle::Angle;
 use crate::pi::{Pi, PiState};
