@@ -228,6 +228,7 @@ impl Console {
             Request::Start(mode) => self.give(Order::Start(mode), machine),
             Request::Stop => self.give(Order::Stop, machine),
             Request::Torque(i_q) => self.give(Order::Torque(i_q), machine),
+            Request::Speed(rpm) => self.give(Order::Speed(rpm), machine),
             Request::Position(turns) => self.give(Order::Position(turns), machine),
             Request::Clear => self.give(Order::Clear, machine),
             Request::Angle(source) => {

@@ -15,6 +15,8 @@ pub enum Order {
     Clear,
     /// See [`Command::Torque`].
     Torque(f32),
+    /// See [`Command::Speed`].
+    Speed(f32),
     /// See [`Command::Position`].
     Position(f32),
     /// See [`Command::Configure`].
@@ -29,6 +31,7 @@ impl Order {
             Self::Stop => Command::Stop,
             Self::Clear => Command::Clear,
             Self::Torque(i_q) => Command::Torque(*i_q),
+            Self::Speed(rpm) => Command::Speed(*rpm),
             Self::Position(turns) => Command::Position(*turns),
             Self::Configure(coefficients) => Command::Configure(coefficients),
         }

@@ -15,9 +15,9 @@ use crate::indirect::IndirectState;
 use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::lock_monitor::LockMonitorState;
+use crate::motion::{Goal, MotionState, RotorCount};
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
-use crate::position::PositionState;
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
@@ -54,6 +54,9 @@ pub struct Drive {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct References {
     current: Dq,
+    /// Mechanical turns/s.
+    speed: f32,
+    /// Mechanical turns.
     turns: f32,
     /// Injection axis seen from the flux.
     injection_axis: UnitVector,
@@ -63,6 +66,7 @@ impl Default for References {
     fn default() -> Self {
         Self {
             current: Dq::ZERO,
+            speed: 0.0,
             turns: 0.0,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
         }
@@ -78,7 +82,8 @@ struct ControlState {
     carrier: Carrier,
     reference: [ReferenceState; 2],
     current_loop: DqPiState,
-    position: PositionState,
+    rotor: RotorCount,
+    motion: MotionState,
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
@@ -112,7 +117,8 @@ pub struct Telemetry {
     pub saliency_loss: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
-    /// Position in mechanical turns from the start.
+    /// Position in mechanical turns from the start; without the encoder it drifts, see
+    /// [`motion`](crate::motion).
     pub turns: f32,
 }
 
@@ -200,7 +206,8 @@ impl Drive {
 
     fn precharge(&mut self, sample: &Sample) -> Compare {
         if self.elapsed >= self.c.sequence.precharge {
-            self.c.position.start(&mut self.control.position, sample.encoder);
+            let count = self.rotor_count(sample);
+            self.c.motion.start(&mut self.control.motion, count);
             self.enter(State::Magnetising);
         }
         Compare::LOW_SIDES_ON
@@ -208,7 +215,8 @@ impl Drive {
 
     /// Regulates the current. This is the control law, top to bottom.
     fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        let wanted = self.reference(sample)?;
+        let rotor_count = self.rotor_count(sample);
+        let wanted = self.reference(rotor_count)?;
         let held = self.state == State::Magnetising;
         let (c, r, s) = (&self.c, &self.references, &mut self.control);
         let reference = Dq {
@@ -267,6 +275,8 @@ impl Drive {
                 // The slip of what is asked for: that of the measured current would feed the angle
                 // error back.
                 c.indirect.update(&mut s.indirect, reference);
+                // The acceleration that is asked for is known: the angle does not lag by it.
+                s.estimator.rotor_step += c.step_per_speed * s.motion.acceleration;
                 // The flux is held still until it stands.
                 if !held
                     && c.estimator
@@ -292,7 +302,7 @@ impl Drive {
             carrier_share: s.carrier.share,
             saliency_loss: s.lock.loss,
             dc_link: measured.dc_link,
-            turns: c.position.turns(&s.position, sample.encoder),
+            turns: c.motion.turns(&s.motion, rotor_count),
         };
 
         // What was computed must make sense before it is put out.
@@ -345,16 +355,29 @@ impl Drive {
         Ok(Compare { a, b, c, enabled: true })
     }
 
+    /// Where the rotor is, counted as by an encoder: by the encoder, or by the flux less the slip.
+    #[inline]
+    fn rotor_count(&mut self, sample: &Sample) -> u32 {
+        let s = &mut self.control;
+        match self.c.source {
+            AngleSource::Encoder => sample.encoder,
+            AngleSource::Injection => s.rotor.follow(s.estimator.flux().phi - s.indirect.slip),
+        }
+    }
+
     /// The current to regulate in this state, A; moves on to the next state where it is time.
-    fn reference(&mut self, sample: &Sample) -> Result<Dq, Fault> {
+    fn reference(&mut self, rotor_count: u32) -> Result<Dq, Fault> {
         let r = &mut self.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
             State::Verifying => return self.verify(),
-            State::Position => {
-                let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
-                r.current.q = i_q;
-                i_q
+            State::Speed | State::Position => {
+                let goal = match self.mode {
+                    Mode::Speed => Goal::Speed(r.speed),
+                    _ => Goal::Position(r.turns),
+                };
+                r.current.q = self.c.motion.step(&mut self.control.motion, goal, rotor_count);
+                r.current.q
             }
             State::Stopping => {
                 let ramp = self.c.sequence.stop_ramp;
@@ -421,7 +444,7 @@ impl Drive {
         let r = &self.references;
         if !self.c.is_finite() {
             Some(Fault::NonFiniteSettings)
-        } else if !(r.current.is_finite() && r.turns.is_finite()) {
+        } else if !(r.current.is_finite() && (r.speed + r.turns).is_finite()) {
             Some(Fault::NonFiniteCommand)
         } else if !self.control.estimator.is_finite() {
             Some(Fault::NonFiniteState)

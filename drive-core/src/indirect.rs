@@ -30,7 +30,8 @@ pub struct Indirect {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IndirectState {
     last_count: Option<u32>,
-    slip: Angle,
+    /// Integral of the slip: by so much the flux is ahead of the rotor.
+    pub slip: Angle,
     /// Slip, electrical turns per period.
     pub slip_step: f32,
     /// Magnetising current, A: the rotor flux over L_m.

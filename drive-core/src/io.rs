@@ -91,9 +91,9 @@ impl Compare {
 pub enum Mode {
     /// Torque, by the current on the quadrature axis.
     Torque,
-    /// Speed. Not available yet: refused.
+    /// Speed of the rotor; see [`motion`](crate::motion).
     Speed,
-    /// Position, with the encoder.
+    /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
     Position,
     /// Identification of the motor. Not available yet: refused.
     Commissioning,
@@ -114,7 +114,10 @@ pub enum Command<'a> {
     Clear,
     /// Reference of the quadrature-axis current, A peak; limited to the machine's limits.
     Torque(f32),
-    /// Reference of the position, mechanical turns from where the drive was started.
+    /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
+    Speed(f32),
+    /// Reference of the position, mechanical turns from where the drive was started; limited to
+    /// what is counted.
     Position(f32),
     /// Reference of the direct-axis (magnetising) current, A peak.
     Magnetising(f32),

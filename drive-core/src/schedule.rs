@@ -15,6 +15,11 @@ use crate::decimal::Shortest;
 const POINTS: usize = 16;
 /// Their distance, A.
 const STEP_A: f32 = 0.25;
+/// Share of the proportional part that is left however steep the fast slope. Only errors faster than
+/// the current loop see that slope in full; with all of it taken out the tracking loop has too little
+/// damping at large currents. (4 Hz, a rotor 30 % warmer than believed, 3 A to -3 A: 19.6° at most
+/// with 0, 17.6° with 0.3, 16.2° with 1, where the noise of the other runs has grown by an eighth.)
+const LEAST_SHARE: f32 = 0.3;
 /// Largest saliency that is believed.
 const LARGEST: f32 = 0.3;
 
@@ -117,7 +122,9 @@ impl Schedule {
             let length = libm::sqrtf(i_d * i_d + i_q * i_q);
             // b |i| cos 2 gamma, where it adds to the slope
             let current_part = b * (i_q * i_q - i_d * i_d) / length;
-            a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 })
+            let by_slope =
+                a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 });
+            LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope
         };
         Self { q: table.q, share: core::array::from_fn(share), per_saliency: -0.5 / a }
     }
@@ -166,10 +173,10 @@ mod tests {
 
     #[test]
     fn the_gain_falls_as_the_slope_rises() {
-        // Of an independent study: 1, 1, .71, .49, .38, .32, .27 at 0, .5, 1, 1.5, 2, 2.5, 3 A.
+        // Of an independent study, which leaves no least share.
         let schedule = Schedule::new(&ReferenceTable::default(), -0.035, 0.0338, 0.7);
         for (n, share) in [1.0, 1.0, 0.71, 0.49, 0.38, 0.32, 0.27].into_iter().enumerate() {
-            let found = schedule.at(0.5 * n as f32).1;
+            let found = (schedule.at(0.5 * n as f32).1 - LEAST_SHARE) / (1.0 - LEAST_SHARE);
             assert!((found - share).abs() < 0.011, "{n}: {found}");
         }
     }

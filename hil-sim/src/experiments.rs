@@ -19,13 +19,17 @@ mod lock_monitor;
 mod modulation;
 mod monte_carlo;
 mod orientation;
+mod perturbation;
 mod pi_design;
 mod position;
 mod reversal;
 mod saliency_check;
+mod sensorless_position;
+mod speed_profile;
 mod steady;
 mod sweep;
 mod torque;
+mod tracking;
 
 use crate::config::Config;
 use crate::error::{Error, nearest};
@@ -73,12 +77,16 @@ pub const EXPERIMENTS: &[Experiment] = &[
     learn_reference::EXPERIMENT,
     saliency_check::EXPERIMENT,
     position::EXPERIMENT,
+    sensorless_position::EXPERIMENT,
     torque::STEPS,
     torque::RAMP,
     reversal::EXPERIMENT,
+    perturbation::EXPERIMENT,
+    speed_profile::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     lock_monitor::EXPERIMENT,
+    tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,

@@ -7,6 +7,7 @@ pub mod experiments;
 pub mod identification;
 pub mod learn;
 pub mod outcome;
+pub mod perturbation;
 pub mod plant;
 pub mod progress;
 pub mod report;

@@ -62,6 +62,8 @@ pub struct Point {
     pub torque_per_flux_ampere: f64,
     /// Position of the rotor, mechanical turns.
     pub turns: f64,
+    /// Position as the drive sees it, mechanical turns from its start.
+    pub turns_estimate: f64,
 }
 
 impl Point {
@@ -139,6 +141,7 @@ impl Rig {
             point.loss = telemetry.saliency_loss.into();
             point.carrier = f64::from(telemetry.carrier_squared).sqrt();
             point.speed_estimate_rpm = rpm(telemetry.rotor_step);
+            point.turns_estimate = telemetry.turns.into();
             let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
             point.angle_error_deg = wrapped_degrees(error);
             look(&point);
@@ -315,6 +318,15 @@ pub fn drive_settings(config: &Config) -> Settings {
                 ..base.injection.synchronous
             },
             ..base.injection
+        },
+        speed: settings::SpeedSettings {
+            limit_rpm: config.speed.limit_rpm.map_or(base.speed.limit_rpm, |v| v as f32),
+            ramp_rpm_per_s: config
+                .speed
+                .ramp_rpm_per_s
+                .map_or(base.speed.ramp_rpm_per_s, |v| v as f32),
+            phase_margin_deg: config.speed.phase_margin_deg as f32,
+            ..base.speed
         },
         sequence: settings::Sequence { i_d: config.reference.id_a as f32, ..base.sequence },
         ..base

@@ -23,6 +23,8 @@ pub enum Request {
     Stop,
     /// Current on the quadrature axis, A.
     Torque(f32),
+    /// Speed, rpm.
+    Speed(f32),
     /// Position, turns from where it started.
     Position(f32),
     /// Where the flux angle comes from.
@@ -111,12 +113,13 @@ impl fmt::Display for Misunderstood {
 }
 
 /// One line per command, for `help`.
-pub const HELP: [&str; 17] = [
+pub const HELP: [&str; 18] = [
     "help                      this list",
     "status                    what the drive is doing",
-    "start [torque|position]   calibrate, charge the bootstraps, magnetise, then regulate",
+    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
     "stop                      torque to zero, then off",
     "torque A                  current on the quadrature axis, A peak",
+    "speed RPM                 speed, mechanical rpm",
     "position TURNS            position, mechanical turns from where it started",
     "angle encoder|injection   where the flux angle comes from",
     "get [KEY]                 one setting with its range, or all",
@@ -143,11 +146,13 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         "status" => Request::Status,
         "start" => Request::Start(match word("") {
             Err(_) | Ok("torque") => Mode::Torque,
+            Ok("speed") => Mode::Speed,
             Ok("position") => Mode::Position,
-            Ok(_) => return Err(Misunderstood::OneOf("torque position")),
+            Ok(_) => return Err(Misunderstood::OneOf("torque speed position")),
         }),
         "stop" => Request::Stop,
         "torque" => Request::Torque(number(word("the current")?)?),
+        "speed" => Request::Speed(number(word("the speed")?)?),
         "position" => Request::Position(number(word("the position")?)?),
         "angle" => Request::Angle(match word("encoder or injection")? {
             "encoder" => AngleSource::Encoder,
@@ -253,6 +258,8 @@ mod tests {
             ("start position", Request::Start(Mode::Position)),
             ("stop", Request::Stop),
             ("torque -1.5", Request::Torque(-1.5)),
+            ("start speed", Request::Start(Mode::Speed)),
+            ("speed -150", Request::Speed(-150.0)),
             ("position 5e1", Request::Position(50.0)),
             ("angle encoder", Request::Angle(AngleSource::Encoder)),
             ("get", Request::Get(None)),
@@ -277,7 +284,7 @@ mod tests {
             ("Stop", Command),
             ("stopp", Command),
             ("stop now", TooMuch),
-            ("start backwards", OneOf("torque position")),
+            ("start backwards", OneOf("torque speed position")),
             ("torque", Missing("the current")),
             ("torque 1 2", TooMuch),
             ("torque 1,5", Number),
@@ -306,9 +313,9 @@ mod tests {
 
         #[test]
         fn words_that_look_like_commands_are_understood_or_refused(
-            line in "(start|torque|position|angle|get|set|trace|log|stop) ?[-+.0-9a-z_ ]{0,30}",
+            line in "(start|torque|speed|position|angle|get|set|trace|log|stop) ?[-+.0-9a-z_ ]{0,30}",
         ) {
-            if let Ok(Request::Torque(x) | Request::Position(x)) = parse(&line) {
+            if let Ok(Request::Torque(x) | Request::Speed(x) | Request::Position(x)) = parse(&line) {
                 prop_assert!(x.is_finite());
             }
         }

@@ -197,7 +197,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 45] = [
+pub static KEYS: [Key; 48] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -253,7 +253,10 @@ pub static KEYS: [Key; 45] = [
     number!("sequence.magnetise_s", "s", drive.sequence.magnetise_s),
     number!("sequence.i_d", "A", drive.sequence.i_d),
     number!("sequence.stop_a_per_s", "A/s", drive.sequence.stop_a_per_s),
-    number!("position.i_q_limit_a", "A", drive.position.i_q_limit_a),
+    number!("speed.i_q_limit_a", "A", drive.speed.i_q_limit_a),
+    number!("speed.limit_rpm", "rpm", drive.speed.limit_rpm),
+    number!("speed.ramp_rpm_per_s", "rpm/s", drive.speed.ramp_rpm_per_s),
+    number!("speed.phase_margin_deg", "deg", drive.speed.phase_margin_deg),
     number!("command.timeout_s", "s", command.timeout_s),
 ];
 

@@ -183,6 +183,10 @@ fn a_session() {
     assert_eq!(talk.ask("start position"), "ok");
     assert_eq!(talk.ask("position 2.5"), "ok");
     assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.ask("start speed"), "ok");
+    assert_eq!(talk.ask("speed -150"), "ok");
+    assert_eq!(talk.ask("speed 1e4"), "ok: limited to 300");
+    assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("faults"), "none latched; last run: power-on");
     assert_eq!(talk.ask("defaults"), "ok");
     assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");

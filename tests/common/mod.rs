@@ -4,7 +4,7 @@
 use drive_core::{Command, Mode, Settings};
 use hil_sim::Config;
 use hil_sim::plant::PlantSettings;
-use hil_sim::rig::{Rig, drive_settings, plant_settings};
+pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {

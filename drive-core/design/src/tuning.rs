@@ -38,9 +38,11 @@ use crate::decimal::{Fixed, Shortest};
 use crate::section::{Section, response};
 
 mod margins;
+mod motion;
 mod roots;
 
 pub use margins::Margins;
+pub use motion::{MotionDesign, design_motion_loops};
 pub use roots::roots;
 
 use margins::{gain_limit, scan};
@@ -112,19 +114,6 @@ pub struct CurrentLoopDesign {
     pub rule_k_c: f64,
     /// Margins on the physical plant with `rule_k_c`.
     pub rule_margins: Margins,
-}
-
-/// What [`design_position_loop`] gives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PositionLoopDesign {
-    /// Gain of the controller.
-    pub k_c: f64,
-    /// Zero of the controller.
-    pub z_c: f64,
-    /// Pole of the reference filter (4.3).
-    pub p_f: f64,
-    /// Margins with the plant.
-    pub margins: Margins,
 }
 
 /// Why a controller could not be designed.
@@ -373,50 +362,4 @@ pub fn design_current_loop(
     } else {
         Err(TuningError::NoCrossover { crossover_hz: margins.crossover_hz, zero_hz })
     }
-}
-
-/// Position controller for k/((z - 1)(z - p)) with a stated phase margin, by the symmetric optimum:
-/// as fictitious frequencies, the crossover is the geometric mean of the controller's zero and the
-/// plant's pole, which is where the phase has its maximum.
-///
-/// The rule of section 3.8 has no solution here: G_pos/(z - 1) is a double integrator with a lag, its
-/// phase is below -180° everywhere and never -176°. The controller the source prints for Eq. 4.1
-/// (Eq. 4.2: 6.466, 0.974) is unstable with it, |z| = 1.046; with that zero the loop is stable for
-/// 0 < k_c < 0.926 only.
-///
-/// For Eq. 4.1 and 45° this gives k_c = 0.0429, z_c = 0.99299, crossover 0.277 Hz.
-///
-/// # Errors
-/// A plant or period out of range, a phase margin outside 5° to 85°.
-pub fn design_position_loop(
-    plant: IntegratorLag,
-    phase_margin_deg: f64,
-    period_s: f64,
-) -> Result<PositionLoopDesign, TuningError> {
-    check_period(period_s)?;
-    check_plant(plant.k, plant.p)?;
-    check("phase margin in degrees", phase_margin_deg, 5.0, 85.0)?;
-    let wanted = phase_margin_deg * (PI / 180.0);
-    // Fictitious frequencies times T/2.
-    let pole = (1.0 - plant.p) / (1.0 + plant.p);
-    // Crossover over zero = pole over crossover = a. Exact margin: the two integrators, the pole and
-    // the zero add -(2 + 1 - 1) atan(vT/2) to the phase in w.
-    let margin = |a: f64| libm::atan(a) - libm::atan(1.0 / a) - 2.0 * libm::atan(pole / a);
-    let (mut low, mut high) = (1.0, 1e6);
-    for _ in 0..80 {
-        // Geometric: the answer may be anywhere over the decades.
-        let middle = libm::sqrt(low * high);
-        if margin(middle) < wanted {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    let crossover = pole / high;
-    let z_c = zero_at(crossover / high);
-    let omega_t = 2.0 * libm::atan(crossover);
-    let k_c = 1.0 / (pi_response(1.0, z_c, omega_t) * plant.response(omega_t)).abs();
-    let margins =
-        margins_or_error(&|w| pi_response(k_c, z_c, w) * plant.response(w), 2, z_c, period_s)?;
-    Ok(PositionLoopDesign { k_c, z_c, p_f: z_c, margins })
 }

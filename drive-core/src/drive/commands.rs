@@ -5,8 +5,9 @@ use crate::angle::Angle;
 use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};
 use crate::lock_monitor::LockMonitorState;
+use crate::motion::limited;
 use crate::sensing::SensingState;
-use crate::settings::{AngleSource, LARGEST_POSITION};
+use crate::settings::AngleSource;
 use crate::state::State;
 
 impl Drive {
@@ -43,9 +44,15 @@ impl Drive {
                 self.references.current.q = taken;
                 Ok(as_taken(i_q, taken))
             }
+            Command::Speed(rpm) => {
+                self.takes_references(Mode::Speed, rpm)?;
+                let taken = limited(rpm, self.c.motion.limit * 60.0);
+                self.references.speed = taken / 60.0;
+                Ok(as_taken(rpm, taken))
+            }
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
-                let taken = limited(turns, LARGEST_POSITION);
+                let taken = limited(turns, self.c.motion.furthest);
                 self.references.turns = taken;
                 Ok(as_taken(turns, taken))
             }
@@ -84,12 +91,7 @@ impl Drive {
     fn start(&mut self, mode: Mode) -> Result<Taken, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
-            (State::Off, Mode::Speed | Mode::Commissioning) => {
-                return Err(Refused::ModeNotAvailable(mode));
-            }
-            (State::Off, Mode::Position) if self.c.source != AngleSource::Encoder => {
-                return Err(Refused::NeedsEncoder);
-            }
+            (State::Off, Mode::Commissioning) => return Err(Refused::ModeNotAvailable(mode)),
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
         }
@@ -134,16 +136,6 @@ impl Drive {
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),
         }
-    }
-}
-
-fn limited(value: f32, largest: f32) -> f32 {
-    if value > largest {
-        largest
-    } else if value < -largest {
-        -largest
-    } else {
-        value
     }
 }
 

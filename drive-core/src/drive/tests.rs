@@ -362,7 +362,10 @@ fn commands_are_taken_limited_or_refused() {
     let mut d = drive();
     let coefficients = settings().build().unwrap();
     assert_eq!(d.command(Command::Torque(1.0)), Err(Refused::State(State::Off)));
-    assert_eq!(d.command(Command::Start(Mode::Speed)), Err(Refused::ModeNotAvailable(Mode::Speed)));
+    assert_eq!(
+        d.command(Command::Start(Mode::Commissioning)),
+        Err(Refused::ModeNotAvailable(Mode::Commissioning))
+    );
     assert_eq!(d.state(), State::Off);
 
     let (mut d, _) = running();
@@ -382,14 +385,27 @@ fn commands_are_taken_limited_or_refused() {
     );
     assert!(matches!(d.command(Command::Magnetising(0.0)), Err(Refused::OutOfRange { .. })));
 
-    let mut sensorless = Drive::new(Settings::default().build().unwrap());
-    assert_eq!(sensorless.command(Command::Start(Mode::Position)), Err(Refused::NeedsEncoder));
+    let mut d = drive();
+    assert_eq!(d.command(Command::Speed(1.0)), Err(Refused::State(State::Off)));
+    d.command(Command::Start(Mode::Speed)).unwrap();
+    assert_eq!(d.command(Command::Speed(-120.0)), Ok(Taken::AsGiven));
+    assert_eq!(d.command(Command::Speed(f32::NAN)), Err(Refused::NotFinite));
+    assert_eq!(d.command(Command::Torque(1.0)), Err(Refused::State(State::Speed)));
+    assert_eq!(d.references.speed, -2.0, "refused commands change nothing");
+    assert_eq!(d.command(Command::Speed(1e6)), Ok(Taken::Limited(300.0)));
+    d.command(Command::Stop).unwrap();
+    d.command(Command::Start(Mode::Position)).unwrap();
+    assert_eq!(d.references.speed, 0.0, "a start takes the references back");
+    assert_eq!(d.command(Command::Speed(1.0)), Err(Refused::State(State::Position)));
+    assert_eq!(d.command(Command::Position(-1e9)), Ok(Taken::Limited(-1000.0)));
 }
 
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
     type Change = fn(&mut Settings);
-    let cases: [(Change, &str); 7] = [
+    let cases: [(Change, &str); 9] = [
+        (|s| s.speed.limit_rpm = 3000.0, "speed.limit_rpm = 3000: allowed is 1 to 2000"),
+        (|s| s.speed.phase_margin_deg = 80.0, "speed.phase_margin_deg = 80: allowed is 45 to 70"),
         (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000"),
         (|s| s.motor.l_m = 0.0, "motor.l_m = 0"),
         (|s| s.limits.trip_a = 5.0, "limits.trip_a = 5"),
@@ -401,7 +417,7 @@ fn settings_out_of_range_are_refused_by_name() {
                 let bad = crate::tuning::FirstOrder { k: 0.003, p: 1.5 };
                 s.current_plant = CurrentPlant::Identified { d: bad, q: bad };
             },
-            "current controllers:",
+            "controllers:",
         ),
     ];
     for (change, text) in cases {
@@ -443,9 +459,10 @@ proptest! {
         for (n, (sample, command, value)) in samples.into_iter().enumerate() {
             let _ = drive.command(match command {
                 0 => Command::Start(Mode::Torque),
-                1 => Command::Start(Mode::Position),
+                1 => Command::Start(if n % 2 == 0 { Mode::Position } else { Mode::Speed }),
                 2 => Command::Torque(value),
-                3 => Command::Position(value),
+                3 if n % 2 == 0 => Command::Position(value),
+                3 => Command::Speed(value),
                 4 => Command::Magnetising(value),
                 5 => Command::TurnInjection(value),
                 _ => Command::Clear,

@@ -83,8 +83,13 @@ impl Settings {
         check("sequence.magnetise_s", q.magnetise_s, if needs_baseline { 0.5 } else { 0.0 }, 60.0)?;
         check("sequence.i_d", q.i_d, 0.01, l.current_a)?;
         check("sequence.stop_a_per_s", q.stop_a_per_s, 0.1, 1e5)?;
-        check("position.i_q_limit_a", self.position.i_q_limit_a, 0.01, l.current_a)?;
-        check("position.guard_rpm", self.position.guard_rpm, 1.0, l.speed_rpm)?;
+
+        let v = &self.speed;
+        check("speed.i_q_limit_a", v.i_q_limit_a, 0.01, l.current_a)?;
+        check("speed.limit_rpm", v.limit_rpm, 1.0, l.speed_rpm)?;
+        check("speed.ramp_rpm_per_s", v.ramp_rpm_per_s, 1.0, 1e5)?;
+        // Below 45° the position loop, which has some 12° less, rings; the zero leaves 76° at most.
+        check("speed.phase_margin_deg", v.phase_margin_deg, 45.0, 70.0)?;
         Ok(())
     }
 }

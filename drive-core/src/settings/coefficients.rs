@@ -1,5 +1,7 @@
 //! From settings to what the control step works with.
 
+use core::f32::consts::TAU;
+
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::angle::{Angle, UnitVector};
 use crate::dead_time::DeadTime;
@@ -8,14 +10,14 @@ use crate::indirect::Indirect;
 use crate::injection::{CARRIER_SAMPLES, Injection};
 use crate::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::modulation::Modulator;
+use crate::motion::{self, Motion};
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
-use crate::position::Position;
 use crate::saliency_check::SaliencyCheck;
 use crate::schedule::Schedule;
 use crate::sensing::Sensing;
 use crate::tracker::{Pll, Tracker};
-use crate::tuning::{self, CurrentLoopDesign};
+use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
@@ -54,11 +56,15 @@ pub struct Coefficients {
     pub(crate) modulator: Modulator,
     pub(crate) dead_time: DeadTime,
     pub(crate) prediction: Prediction,
-    pub(crate) position: Position,
+    pub(crate) motion: Motion,
+    /// Electrical turns per period for one mechanical turn/s.
+    pub(crate) step_per_speed: f32,
     pub(crate) protection: Protection,
     pub(crate) sequence: SequenceSteps,
     /// What the design of the current controllers came to, d and q.
     pub designs: [CurrentLoopDesign; 2],
+    /// What the design of the speed and the position loop came to.
+    pub motion_design: MotionDesign,
 }
 
 impl Coefficients {
@@ -80,8 +86,8 @@ impl Coefficients {
             + self.current_lag
             + self.reference_filter[0].one_minus_p
             + self.reference_filter[1].one_minus_p
-            + self.position.pi.k_c
-            + self.position.damping
+            + self.motion.pi.k_c
+            + self.motion.limit
             + self.sequence.i_d
             + self.sequence.stop_ramp;
         sum.is_finite()
@@ -160,6 +166,7 @@ impl Settings {
         };
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
+        let motion_design = self.motion_design()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let injection = Injection::new(inj.amplitude_v, motor_plant, current_lag);
         let (injection_turn, injection_axis) = match inj.demodulator {
@@ -234,13 +241,8 @@ impl Settings {
                 DeadTime::NONE
             },
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
-            position: Position::new(
-                m.torque_per_ampere(self.sequence.i_d) / m.inertia,
-                self.scales.encoder_counts,
-                self.position.guard_rpm / 60.0,
-                self.position.i_q_limit_a,
-                PERIOD_S,
-            ),
+            motion: self.motion(&motion_design),
+            step_per_speed: turns_per_step(60.0),
             protection: Protection {
                 trip_a: self.limits.trip_a,
                 dc_over: self.limits.dc_over_v,
@@ -256,7 +258,33 @@ impl Settings {
                 stop_ramp: self.sequence.stop_a_per_s * PERIOD_S,
             },
             designs,
+            motion_design,
         })
+    }
+
+    fn motion_design(&self) -> Result<MotionDesign, TuningError> {
+        let m = &self.motor;
+        let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
+        let tracking_hz = match self.angle_source {
+            AngleSource::Encoder => None,
+            AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
+        };
+        tuning::design_motion_loops(
+            f64::from(acceleration),
+            tracking_hz,
+            f64::from(self.speed.phase_margin_deg),
+            f64::from(PERIOD_S) * f64::from(motion::DIVIDER),
+        )
+    }
+
+    fn motion(&self, design: &MotionDesign) -> Motion {
+        let counts = match self.angle_source {
+            AngleSource::Encoder => self.scales.encoder_counts,
+            AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
+        };
+        let v = &self.speed;
+        let (limit, ramp) = (v.limit_rpm / 60.0, v.ramp_rpm_per_s / 60.0);
+        Motion::new(design, counts, limit, ramp, v.i_q_limit_a)
     }
 
     /// Only a sensorless start with the synchronous demodulation is checked.

@@ -229,6 +229,15 @@ keys! {
         /// Quadrature-axis (torque) current, peak.
         iq_a: f64 = 1.0, [-20 .. 20], "A";
     }
+    /// The speed and the position loop.
+    "speed." speed: Speed {
+        /// Largest speed that is asked for; unset: 300, or the experiment's own.
+        limit_rpm: Option<f64> = None, [1 .. 2000], "rpm";
+        /// Largest acceleration that is asked for; unset: 300, or the experiment's own.
+        ramp_rpm_per_s: Option<f64> = None, [1 .. 100000], "rpm/s";
+        /// Phase margin that the speed loop is designed for.
+        phase_margin_deg: f64 = 60.0, [45 .. 70], "deg";
+    }
     /// What the drive believes of the motor; what is not set follows `motor.*`.
     "drive.motor." drive_motor: DriveMotor {
         /// Stator resistance; follows motor.rs.

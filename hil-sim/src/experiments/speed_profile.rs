@@ -1,0 +1,103 @@
+//! The speed loop without a position sensor: a profile with a reversal and a load step.
+
+use drive_core::{Command, Mode, State};
+
+use super::torque::{LOST_DEG, assumptions};
+use super::{Context, Experiment};
+use crate::config::LoadMode;
+use crate::error::Error;
+use crate::outcome::{Figure, Outcome, Panel, Series};
+use crate::plant::Load;
+use crate::rig::{Point, Rig};
+use crate::stats::Stats;
+
+/// The aim of the source: motion without a sensor on the shaft.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "speed-profile",
+    stands_for: "section 5.2",
+    about: "Speed steps with a reversal through standstill and a load, with the angle source as set.",
+    run,
+};
+
+/// Speed reference, rpm, and load, Nm, each for so many seconds.
+const PROFILE: [(f64, f64, f64); 7] = [
+    (0.0, 0.0, 1.0),
+    (150.0, 0.0, 2.0),
+    (150.0, 0.6, 2.0),
+    (-150.0, 0.6, 3.0),
+    (0.0, 0.6, 2.0),
+    (0.0, 0.0, 2.0),
+    (300.0, 0.0, 2.5),
+];
+/// The end of each part that is judged as settled, s.
+const SETTLED_S: f64 = 0.5;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let whole: f64 = PROFILE.iter().map(|p| p.2).sum();
+    let scale = context.seconds.map_or(1.0, |s| s / whole);
+    let mut config = context.config.clone();
+    config.load.mode = LoadMode::Free;
+    config.load.torque_nm = 0.0;
+    let mut rig = Rig::from_config(&config, context.seed)?;
+    rig.start(Mode::Speed)?;
+    let start = rig.time();
+    let mut points: Vec<Point> = Vec::new();
+    let mut wanted = Vec::new();
+    let (mut steady, mut seen) = (Stats::default(), Stats::default());
+    for (rpm, torque, seconds) in PROFILE {
+        if matches!(rig.drive.state(), State::Fault(_)) {
+            break;
+        }
+        rig.command(Command::Speed(rpm as f32))?;
+        rig.set_load(Load::Free { torque })?;
+        let (begin, seconds) = (rig.time() - start, seconds * scale);
+        wanted.extend([(begin, rpm), (begin + seconds, rpm)]);
+        let from = begin + seconds - SETTLED_S * scale;
+        rig.run(seconds, |p| {
+            let p = Point { t: p.t - start, ..*p };
+            if p.t >= from {
+                steady.push(p.speed_rpm - rpm);
+                seen.push(p.speed_estimate_rpm - p.speed_rpm);
+            }
+            points.push(p);
+        });
+    }
+
+    let mut outcome = Outcome::default();
+    let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
+    let stopped = matches!(rig.drive.state(), State::Fault(_));
+    let m = &mut outcome.metrics;
+    m.set("angle_error_rms_deg", error.rms());
+    m.set("angle_error_max_deg", error.largest());
+    m.set("speed_error_rms_rpm", steady.rms());
+    m.set("speed_error_mean_rpm", steady.mean());
+    m.set("speed_estimate_error_rms_rpm", seen.rms());
+    m.set("speed_max_rpm", points.iter().map(|p| p.speed_rpm).fold(0.0, f64::max));
+    m.set("lost", f64::from(u8::from(stopped || error.largest() > LOST_DEG)));
+
+    let line = |of: fn(&Point) -> f64| {
+        let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
+        points.chunks(10).map(|c| (c[0].t, mean(c))).collect::<Vec<_>>()
+    };
+    let x = "time (s)";
+    outcome.figures.push(
+        Figure::new("profile", "Speed profile with a reversal and a load of 0.6 Nm", "section 5.2")
+            .panel(
+                Panel::new(x, "speed (rpm)")
+                    .with(Series::line("rotor", line(|p| p.speed_rpm)))
+                    .with(Series::line("estimated", line(|p| p.speed_estimate_rpm)))
+                    .with(Series::reference("asked for", wanted)),
+            )
+            .panel(
+                Panel::new(x, "quadrature current (A)")
+                    .with(Series::line("measured", line(|p| p.iq))),
+            )
+            .panel(
+                Panel::new(x, "angle error (° electrical)")
+                    .with(Series::line("true minus estimated", line(|p| p.angle_error_deg))),
+            ),
+    );
+    outcome.remarks = assumptions(&config);
+    outcome.remarks.push("The load of 0.6 Nm acts from 3 s to 10 s.".into());
+    Ok(outcome)
+}

@@ -1,0 +1,130 @@
+//! Procedure: the speed of a free shaft regulated without a position sensor, on the simulated rotor.
+
+mod common;
+
+use std::f64::consts::TAU;
+
+use common::{config, drive_settings, plant_settings};
+use drive_core::{Command, Mode, State};
+use hil_sim::Config;
+use hil_sim::plant::Load;
+use hil_sim::rig::Rig;
+
+/// A drive that regulates the speed of a free shaft at `rpm`, settled.
+fn regulating(config: &Config, seed: u64, rpm: f64) -> Rig {
+    let mut rig = Rig::from_config(config, seed).unwrap();
+    rig.start(Mode::Speed).unwrap();
+    rig.command(Command::Speed(rpm as f32)).unwrap();
+    rig.run(1.5 + rpm.abs() / 300.0, |_| {});
+    rig
+}
+
+const FREE: &str = "load.mode=free";
+
+/// Mean and largest deviation of the true speed, rpm, and the largest angle error, degrees.
+fn watch(rig: &mut Rig, rpm: f64, seconds: f64) -> (f64, f64, f64) {
+    let (mut sum, mut most, mut angle, mut n) = (0.0, 0.0_f64, 0.0_f64, 0.0);
+    rig.run(seconds, |p| {
+        sum += p.speed_rpm - rpm;
+        most = most.max((p.speed_rpm - rpm).abs());
+        angle = angle.max(p.angle_error_deg.abs());
+        n += 1.0;
+    });
+    (sum / n, most, angle)
+}
+
+#[test]
+fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
+    for (seed, speeds) in
+        [(1, [150.0, -150.0, 30.0, 0.0, 300.0]), (2, [-300.0, -30.0, 0.0, 90.0, 5.0])]
+    {
+        let mut rig = regulating(&config(&[FREE]), seed, 0.0);
+        let mut before = 0.0_f64;
+        for rpm in speeds {
+            rig.command(Command::Speed(rpm as f32)).unwrap();
+            // The ramp of 300 rpm/s, and a second to settle.
+            let (.., on_the_way) = watch(&mut rig, rpm, (rpm - before).abs() / 300.0 + 1.0);
+            let (mean, most, angle) = watch(&mut rig, rpm, 0.5);
+            println!(
+                "{rpm} rpm: mean {mean:.2}, largest {most:.2} rpm; {on_the_way:.1}, {angle:.1} deg"
+            );
+            // Without a load there is no slip to be wrong: what is left is noise.
+            assert!(mean.abs() < 3.0 && most < 12.0, "{rpm} rpm: {mean} {most}");
+            assert!(on_the_way < 14.0 && angle < 11.0, "{rpm} rpm: {on_the_way} {angle}");
+            before = rpm;
+        }
+        assert_eq!(rig.drive.state(), State::Speed);
+    }
+}
+
+/// Half the largest torque at standstill, forwards and backwards; the angle is kept and the speed comes
+/// back to within the error of the slip.
+#[test]
+fn a_load_step_is_carried() {
+    for (seed, rpm) in [(11, 0.0), (12, 30.0), (13, -150.0)] {
+        let mut rig = regulating(&config(&[FREE]), seed, rpm);
+        rig.set_load(Load::Free { torque: 0.6 }).unwrap();
+        let (_, dip, angle) = watch(&mut rig, rpm, 1.0);
+        let (mean, ..) = watch(&mut rig, rpm, 1.0);
+        println!("{rpm} rpm: dip {dip:.1} rpm, then {mean:.2}; angle {angle:.1} deg");
+        // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop answers with its crossover of 2 Hz.
+        assert!((10.0..60.0).contains(&dip), "{rpm}: {dip}");
+        assert!(mean.abs() < 4.0, "{rpm}: {mean}");
+        // Peak of the mean response 8, and noise.
+        assert!(angle < 15.0, "{rpm}: {angle}");
+        assert_eq!(rig.drive.state(), State::Speed);
+    }
+}
+
+/// An inertia that the drive does not know: half and twice what it was designed for.
+#[test]
+fn the_inertia_need_not_be_known_well() {
+    for factor in [0.5, 2.0] {
+        let config = config(&[FREE]);
+        let mut settings = drive_settings(&config);
+        settings.motor.inertia *= factor;
+        let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
+        rig.start(Mode::Speed).unwrap();
+        rig.command(Command::Speed(150.0)).unwrap();
+        let (.., angle) = watch(&mut rig, 150.0, 2.0);
+        let (mean, most, _) = watch(&mut rig, 150.0, 1.0);
+        println!("x{factor}: {mean:.2} {most:.2} rpm, {angle:.1} deg");
+        assert!(
+            mean.abs() < 3.0 && most < 15.0 && angle < 15.0,
+            "x{factor}: {mean} {most} {angle}"
+        );
+    }
+}
+
+/// A shaft that is blocked while the speed is asked for: the current stays at its limit, the angle
+/// holds, and the shaft turns when it is let go.
+#[test]
+fn a_blocked_shaft_is_survived() {
+    let mut rig = regulating(&config(&[FREE]), 7, 0.0);
+    rig.set_load(Load::Locked).unwrap();
+    rig.command(Command::Speed(100.0)).unwrap();
+    let (.., angle) = watch(&mut rig, 100.0, 2.0);
+    let i_q = rig.drive.telemetry().reference.q;
+    assert!(i_q > 2.9 && angle < 15.0, "{i_q} A, {angle} deg");
+    rig.set_load(Load::Free { torque: 0.0 }).unwrap();
+    let (_, most, _) = watch(&mut rig, 100.0, 2.0);
+    let (mean, ..) = watch(&mut rig, 100.0, 1.0);
+    println!("blocked: {angle:.1} deg; let go: within {most:.1} rpm, then {mean:.2}");
+    assert!(mean.abs() < 3.0, "{mean}");
+    assert_eq!(rig.drive.state(), State::Speed);
+}
+
+/// The same mode with the encoder.
+#[test]
+fn with_the_encoder_the_speed_is_exact() {
+    let config = config(&[FREE, "angle.source=encoder", "speed.limit_rpm=1440"]);
+    let mut rig = regulating(&config, 3, 600.0);
+    rig.set_load(Load::Free { torque: 0.6 }).unwrap();
+    let (_, dip, _) = watch(&mut rig, 600.0, 1.0);
+    let (mean, most, angle) = watch(&mut rig, 600.0, 0.5);
+    println!("encoder: dip {dip:.1}, then {mean:.3}, {most:.3} rpm; {angle:.2} deg");
+    // One count in 10 ms is 0.6 rpm.
+    assert!(dip < 30.0 && mean.abs() < 0.1 && most < 1.0 && angle < 1.0);
+    let truth = rig.plant.mechanical_speed() * 60.0 / TAU;
+    assert!((truth - 600.0).abs() < 1.0, "{truth}");
+}
