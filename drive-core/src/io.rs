@@ -116,6 +116,10 @@ pub enum Command<'a> {
     /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
     /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
     TurnInjection(f32),
+    /// Rotor time constant, s, as [`online`](crate::online) finds it: what the slip is computed with.
+    /// Only with [`track_rotor`](crate::Settings::track_rotor); within
+    /// [`LIMITS`](crate::online::LIMITS), and approached by no more than 2 % with each command.
+    RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
     Configure(&'a crate::Coefficients),
 }
@@ -140,6 +144,8 @@ pub enum Refused {
     ModeNotAvailable(Mode),
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
+    /// The settings do not want the rotor time constant tracked.
+    RotorNotTracked,
     /// A fault is latched; clear it first.
     Fault(crate::Fault),
     /// The value is outside the allowed range.
@@ -158,6 +164,7 @@ impl core::fmt::Display for Refused {
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
             Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
+            Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
                 write!(f, "the value is outside the allowed range {min} to {max}")

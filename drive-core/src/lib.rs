@@ -39,6 +39,7 @@ pub mod indirect;
 pub mod injection;
 pub mod io;
 pub mod modulation;
+pub mod online;
 pub mod pi;
 pub mod plausibility;
 pub mod position;

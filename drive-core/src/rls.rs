@@ -266,6 +266,28 @@ impl Rls {
         [g1, g0, h1 * admittance, u0 * admittance]
     }
 
+    /// A difference of coefficients, like those of [`latest`](Self::latest), as numbers of size one that know
+    /// nothing of each other; see [`Ud::whitened`].
+    pub fn whitened(&self, [g1, g0, h1, u0]: [Complex32; N]) -> [Complex32; N] {
+        let impedance = self.settings.voltage_base * self.scale[1];
+        self.ud.whitened([g1, g0, h1 * impedance, u0 * impedance])
+    }
+
+    /// Mean square of the prediction error over one memory, in units of the base.
+    pub fn error_square(&self) -> f32 {
+        self.validity.error
+    }
+
+    /// Samples in a row that were not used until now.
+    pub fn missing(&self) -> u32 {
+        self.validity.missing
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &RlsSettings {
+        &self.settings
+    }
+
     /// Largest element of D, in units of the bases: grows where the signals do not excite.
     pub fn uncertainty(&self) -> f32 {
         self.ud.largest()
@@ -279,6 +301,13 @@ impl Rls {
     /// Forgets how sure the estimate is, and keeps it: after a fault.
     pub fn reset_covariance(&mut self) {
         self.ud = Ud::new(self.ud.theta, self.settings.p0);
+        self.validity = Validity::NONE;
+    }
+
+    /// Begins from these coefficients, as [`latest`](Self::latest) gives them, instead of from zero.
+    pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
+        let impedance = self.settings.voltage_base * self.scale[1];
+        self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
         self.validity = Validity::NONE;
     }
 
