@@ -15,6 +15,7 @@ mod injection_map;
 mod learn_reference;
 mod modulation;
 mod monte_carlo;
+mod online_tracking;
 mod orientation;
 mod pi_design;
 mod position;
@@ -78,6 +79,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_recursive::EXPERIMENT,
     identify_validate::EXPERIMENT,
     identify_machine::EXPERIMENT,
+    online_tracking::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.
