@@ -105,6 +105,11 @@ pub struct Telemetry {
     pub current: Dq,
     /// Wanted voltage without the carrier, V.
     pub voltage: Dq,
+    /// Measured current in the stator frame, A: nothing filtered, the carrier's part in it.
+    pub measured: AlphaBeta,
+    /// Voltage of the period that begins with the next sample, limited, dead-time compensation not
+    /// counted, V.
+    pub realised: AlphaBeta,
     /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
     /// Saliency that the synchronous demodulation sees.
@@ -296,6 +301,8 @@ impl Drive {
             reference,
             current,
             voltage,
+            measured: measured.current,
+            realised: modulated.realised,
             delta_i: s.estimator.delta_i,
             saliency: s.estimator.saliency.q,
             carrier_squared: s.estimator.saliency.carrier_squared,

@@ -9,6 +9,7 @@ use core::f32::consts::TAU;
 
 use crate::angle::Angle;
 use crate::frames::Dq;
+use crate::online::LIMITS;
 
 /// Coefficients of the encoder and the slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,9 @@ pub struct Indirect {
     bits_per_count: u32,
     /// T / T_sec.
     rate: f32,
+    /// The same of the settings, for [`Self::track`].
+    nominal_rate: f32,
+    period_s: f32,
     /// Least magnetising current that is divided by, A.
     least: f32,
     /// Share of the newest step in the mean speed.
@@ -53,6 +57,10 @@ pub struct FluxAngle {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Jump;
 
+/// Most that one command changes 1 / T_sec, as a share of that of the settings: at ten commands a
+/// second a wrong estimate needs 1.5 s for the 30 % of a warm rotor.
+pub const TRACKED_STEP: f32 = 0.02;
+
 /// Time constant of the mean speed, s.
 const SPEED_FILTER_S: f32 = 5e-3;
 
@@ -71,10 +79,36 @@ impl Indirect {
         Self {
             bits_per_count: libm::round(bits) as u32,
             rate: period_s / t_sec,
+            nominal_rate: period_s / t_sec,
+            period_s,
             least: 0.2 * nominal_a,
             smoothing: period_s / SPEED_FILTER_S,
             most_counts: 2 + (highest * period_s * counts as f32) as i32,
         }
+    }
+
+    /// Goes towards another rotor time constant, s, by no more than [`TRACKED_STEP`] of the settings'
+    /// rate; gives the one that holds now. Not from within the control step: it divides.
+    ///
+    /// # Errors
+    /// The smallest and the largest one allowed, s.
+    #[inline]
+    pub fn track(&mut self, t_sec: f32) -> Result<f32, [f32; 2]> {
+        let limits = LIMITS.map(|factor| factor * self.period_s / self.nominal_rate);
+        if !(limits[0]..=limits[1]).contains(&t_sec) {
+            return Err(limits);
+        }
+        let most = TRACKED_STEP * self.nominal_rate;
+        let change = self.period_s / t_sec - self.rate;
+        if change > most {
+            self.rate += most;
+        } else if change < -most {
+            self.rate -= most;
+        } else {
+            self.rate = self.period_s / t_sec;
+            return Ok(t_sec);
+        }
+        Ok(self.period_s / self.rate)
     }
 
     /// The flux angle at the present sample from the encoder's counter.

@@ -124,6 +124,10 @@ pub enum Command<'a> {
     /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
     /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
     TurnInjection(f32),
+    /// Rotor time constant, s, as [`online`](crate::online) finds it: what the slip is computed with.
+    /// Only with [`track_rotor`](crate::Settings::track_rotor); within
+    /// [`LIMITS`](crate::online::LIMITS), and approached by no more than 2 % with each command.
+    RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
     Configure(&'a crate::Coefficients),
 }
@@ -150,6 +154,8 @@ pub enum Refused {
     NeedsEncoder,
     /// The injection is needed as angle source.
     NeedsInjection,
+    /// The settings do not want the rotor time constant tracked.
+    RotorNotTracked,
     /// A fault is latched; clear it first.
     Fault(crate::Fault),
     /// The value is outside the allowed range.
@@ -169,6 +175,7 @@ impl core::fmt::Display for Refused {
             Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::NeedsInjection => write!(f, "this needs the injection as angle source"),
+            Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
                 let (min, max) = (Shortest(*min), Shortest(*max));

@@ -42,6 +42,7 @@ pub mod lock_monitor;
 pub mod modulation;
 pub mod motion;
 pub mod moving_sum;
+pub mod online;
 pub mod pi;
 pub mod plausibility;
 pub mod rls;

@@ -382,6 +382,8 @@ pub struct Settings {
     /// dissertation does, to show what they cost: with the encoder 4.7° at 1440 rpm, with the
     /// injection some 9° at standstill already (the flux slips) and 35° at 150 rpm.
     pub ignore_delays: bool,
+    /// Whether the drive takes the rotor time constant that [`online`](crate::online) finds.
+    pub track_rotor: bool,
     /// The injection.
     pub injection: InjectionSettings,
     /// Limits and protections.

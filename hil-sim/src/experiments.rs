@@ -18,6 +18,7 @@ mod learn_reference;
 mod lock_monitor;
 mod modulation;
 mod monte_carlo;
+mod online_tracking;
 mod orientation;
 mod perturbation;
 mod pi_design;
@@ -92,6 +93,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_recursive::EXPERIMENT,
     identify_validate::EXPERIMENT,
     identify_machine::EXPERIMENT,
+    online_tracking::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.

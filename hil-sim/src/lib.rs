@@ -13,6 +13,7 @@ pub mod progress;
 pub mod report;
 pub mod rig;
 pub mod stats;
+pub mod tracking;
 
 pub use config::Config;
 pub use error::Error;

@@ -39,12 +39,15 @@ enum Fault {
 
 #[derive(Clone, Copy, Debug)]
 struct Result {
-    /// Said to be valid at any time from 0.5 s after the fault to its end.
-    valid_in_fault: bool,
+    /// From the begin of the fault until it is no longer said to be valid, s.
+    flagged: f64,
     /// Largest error of the speed while valid, rad/s.
     worst_valid: f64,
     /// From the return until it is valid for good, s.
     back: f64,
+    /// The same from the last sample at which the converter saturated: the current that flows in after a
+    /// fault is larger than the converter's range for up to 0.24 s, and till then there is no input.
+    back_from_good: f64,
     /// Error of the speed 0.2 s and 0.5 s after the return, rad/s.
     errors: [f64; 2],
 }
@@ -69,8 +72,9 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
     let step = machine.continuous().exact(H);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
     let mut x = [Complex::ZERO; 2];
+    let mut last_bad = 0;
     let mut result =
-        Result { valid_in_fault: false, worst_valid: 0.0, back: 0.0, errors: [0.0; 2] };
+        Result { flagged: 0.0, worst_valid: 0.0, back: 0.0, back_from_good: 0.0, errors: [0.0; 2] };
     for n in 0..RETURN + 2 * RATE {
         let faulty = (BEFORE..RETURN).contains(&n);
         let t = n as f64 * H;
@@ -88,6 +92,9 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
             Fault::NoCurrent if faulty => x[0] = Complex::ZERO,
             Fault::OpenPhase if faulty => x[0].re = 0.0,
             _ => {}
+        }
+        if n < RETURN || i.re.abs().max(i.im.abs()) >= full_scale {
+            last_bad = n;
         }
         i.re = i.re.clamp(-full_scale, full_scale);
         i.im = i.im.clamp(-full_scale, full_scale);
@@ -110,11 +117,12 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
         if rls.is_valid() && n > RATE {
             result.worst_valid = result.worst_valid.max(error);
         }
-        if faulty && n > BEFORE + RATE / 2 {
-            result.valid_in_fault |= rls.is_valid();
+        if faulty && rls.is_valid() {
+            result.flagged = (n + 1 - BEFORE) as f64 * H;
         }
         if n >= RETURN && !rls.is_valid() {
             result.back = (n + 1 - RETURN) as f64 * H;
+            result.back_from_good = (n - last_bad) as f64 * H;
         }
         if n == RETURN + RATE / 5 {
             result.errors[0] = error;
@@ -147,11 +155,15 @@ fn r4_bad_input() {
             println!("   with noise {noisy:.4?}");
             let open = matches!(fault, Fault::NoCurrent | Fault::OpenPhase);
             // After 0.2 s, after an open phase and a reset of the covariance after 0.5 s.
-            let back = result.errors[usize::from(open)] < 0.1 && result.back <= 0.4;
+            let right = result.errors[usize::from(open)] < 0.1;
+            let back = right && result.back_from_good <= 0.2 && noisy.back_from_good <= 0.2;
             // One sample is no fault that lasts; a saturated one is left out like it, and what is
             // left can be enough. The flag is then true, and so is the estimate.
             let lasting = !matches!(fault, Fault::OneNan | Fault::Saturated);
-            let flagged = !(lasting && (result.valid_in_fault || noisy.valid_in_fault));
+            // Good data fade from the memory before the flag falls; the clean estimate is right until
+            // then, but where a phase is open.
+            let longest = if open { 0.15 } else { 0.45 };
+            let flagged = !lasting || result.flagged <= longest && noisy.flagged <= longest;
             let honest = lasting && open || result.worst_valid < 0.1;
             if !(back && flagged && honest) {
                 failed.push((fault, signal, speed));

@@ -77,6 +77,18 @@ impl Drive {
                 self.references.injection_axis = turn.unit_vector();
                 Ok(Taken::AsGiven)
             }
+            Command::RotorTimeConstant(tau_r) => {
+                if !self.c.track_rotor {
+                    return Err(Refused::RotorNotTracked);
+                }
+                self.takes_references(self.mode, tau_r)?;
+                let taken = self
+                    .c
+                    .indirect
+                    .track(tau_r)
+                    .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
+                Ok(as_taken(tau_r, taken))
+            }
             Command::Configure(coefficients) => match self.state {
                 State::Off | State::Fault(_) => {
                     self.c = *coefficients;

@@ -47,6 +47,13 @@ impl From<AlphaBeta> for Complex32 {
     }
 }
 
+impl From<Complex32> for AlphaBeta {
+    #[inline]
+    fn from(x: Complex32) -> Self {
+        Self::new(x.re, x.im)
+    }
+}
+
 impl Add for Complex32 {
     type Output = Self;
     #[inline]

@@ -42,6 +42,17 @@ impl Ud {
         self.theta.iter().all(|x| x.is_finite()) && self.d.iter().all(|&d| d > 0.0 && d.is_finite())
     }
 
+    /// D^-1/2 U^-1 x: where P is the covariance of x, numbers of size one that know nothing of each
+    /// other. Where P is large, x counts for little. Not for the control step: it takes roots.
+    pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
+        for j in (1..N).rev() {
+            for i in 0..j {
+                x[i] = x[i] - self.u[i][j] * x[j];
+            }
+        }
+        core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
+    }
+
     /// Takes y = sum x theta in, forgetting by `lambda`. The error of the prediction.
     ///
     /// About 290 multiplications and additions and 5 divisions.

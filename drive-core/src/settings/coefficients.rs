@@ -34,6 +34,7 @@ pub struct Coefficients {
     pub(crate) sensing: Sensing,
     pub(crate) source: AngleSource,
     pub(crate) indirect: Indirect,
+    pub(crate) track_rotor: bool,
     /// Inject a carrier at all.
     pub(crate) inject: bool,
     /// Demodulate and, with the injection as source, track.
@@ -198,6 +199,7 @@ impl Settings {
                 largest_offset: 0.2,
             },
             source: self.angle_source,
+            track_rotor: self.track_rotor,
             indirect: Indirect::new(
                 self.scales.encoder_counts,
                 m.pole_pairs,

@@ -1,0 +1,291 @@
+//! The rotor time constant, and the speed, from the terminals while the drive runs.
+//!
+//! ```text
+//! control step, 6 kHz: measured current, realised voltage -> ring
+//! idle loop:           ring -> Online::push (filters, recursive least squares) -> Online::refine, 10 Hz
+//!                      -> Command::RotorTimeConstant
+//! ```
+//!
+//! [`Rls`] condenses the last 1.7 s into four complex coefficients and their covariance. They are
+//! not inverted one by one (Model D): while the drive runs, three sinusoids at most excite four complex
+//! unknowns, and the inverse reads the speed wrong by a factor of two on data of a simulation without
+//! any noise. [`refine`](Online::refine) instead fits the *machine* to them, weighted by the
+//! covariance: what the data do not fix carries no weight. Of the machine the inductances are taken
+//! from the settings, and these are free:
+//!
+//! * the stator resistance, which takes up the dead time that is left uncompensated: the sign of a
+//!   sinusoidal current has a fundamental in phase with it, and acts like a resistance;
+//! * 1 / tau_r;
+//! * the speed, where no encoder gives it. Then the flux must not stand still: in the steady state
+//!   speed and rotor resistance show as the slip alone, and the answer is [`Doubt::PoorExcitation`]
+//!   until the magnetising current is moved, by ±0.2 A at 2 Hz for example
+//!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the injection's tracking
+//!   loop is no substitute: the believed slip is in it.
+//!
+//! The saliency makes the transient inductance look larger along the current; with the sensorless
+//! settings' two numbers that is taken into account (left out, tau_r is 11 % low at 2 A).
+
+mod fit;
+
+use core::f32::consts::TAU;
+
+use crate::frames::{AlphaBeta, Dq};
+use crate::rls::filter::Filter;
+use crate::rls::{Complex32, Rls, RlsError, RlsSettings};
+use crate::settings::{PERIOD_S, Settings};
+use fit::{Machine, Unknowns};
+
+/// Control periods to one sample of the least squares: 750 Hz. At 6 kHz the increments, which carry
+/// the rotor, would be a thousandth of the signals.
+const DECIMATION: u8 = 8;
+/// Sampling period of the least squares, s.
+pub const SAMPLE_S: f32 = DECIMATION as f32 * PERIOD_S;
+/// Corner of the filters before the decimation, Hz: the carrier comes through 27 000 times smaller.
+const BEFORE_HZ: f32 = 20.0;
+/// Corner of the filters of the least squares, Hz. They keep out the harmonics of the dead time; of
+/// the fundamental enough comes through up to some 20 Hz.
+const CORNER_HZ: f32 = 10.0;
+/// Memory of 1250 samples, 1.7 s.
+const LAMBDA: f32 = 0.9992;
+/// Initial covariance in units of the bases.
+const P0: f32 = 1e6;
+/// Weight of a call of `refine` in the means of current and speed: the memory at ten calls a second.
+const SMOOTHING: f32 = 0.06;
+/// Calls of `refine` until the memory is full once.
+const SETTLE: u32 = 30;
+/// Largest change of the speed within the memory, electrical rad/s: faster, there is no one machine.
+const STEADY: f32 = 3.0;
+/// The same where the speed is a guess: the tracking loop moves with the flux.
+const STEADY_GUESS: f32 = 12.0;
+/// Samples that may be missing in a row.
+const MISSING: u32 = 75;
+/// tau_r, as a factor of the one in the settings, beyond which it is not believed: the rotor at
+/// 150 degrees has 0.65.
+pub const LIMITS: [f32; 2] = [0.5, 2.0];
+/// Largest relative uncertainty of tau_r that is published.
+const UNCERTAIN: f32 = 0.04;
+
+/// What else is known of the speed, electrical rad/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// By an encoder: it is not estimated.
+    Known(f32),
+    /// By the tracking loop of the injection: the fit begins there.
+    Guess(f32),
+}
+
+/// An estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracked {
+    /// Rotor time constant, s.
+    pub tau_r: f32,
+    /// Stator resistance and what looks like one: the dead time that is left, over the current, ohm.
+    pub resistance: f32,
+    /// Speed of the rotor, electrical rad/s: what was given, or the estimate.
+    pub omega_m: f32,
+    /// Relative uncertainty of tau_r by the noise.
+    pub uncertainty: f32,
+}
+
+/// Why there is no estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// The memory is not full yet since the start, or since samples were missing.
+    Settling,
+    /// The speed changed while the memory was filled.
+    Transient,
+    /// The signals do not tell tau_r (and the speed) apart from the rest.
+    PoorExcitation,
+    /// tau_r outside [`LIMITS`] times that of the settings, or a resistance below zero or above
+    /// three times that of the settings.
+    Unbelievable,
+}
+
+/// The estimator. It lives in the idle loop.
+#[derive(Clone, Copy, Debug)]
+pub struct Online {
+    rls: Rls,
+    motor: Motor,
+    /// Share of the voltage of the period before: the delay of the current's analog filter.
+    delay: f32,
+    before: AlphaBeta,
+    present: AlphaBeta,
+    filters: [Filter; 2],
+    /// Sum of the filtered voltages since the last sample, and the filtered current then.
+    sum: Complex32,
+    sampled: Complex32,
+    pushed: u8,
+    unknowns: Unknowns,
+    current: Dq,
+    speed: f32,
+    calls: u32,
+}
+
+/// What is taken from the settings.
+#[derive(Clone, Copy, Debug)]
+struct Motor {
+    r_s: f32,
+    tau_r: f32,
+    sigma_l_s: f32,
+    l_s: f32,
+    flux_saliency: f32,
+    current_saliency: f32,
+}
+
+impl Motor {
+    /// The machine's inductances with `current`, A: L x = sigma L_s (x - s x*), and x turns with the
+    /// current in the steady state.
+    fn machine(&self, current: Dq) -> Machine {
+        let square = current.length_squared();
+        let along = current.d * current.d - current.q * current.q;
+        let share = if square > 1e-6 {
+            self.current_saliency * libm::sqrtf(square) + self.flux_saliency * along / square
+        } else {
+            self.flux_saliency
+        };
+        let more = self.sigma_l_s * share;
+        Machine {
+            sigma_l_s: self.sigma_l_s + more,
+            coupled: self.l_s - self.sigma_l_s,
+            period: SAMPLE_S,
+        }
+    }
+}
+
+impl Online {
+    /// For the motor and the sensors of these settings.
+    ///
+    /// # Errors
+    /// What the recursive least squares refuse.
+    pub fn new(settings: &Settings) -> Result<Self, RlsError> {
+        let (m, limits) = (&settings.motor, &settings.limits);
+        let synchronous = &settings.injection.synchronous;
+        let l_s = m.l_m + m.l_ls;
+        let motor = Motor {
+            r_s: m.r_s,
+            tau_r: m.t_sec(),
+            sigma_l_s: l_s - m.l_m * m.l_m / m.l_r(),
+            l_s,
+            flux_saliency: synchronous.flux_saliency,
+            current_saliency: synchronous.current_saliency,
+        };
+        let rls = Rls::new(RlsSettings {
+            lambda: LAMBDA,
+            p0: P0,
+            corner: TAU * CORNER_HZ * SAMPLE_S,
+            voltage_base: limits.current_a * m.r_s,
+            current_base: settings.sequence.i_d,
+            voltage_limit: limits.dc_over_v,
+            current_limit: limits.trip_a,
+        })?;
+        let mut online = Self {
+            rls,
+            motor,
+            delay: settings.scales.current_delay_s / PERIOD_S,
+            before: AlphaBeta::ZERO,
+            present: AlphaBeta::ZERO,
+            filters: [Filter::new(TAU * BEFORE_HZ * PERIOD_S); 2],
+            sum: Complex32::ZERO,
+            sampled: Complex32::ZERO,
+            pushed: 0,
+            unknowns: Unknowns { r_s: motor.r_s, rate: 1.0 / motor.tau_r, omega_m: 0.0 },
+            current: Dq::ZERO,
+            speed: 0.0,
+            calls: 0,
+        };
+        online.restart();
+        Ok(online)
+    }
+
+    /// One control period, in order and without gaps: the current that was measured, A, and the voltage
+    /// that the same step put out, V ([`Telemetry`](crate::Telemetry) has both).
+    pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta) {
+        // What a step puts out acts from the next sample on; the current is seen later still.
+        let voltage = self.present + (self.before - self.present) * self.delay;
+        (self.before, self.present) = (self.present, realised);
+        if !(voltage.is_finite() && measured.is_finite()) {
+            // Inside the filters they would never leave.
+            self.restart();
+            return;
+        }
+        let [on_voltage, on_current] = &mut self.filters;
+        let v = on_voltage.step(voltage.into()).value;
+        let i = on_current.step(measured.into()).value;
+        if self.pushed == DECIMATION {
+            let mean = self.sum * (1.0 / f32::from(DECIMATION));
+            self.rls.step(mean.into(), self.sampled.into());
+            (self.pushed, self.sum) = (0, Complex32::ZERO);
+        }
+        if self.pushed == 0 {
+            self.sampled = i;
+        }
+        self.sum += v;
+        self.pushed += 1;
+    }
+
+    /// Samples were lost, or the outputs were off: begins anew, but with what it believes.
+    pub fn restart(&mut self) {
+        self.rls.reset();
+        let nominal =
+            Unknowns { r_s: self.motor.r_s, rate: 1.0 / self.motor.tau_r, omega_m: self.speed };
+        self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
+        (self.before, self.present) = (AlphaBeta::ZERO, AlphaBeta::ZERO);
+        self.filters = [Filter::new(TAU * BEFORE_HZ * PERIOD_S); 2];
+        (self.sum, self.pushed) = (Complex32::ZERO, 0);
+        self.calls = 0;
+    }
+
+    /// Takes the fit one step on; call it ten times a second. `current` is the reference in the flux
+    /// frame, A.
+    ///
+    /// Four times the sampled machine and a system of three equations, about 2000 multiplications and
+    /// additions.
+    ///
+    /// # Errors
+    /// Why the estimate must not be used now.
+    pub fn refine(&mut self, current: Dq, speed: Speed) -> Result<Tracked, Doubt> {
+        let (Speed::Known(seen) | Speed::Guess(seen)) = speed;
+        let free_speed = matches!(speed, Speed::Guess(_));
+        let weight = if self.calls == 0 { 1.0 } else { SMOOTHING };
+        self.current += (current - self.current) * weight;
+        self.speed += (seen - self.speed) * weight;
+        if self.calls == 0 || !free_speed {
+            self.unknowns.omega_m = self.speed;
+        }
+        // Not-a-number is not steady.
+        let most = if free_speed { STEADY_GUESS } else { STEADY };
+        let steady = (seen - self.speed).abs() < most && self.current.is_finite();
+        if !steady {
+            self.calls = 0;
+            return Err(Doubt::Transient);
+        }
+        self.calls = self.calls.saturating_add(1);
+        let nominal =
+            Unknowns { r_s: self.motor.r_s, rate: 1.0 / self.motor.tau_r, omega_m: self.speed };
+        let machine = self.motor.machine(self.current);
+        let Some(fit) = machine.step(&self.rls, &self.unknowns, &nominal, free_speed) else {
+            self.unknowns = nominal;
+            return Err(Doubt::PoorExcitation);
+        };
+        self.unknowns = fit.unknowns;
+        let Unknowns { r_s, rate, omega_m } = fit.unknowns;
+        let (tau_r, uncertainty) = (1.0 / rate, fit.uncertainty);
+        let ratio = tau_r / self.motor.tau_r;
+        let certain = uncertainty < UNCERTAIN && self.rls.missing() < MISSING;
+        if self.calls < SETTLE {
+            Err(Doubt::Settling)
+        } else if !certain {
+            Err(Doubt::PoorExcitation)
+        } else if ratio > LIMITS[0] && ratio < LIMITS[1] && r_s > 0.0 && r_s < 3.0 * nominal.r_s {
+            Ok(Tracked { tau_r, resistance: r_s, omega_m, uncertainty })
+        } else {
+            self.unknowns = nominal;
+            Err(Doubt::Unbelievable)
+        }
+    }
+
+    /// The recursive least squares behind it.
+    pub fn rls(&self) -> &Rls {
+        &self.rls
+    }
+}
