@@ -1,5 +1,6 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
 
+mod board;
 mod control;
 mod fuzz;
 mod image;
@@ -16,10 +17,12 @@ use run::Step;
 const HELP: &str = "\
 Usage: cargo xtask <task>
 
-  test      everything a change must pass: format, lints, host tests, documentation, firmware;
-            gets what is missing from the system, or says what to type
+  test      everything a change must pass: format, lints, host tests, documentation, firmware, the
+            firmware on the virtual board; gets what is missing from the system, or says what to type
   firmware  builds the image for the board (also: cargo firmware)
   flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
+  board     builds the image and tests it on the virtual board
+  cycles    counts what the control interrupt costs on the virtual board, and fails when it rises
   fuzz [S]  fuzzes console and saved settings, S seconds each (300)
   size      shows what the image takes of each memory, and fails above the limits";
 
@@ -35,6 +38,8 @@ fn main() -> ExitCode {
         }
         ["flash"] => image::flash(),
         ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
+        ["board"] => image::build().and_then(|elf| board::test(&elf)),
+        ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
         [] | ["help" | "-h" | "--help"] => {
             println!("{HELP}");
             Ok(())
@@ -57,6 +62,7 @@ fn main() -> ExitCode {
 fn test() -> Result<()> {
     let began = Instant::now();
     toolchain::ensure_format_and_lints()?;
+    toolchain::ensure_c_compiler()?;
     let host = run::cargo();
 
     Step::new("format").run(host().args(["fmt", "--all", "--check"]))?;
@@ -68,7 +74,13 @@ fn test() -> Result<()> {
         "-D",
         "warnings",
     ]))?;
-    Step::new("host tests").run(host().args(["test", "--workspace"]))?;
+    Step::new("host tests").run(host().args([
+        "test",
+        "--workspace",
+        // It needs the image.
+        "--exclude",
+        "virtual-board",
+    ]))?;
     Step::new("documentation")
         .run(host().args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
 
@@ -85,6 +97,8 @@ fn test() -> Result<()> {
     ]))?;
     let elf = image::build_with(&target)?;
     image::report_size(&elf)?;
+    board::test(&elf)?;
+    board::cycles(&elf)?;
 
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());
     Ok(())

@@ -234,6 +234,34 @@ pub fn ensure_format_and_lints() -> Result<()> {
     Ok(())
 }
 
+/// Debian's packages for C code: the emulator of the virtual board.
+const C_PACKAGES: &str = "cmake gcc libc6-dev make pkg-config";
+
+/// Finds or gets what builds C code.
+pub fn ensure_c_compiler() -> Result<()> {
+    let there = || {
+        ["cmake", "cc", "make", "pkg-config"].iter().all(|tool| run::succeeds(tool, &["--version"]))
+    };
+    if there() {
+        return Ok(());
+    }
+    println!(
+        "\nThe emulator of the virtual board is written in C; cmake or a compiler is missing."
+    );
+    match Machine::look() {
+        Machine { debian: true, root: true, .. } => install(C_PACKAGES)?,
+        Machine { debian: true, .. } => bail!(
+            "cmake, make, pkg-config or a C compiler is missing. Type:\n    sudo apt-get update && \
+             sudo apt-get install -y --no-install-recommends {C_PACKAGES}"
+        ),
+        _ => bail!("cmake, make, pkg-config or a C compiler (cc) is missing: install them"),
+    }
+    if !there() {
+        bail!("cmake, make, pkg-config or a C compiler is still missing");
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

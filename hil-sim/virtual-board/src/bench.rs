@@ -50,7 +50,12 @@ impl Options {
             // A microsecond, less what rounding to counts takes.
             pulse: us - 2,
         };
-        Self { plant: Self::plant(config), seed, counting: Counting { cycles: true, every_instruction: false }, gates }
+        Self {
+            plant: Self::plant(config),
+            seed,
+            counting: Counting { cycles: true, every_instruction: false },
+            gates,
+        }
     }
 }
 
@@ -70,7 +75,11 @@ impl fmt::Display for Failure {
         match self {
             Self::Unknown(access, place) => match access.written {
                 Some(value) => {
-                    write!(f, "unknown register {:#010x} written with {value:#x} at {place}", access.address)
+                    write!(
+                        f,
+                        "unknown register {:#010x} written with {value:#x} at {place}",
+                        access.address
+                    )
                 }
                 None => write!(f, "unknown register {:#010x} read at {place}", access.address),
             },
@@ -158,7 +167,8 @@ impl Board {
     /// What is wrong with the image or the plant.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
-        let mut cpu = UnicornCpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let mut cpu = UnicornCpu::new(Chip::new(), options.counting)
+            .map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
             if segment.address < memory::FLASH || end > memory::BANK_2 {
@@ -167,7 +177,8 @@ impl Board {
             cpu.write(segment.address, &segment.bytes);
         }
         let (size, offset) = image.member("Mailbox<induction_drive::link::Order>", "full")?;
-        let order_flag = image.variable("start_control", size).context("mailbox of orders")? + offset;
+        let order_flag =
+            image.variable("start_control", size).context("mailbox of orders")? + offset;
         let log = Log::new(&image)?;
         let mut board = Self {
             cpu,
@@ -391,7 +402,9 @@ impl Board {
         let chip = self.cpu.chip_mut();
         if chip.scs.running() < 0 {
             let place = self.image.location(pc);
-            return Err(Failure::Core(format!("lock-up: a fault in a fault handler at {place}")).into());
+            return Err(
+                Failure::Core(format!("lock-up: a fault in a fault handler at {place}")).into()
+            );
         }
         chip.scs.cfsr |= cfsr;
         chip.scs.hfsr |= 1 << 30;
@@ -422,7 +435,8 @@ impl Board {
             chip.deadline = chip.now + 1;
         }
         if let Some(at) = self.preempt_at {
-            chip.deadline = chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
+            chip.deadline =
+                chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
         }
         match self.cpu.run() {
             Stop::Asked => {}
@@ -501,8 +515,13 @@ impl Board {
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
-            let period =
-                Period { began: entered.began, sample: entered.sample, compare, took_order, cycles };
+            let period = Period {
+                began: entered.began,
+                sample: entered.sample,
+                compare,
+                took_order,
+                cycles,
+            };
             self.periods.push_back(period);
         }
     }

@@ -255,7 +255,8 @@ impl Chip {
             let shift = 8 * (address & 3);
             let mask = ((1_u32 << (8 * size)) - 1) << shift;
             let word = address & !3;
-            self.peek(word).and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
+            self.peek(word)
+                .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
         } else {
             self.write_word(address, value)
         };
@@ -274,7 +275,9 @@ impl Chip {
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 => Some(0),
-            _ if address >= 0xe000_e400 && address < 0xe000_e4f0 => self.scs.read(address, self.now),
+            _ if address >= 0xe000_e400 && address < 0xe000_e4f0 => {
+                self.scs.read(address, self.now)
+            }
             _ => self.read_word(address),
         }
     }
@@ -413,7 +416,8 @@ impl Chip {
     pub fn compare_currents(&mut self, current_a: u16, current_b: u16) {
         let code = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         self.comp.inputs[2] = code;
-        self.comp.references[2] = self.dac.code(if self.comp.reference_of(2) == 4 { 1 } else { 0 }, 1);
+        self.comp.references[2] =
+            self.dac.code(if self.comp.reference_of(2) == 4 { 1 } else { 0 }, 1);
         if self.comp.output(2) {
             self.tim1.comparator_break(2);
         }

@@ -22,10 +22,29 @@ const BLOCKS: [(&str, &[&str]); 9] = [
     ("protection", &["Drive>::protect", "drive_core::plausibility"]),
     ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
     ("tracker", &["drive_core::tracker"]),
-    ("estimator", &["drive_core::estimator", "drive_core::synchronous", "drive_core::demodulator", "drive_core::schedule", "drive_core::indirect", "drive_core::position"]),
+    (
+        "estimator",
+        &[
+            "drive_core::estimator",
+            "drive_core::synchronous",
+            "drive_core::demodulator",
+            "drive_core::schedule",
+            "drive_core::indirect",
+            "drive_core::position",
+        ],
+    ),
     ("current loop", &["drive_core::pi"]),
     ("modulation", &["drive_core::modulation", "drive_core::dead_time"]),
-    ("frames, filters", &["drive_core::frames", "drive_core::filters", "drive_core::sos", "drive_core::angle", "idsp::"]),
+    (
+        "frames, filters",
+        &[
+            "drive_core::frames",
+            "drive_core::filters",
+            "drive_core::sos",
+            "drive_core::angle",
+            "idsp::",
+        ],
+    ),
     ("sequence", &["drive_core::drive"]),
 ];
 /// What belongs to none: timer, mailboxes, report.
@@ -48,6 +67,8 @@ pub struct Line {
     pub median: u32,
     /// Cycles by block.
     pub blocks: BTreeMap<&'static str, u32>,
+    /// Cycles by block and innermost function.
+    pub functions: BTreeMap<(&'static str, String), u32>,
 }
 
 /// Runs whole scenarios on the board: start, magnetising, torque steps, a reversal, the current limit, stop,
@@ -63,7 +84,11 @@ fn sensorless(image: Image) -> Result<Line> {
     let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
-    regulate(&mut pair, "sensorless", &["torque 1", "torque 2", "torque -2", "torque 9", "torque 0"])
+    regulate(
+        &mut pair,
+        "sensorless",
+        &["torque 1", "torque 2", "torque -2", "torque 9", "torque 0"],
+    )
 }
 
 fn sensored(image: Image) -> Result<Line> {
@@ -79,6 +104,8 @@ fn sensored(image: Image) -> Result<Line> {
 /// Gives the orders, a second each, and judges the run from its start to off.
 fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line> {
     let mut cycles = Vec::new();
+    // From here on: while the drive was off, it was configured, which has all the time there is.
+    pair.board.worst = Worst::default();
     for line in orders {
         // Taken, or taken as far as the limits allow.
         pair.say(line)?;
@@ -113,30 +140,33 @@ fn attribute(
     read: impl Fn(u32, &mut [u8]),
 ) -> Result<Line> {
     let mut blocks = BTreeMap::from([(ENTRY[0], EXCEPTION), (ENTRY[1], worst.accesses * BUS)]);
-    let mut belongs: BTreeMap<u32, &'static str> = BTreeMap::new();
+    let mut functions = BTreeMap::new();
+    let mut belongs: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
     let mut count = 0;
     for block in &worst.blocks {
         let mut code = vec![0; block.size as usize];
         read(block.address, &mut code);
-        let mut last = REST;
-        for instruction in instructions(&code) {
-            let at = block.address + instruction.offset;
-            last = belongs.entry(at).or_insert_with(|| block_of(image, at));
-            *blocks.entry(last).or_default() += instruction.cycles;
-            count += 1;
+        let mut list: Vec<_> = instructions(&code).collect();
+        if let (true, Some(last)) = (block.taken, list.last_mut()) {
+            last.cycles += TAKEN;
         }
-        if block.taken {
-            *blocks.entry(last).or_default() += TAKEN;
+        for instruction in list {
+            let at = block.address + instruction.offset;
+            let place = belongs.entry(at).or_insert_with(|| block_of(image, at));
+            *blocks.entry(place.0).or_default() += instruction.cycles;
+            *functions.entry(place.clone()).or_default() += instruction.cycles;
+            count += 1;
         }
     }
     let cycles: u32 = blocks.values().sum();
     if cycles != worst.cycles {
         bail!("{cycles} cycles by blocks, but {} counted", worst.cycles);
     }
-    Ok(Line { name, instructions: count, cycles, median, blocks })
+    Ok(Line { name, instructions: count, cycles, median, blocks, functions })
 }
 
-fn block_of(image: &Image, address: u32) -> &'static str {
+/// The block of an instruction, and the innermost function it is of.
+fn block_of(image: &Image, address: u32) -> (&'static str, String) {
     let frames = image.frames(address);
     // From the outermost inwards; what no other block claims is the sequence's.
     let (named, sequence) = BLOCKS.split_at(BLOCKS.len() - 1);
@@ -146,7 +176,8 @@ fn block_of(image: &Image, address: u32) -> &'static str {
             blocks.iter().find(|(_, parts)| parts.iter().any(|part| fits(&part))).map(|b| b.0)
         })
     };
-    find(named).or_else(|| find(sequence)).unwrap_or(REST)
+    let block = find(named).or_else(|| find(sequence)).unwrap_or(REST);
+    (block, frames.first().map_or_else(String::new, |frame| frame.function.clone()))
 }
 
 /// The lines as a table.
@@ -166,6 +197,16 @@ pub fn table(lines: &[Line]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// What every function of every block takes on the longest path, the largest first.
+pub fn functions(line: &Line) -> String {
+    let mut list: Vec<_> = line.functions.iter().collect();
+    list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));
+    list.iter().fold(String::new(), |mut text, ((block, function), cycles)| {
+        let _ = writeln!(text, "{:<12}{cycles:>6} {block:<16} {function}", line.name);
+        text
+    })
 }
 
 /// Compares with a table that [`table`] wrote before.

@@ -63,7 +63,8 @@ impl Image {
             return Self::open(Path::new(&path));
         }
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
         let places = PLACES.map(|place| target.join(place).join(INSIDE));
         let age = |path: PathBuf| Some((path.metadata().ok()?.modified().ok()?, path));
         let newest = places.into_iter().filter_map(age).max();
@@ -183,7 +184,8 @@ impl Image {
                     let short = short.into_iter().rev().collect::<Vec<_>>().join("/");
                     format!("{short}:{}", at.line.unwrap_or(0))
                 });
-                frames.push(Frame { function: function.map_or("?".into(), Cow::into_owned), place });
+                frames
+                    .push(Frame { function: function.map_or("?".into(), Cow::into_owned), place });
             }
         }
         frames

@@ -23,6 +23,9 @@ enum Task {
         /// A table of before: fails if a line is over 5 % above it.
         #[arg(long)]
         against: Option<PathBuf>,
+        /// Shows the functions of the blocks as well.
+        #[arg(long)]
+        functions: bool,
     },
 }
 
@@ -38,9 +41,12 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Cycles { elf, against } => {
+        Task::Cycles { elf, against, functions } => {
             let lines = cycles::measure(|| Image::open(&elf))?;
             print!("{}", cycles::table(&lines));
+            if functions {
+                lines.iter().for_each(|line| print!("\n{}", cycles::functions(line)));
+            }
             if let Some(path) = against {
                 let before = std::fs::read_to_string(&path);
                 let before = before.with_context(|| path.display().to_string())?;

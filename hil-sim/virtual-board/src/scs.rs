@@ -97,7 +97,13 @@ impl Default for Scs {
 /// Indices of registers that only hold what is written: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR,
 /// FPCAR, FPCCR.
 const PLAIN: [u32; 8] = [
-    0xe000_ed14, 0xe000_ed24, 0xe000_ed88, 0xe000_ed10, 0xe000_ed34, 0xe000_ed3c, 0xe000_ef38,
+    0xe000_ed14,
+    0xe000_ed24,
+    0xe000_ed88,
+    0xe000_ed10,
+    0xe000_ed34,
+    0xe000_ed3c,
+    0xe000_ef38,
     0xe000_ef34,
 ];
 
@@ -250,7 +256,9 @@ impl Scs {
     }
 
     fn priorities(&self, first: usize) -> u32 {
-        (0..4).fold(0, |w, n| w | u32::from(self.priority.get(first + n).copied().unwrap_or(0)) << (8 * n))
+        (0..4).fold(0, |w, n| {
+            w | u32::from(self.priority.get(first + n).copied().unwrap_or(0)) << (8 * n)
+        })
     }
 
     /// Writes a register; `None` if it is not known.
@@ -281,12 +289,19 @@ impl Scs {
             0xe000_e180..0xe000_e190 => set(&mut self.enabled, 0xe000_e180, false),
             0xe000_e200..0xe000_e210 => set(&mut self.pending, 0xe000_e200, true),
             0xe000_e280..0xe000_e290 => set(&mut self.pending, 0xe000_e280, false),
-            0xe000_e400..0xe000_e468 => self.set_priorities(16 + (address - 0xe000_e400) as usize, value),
-            0xe000_ed18..0xe000_ed24 => self.set_priorities(4 + (address - 0xe000_ed18) as usize, value),
+            0xe000_e400..0xe000_e468 => {
+                self.set_priorities(16 + (address - 0xe000_e400) as usize, value)
+            }
+            0xe000_ed18..0xe000_ed24 => {
+                self.set_priorities(4 + (address - 0xe000_ed18) as usize, value)
+            }
             0xe000_ed04 => {
                 for (bit, exception, to) in [
-                    (31, NMI, true), (28, PEND_SV, true), (27, PEND_SV, false),
-                    (26, SYSTICK, true), (25, SYSTICK, false),
+                    (31, NMI, true),
+                    (28, PEND_SV, true),
+                    (27, PEND_SV, false),
+                    (26, SYSTICK, true),
+                    (25, SYSTICK, false),
                 ] {
                     if value & 1 << bit != 0 {
                         self.pending[usize::from(exception)] = to;
@@ -305,7 +320,11 @@ impl Scs {
             0xe000_ed2c => self.hfsr &= !value,
             0xe000_edfc | 0xe000_1000 => {
                 let cycles = self.cycles(now);
-                if address == 0xe000_edfc { self.demcr = value } else { self.dwt_control = value & 1 }
+                if address == 0xe000_edfc {
+                    self.demcr = value
+                } else {
+                    self.dwt_control = value & 1
+                }
                 self.cycles_held = cycles;
                 self.cycles_from = now.wrapping_sub(u64::from(cycles));
                 return Some(Effect::None);

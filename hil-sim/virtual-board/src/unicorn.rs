@@ -61,10 +61,12 @@ impl UnicornCpu {
                             let address = (base + offset) as u32;
                             u64::from(uc.get_data_mut().read(address, size as u8))
                         }),
-                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
-                            let address = (base + offset) as u32;
-                            uc.get_data_mut().write(address, size as u8, value as u32);
-                        }),
+                        Some(
+                            move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
+                                let address = (base + offset) as u32;
+                                uc.get_data_mut().write(address, size as u8, value as u32);
+                            },
+                        ),
                     )?;
                 }
             }
@@ -104,7 +106,8 @@ impl UnicornCpu {
             })?;
         }
         if counting.cycles {
-            let mut costs = Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
+            let mut costs =
+                Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
             let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
             uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
                 let cycles = cost_of(&mut costs, uc, address as u32, size);
@@ -217,9 +220,8 @@ impl Cpu for UnicornCpu {
         };
         let stacked = self.uc.mem_write(u64::from(sp), &frame[..size]).is_ok();
         let from_handler = xpsr & 0x1ff != 0;
-        let exc_return = 0xffff_ffe1
-            | if from_handler { 0 } else { 8 }
-            | if float { 0 } else { BASIC_FRAME };
+        let exc_return =
+            0xffff_ffe1 | if from_handler { 0 } else { 8 } | if float { 0 } else { BASIC_FRAME };
         self.set(Register::Sp, sp);
         self.set(Register::Lr, exc_return);
         self.set_exception(1 << 24 | u32::from(exception));
@@ -251,7 +253,10 @@ impl Cpu for UnicornCpu {
         self.uc.reg_write(R::CONTROL, control).ok();
         let basic: [u64; 7] = std::array::from_fn(|k| word(4 * k));
         self.uc.reg_write_batch(&BASIC[..6], &basic[..6], 6).ok();
-        let sp = sp.wrapping_add(size as u32).wrapping_add(xpsr >> 9 & 1).wrapping_add(3 * (xpsr >> 9 & 1));
+        let sp = sp
+            .wrapping_add(size as u32)
+            .wrapping_add(xpsr >> 9 & 1)
+            .wrapping_add(3 * (xpsr >> 9 & 1));
         self.set(Register::Sp, sp);
         self.set(Register::Pc, basic[6] as u32);
         true
@@ -285,7 +290,19 @@ impl Cpu for UnicornCpu {
 
 fn number(register: Register) -> R {
     const GENERAL: [R; 13] = [
-        R::R0, R::R1, R::R2, R::R3, R::R4, R::R5, R::R6, R::R7, R::R8, R::R9, R::R10, R::R11, R::R12,
+        R::R0,
+        R::R1,
+        R::R2,
+        R::R3,
+        R::R4,
+        R::R5,
+        R::R6,
+        R::R7,
+        R::R8,
+        R::R9,
+        R::R10,
+        R::R11,
+        R::R12,
     ];
     match register {
         Register::R(n) => GENERAL[usize::from(n.min(12))],

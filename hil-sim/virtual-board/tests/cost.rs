@@ -20,9 +20,7 @@ fn the_table_of_the_manual() {
     );
     // vmla.f32 s0,s1,s2; vldr s0,[r0]; vstr s0,[r0]; vmrs; udiv r0,r1,r2
     assert_eq!(
-        cycles(&[
-            0xee00, 0x0a81, 0xed90, 0x0a00, 0xed80, 0x0a00, 0xeef1, 0xfa10, 0xfbb1, 0xf0f2
-        ]),
+        cycles(&[0xee00, 0x0a81, 0xed90, 0x0a00, 0xed80, 0x0a00, 0xeef1, 0xfa10, 0xfbb1, 0xf0f2]),
         [3, 2, 2, 1, 6]
     );
     // vpush {s16-s19}; ldrd r0,r1,[r2]; bl

@@ -110,8 +110,14 @@ fn torque_steps() -> Result<()> {
         let current = [mean(b, |p| p.iq - p.iq_ref).rms(), mean(h, |p| p.iq - p.iq_ref).rms()];
         println!(
             "level {n}: torque {:.4} {:.4} Nm, angle error mean {:.3} {:.3} rms {:.3} {:.3} deg, current error rms {:.2} {:.2} mA",
-            torque[0], torque[1], error[0].mean(), error[1].mean(), error[0].rms(), error[1].rms(),
-            current[0] * 1e3, current[1] * 1e3,
+            torque[0],
+            torque[1],
+            error[0].mean(),
+            error[1].mean(),
+            error[0].rms(),
+            error[1].rms(),
+            current[0] * 1e3,
+            current[1] * 1e3,
         );
         assert!((torque[0] / torque[1] - 1.0).abs() < 0.01, "level {n}: {torque:?} Nm");
         assert!((error[0].mean() - error[1].mean()).abs() < 0.2, "level {n}");
@@ -139,7 +145,9 @@ fn position_step() -> Result<()> {
         let error = mean(&points, |p| p.error_deg).rms();
         [overshoot, settling, end, largest(|p| p.iq.abs()), largest(|p| p.rpm), error]
     });
-    println!("overshoot (turns), settling (s), end (deg), iq (A), rpm, error rms (deg): {figures:?}");
+    println!(
+        "overshoot (turns), settling (s), end (deg), iq (A), rpm, error rms (deg): {figures:?}"
+    );
     let [b, h] = figures;
     // A thousandth of a turn, ten milliseconds, a count of the encoder, the noise of a current, one
     // percent of the speed.

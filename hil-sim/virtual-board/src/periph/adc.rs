@@ -6,9 +6,21 @@ use crate::chip::NEVER;
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (ISR, 0, 0), (IER, 0, 0x7ff), (CR, 0x2000_0000, 0), (CFGR, 0x8000_0000, ALL), (0x10, 0, 0),
-    (SMPR1, 0, ALL), (SMPR1 + 4, 0, ALL), (TR1, 0x0fff_0000, ALL), (JSQR, 0, ALL),
-    (JDR1, 0, 0), (0x84, 0, 0), (0x88, 0, 0), (0x8c, 0, 0), (0xb4, 0, ALL), (0xc0, 0, 0),
+    (ISR, 0, 0),
+    (IER, 0, 0x7ff),
+    (CR, 0x2000_0000, 0),
+    (CFGR, 0x8000_0000, ALL),
+    (0x10, 0, 0),
+    (SMPR1, 0, ALL),
+    (SMPR1 + 4, 0, ALL),
+    (TR1, 0x0fff_0000, ALL),
+    (JSQR, 0, ALL),
+    (JDR1, 0, 0),
+    (0x84, 0, 0),
+    (0x88, 0, 0),
+    (0x8c, 0, 0),
+    (0xb4, 0, ALL),
+    (0xc0, 0, 0),
 ];
 const ISR: u32 = 0x00;
 const IER: u32 = 0x04;

@@ -5,8 +5,17 @@ use super::{Effect, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (0x00, 0, 0xfff), (0x04, 0, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x10, 0, 0), (0x18, 0, ALL),
-    (0x1c, 0, ALL), (0x20, 0, ALL), (0x24, 0, 0), (0x28, 0, ALL), (0x2c, ALL, ALL),
+    (0x00, 0, 0xfff),
+    (0x04, 0, ALL),
+    (0x08, 0, ALL),
+    (0x0c, 0, ALL),
+    (0x10, 0, 0),
+    (0x18, 0, ALL),
+    (0x1c, 0, ALL),
+    (0x20, 0, ALL),
+    (0x24, 0, 0),
+    (0x28, 0, ALL),
+    (0x2c, ALL, ALL),
 ];
 const CR1: u32 = 0x00;
 const SMCR: u32 = 0x08;

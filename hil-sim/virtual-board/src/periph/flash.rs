@@ -9,8 +9,17 @@ use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (ACR, 0x0004_0600, ALL), (0x04, 0, ALL), (KEYR, 0, 0), (0x0c, 0, ALL), (SR, 0, 0), (CR, 0xc000_0000, ALL),
-    (ECCR, 0, 0), (OPTR, 0xffef_f8aa, 0), (0x24, 0, 0), (0x2c, 0, 0), (0x30, 0, 0),
+    (ACR, 0x0004_0600, ALL),
+    (0x04, 0, ALL),
+    (KEYR, 0, 0),
+    (0x0c, 0, ALL),
+    (SR, 0, 0),
+    (CR, 0xc000_0000, ALL),
+    (ECCR, 0, 0),
+    (OPTR, 0xffef_f8aa, 0),
+    (0x24, 0, 0),
+    (0x2c, 0, 0),
+    (0x30, 0, 0),
 ];
 const ACR: u32 = 0x00;
 const KEYR: u32 = 0x08;
@@ -98,7 +107,8 @@ impl Flash {
     /// A word of the second bank, and whether its check code is wrong.
     pub fn load(&mut self, address: u32) -> (u32, bool) {
         let at = (address - BANK_2) as usize & !3;
-        let word = self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let word =
+            self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let torn = self.torn.get(at / 8) == Some(&true);
         if torn {
             self.eccr = ECCD | 1 << 21 | (at as u32 / 8) & 0x7_ffff;

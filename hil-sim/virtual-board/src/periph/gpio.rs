@@ -4,8 +4,17 @@ use super::{Effect, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (0x00, ALL, ALL), (0x04, 0, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x10, 0, 0), (0x14, 0, 0xffff),
-    (0x18, 0, 0), (0x1c, 0, ALL), (0x20, 0, ALL), (0x24, 0, ALL), (0x28, 0, 0),
+    (0x00, ALL, ALL),
+    (0x04, 0, ALL),
+    (0x08, 0, ALL),
+    (0x0c, 0, ALL),
+    (0x10, 0, 0),
+    (0x14, 0, 0xffff),
+    (0x18, 0, 0),
+    (0x1c, 0, ALL),
+    (0x20, 0, ALL),
+    (0x24, 0, ALL),
+    (0x28, 0, 0),
 ];
 const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0c;

@@ -54,7 +54,13 @@ impl Iwdg {
             0x04 => self.prescaler,
             0x08 => self.reload,
             // Both values on their way.
-            0x0c => if now < self.busy_until { 3 } else { 0 },
+            0x0c => {
+                if now < self.busy_until {
+                    3
+                } else {
+                    0
+                }
+            }
             0x10 => self.window,
             _ => return None,
         })
@@ -76,7 +82,11 @@ impl Iwdg {
             }
             (0x00, _) => self.unlocked = false,
             (0x04 | 0x08, _) if self.unlocked => {
-                if offset == 0x04 { self.prescaler = value & 7 } else { self.reload = value & 0xfff }
+                if offset == 0x04 {
+                    self.prescaler = value & 7
+                } else {
+                    self.reload = value & 0xfff
+                }
                 self.busy_until = now + ARRIVES * CLOCK;
             }
             (0x04 | 0x08, _) => {}

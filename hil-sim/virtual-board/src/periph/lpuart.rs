@@ -7,8 +7,16 @@ use crate::chip::NEVER;
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (CR1, 0, ALL), (0x04, 0, ALL), (CR3, 0, ALL), (BRR, 0, 0xf_ffff), (0x18, 0, 0), (ISR, 0, 0), (ICR, 0, 0),
-    (RDR, 0, 0), (TDR, 0, 0), (0x2c, 0, ALL),
+    (CR1, 0, ALL),
+    (0x04, 0, ALL),
+    (CR3, 0, ALL),
+    (BRR, 0, 0xf_ffff),
+    (0x18, 0, 0),
+    (ISR, 0, 0),
+    (ICR, 0, 0),
+    (RDR, 0, 0),
+    (TDR, 0, 0),
+    (0x2c, 0, ALL),
 ];
 const CR1: u32 = 0x00;
 const CR3: u32 = 0x08;
@@ -130,14 +138,19 @@ impl Lpuart {
     pub fn requests(&self) -> bool {
         let (cr1, cr3) = (self.store.get(CR1), self.store.get(CR3));
         let asked = cr1 & (RXNE | TC | TXE);
-        let errors = if cr3 & 1 != 0 { FE | ORE } else { 0 } | if cr1 & RXNE != 0 { ORE } else { 0 };
+        let errors =
+            if cr3 & 1 != 0 { FE | ORE } else { 0 } | if cr1 & RXNE != 0 { ORE } else { 0 };
         cr1 & UE != 0 && self.status & (asked | errors) != 0
     }
 
     /// Reads a register, with what that does.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
-            ISR => Some(self.status | self.store.get(CR1) << 18 & 1 << 22 | self.store.get(CR1) << 18 & 1 << 21),
+            ISR => Some(
+                self.status
+                    | self.store.get(CR1) << 18 & 1 << 22
+                    | self.store.get(CR1) << 18 & 1 << 21,
+            ),
             RDR => {
                 self.status &= !RXNE;
                 Some(u32::from(self.received))

@@ -5,12 +5,28 @@ use super::{Effect, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const SYSCFG: &[Plain] = &[
-    (0x00, 0, ALL), (0x04, 0x7c00_0001, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x10, 0, ALL),
-    (0x14, 0, ALL), (0x18, 0, ALL), (0x1c, 0, ALL), (0x20, 0, ALL), (0x24, 0, ALL),
+    (0x00, 0, ALL),
+    (0x04, 0x7c00_0001, ALL),
+    (0x08, 0, ALL),
+    (0x0c, 0, ALL),
+    (0x10, 0, ALL),
+    (0x14, 0, ALL),
+    (0x18, 0, ALL),
+    (0x1c, 0, ALL),
+    (0x20, 0, ALL),
+    (0x24, 0, ALL),
 ];
 const EXTI: &[Plain] = &[
-    (0x00, 0xff82_0000, ALL), (0x04, 0, ALL), (0x08, 0, ALL), (0x0c, 0, ALL), (0x14, 0, 0),
-    (0x20, 0xffff_ff87, ALL), (0x24, 0, ALL), (0x28, 0, ALL), (0x2c, 0, ALL), (0x34, 0, 0),
+    (0x00, 0xff82_0000, ALL),
+    (0x04, 0, ALL),
+    (0x08, 0, ALL),
+    (0x0c, 0, ALL),
+    (0x14, 0, 0),
+    (0x20, 0xffff_ff87, ALL),
+    (0x24, 0, ALL),
+    (0x28, 0, ALL),
+    (0x2c, 0, ALL),
+    (0x34, 0, 0),
 ];
 
 /// System configuration.

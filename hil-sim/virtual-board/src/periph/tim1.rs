@@ -8,10 +8,30 @@ use crate::chip::NEVER;
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (CR1, 0, 0xbff), (CR2, 0, ALL), (0x08, 0, ALL), (DIER, 0, ALL), (SR, 0, 0), (EGR, 0, 0),
-    (CCMR1, 0, ALL), (CCMR2, 0, ALL), (CCER, 0, ALL), (CNT, 0, 0), (PSC, 0, ALL), (ARR, 0xffff, 0xf_ffff),
-    (RCR, 0, 0xffff), (CCR1, 0, 0xf_ffff), (0x38, 0, 0xf_ffff), (0x3c, 0, 0xf_ffff), (CCR4, 0, 0xf_ffff),
-    (BDTR, 0, ALL), (0x48, 0, ALL), (0x4c, 0, ALL), (0x50, 0, ALL), (0x54, 0, ALL), (AF1, 1, ALL), (0x64, 1, ALL),
+    (CR1, 0, 0xbff),
+    (CR2, 0, ALL),
+    (0x08, 0, ALL),
+    (DIER, 0, ALL),
+    (SR, 0, 0),
+    (EGR, 0, 0),
+    (CCMR1, 0, ALL),
+    (CCMR2, 0, ALL),
+    (CCER, 0, ALL),
+    (CNT, 0, 0),
+    (PSC, 0, ALL),
+    (ARR, 0xffff, 0xf_ffff),
+    (RCR, 0, 0xffff),
+    (CCR1, 0, 0xf_ffff),
+    (0x38, 0, 0xf_ffff),
+    (0x3c, 0, 0xf_ffff),
+    (CCR4, 0, 0xf_ffff),
+    (BDTR, 0, ALL),
+    (0x48, 0, ALL),
+    (0x4c, 0, ALL),
+    (0x50, 0, ALL),
+    (0x54, 0, ALL),
+    (AF1, 1, ALL),
+    (0x64, 1, ALL),
 ];
 const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;
@@ -179,7 +199,8 @@ impl Tim1 {
             return Ok(());
         }
         // Both outputs of three legs, active high, PWM mode 1: nothing else is known to be safe.
-        let modes = [self.store.get(CCMR1) >> 4, self.store.get(CCMR1) >> 12, self.store.get(CCMR2) >> 4];
+        let modes =
+            [self.store.get(CCMR1) >> 4, self.store.get(CCMR1) >> 12, self.store.get(CCMR2) >> 4];
         if self.store.get(CCER) & 0xfff != 0x555 || modes.iter().any(|mode| mode & 7 != 6) {
             return Err(BadGates::NotComplementary);
         }
@@ -343,7 +364,9 @@ impl Tim1 {
                 return Some(Effect::None);
             }
             // Locked with levels 2 and 3.
-            CCER if self.lock() >= 2 => return self.store.write(CCER, value & !0xaaaa | old & 0xaaaa),
+            CCER if self.lock() >= 2 => {
+                return self.store.write(CCER, value & !0xaaaa | old & 0xaaaa);
+            }
             CCMR1 | CCMR2 if self.lock() >= 3 => return Some(Effect::None),
             PSC if value != 0 => return None,
             CR1 if value & 1 != 0 && value >> 5 & 3 == 0 => return None,

@@ -1,0 +1,31 @@
+//! Wall time per simulated second of the drive regulating torque, motor in the loop; the aims are 0.12 s
+//! without and 0.2 s with counting of cycles.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use drive_core::State;
+use hil_sim::Config;
+use virtual_board::{Counting, Image, Options, Pair};
+
+fn one_second(c: &mut Criterion) {
+    let mut group = c.benchmark_group("one simulated second");
+    group.sample_size(10);
+    for (name, cycles) in [("no counting", false), ("cycles counted", true)] {
+        let image = Image::built().expect("type `cargo firmware` first");
+        let mut options = Options::new(&Config::default(), 1);
+        options.counting = Counting { cycles, every_instruction: false };
+        let mut pair = Pair::new(image, options).expect("starts");
+        pair.order("start torque").expect("is taken");
+        pair.until_state(State::Torque).expect("regulates");
+        pair.order("torque 1").expect("is taken");
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                pair.board.run_periods(6000).expect("goes on");
+                while pair.board.next_period().is_some() {}
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, one_second);
+criterion_main!(benches);

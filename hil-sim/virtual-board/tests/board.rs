@@ -1,0 +1,105 @@
+//! The image on the board: how it starts, what it says, and what stops it.
+
+mod common;
+
+use anyhow::Result;
+use drive_core::State;
+use hil_sim::Config;
+use virtual_board::chip::Reset;
+use virtual_board::{Board, Counting, Image, Options};
+
+/// Periods that the firmware needs from reset to its greeting, at most.
+const START: u64 = 15_000;
+
+fn started(seed: u64) -> Result<Board> {
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), seed))?;
+    board.run_periods(START)?;
+    Ok(board)
+}
+
+#[test]
+fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
+    let mut board = started(1)?;
+    assert!(board.heard().contains("last run: power-on"), "{}", board.heard());
+    let log = board.logged()?;
+    assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
+    assert!(log.iter().any(|line| line.contains("off: codes")), "{log:#?}");
+    assert!(!log.iter().any(|line| line.starts_with("ERROR")), "{log:#?}");
+    assert!(!board.chip().tim1.outputs_on());
+    assert!(board.resets.is_empty());
+    Ok(())
+}
+
+/// A hanging core is reset by the watchdog, which takes the outputs off; the motor is not hurt, and the
+/// next run says why it is there.
+#[test]
+fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
+    let mut pair = common::pair(&Config::default(), 2)?;
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    pair.order("torque 2")?;
+    pair.run(1200, |_, _| {})?;
+    let began = pair.board.time();
+    pair.board.hang();
+    let mut peak: f64 = 0.0;
+    while pair.board.chip().tim1.outputs_on() {
+        pair.board.run_ticks(2000)?;
+        let largest =
+            pair.board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
+        peak = peak.max(largest);
+        assert!(pair.board.time() - began < 6e-3, "still on");
+    }
+    println!("off after {:.2} ms, peak current {peak:.2} A", (pair.board.time() - began) * 1e3);
+    assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Watchdog));
+    pair.board.heard();
+    pair.board.run_periods(START)?;
+    assert!(pair.board.heard().contains("last run: watchdog"));
+    Ok(())
+}
+
+/// A pull at the break pin takes the outputs off in hardware, before the firmware knows.
+#[test]
+fn a_break_switches_off_and_is_reported() -> Result<()> {
+    let mut pair = common::pair(&Config::default(), 3)?;
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    pair.board.set_fault_pin(false);
+    assert!(!pair.board.chip().tim1.outputs_on());
+    pair.run(2, |_, _| {})?;
+    assert_eq!(pair.shadow.drive.state(), State::Fault(drive_core::Fault::Break));
+    assert!(pair.say("faults")?.contains("20"));
+    Ok(())
+}
+
+/// The crystal stops: the chip takes the outputs off, and the firmware starts again from its internal
+/// oscillator and says so.
+#[test]
+fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
+    let mut pair = common::pair(&Config::default(), 4)?;
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    pair.board.heard();
+    pair.board.set_crystal(false);
+    pair.board.run_ticks(2000)?;
+    assert!(!pair.board.chip().tim1.outputs_on());
+    pair.board.run_periods(2 * START)?;
+    let heard = pair.board.heard();
+    assert!(heard.contains("clock or flash failure"), "{heard}");
+    let log = pair.board.logged()?;
+    assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
+    Ok(())
+}
+
+/// Main loop and serial interrupt are preempted at any instruction, with all interrupts at work, and
+/// nothing of it shows.
+#[test]
+fn every_instruction_can_be_interrupted() -> Result<()> {
+    let mut options = Options::new(&Config::default(), 5);
+    options.counting = Counting { cycles: true, every_instruction: true };
+    let mut pair = virtual_board::Pair::new(Image::built()?, options)?;
+    pair.order("start torque")?;
+    for _ in 0..100 {
+        assert!(pair.say("status")?.contains(" A, "));
+    }
+    Ok(())
+}
