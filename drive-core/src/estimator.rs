@@ -147,23 +147,22 @@ impl Estimator {
         carrier: CarrierPeriod,
         i_q: f32,
     ) {
-        let seen_from = |step: f32| {
-            let axis = theta.phi - Angle::EIGHTH - Angle::within_turn(step * self.lag);
-            CarrierSample { current, dm_axis: axis.unit_vector(), carrier, i_q }
-        };
-        let mean_step = &mut state.mean_step;
-        let mut seen_late = || {
-            *mean_step += FLUX_SMOOTHING * (theta.step - *mean_step);
-            seen_from(*mean_step)
-        };
-        match &mut state.demodulator {
-            Demodulator::Literal(d) => state.delta_i = d.step(&seen_late()),
-            Demodulator::Rectified(d) => state.delta_i = d.step(&seen_late()),
-            Demodulator::RmsImpedance(d) => {
-                state.delta_i = self.ampere_per_ohm * d.step(&seen_from(theta.step));
+        let step = match self.demodulator {
+            // These rotate what has passed the band-pass.
+            Tracking::Literal | Tracking::Rectified => {
+                state.mean_step += FLUX_SMOOTHING * (theta.step - state.mean_step);
+                state.mean_step
             }
-            Demodulator::Envelope(d) => state.delta_i = d.step(&seen_from(theta.step)),
-            Demodulator::Synchronous(d) => state.saliency = d.step(&seen_from(theta.step)),
+            _ => theta.step,
+        };
+        let axis = theta.phi - Angle::EIGHTH - Angle::within_turn(step * self.lag);
+        let sample = CarrierSample { current, dm_axis: axis.unit_vector(), carrier, i_q };
+        match &mut state.demodulator {
+            Demodulator::Literal(d) => state.delta_i = d.step(&sample),
+            Demodulator::Rectified(d) => state.delta_i = d.step(&sample),
+            Demodulator::RmsImpedance(d) => state.delta_i = self.ampere_per_ohm * d.step(&sample),
+            Demodulator::Envelope(d) => state.delta_i = d.step(&sample),
+            Demodulator::Synchronous(d) => state.saliency = d.step(&sample),
         }
     }
 
