@@ -383,7 +383,8 @@ fn remarks() -> Vec<String> {
          identification that looks sound made a loop that cannot track."
             .into(),
         "Eq. 3.43 fits the literal chain alone (its step response is that of the post-processing filter; \
-         the poles come out within 0.007 of Table 6, so the source identified this). Where the carrier is \
+         its poles \
+         come out within 0.015 of those of Table 6, in either part). Where the carrier is \
          seen, a step of the axis shows at once, before the carrier current has turned: for 2 samples, \
          and in the rectified chain for the 8.8 samples of the band-pass as well, which it rotates \
          afterwards. The signal answers to how fast the axis turns, not only to where it is. Eq. 3.43 has \
