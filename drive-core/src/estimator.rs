@@ -149,23 +149,22 @@ impl Estimator {
         carrier: CarrierPeriod,
         i_q: f32,
     ) {
-        let seen_at = |step: f32| {
-            let axis = axis.turned_slightly(-step * self.lag);
-            CarrierSample { current, axis, carrier, i_q }
-        };
-        let mean_step = &mut state.mean_step;
-        let mut seen_late = || {
-            *mean_step += FLUX_SMOOTHING * (step - *mean_step);
-            seen_at(*mean_step)
-        };
-        match &mut state.demodulator {
-            Demodulator::Literal(d) => state.delta_i = d.step(&seen_late()),
-            Demodulator::Rectified(d) => state.delta_i = d.step(&seen_late()),
-            Demodulator::RmsImpedance(d) => {
-                state.delta_i = self.ampere_per_ohm * d.step(&seen_at(step));
+        let step = match self.demodulator {
+            // These rotate what has passed the band-pass.
+            Tracking::Literal | Tracking::Rectified => {
+                state.mean_step += FLUX_SMOOTHING * (step - state.mean_step);
+                state.mean_step
             }
-            Demodulator::Envelope(d) => state.delta_i = d.step(&seen_at(step)),
-            Demodulator::Synchronous(d) => state.saliency = d.step(&seen_at(step)),
+            _ => step,
+        };
+        let axis = axis.turned_slightly(-step * self.lag);
+        let sample = CarrierSample { current, axis, carrier, i_q };
+        match &mut state.demodulator {
+            Demodulator::Literal(d) => state.delta_i = d.step(&sample),
+            Demodulator::Rectified(d) => state.delta_i = d.step(&sample),
+            Demodulator::RmsImpedance(d) => state.delta_i = self.ampere_per_ohm * d.step(&sample),
+            Demodulator::Envelope(d) => state.delta_i = d.step(&sample),
+            Demodulator::Synchronous(d) => state.saliency = d.step(&sample),
         }
     }
 

@@ -28,16 +28,10 @@ const UNITS: f32 = 131_072.0;
 const SIGNALS: usize = 5;
 
 /// State of the demodulation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
     index: usize,
     stages: [MovingSum<SIGNALS, LENGTH>; 2],
-}
-
-impl Default for SynchronousState {
-    fn default() -> Self {
-        Self { index: 0, stages: [MovingSum::default(); 2] }
-    }
 }
 
 /// What the demodulation gives.

@@ -51,7 +51,7 @@ pub fn table(learned: &[Learned]) -> Result<ReferenceTable, Error> {
 /// The same for any demodulation.
 ///
 /// # Errors
-/// As [`reference`].
+/// As [`reference()`].
 pub fn reference_of(
     demodulator: Demodulator,
     config: &Config,

@@ -304,10 +304,13 @@ fn steps_figure<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> F
 
 fn remarks() -> Vec<String> {
     vec![
-        "The printed controller (z_s = 0.90) amplifies what lies above 100 Hz ten times: behind the \
-         envelope, which has no low-pass, and behind the longer delay of the rms filters it oscillates. \
-         With z_s = 0.995 both track like the rest. A learned reference takes the bias out; only what \
-         sees the saliency gains by it."
+        "The zero of the printed controller, z_s = 0.90, lies at 100 Hz: below, it is a bare double \
+         integrator. The rectified chain runs with it, because it rotates a current that the band-pass \
+         has delayed, and so sees how fast the axis turns: a damping (with the rotation put before the \
+         band-pass it loses the angle). Envelope and rms-impedance rotate first, which spares them the \
+         compensation of that delay, and oscillate or lose the angle with z_s = 0.90; with z_s = 0.995 \
+         both track like the rest. A learned reference takes the bias out of whatever sees the \
+         saliency."
             .into(),
         "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
          envelope promising but for spurious oscillations: they are the leak of the fundamental, at \

@@ -132,7 +132,6 @@ pub enum Kind {
 pub const KINDS: [(Kind, &str); 3] =
     [(Kind::Constant, "constant"), (Kind::Learned, "learned"), (Kind::Retuned, "retuned")];
 
-/// k_s in rad/A of the rectified chain's current difference, and z_s. With the printed zero, 0.90, the
-/// gain above some 100 Hz is ten times what it is at the crossover: enough to oscillate with the
-/// longer delay of the rms filters, or without the low-pass.
+/// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
+/// crossover, where the printed one has none.
 const RETUNED: (f32, f32) = (0.1, 0.995);
