@@ -49,7 +49,7 @@ fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
                 "{rpm} rpm: mean {mean:.2}, largest {most:.2} rpm; {on_the_way:.1}, {angle:.1} deg"
             );
             // Without a load there is no slip to be wrong: what is left is noise.
-            assert!(mean.abs() < 3.0 && most < 12.0, "{rpm} rpm: {mean} {most}");
+            assert!(mean.abs() < 2.0 && most < 6.0, "{rpm} rpm: {mean} {most}");
             assert!(on_the_way < 14.0 && angle < 11.0, "{rpm} rpm: {on_the_way} {angle}");
             before = rpm;
         }
@@ -67,11 +67,11 @@ fn a_load_step_is_carried() {
         let (_, dip, angle) = watch(&mut rig, rpm, 1.0);
         let (mean, ..) = watch(&mut rig, rpm, 1.0);
         println!("{rpm} rpm: dip {dip:.1} rpm, then {mean:.2}; angle {angle:.1} deg");
-        // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop answers with its crossover of 2 Hz.
-        assert!((10.0..60.0).contains(&dip), "{rpm}: {dip}");
+        // 0.6 Nm on 0.012 kg m^2 are 480 rpm/s; the loop answers with its crossover of 1.4 Hz.
+        assert!((10.0..70.0).contains(&dip), "{rpm}: {dip}");
         assert!(mean.abs() < 4.0, "{rpm}: {mean}");
         // Peak of the mean response 8, and noise.
-        assert!(angle < 15.0, "{rpm}: {angle}");
+        assert!(angle < 12.0, "{rpm}: {angle}");
         assert_eq!(rig.drive.state(), State::Speed);
     }
 }

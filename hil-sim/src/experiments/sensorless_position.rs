@@ -107,7 +107,7 @@ fn hold(
     rig.run(seconds, |p| {
         iq.push(p.iq);
         held.angle_error.push(p.angle_error_deg);
-        if period % 600 == 0 {
+        if period.is_multiple_of(600) {
             held.track.push((p.t - start, (p.turns - origin) * 360.0));
         }
         period += 1;
