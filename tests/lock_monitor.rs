@@ -25,7 +25,7 @@ fn run(changes: &[&str], seed: u64) -> Outcome {
 /// A share of what `cargo sim run lock-monitor --set runs=1000` shows.
 #[test]
 fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
-    let outcome = run(&["runs=16"], 31);
+    let outcome = run(&["runs=12"], 31);
     for metric in [
         "not_in_time_p90",
         "not_in_time_m90",
@@ -39,14 +39,14 @@ fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
     ] {
         assert_eq!(outcome.metrics.get(metric), Some(0.0), "{metric}");
     }
-    // 0.24 is the most of 10 000 runs; the limit is 0.55.
+    // 0.22 is the most of 10 000 runs; the limit is 0.55.
     assert!(outcome.metrics.get("healthy_loss_max").unwrap() < 0.35);
 }
 
 /// Without the monitor the same trials end in false locks.
 #[test]
 fn without_the_monitor_a_false_lock_stays() {
-    let outcome = run(&["runs=8", "injection.monitor=false"], 32);
+    let outcome = run(&["runs=6", "injection.monitor=false"], 32);
     let missed = ["p120", "m120", "180"].map(|n| outcome.metrics.get(&format!("not_in_time_{n}")));
     assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");
 }
@@ -91,7 +91,7 @@ fn a_relock_on_request_goes_on_without_torque() {
             }
         }
         assert!(verified && rig.drive.state() == State::Torque, "{}", rig.drive.state());
-        assert_eq!(rig.drive.telemetry().reference.q, 0.0);
+        assert!(rig.drive.telemetry().reference.q.abs() < 1e-6);
         rig.command(Command::Torque(i_q)).unwrap();
         rig.run(0.5, |_| {});
         let worst = worst(&mut rig);

@@ -334,14 +334,15 @@ impl Drive {
             if let Some(fault) = s.carrier_watch.step(measured, carrier, theta_axis, amplitude) {
                 return Err(fault);
             }
-            // Once a carrier period: does the carrier fit, and is it the flux that is tracked?
-            if carrier.index + 1 == CARRIER_SAMPLES {
+            // Once a carrier period each: is it the flux that is tracked, and does the carrier fit?
+            if carrier.index == MONITORED {
+                if let (Some(monitor), true) = (&c.lock_monitor, s.carrier.is_settled()) {
+                    monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
+                }
+            } else if carrier.index + 1 == CARRIER_SAMPLES {
                 let largest = c.modulator.circle(measured.dc_link);
                 if s.carrier.fit(&c.injection, voltage, largest).is_err() {
                     return Err(Fault::CarrierNoRoom);
-                }
-                if let (Some(monitor), true) = (&c.lock_monitor, s.carrier.is_settled()) {
-                    monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
                 }
             }
         }
@@ -468,6 +469,10 @@ impl Drive {
 
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
+
+/// Sample of the carrier period in which the lock is watched: not the last, where the rest of what is
+/// done once a carrier period is done.
+const MONITORED: usize = 4;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

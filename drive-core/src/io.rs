@@ -102,8 +102,8 @@ pub enum Mode {
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command<'a> {
-    /// From off: calibrate the offsets, charge the bootstraps, magnetise, then regulate as `Mode`
-    /// says.
+    /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
+    /// angle comes from the injection, then regulate as `Mode` says.
     Start(Mode),
     /// While regulating with the injection: no torque, magnetise again, verify that the flux is
     /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.

@@ -197,7 +197,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 48] = [
+pub static KEYS: [Key; 52] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -242,6 +242,11 @@ pub static KEYS: [Key; 48] = [
     number!("injection.current_saliency", "1/A", drive.injection.synchronous.current_saliency),
     word!("injection.check", |s| s.drive.injection.synchronous.check,
         "no" = false => false, "yes" = true => true),
+    word!("injection.monitor", |s| s.drive.injection.synchronous.monitor,
+        "no" = false => false, "yes" = true => true),
+    number!("injection.allowed_loss", "", drive.injection.synchronous.allowed_loss),
+    number!("injection.loss_s", "s", drive.injection.synchronous.loss_s),
+    number!("injection.tracked_rpm", "rpm", drive.injection.synchronous.tracked_rpm),
     word!("injection.beside_encoder", |s| s.drive.injection.beside_encoder,
         "no" = false => false, "yes" = true => true),
     number!("limits.current_a", "A", drive.limits.current_a),

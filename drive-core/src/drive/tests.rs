@@ -403,7 +403,7 @@ fn commands_are_taken_limited_or_refused() {
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
     type Change = fn(&mut Settings);
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 12] = [
         (|s| s.speed.limit_rpm = 3000.0, "speed.limit_rpm = 3000: allowed is 1 to 2000"),
         (|s| s.speed.phase_margin_deg = 80.0, "speed.phase_margin_deg = 80: allowed is 45 to 70"),
         (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000"),
@@ -411,6 +411,18 @@ fn settings_out_of_range_are_refused_by_name() {
         (|s| s.limits.trip_a = 5.0, "limits.trip_a = 5"),
         (|s| s.injection.amplitude_v = -1.0, "injection.amplitude_v = -1: allowed is 0 to 150"),
         (|s| s.sequence.i_d = 9.0, "sequence.i_d = 9"),
+        (
+            |s| s.injection.synchronous.allowed_loss = 2.0,
+            "injection.allowed_loss = 2: allowed is 0.3 to 0.9",
+        ),
+        (|s| s.injection.synchronous.loss_s = f32::NAN, "injection.loss_s = NaN"),
+        (
+            |s| {
+                *s = sensorless();
+                s.sequence.magnetise_s = 0.1;
+            },
+            "sequence.magnetise_s = 0.1: allowed is 0.5 to 60",
+        ),
         (|s| s.inverter.dead_time_s = 1e-3, "inverter.dead_time_s = 0.001"),
         (
             |s| {

@@ -1,6 +1,6 @@
 //! The range of every setting.
 
-use super::{PERIOD_S, Settings, SettingsError};
+use super::{AngleSource, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::demodulator::{LONGEST, SHORTEST};
 
 /// Not inlined: it is called forty times, and never in a hurry.
@@ -43,7 +43,12 @@ impl Settings {
         check("scales.encoder_counts", s.encoder_counts as f32, 16.0, 1e7)?;
 
         let inj = &self.injection;
-        check("injection.amplitude_v", inj.amplitude_v, 0.0, 150.0)?;
+        // Without a carrier there is nothing to watch the lock by.
+        let watched = self.angle_source == AngleSource::Injection
+            && inj.demodulator == Tracking::Synchronous
+            && inj.synchronous.monitor;
+        let least = if watched { 1.0 } else { 0.0 };
+        check("injection.amplitude_v", inj.amplitude_v, least, 150.0)?;
         let t = &inj.printed;
         check("injection.reference_a", t.reference_a, -1.0, 1.0)?;
         check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0)?;
@@ -78,8 +83,7 @@ impl Settings {
         check("sequence.precharge_s", q.precharge_s, 0.0, 10.0)?;
         // The lock monitor takes its baseline while the flux is built up; the saliency check leaves it
         // another time to do so.
-        let synchronous = &inj.synchronous;
-        let needs_baseline = synchronous.monitor && !synchronous.check;
+        let needs_baseline = watched && !inj.synchronous.check;
         check("sequence.magnetise_s", q.magnetise_s, if needs_baseline { 0.5 } else { 0.0 }, 60.0)?;
         check("sequence.i_d", q.i_d, 0.01, l.current_a)?;
         check("sequence.stop_a_per_s", q.stop_a_per_s, 0.1, 1e5)?;

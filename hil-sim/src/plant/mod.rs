@@ -271,7 +271,7 @@ impl Plant {
     pub fn turn_rotor_flux(&mut self, angle: f64) {
         let turn = Complex::new(angle.cos(), angle.sin());
         let electrical = &mut self.motor.state.electrical;
-        electrical.psi = electrical.psi * turn;
+        electrical.psi *= turn;
     }
 
     /// Makes a current channel faulty, or sound again.
