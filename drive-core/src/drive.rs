@@ -54,6 +54,8 @@ pub struct Drive {
 struct References {
     current: Dq,
     turns: f32,
+    /// Added to the voltage of the current loop, V.
+    test_voltage: Dq,
     /// Injection axis seen from the flux, as an angle and a unit vector.
     injection_turn: Angle,
     injection_axis: UnitVector,
@@ -64,6 +66,7 @@ impl Default for References {
         Self {
             current: Dq::ZERO,
             turns: 0.0,
+            test_voltage: Dq::ZERO,
             injection_turn: Angle::QUARTER,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
         }
@@ -239,7 +242,8 @@ impl Drive {
 
         // Current loop.
         let current = filtered.to_dq(seen);
-        let voltage = c.current_loop.step(&mut s.current_loop, reference - current);
+        let voltage =
+            c.current_loop.step(&mut s.current_loop, reference - current) + r.test_voltage;
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
         let axis = applied.turned_by(r.injection_axis);

@@ -15,9 +15,11 @@ mod injection_map;
 mod learn_reference;
 mod modulation;
 mod monte_carlo;
+mod motor_tests;
 mod online_tracking;
 mod orientation;
 mod pi_design;
+mod plant_identification;
 mod position;
 mod reversal;
 mod saliency_check;
@@ -61,6 +63,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     filters::EXPERIMENT,
     adc_calibration::EXPERIMENT,
     pi_design::EXPERIMENT,
+    plant_identification::EXPERIMENT,
     current_step::EXPERIMENT,
     anti_windup::EXPERIMENT,
     dead_time::EXPERIMENT,
@@ -79,6 +82,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_recursive::EXPERIMENT,
     identify_validate::EXPERIMENT,
     identify_machine::EXPERIMENT,
+    motor_tests::EXPERIMENT,
     online_tracking::EXPERIMENT,
 ];
 
