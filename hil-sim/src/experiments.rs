@@ -89,6 +89,15 @@ pub const EXPERIMENTS: &[Experiment] = &[
 /// What runs when nothing is asked for.
 pub const DEFAULT: &str = "torque-steps";
 
+/// What a name on the command line stands for: an experiment, or a group of them, all whose names begin
+/// with it and a hyphen, as `identify`. A name of nothing stands for itself.
+pub fn named(name: &str) -> Vec<&str> {
+    let known = || EXPERIMENTS.iter().map(|experiment| experiment.name);
+    let begins = format!("{name}-");
+    let group: Vec<&str> = known().filter(|known| known.starts_with(&begins)).collect();
+    if group.len() < 2 || known().any(|known| known == name) { vec![name] } else { group }
+}
+
 /// The experiment with this name.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
@@ -102,6 +111,13 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_group_is_all_that_begin_alike() {
+        assert!(named("identify").len() == 5 && named("identify").contains(&"identify-validate"));
+        assert_eq!(named("motor-tests"), ["motor-tests"]);
+        assert_eq!(named("nonsense"), ["nonsense"]);
+    }
 
     #[test]
     fn names_are_unique_and_found() {
