@@ -58,6 +58,8 @@ struct References {
     speed: f32,
     /// Mechanical turns.
     turns: f32,
+    /// Added to the voltage of the current loop, V.
+    test_voltage: Dq,
     /// Injection axis seen from the flux.
     injection_axis: UnitVector,
 }
@@ -68,6 +70,7 @@ impl Default for References {
             current: Dq::ZERO,
             speed: 0.0,
             turns: 0.0,
+            test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
         }
     }
@@ -252,7 +255,8 @@ impl Drive {
 
         // Current loop.
         let current = filtered.to_dq(seen);
-        let voltage = c.current_loop.step(&mut s.current_loop, reference - current);
+        let voltage =
+            c.current_loop.step(&mut s.current_loop, reference - current) + r.test_voltage;
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
         let axis = applied.turned_by(r.injection_axis);

@@ -124,6 +124,9 @@ pub enum Command<'a> {
     /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
     /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
     TurnInjection(f32),
+    /// A voltage in the flux frame, V, added to that of the current loop from the next period on: to
+    /// identify the plant of the loop. Up to 60 V a component; a start takes it back.
+    TestVoltage(crate::Dq),
     /// Rotor time constant, s, as [`online`](crate::online) finds it: what the slip is computed with.
     /// Only with [`track_rotor`](crate::Settings::track_rotor); within
     /// [`LIMITS`](crate::online::LIMITS), and approached by no more than 2 % with each command.

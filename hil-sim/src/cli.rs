@@ -79,7 +79,9 @@ pub fn main() -> ExitCode {
         None => run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, None, false),
         Some(Command::List) => say(&list()),
         Some(Command::Keys) => say(&report::table(&keys())),
-        Some(Command::Run { name, input, out, json }) => run(&name, &input, out, json),
+        Some(Command::Run { name, input, out, json }) => experiments::named(&name)
+            .into_iter()
+            .try_for_each(|name| run(name, &input, out.clone(), json)),
         Some(Command::Report { input, out }) => full_report(&input, &out),
     };
     match result {

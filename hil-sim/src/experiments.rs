@@ -18,10 +18,12 @@ mod learn_reference;
 mod lock_monitor;
 mod modulation;
 mod monte_carlo;
+mod motor_tests;
 mod online_tracking;
 mod orientation;
 mod perturbation;
 mod pi_design;
+mod plant_identification;
 mod position;
 mod reversal;
 mod saliency_check;
@@ -68,6 +70,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     filters::EXPERIMENT,
     adc_calibration::EXPERIMENT,
     pi_design::EXPERIMENT,
+    plant_identification::EXPERIMENT,
     current_step::EXPERIMENT,
     anti_windup::EXPERIMENT,
     dead_time::EXPERIMENT,
@@ -93,11 +96,21 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_recursive::EXPERIMENT,
     identify_validate::EXPERIMENT,
     identify_machine::EXPERIMENT,
+    motor_tests::EXPERIMENT,
     online_tracking::EXPERIMENT,
 ];
 
 /// What runs when nothing is asked for.
 pub const DEFAULT: &str = "torque-steps";
+
+/// What a name on the command line stands for: an experiment, or a group of them, all whose names begin
+/// with it and a hyphen, as `identify`. A name of nothing stands for itself.
+pub fn named(name: &str) -> Vec<&str> {
+    let known = || EXPERIMENTS.iter().map(|experiment| experiment.name);
+    let begins = format!("{name}-");
+    let group: Vec<&str> = known().filter(|known| known.starts_with(&begins)).collect();
+    if group.len() < 2 || known().any(|known| known == name) { vec![name] } else { group }
+}
 
 /// The experiment with this name.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
@@ -112,6 +125,13 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_group_is_all_that_begin_alike() {
+        assert!(named("identify").len() == 5 && named("identify").contains(&"identify-validate"));
+        assert_eq!(named("motor-tests"), ["motor-tests"]);
+        assert_eq!(named("nonsense"), ["nonsense"]);
+    }
 
     #[test]
     fn names_are_unique_and_found() {

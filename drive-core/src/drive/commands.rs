@@ -10,6 +10,9 @@ use crate::sensing::SensingState;
 use crate::settings::AngleSource;
 use crate::state::State;
 
+/// Largest test voltage of an axis, V: a step of it moves the current by 0.2 A a period.
+const LARGEST_TEST_V: f32 = 60.0;
+
 impl Drive {
     /// Takes a command; not from within [`step`](Self::step), but between two steps.
     ///
@@ -75,6 +78,15 @@ impl Drive {
                 }
                 let turn = self.c.injection_turn + Angle::from_degrees(degrees);
                 self.references.injection_axis = turn.unit_vector();
+                Ok(Taken::AsGiven)
+            }
+            Command::TestVoltage(voltage) => {
+                self.takes_references(self.mode, voltage.d + voltage.q)?;
+                let inside = |x: f32| (-LARGEST_TEST_V..=LARGEST_TEST_V).contains(&x);
+                if !(inside(voltage.d) && inside(voltage.q)) {
+                    return Err(Refused::OutOfRange { min: -LARGEST_TEST_V, max: LARGEST_TEST_V });
+                }
+                self.references.test_voltage = voltage;
                 Ok(Taken::AsGiven)
             }
             Command::RotorTimeConstant(tau_r) => {

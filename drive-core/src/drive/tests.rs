@@ -401,6 +401,21 @@ fn commands_are_taken_limited_or_refused() {
 }
 
 #[test]
+fn a_test_voltage_is_put_out_bounded_and_taken_back() {
+    let (mut d, _) = running();
+    let volts = Dq::new(20.0, -10.0);
+    assert_eq!(d.command(Command::TestVoltage(volts)), Ok(Taken::AsGiven));
+    assert_eq!(d.references.test_voltage, volts);
+    let refused = d.command(Command::TestVoltage(Dq::new(0.0, 61.0)));
+    assert_eq!(refused, Err(Refused::OutOfRange { min: -60.0, max: 60.0 }));
+    let refused = d.command(Command::TestVoltage(Dq::new(f32::NAN, 0.0)));
+    assert_eq!(refused, Err(Refused::NotFinite));
+    assert_eq!(d.references.test_voltage, volts, "refused commands change nothing");
+    d.command(Command::Stop).unwrap();
+    assert!(matches!(d.command(Command::TestVoltage(volts)), Err(Refused::State(_))));
+}
+
+#[test]
 fn settings_out_of_range_are_refused_by_name() {
     type Change = fn(&mut Settings);
     let cases: [(Change, &str); 12] = [

