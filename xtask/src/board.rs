@@ -18,7 +18,7 @@ const TABLE: &str = "hil-sim/virtual-board/cycles.txt";
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     Step::new("the image on the virtual board")
-        .run(on_the_board(["test", "--package", "virtual-board"]).env(ELF, elf))
+        .run(on_the_board(["test", "--release", "--package", "virtual-board"]).env(ELF, elf))
 }
 
 /// Prints what the control interrupt of this image costs; fails if it costs over 5 % more than the table
@@ -26,7 +26,7 @@ pub fn test(elf: &Path) -> Result<()> {
 pub fn cycles(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     Step::new("cycles of the control interrupt").run(
-        on_the_board(["run", "--package", "virtual-board"])
+        on_the_board(["run", "--release", "--package", "virtual-board"])
             .args(["--", "cycles"])
             .arg(elf)
             .args(["--against", TABLE]),

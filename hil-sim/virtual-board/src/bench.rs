@@ -127,6 +127,9 @@ pub struct Worst {
     pub blocks: Vec<Block>,
 }
 
+/// Periods after which the log is fetched, before its buffer in RAM is full.
+const PERIODS_PER_LOG: u32 = 100;
+
 /// A change of what the converters see.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
@@ -136,6 +139,7 @@ pub struct Board {
     image: Image,
     log: Log,
     lines: Vec<String>,
+    since_log: u32,
     /// The motor with everything around it.
     pub plant: Plant,
     gates: GateLimits,
@@ -185,6 +189,7 @@ impl Board {
             image,
             log,
             lines: Vec::new(),
+            since_log: 0,
             plant,
             gates: options.gates,
             plant_at: 0,
@@ -322,6 +327,11 @@ impl Board {
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(2 * u64::from(numbers::PWM_TOP))?;
+            self.since_log += 1;
+            if self.since_log >= PERIODS_PER_LOG {
+                self.since_log = 0;
+                self.drain_log()?;
+            }
         }
         Ok(())
     }

@@ -275,9 +275,7 @@ impl Chip {
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 => Some(0),
-            _ if address >= 0xe000_e400 && address < 0xe000_e4f0 => {
-                self.scs.read(address, self.now)
-            }
+            _ if (0xe000_e400..0xe000_e4f0).contains(&address) => self.scs.read(address, self.now),
             _ => self.read_word(address),
         }
     }

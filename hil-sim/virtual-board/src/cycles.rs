@@ -173,7 +173,7 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
     let find = |blocks: &[(&'static str, &[&str])]| {
         frames.iter().rev().find_map(|frame| {
             let fits = |part: &&str| frame.function.contains(*part);
-            blocks.iter().find(|(_, parts)| parts.iter().any(|part| fits(&part))).map(|b| b.0)
+            blocks.iter().find(|(_, parts)| parts.iter().any(fits)).map(|b| b.0)
         })
     };
     let block = find(named).or_else(|| find(sequence)).unwrap_or(REST);

@@ -58,9 +58,11 @@ impl Log {
 
     fn decode(&mut self) -> Result<Vec<String>> {
         let mut lines = Vec::new();
+        // A frame ends with a zero; the rest is the beginning of one that is still being written.
+        let whole = self.bytes.iter().rposition(|byte| *byte == 0).map_or(0, |end| end + 1);
         let mut decoder = self.table.new_stream_decoder();
-        decoder.received(&self.bytes);
-        self.bytes.clear();
+        decoder.received(&self.bytes[..whole]);
+        self.bytes.drain(..whole);
         loop {
             match decoder.decode() {
                 Ok(frame) => lines.push(frame.display(false).to_string()),

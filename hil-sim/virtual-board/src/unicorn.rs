@@ -246,7 +246,6 @@ impl Cpu for UnicornCpu {
         if float {
             let values: [u64; 9] =
                 std::array::from_fn(|k| word(0x20 + 8 * k) | word(0x24 + 8 * k) << 32);
-            let values = values.map(|v| v);
             self.uc.reg_write_batch(&FLOAT, &values, 9).ok();
         }
         let control = self.control() & !FPCA | if float { FPCA } else { 0 };

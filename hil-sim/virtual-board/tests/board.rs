@@ -11,6 +11,9 @@ use virtual_board::{Board, Counting, Image, Options};
 /// Periods that the firmware needs from reset to its greeting, at most.
 const START: u64 = 15_000;
 
+/// Periods between two reports of the control to the console.
+const REPORT: u64 = 601;
+
 fn started(seed: u64) -> Result<Board> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), seed))?;
     board.run_periods(START)?;
@@ -67,7 +70,10 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.run(2, |_, _| {})?;
     assert_eq!(pair.shadow.drive.state(), State::Fault(drive_core::Fault::Break));
-    assert!(pair.say("faults")?.contains("20"));
+    // The console hears of it with the next report.
+    pair.run(REPORT, |_, _| {})?;
+    let faults = pair.say("faults")?;
+    assert!(faults.contains("20"), "{faults}");
     Ok(())
 }
 
@@ -98,8 +104,10 @@ fn every_instruction_can_be_interrupted() -> Result<()> {
     options.counting = Counting { cycles: true, every_instruction: true };
     let mut pair = virtual_board::Pair::new(Image::built()?, options)?;
     pair.order("start torque")?;
+    pair.run(REPORT, |_, _| {})?;
     for _ in 0..100 {
-        assert!(pair.say("status")?.contains(" A, "));
+        let status = pair.say("status")?;
+        assert!(status.contains(" A, "), "{status}");
     }
     Ok(())
 }

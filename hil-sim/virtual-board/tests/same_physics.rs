@@ -1,6 +1,6 @@
 //! The ELF on the board does with the motor what the drive on the host does.
 //!
-//! Same plant, same settings, same steps. The seeds are the same too, but the noise is not: the board
+//! Same plant, same settings, same steps. The seeds are the same too, but not the noise: the board
 //! has drawn from it while it started, and an order comes some periods later.
 
 mod common;
@@ -102,8 +102,8 @@ fn torque_steps() -> Result<()> {
     for (n, (board, host)) in
         board.chunks(LEVEL as usize).zip(host.chunks(LEVEL as usize)).enumerate()
     {
-        // The second half: settled. Over so many periods the noise moves the means by a hundredth of a
-        // degree and a fraction of a milliampere; the tolerances are ten times that.
+        // The second half: settled. What is left between the two is where in the run the quantised
+        // samples fall: seen are 0.8 % of the torque, 0.16 degrees, 6 % of the rms values.
         let (b, h) = (&board[board.len() / 2..], &host[host.len() / 2..]);
         let torque = [mean(b, |p| p.torque).mean(), mean(h, |p| p.torque).mean()];
         let error = [mean(b, |p| p.error_deg), mean(h, |p| p.error_deg)];

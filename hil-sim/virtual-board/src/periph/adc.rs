@@ -77,7 +77,7 @@ impl Default for One {
 pub type Inputs = [u16; 19];
 
 /// Both converters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Adc {
     converters: [One; 2],
     common: u32,
@@ -85,17 +85,6 @@ pub struct Adc {
     pub inputs: [Inputs; 2],
     /// Triggers to be lost, for each converter.
     pub lose_triggers: [u32; 2],
-}
-
-impl Default for Adc {
-    fn default() -> Self {
-        Self {
-            converters: Default::default(),
-            common: 0,
-            inputs: [[0; 19]; 2],
-            lose_triggers: [0; 2],
-        }
-    }
 }
 
 impl Adc {

@@ -136,7 +136,7 @@ impl Flash {
             return Some(Effect::None);
         }
         match self.half.take() {
-            None if address % 8 == 0 => self.half = Some((address, value)),
+            None if address.is_multiple_of(8) => self.half = Some((address, value)),
             Some((at, low)) if address == at + 4 => self.program(at, low, value, now),
             _ => self.status |= PGSERR | SIZERR,
         }
