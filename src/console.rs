@@ -12,7 +12,7 @@ use core::fmt::{self, Write};
 
 use drive_core::decimal::{Fixed, Shortest};
 use drive_core::settings::{PERIOD_S, SettingsError};
-use drive_core::{Coefficients, Refused, State, Taken};
+use drive_core::{Coefficients, Mode, Refused, State, Taken};
 
 use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
@@ -109,6 +109,8 @@ pub struct Console {
     began_ms: Option<u32>,
     /// When a line was last understood.
     heard_ms: u32,
+    /// The wiring is being checked; the periods of the status when that began.
+    checking: Option<u32>,
 }
 
 /// Most bytes that are read at one go: a flood must not keep the main loop.
@@ -117,7 +119,15 @@ const BYTES_AT_ONCE: usize = 64;
 impl Console {
     /// A console over settings that the drive has.
     pub const fn new(settings: Everything) -> Self {
-        Self { settings, lines: Lines::new(), out: None, list: None, began_ms: None, heard_ms: 0 }
+        Self {
+            settings,
+            lines: Lines::new(),
+            out: None,
+            list: None,
+            began_ms: None,
+            heard_ms: 0,
+            checking: None,
+        }
     }
 
     /// Says who this is and what ended the last run.
@@ -133,6 +143,7 @@ impl Console {
     /// Reads what came and writes what is due; never waits. `now_ms` wraps.
     pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl Machine, now_ms: u32) {
         self.watch_silence(machine, now_ms);
+        self.watch_wiring(machine);
         if port.take_damage() {
             self.lines.spoil(Garbled::Lost);
         }
@@ -187,6 +198,35 @@ impl Console {
         }
     }
 
+    /// A drive that has got past the check of the wiring need not check it again.
+    fn watch_wiring(&mut self, machine: &impl Machine) {
+        let (Some(began), Some(status)) = (self.checking, machine.status()) else { return };
+        let past = matches!(
+            status.state,
+            State::Magnetising | State::Torque | State::Speed | State::Position
+        );
+        // Not what it did before.
+        if past && status.periods != began {
+            self.settings.command.wiring_checked = true;
+            self.checking = None;
+        }
+    }
+
+    /// Starts; the first time since the defaults were set with a check of the wiring.
+    fn start(&mut self, mode: Mode, machine: &mut impl Machine) {
+        if self.settings.command.wiring_checked {
+            return self.give(Order::Start(mode), machine);
+        }
+        let began = machine.status().map(|status| status.periods);
+        match machine.order(Order::CheckWiring).and_then(|_| machine.order(Order::Start(mode))) {
+            Ok(_) => {
+                self.checking = began;
+                self.reply(|text| text.write_str("ok: the wiring is checked first"));
+            }
+            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+        }
+    }
+
     fn take(&mut self, byte: u8, machine: &mut impl Machine, now_ms: u32) {
         let request = match self.lines.push(byte) {
             None => return,
@@ -225,7 +265,7 @@ impl Console {
                 }
                 None => self.reply(|text| write!(text, "error: {}", NotDone::NoAnswer)),
             },
-            Request::Start(mode) => self.give(Order::Start(mode), machine),
+            Request::Start(mode) => self.start(mode, machine),
             Request::Stop => self.give(Order::Stop, machine),
             Request::Torque(i_q) => self.give(Order::Torque(i_q), machine),
             Request::Position(turns) => self.give(Order::Position(turns), machine),

@@ -53,6 +53,11 @@ faults! {
     ConverterOverrun = 23, "a conversion was lost";
     ClockFailure = 24, "the clock failed";
     NoSaliency = 25, "the motor shows too little saliency for the injection";
+    WiringNoCurrent = 30, "wiring check: a sensor sees no current, it or a phase is open";
+    WiringPolarityA = 31, "wiring check: current sensor a is the wrong way round";
+    WiringPolarityB = 32, "wiring check: current sensor b is the wrong way round";
+    WiringExchanged = 33, "wiring check: current sensors or gates are on the wrong phases";
+    WiringCurrent = 34, "wiring check: more current than the motor's settings explain";
 }
 
 impl Fault {
@@ -106,6 +111,11 @@ mod tests {
             (23, Fault::ConverterOverrun),
             (24, Fault::ClockFailure),
             (25, Fault::NoSaliency),
+            (30, Fault::WiringNoCurrent),
+            (31, Fault::WiringPolarityA),
+            (32, Fault::WiringPolarityB),
+            (33, Fault::WiringExchanged),
+            (34, Fault::WiringCurrent),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

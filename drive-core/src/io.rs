@@ -105,6 +105,8 @@ pub enum Command<'a> {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, then regulate as `Mode`
     /// says.
     Start(Mode),
+    /// From off: the next start checks the wiring first; see [`crate::wiring_check`].
+    CheckWiring,
     /// Take the torque to zero, then switch off.
     Stop,
     /// Forget the latched fault and be off.

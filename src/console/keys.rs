@@ -24,6 +24,8 @@ pub struct Everything {
 pub struct Commands {
     /// The drive is stopped when no line was understood for so long, s; 0 for never.
     pub timeout_s: f32,
+    /// Whether a start has checked the wiring since the defaults were set.
+    pub wiring_checked: bool,
 }
 
 /// Longest time-out of commands, s.
@@ -197,7 +199,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 44] = [
+pub static KEYS: [Key; 45] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -252,6 +254,7 @@ pub static KEYS: [Key; 44] = [
     number!("sequence.stop_a_per_s", "A/s", drive.sequence.stop_a_per_s),
     number!("position.i_q_limit_a", "A", drive.position.i_q_limit_a),
     number!("command.timeout_s", "s", command.timeout_s),
+    word!("wiring_checked", |s| s.command.wiring_checked, "no" = false => false, "yes" = true => true),
 ];
 
 /// The setting with this [number](Key::id).

@@ -39,7 +39,7 @@ impl Machine for Desk {
     }
     fn status(&self) -> Option<Status> {
         self.running.then(|| Status {
-            periods: 1,
+            periods: self.orders.len() as u32,
             state: self.drive.state(),
             sample: Sample::default(),
             telemetry: *self.drive.telemetry(),
@@ -118,8 +118,10 @@ struct Talk {
 
 impl Talk {
     fn new() -> Self {
+        let mut settings = Everything::of_the_board();
+        settings.command.wiring_checked = true;
         Self {
-            console: Console::new(Everything::of_the_board()),
+            console: Console::new(settings),
             desk: Desk::new(),
             wire: Wire { room: usize::MAX, ..Wire::default() },
             now_ms: 0,
@@ -186,6 +188,53 @@ fn a_session() {
     assert_eq!(talk.ask("faults"), "none latched; last run: power-on");
     assert_eq!(talk.ask("defaults"), "ok");
     assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
+}
+
+#[test]
+fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("defaults"), "ok");
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    assert_eq!(talk.desk.orders[1..], [Order::CheckWiring, Order::Start(Mode::Torque)]);
+    assert_eq!(talk.ask("stop"), "ok");
+    // It was not got past: it is checked again.
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    // No current in it: a motor that is not there.
+    let sample = Sample { current_a: 1838, current_b: 1832, dc_link: 2827, ..Sample::default() };
+    while !matches!(talk.desk.drive.state(), State::Fault(_)) {
+        talk.desk.drive.step(&sample);
+    }
+    assert_eq!(talk.desk.drive.state(), State::Fault(Fault::WiringNoCurrent));
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
+    // Without the check, past it.
+    assert_eq!(talk.ask("clear"), "ok");
+    assert_eq!(talk.ask("set wiring_checked yes"), "ok");
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
+fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
+    let mut settings = Everything::of_the_board();
+    // The simulated converter is calibrated for its own reference.
+    settings.drive.scales = drive_core::settings::Scales::default();
+    let mut talk = Talk::new();
+    talk.console = Console::new(settings);
+    talk.desk.drive = Drive::new(settings.build().unwrap());
+    let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    let mut pending = drive_core::Compare::OFF;
+    while talk.desk.drive.state() != State::Magnetising {
+        assert!(talk.desk.drive.state() != State::Off, "{}", talk.desk.drive.state());
+        let compare = talk.desk.drive.step(&plant.sample());
+        pending.enabled &= compare.enabled;
+        plant.advance(&pending, f64::from(PERIOD_S));
+        pending = compare;
+    }
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = yes (one of: no yes)");
+    talk.ask("stop");
+    talk.desk.drive = Drive::new(settings.build().unwrap());
+    assert_eq!(talk.ask("start"), "ok");
 }
 
 #[test]

@@ -19,10 +19,20 @@ impl Drive {
     pub fn command(&mut self, command: Command) -> Result<Taken, Refused> {
         match command {
             Command::Start(mode) => self.start(mode),
+            Command::CheckWiring => match self.state {
+                State::Off => {
+                    self.wiring_unchecked = true;
+                    Ok(Taken::AsGiven)
+                }
+                State::Fault(fault) => Err(Refused::Fault(fault)),
+                state => Err(Refused::State(state)),
+            },
             Command::Stop => {
                 match self.state {
                     State::Off | State::Fault(_) | State::Stopping => {}
-                    State::Calibrating | State::Precharge => self.enter(State::Off),
+                    State::Calibrating | State::Precharge | State::CheckingWiring => {
+                        self.enter(State::Off);
+                    }
                     _ => self.enter(State::Stopping),
                 }
                 Ok(Taken::AsGiven)

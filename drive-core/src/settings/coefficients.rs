@@ -15,6 +15,7 @@ use crate::schedule::Schedule;
 use crate::sensing::Sensing;
 use crate::tracker::{Pll, Tracker};
 use crate::tuning::{self, CurrentLoopDesign};
+use crate::wiring_check::WiringCheck;
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
@@ -34,6 +35,7 @@ pub struct Coefficients {
     pub(crate) estimator: Estimator,
     /// The check of a sensorless start, if it is wanted.
     pub(crate) saliency_check: Option<SaliencyCheck>,
+    pub(crate) wiring: WiringCheck,
     pub(crate) current_loop: DqPi,
     pub(crate) reference_filter: [ReferenceFilter; 2],
     /// Delay of the measured current beside the filter, samples.
@@ -165,6 +167,7 @@ impl Settings {
             demodulate: injecting,
             injection: Injection::new(inj.amplitude_v, motor_plant, current_lag),
             saliency_check: self.saliency_check(),
+            wiring: WiringCheck::new(m.sigma_l_s(), PERIOD_S),
             estimator: self.estimator(lag_share, turns_per_step(self.limits.speed_rpm)),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
