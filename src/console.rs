@@ -17,7 +17,7 @@ use drive_core::{Coefficients, Mode, Refused, State, Taken};
 use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
 use crate::saved::Failed;
-use crate::trace;
+use crate::trace::{self, Choice};
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
 use line::{Garbled, Lines, Text};
@@ -65,7 +65,7 @@ pub trait Machine {
     /// Why not.
     fn save(&mut self, settings: &Everything) -> Result<(), Failed>;
     /// Starts a trace, if none is being recorded; says whether it did.
-    fn begin_trace(&mut self, records: u16, divider: u16) -> bool;
+    fn begin_trace(&mut self, records: u16, divider: u16, choice: &Choice) -> bool;
     /// Whether a trace is being recorded.
     fn tracing(&self) -> bool;
     /// A record of the last trace.
@@ -111,6 +111,8 @@ pub struct Console {
     heard_ms: u32,
     /// The wiring is being checked; the periods of the status when that began.
     checking: Option<u32>,
+    /// What the last trace recorded.
+    traced: Choice,
 }
 
 /// Most bytes that are read at one go: a flood must not keep the main loop.
@@ -127,6 +129,7 @@ impl Console {
             began_ms: None,
             heard_ms: 0,
             checking: None,
+            traced: Choice::NONE,
         }
     }
 
@@ -308,8 +311,9 @@ impl Console {
                     machine.last_run(text)
                 });
             }
-            Request::Trace { records, divider } => {
-                if machine.begin_trace(records, divider) {
+            Request::Trace { records, divider, choice } => {
+                if machine.begin_trace(records, divider, &choice) {
+                    self.traced = choice;
                     self.list = Some(List::Trace(0));
                 } else {
                     self.reply(|text| text.write_str("error: a trace is being recorded"));
@@ -355,7 +359,7 @@ impl Console {
     /// Puts the next line of the list out; `false` if it has to wait for it.
     fn next_of_list(&mut self, machine: &impl Machine) -> bool {
         let Some(list) = self.list else { return false };
-        let settings = self.settings;
+        let (settings, traced) = (self.settings, self.traced);
         match list {
             List::Help(i) => match HELP.get(usize::from(i)) {
                 Some(line) => self.one_of_list(List::Help(i + 1), |text| text.write_str(line)),
@@ -369,12 +373,16 @@ impl Console {
             },
             List::Trace(_) if machine.tracing() => return false,
             List::Trace(0) => {
-                self.one_of_list(List::Trace(1), |text| text.write_str(trace::HEADER));
+                self.one_of_list(List::Trace(1), |text| {
+                    text.write_str("record")?;
+                    traced.names().try_for_each(|name| write!(text, ",{name}"))
+                });
             }
             List::Trace(i) => match machine.traced(i - 1) {
                 Some(record) => self.one_of_list(List::Trace(i + 1), |text| {
-                    write!(text, "{},{}", i - 1, Fixed::<2>(record.phi_degrees()))?;
-                    record.signals.iter().try_for_each(|x| write!(text, ",{}", Fixed::<4>(*x)))
+                    write!(text, "{}", i - 1)?;
+                    let values = record.iter().take(traced.count());
+                    values.copied().try_for_each(|x| write!(text, ",{}", Fixed::<4>(x)))
                 }),
                 None => self.end_list(),
             },

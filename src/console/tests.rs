@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use drive_core::{Drive, Fault, Hardware, Mode, Sample, Telemetry};
+use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
 use super::*;
@@ -62,9 +62,8 @@ impl Machine for Desk {
         self.saved = Some(*settings);
         Ok(())
     }
-    fn begin_trace(&mut self, records: u16, _: u16) -> bool {
-        let record = trace::Record::of(&Telemetry::default());
-        self.trace = vec![record; usize::from(records)];
+    fn begin_trace(&mut self, records: u16, _: u16, _: &Choice) -> bool {
+        self.trace = vec![[0.0; trace::MOST]; usize::from(records)];
         true
     }
     fn tracing(&self) -> bool {
@@ -265,9 +264,11 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let all = talk.say("get\n");
     assert_eq!(all.len(), KEYS.len() + 1);
     let trace = talk.say("trace 3\n");
-    assert_eq!(trace[0], trace::HEADER);
-    assert_eq!(trace[1], "0,0.00,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
+    assert_eq!(trace[0], "record,phi_deg,i_d,i_q,i_q_ref,v_d,v_q,delta_i,turns");
+    assert_eq!(trace[1], "0,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
     assert_eq!(trace.len(), 5);
+    let trace = talk.say("trace 1 5 i_q dc_link\n");
+    assert_eq!(trace, ["record,i_q,dc_link", "0,0.0000,0.0000", "ok"]);
     // Nothing leaves, and meanwhile a line comes.
     talk.wire.room = 0;
     talk.wire.sent.extend(b"get\n");
