@@ -76,7 +76,7 @@ fn functions(elf: &[u8]) -> Result<Functions> {
             if name.starts_with("$t") || name.starts_with("$d") {
                 marks.insert(address, name.starts_with("$t"));
             } else if symbol.st_type() == STT_FUNC && symbol.st_size(endian) > 0 {
-                let function = functions.entry(address).or_insert_with(Function::default);
+                let function = functions.entry(address).or_default();
                 function.end = address + symbol.st_size(endian);
                 // Of several names for one address, one that is asked for.
                 if function.name.is_empty() || is_entry(&name) {
