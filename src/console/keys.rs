@@ -64,7 +64,10 @@ impl Everything {
     }
 
     /// What the firmware asks of settings beside the drive.
-    fn check(&self) -> Result<(), SettingsError> {
+    ///
+    /// # Errors
+    /// The first value outside its range.
+    pub fn check(&self) -> Result<(), SettingsError> {
         let (shortest, longest) = crate::board::DEAD_TIME_RANGE_S;
         for (name, value, min, max) in [
             ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
