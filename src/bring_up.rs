@@ -78,8 +78,8 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
-    let Start { saved, settings, coefficients, not_used } = load(Pages::new(chip.FLASH));
-    let (dead_time_code, dead_time_s) = board::dead_time(settings.drive.inverter.dead_time_s);
+    let mut start = load(Pages::new(chip.FLASH));
+    let (dead_time_code, dead_time_s) = board::dead_time(start.settings.drive.inverter.dead_time_s);
 
     let a = chip.GPIOA.split(&mut rcc);
     let b = chip.GPIOB.split(&mut rcc);
@@ -99,12 +99,13 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     let ends = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, adc_pins, &mut rcc)
         .map_err(NotStarted::Converter)
-        .and_then(|adc| start_control(coefficients, pwm, adc, encoder, resets));
+        .and_then(|adc| start_control(start.build(dead_time_s), pwm, adc, encoder, resets));
     if let Err(error) = &ends {
         defmt::error!("the drive is not started, outputs stay off: {}", error);
     }
     // Only over a control that runs: without it the outputs stay off.
     let watchdog = ends.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
+    let Start { saved, settings, not_used } = start;
     let chip = Chip { cause, record, options, dual_bank, saved, not_used, dead_time_s };
     Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip) }
 }
@@ -113,7 +114,6 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
 struct Start {
     saved: Saved<Pages>,
     settings: Everything,
-    coefficients: Result<Coefficients, SettingsError>,
     /// Why what was saved is not used, if it is not.
     not_used: Option<NotUsed>,
 }
@@ -127,15 +127,26 @@ fn load(pages: Pages) -> Start {
         Loaded::NotUsed(why) => (defaults, Some(why)),
         Loaded::Nothing => (defaults, None),
     };
-    let mut coefficients = settings.build();
-    if coefficients.is_err() {
+    // What the power stage needs to know first; the rest takes longer to check.
+    if settings.check().is_err() {
         (settings, not_used) = (defaults, Some(NotUsed::Refused));
-        coefficients = settings.build();
     }
-    if let Some(why) = not_used {
-        defmt::error!("{}", defmt::Display2Format(&why));
+    Start { saved, settings, not_used }
+}
+
+impl Start {
+    /// Runs the design rules, which takes a while, for the dead time that the timer makes, s. If they do
+    /// not take what was saved, the defaults hold.
+    fn build(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
+        let built = self.settings.build_for(dead_time_s).or_else(|_| {
+            (self.settings, self.not_used) = (Everything::of_the_board(), Some(NotUsed::Refused));
+            self.settings.build_for(dead_time_s)
+        });
+        if let Some(why) = self.not_used {
+            defmt::error!("{}", defmt::Display2Format(&why));
+        }
+        built
     }
-    Start { saved, settings, coefficients, not_used }
 }
 
 /// What reset the chip, what the firmware wrote before, and how many in a row ended so that nobody

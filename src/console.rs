@@ -12,12 +12,12 @@ use core::fmt::{self, Write};
 
 use drive_core::decimal::{Fixed, Shortest};
 use drive_core::settings::{PERIOD_S, SettingsError};
-use drive_core::{Coefficients, Refused, State, Taken};
+use drive_core::{Coefficients, Mode, Refused, State, Taken};
 
 use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
 use crate::saved::Failed;
-use crate::trace;
+use crate::trace::{self, Choice};
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
 use line::{Garbled, Lines, Text};
@@ -65,7 +65,7 @@ pub trait Machine {
     /// Why not.
     fn save(&mut self, settings: &Everything) -> Result<(), Failed>;
     /// Starts a trace, if none is being recorded; says whether it did.
-    fn begin_trace(&mut self, records: u16, divider: u16) -> bool;
+    fn begin_trace(&mut self, records: u16, divider: u16, choice: &Choice) -> bool;
     /// Whether a trace is being recorded.
     fn tracing(&self) -> bool;
     /// A record of the last trace.
@@ -109,6 +109,10 @@ pub struct Console {
     began_ms: Option<u32>,
     /// When a line was last understood.
     heard_ms: u32,
+    /// The wiring is being checked; the periods of the status when that began.
+    checking: Option<u32>,
+    /// What the last trace recorded.
+    traced: Choice,
 }
 
 /// Most bytes that are read at one go: a flood must not keep the main loop.
@@ -117,7 +121,16 @@ const BYTES_AT_ONCE: usize = 64;
 impl Console {
     /// A console over settings that the drive has.
     pub const fn new(settings: Everything) -> Self {
-        Self { settings, lines: Lines::new(), out: None, list: None, began_ms: None, heard_ms: 0 }
+        Self {
+            settings,
+            lines: Lines::new(),
+            out: None,
+            list: None,
+            began_ms: None,
+            heard_ms: 0,
+            checking: None,
+            traced: Choice::NONE,
+        }
     }
 
     /// Says who this is and what ended the last run.
@@ -133,6 +146,7 @@ impl Console {
     /// Reads what came and writes what is due; never waits. `now_ms` wraps.
     pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl Machine, now_ms: u32) {
         self.watch_silence(machine, now_ms);
+        self.watch_wiring(machine);
         if port.take_damage() {
             self.lines.spoil(Garbled::Lost);
         }
@@ -187,6 +201,35 @@ impl Console {
         }
     }
 
+    /// A drive that has got past the check of the wiring need not check it again.
+    fn watch_wiring(&mut self, machine: &impl Machine) {
+        let (Some(began), Some(status)) = (self.checking, machine.status()) else { return };
+        let past = matches!(
+            status.state,
+            State::Magnetising | State::Torque | State::Speed | State::Position
+        );
+        // Not what it did before.
+        if past && status.periods != began {
+            self.settings.command.wiring_checked = true;
+            self.checking = None;
+        }
+    }
+
+    /// Starts; the first time since the defaults were set with a check of the wiring.
+    fn start(&mut self, mode: Mode, machine: &mut impl Machine) {
+        if self.settings.command.wiring_checked {
+            return self.give(Order::Start(mode), machine);
+        }
+        let began = machine.status().map(|status| status.periods);
+        match machine.order(Order::CheckWiring).and_then(|_| machine.order(Order::Start(mode))) {
+            Ok(_) => {
+                self.checking = began;
+                self.reply(|text| text.write_str("ok: the wiring is checked first"));
+            }
+            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+        }
+    }
+
     fn take(&mut self, byte: u8, machine: &mut impl Machine, now_ms: u32) {
         let request = match self.lines.push(byte) {
             None => return,
@@ -225,7 +268,7 @@ impl Console {
                 }
                 None => self.reply(|text| write!(text, "error: {}", NotDone::NoAnswer)),
             },
-            Request::Start(mode) => self.give(Order::Start(mode), machine),
+            Request::Start(mode) => self.start(mode, machine),
             Request::Stop => self.give(Order::Stop, machine),
             Request::Torque(i_q) => self.give(Order::Torque(i_q), machine),
             Request::Speed(rpm) => self.give(Order::Speed(rpm), machine),
@@ -269,8 +312,9 @@ impl Console {
                     machine.last_run(text)
                 });
             }
-            Request::Trace { records, divider } => {
-                if machine.begin_trace(records, divider) {
+            Request::Trace { records, divider, choice } => {
+                if machine.begin_trace(records, divider, &choice) {
+                    self.traced = choice;
                     self.list = Some(List::Trace(0));
                 } else {
                     self.reply(|text| text.write_str("error: a trace is being recorded"));
@@ -316,7 +360,7 @@ impl Console {
     /// Puts the next line of the list out; `false` if it has to wait for it.
     fn next_of_list(&mut self, machine: &impl Machine) -> bool {
         let Some(list) = self.list else { return false };
-        let settings = self.settings;
+        let (settings, traced) = (self.settings, self.traced);
         match list {
             List::Help(i) => match HELP.get(usize::from(i)) {
                 Some(line) => self.one_of_list(List::Help(i + 1), |text| text.write_str(line)),
@@ -330,12 +374,16 @@ impl Console {
             },
             List::Trace(_) if machine.tracing() => return false,
             List::Trace(0) => {
-                self.one_of_list(List::Trace(1), |text| text.write_str(trace::HEADER));
+                self.one_of_list(List::Trace(1), |text| {
+                    text.write_str("record")?;
+                    traced.names().try_for_each(|name| write!(text, ",{name}"))
+                });
             }
             List::Trace(i) => match machine.traced(i - 1) {
                 Some(record) => self.one_of_list(List::Trace(i + 1), |text| {
-                    write!(text, "{},{}", i - 1, Fixed::<2>(record.phi_degrees()))?;
-                    record.signals.iter().try_for_each(|x| write!(text, ",{}", Fixed::<4>(*x)))
+                    write!(text, "{}", i - 1)?;
+                    let values = record.iter().take(traced.count());
+                    values.copied().try_for_each(|x| write!(text, ",{}", Fixed::<4>(x)))
                 }),
                 None => self.end_list(),
             },

@@ -202,8 +202,8 @@ impl Machine for Desk {
         Ok(())
     }
 
-    fn begin_trace(&mut self, records: u16, divider: u16) -> bool {
-        self.ends.as_mut().is_some_and(|ends| ends.trace.begin(records, divider))
+    fn begin_trace(&mut self, records: u16, divider: u16, choice: &trace::Choice) -> bool {
+        self.ends.as_mut().is_some_and(|ends| ends.trace.begin(records, divider, choice))
     }
 
     fn tracing(&self) -> bool {

@@ -2,6 +2,8 @@
 //!
 //! Start reading at `main.rs`.
 #![cfg_attr(not(test), no_std)]
+// They are made in constants, which `Default` cannot be.
+#![allow(clippy::new_without_default)]
 
 pub mod board;
 pub mod console;

@@ -9,6 +9,8 @@ use drive_core::{Coefficients, Command, Hardware, Mode, Refused, Sample, State, 
 pub enum Order {
     /// See [`Command::Start`].
     Start(Mode),
+    /// See [`Command::CheckWiring`].
+    CheckWiring,
     /// See [`Command::Stop`].
     Stop,
     /// See [`Command::Clear`].
@@ -28,6 +30,7 @@ impl Order {
     pub fn command(&self) -> Command<'_> {
         match self {
             Self::Start(mode) => Command::Start(*mode),
+            Self::CheckWiring => Command::CheckWiring,
             Self::Stop => Command::Stop,
             Self::Clear => Command::Clear,
             Self::Torque(i_q) => Command::Torque(*i_q),

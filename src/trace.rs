@@ -8,33 +8,90 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use drive_core::Telemetry;
 
-/// Names of the signals, as the first line of a CSV file.
-pub const HEADER: &str = "record,phi_deg,i_d,i_q,i_q_ref,v_d,v_q,delta_i,turns";
+/// Everything that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
+pub const SIGNALS: [&str; 13] = [
+    "phi_deg",
+    "flux_step",
+    "rotor_step",
+    "i_d_ref",
+    "i_q_ref",
+    "i_d",
+    "i_q",
+    "v_d",
+    "v_q",
+    "delta_i",
+    "saliency",
+    "dc_link",
+    "turns",
+];
 
-/// One record.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
-    /// Electrical angle of the flux, bits of a signed fraction of a turn.
-    pub phi: i32,
-    /// d and q current, reference of the q current, d and q voltage, current difference, position.
-    pub signals: [f32; 7],
+/// Most signals in one record.
+pub const MOST: usize = 8;
+
+/// Which signals are recorded, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// Places among [`SIGNALS`].
+    signals: [u8; MOST],
+    count: usize,
 }
 
-impl Record {
-    const EMPTY: Self = Self { phi: 0, signals: [0.0; 7] };
+impl Choice {
+    /// None yet.
+    pub const NONE: Self = Self { signals: [0; MOST], count: 0 };
+    /// What one mostly wants: angle, currents and their reference, voltages, position.
+    pub const USUAL: Self = Self { signals: [0, 5, 6, 4, 7, 8, 9, 12], count: MOST };
 
-    /// What of the telemetry is recorded.
-    pub fn of(t: &Telemetry) -> Self {
-        let signals =
-            [t.current.d, t.current.q, t.reference.q, t.voltage.d, t.voltage.q, t.delta_i, t.turns];
-        Self { phi: t.phi.to_bits(), signals }
+    /// Adds one by its name; says whether there is such a signal, and room for it.
+    pub fn add(&mut self, name: &str) -> bool {
+        let signal = SIGNALS.iter().position(|known| *known == name);
+        match (signal.and_then(|at| u8::try_from(at).ok()), self.signals.get_mut(self.count)) {
+            (Some(signal), Some(place)) => {
+                *place = signal;
+                self.count += 1;
+                true
+            }
+            _ => false,
+        }
     }
 
-    /// The angle in degrees.
-    pub fn phi_degrees(&self) -> f32 {
-        self.phi as f32 * (180.0 / 2_147_483_648.0)
+    /// Their names.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        let known = |signal: &u8| SIGNALS.get(usize::from(*signal)).copied().unwrap_or("");
+        self.signals.iter().take(self.count).map(known)
+    }
+
+    /// How many.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Their values.
+    fn of(&self, t: &Telemetry) -> Record {
+        let mut record = [0.0; MOST];
+        for (value, signal) in record.iter_mut().zip(self.signals) {
+            *value = match signal {
+                0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
+                1 => t.flux_step,
+                2 => t.rotor_step,
+                3 => t.reference.d,
+                4 => t.reference.q,
+                5 => t.current.d,
+                6 => t.current.q,
+                7 => t.voltage.d,
+                8 => t.voltage.q,
+                9 => t.delta_i,
+                10 => t.saliency,
+                11 => t.dc_link,
+                _ => t.turns,
+            };
+        }
+        record
     }
 }
+
+/// One record: the values of a [`Choice`], in its order.
+pub type Record = [f32; MOST];
 
 /// Nothing asked for or all read: the main loop's.
 const IDLE: u8 = 0;
@@ -47,6 +104,7 @@ struct Inner<const N: usize> {
     records: [Record; N],
     wanted: usize,
     divider: u16,
+    choice: Choice,
     /// Next record to write.
     next: usize,
     /// Periods until the next record.
@@ -72,7 +130,14 @@ pub struct Reader<'a, const N: usize>(&'a Trace<N>);
 impl<const N: usize> Trace<N> {
     /// Nothing recorded.
     pub const fn new() -> Self {
-        let inner = Inner { records: [Record::EMPTY; N], wanted: 0, divider: 1, next: 0, wait: 0 };
+        let inner = Inner {
+            records: [[0.0; MOST]; N],
+            wanted: 0,
+            divider: 1,
+            choice: Choice::NONE,
+            next: 0,
+            wait: 0,
+        };
         Self { stage: AtomicU8::new(IDLE), inner: UnsafeCell::new(inner) }
     }
 
@@ -96,7 +161,7 @@ impl<const N: usize> Recorder<'_, N> {
         }
         inner.wait = inner.divider.saturating_sub(1);
         if let Some(place) = inner.records.get_mut(inner.next) {
-            *place = Record::of(telemetry);
+            *place = inner.choice.of(telemetry);
             inner.next += 1;
         }
         if inner.next >= inner.wanted {
@@ -107,7 +172,7 @@ impl<const N: usize> Recorder<'_, N> {
 
 impl<const N: usize> Reader<'_, N> {
     /// Asks for `records`, one in `divider` periods. Not while recording: says whether it did.
-    pub fn begin(&mut self, records: u16, divider: u16) -> bool {
+    pub fn begin(&mut self, records: u16, divider: u16, choice: &Choice) -> bool {
         if self.0.stage.load(Ordering::Acquire) == RECORDING {
             return false;
         }
@@ -115,6 +180,7 @@ impl<const N: usize> Reader<'_, N> {
         let inner = unsafe { &mut *self.0.inner.get() };
         inner.wanted = usize::from(records).min(N);
         inner.divider = divider;
+        inner.choice = *choice;
         inner.next = 0;
         inner.wait = 0;
         self.0.stage.store(RECORDING, Ordering::Release);
@@ -147,15 +213,15 @@ mod tests {
         let mut trace = Trace::<4>::new();
         let (mut recorder, mut reader) = trace.split();
         assert_eq!(reader.get(0), None);
-        assert!(reader.begin(3, 2));
-        assert!(!reader.begin(1, 1));
+        assert!(reader.begin(3, 2, &Choice::USUAL));
+        assert!(!reader.begin(1, 1, &Choice::USUAL));
         for period in 0..5 {
             assert!(reader.recording());
             assert_eq!(reader.get(0), None);
             recorder.step(&Telemetry { turns: period as f32, ..Telemetry::default() });
         }
         recorder.step(&Telemetry::default());
-        let turns = |i| reader.get(i).map(|record: Record| record.signals[6]);
+        let turns = |i| reader.get(i).map(|record: Record| record[7]);
         assert_eq!(
             [turns(0), turns(1), turns(2), turns(3)],
             [Some(0.0), Some(2.0), Some(4.0), None]
@@ -166,7 +232,7 @@ mod tests {
     fn asks_for_no_more_than_there_is_room() {
         let mut trace = Trace::<4>::new();
         let (mut recorder, mut reader) = trace.split();
-        assert!(reader.begin(100, 1));
+        assert!(reader.begin(100, 1, &Choice::USUAL));
         for _ in 0..4 {
             recorder.step(&Telemetry::default());
         }
@@ -174,10 +240,30 @@ mod tests {
         assert!(reader.get(3).is_some() && reader.get(4).is_none());
     }
 
+    /// Every signal is its own, under its name.
     #[test]
-    fn angles_are_shown_in_degrees() {
-        let phi = drive_core::Angle::QUARTER;
-        let record = Record::of(&Telemetry { phi, ..Telemetry::default() });
-        assert_eq!(record.phi_degrees(), 90.0);
+    fn signals_are_recorded_as_they_were_chosen() {
+        let telemetry = Telemetry {
+            phi: drive_core::Angle::QUARTER,
+            flux_step: 1.0,
+            rotor_step: 2.0,
+            reference: drive_core::Dq::new(3.0, 4.0),
+            current: drive_core::Dq::new(5.0, 6.0),
+            voltage: drive_core::Dq::new(7.0, 8.0),
+            delta_i: 9.0,
+            saliency: 10.0,
+            dc_link: 11.0,
+            turns: 12.0,
+            ..Telemetry::default()
+        };
+        for (i, name) in SIGNALS.iter().enumerate() {
+            let mut choice = Choice::NONE;
+            assert!(choice.add(name) && choice.add("turns"));
+            let expected = if i == 0 { 90.0 } else { i as f32 };
+            assert_eq!(choice.of(&telemetry)[..2], [expected, 12.0], "{name}");
+            assert_eq!(choice.names().collect::<Vec<_>>(), [name, "turns"]);
+        }
+        let mut full = Choice::USUAL;
+        assert!(!full.add("turns") && !Choice::NONE.clone().add("speed"));
     }
 }

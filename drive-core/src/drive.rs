@@ -22,6 +22,7 @@ use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
 use crate::state::State;
+use crate::wiring_check::{Next, WiringCheckState};
 
 /// The drive: coefficients, state, and the references it was given.
 ///
@@ -47,6 +48,9 @@ pub struct Drive {
     references: References,
     sensing: SensingState,
     control: ControlState,
+    /// Whether the next start checks the wiring.
+    wiring_unchecked: bool,
+    wiring: WiringCheckState,
     telemetry: Telemetry,
 }
 
@@ -141,6 +145,8 @@ impl Drive {
             references: References::default(),
             sensing: SensingState::default(),
             control: ControlState::default(),
+            wiring_unchecked: false,
+            wiring: WiringCheckState::default(),
             telemetry: Telemetry::default(),
         }
     }
@@ -170,6 +176,7 @@ impl Drive {
             None => match self.state {
                 State::Calibrating => self.calibrate(sample),
                 State::Precharge => Ok(self.precharge(sample)),
+                State::CheckingWiring => self.check_wiring(sample, &measured),
                 _ => self.regulate(sample, &measured),
             },
         };
@@ -214,11 +221,37 @@ impl Drive {
 
     fn precharge(&mut self, sample: &Sample) -> Compare {
         if self.elapsed >= self.c.sequence.precharge {
-            let count = self.rotor_count(sample);
-            self.c.motion.start(&mut self.control.motion, count);
-            self.enter(State::Magnetising);
+            if self.wiring_unchecked {
+                self.wiring = WiringCheckState::default();
+                self.enter(State::CheckingWiring);
+            } else {
+                self.magnetising_from_here(sample);
+            }
         }
         Compare::LOW_SIDES_ON
+    }
+
+    /// Short voltage pulses, without control.
+    fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
+        match self.c.wiring.step(&mut self.wiring, measured.phases)? {
+            Next::Apply(voltage, flowing) => {
+                let compensation = self.c.dead_time.step(flowing.to_abc(), measured.dc_link);
+                let [a, b, c] =
+                    self.c.modulator.step(voltage, compensation, measured.dc_link).compare;
+                Ok(Compare { a, b, c, enabled: true })
+            }
+            Next::Passed => {
+                self.wiring_unchecked = false;
+                self.magnetising_from_here(sample);
+                Ok(Compare::LOW_SIDES_ON)
+            }
+        }
+    }
+
+    fn magnetising_from_here(&mut self, sample: &Sample) {
+        let count = self.rotor_count(sample);
+        self.c.motion.start(&mut self.control.motion, count);
+        self.enter(State::Magnetising);
     }
 
     /// Regulates the current. This is the control law, top to bottom.

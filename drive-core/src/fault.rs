@@ -55,7 +55,12 @@ faults! {
     NoSaliency = 25, "the motor shows too little saliency for the injection";
     LostLock = 26, "the flux is not where the tracked angle says";
     CarrierWeak = 29, "too little carrier current: open phase, or the inverter does not put it out";
-    CarrierNoRoom = 30, "the voltage left by the fundamental is too small for the carrier";
+    WiringNoCurrent = 30, "wiring check: a sensor sees no current, it or a phase is open";
+    WiringPolarityA = 31, "wiring check: current sensor a is the wrong way round";
+    WiringPolarityB = 32, "wiring check: current sensor b is the wrong way round";
+    WiringExchanged = 33, "wiring check: current sensors or gates are on the wrong phases";
+    WiringCurrent = 34, "wiring check: more current than the motor's settings explain";
+    CarrierNoRoom = 35, "the voltage left by the fundamental is too small for the carrier";
 }
 
 impl Fault {
@@ -111,7 +116,12 @@ mod tests {
             (25, Fault::NoSaliency),
             (26, Fault::LostLock),
             (29, Fault::CarrierWeak),
-            (30, Fault::CarrierNoRoom),
+            (30, Fault::WiringNoCurrent),
+            (31, Fault::WiringPolarityA),
+            (32, Fault::WiringPolarityB),
+            (33, Fault::WiringExchanged),
+            (34, Fault::WiringCurrent),
+            (35, Fault::CarrierNoRoom),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

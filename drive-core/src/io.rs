@@ -108,6 +108,8 @@ pub enum Command<'a> {
     /// While regulating with the injection: no torque, magnetise again, verify that the flux is
     /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
     Relock,
+    /// From off: the next start checks the wiring first; see [`crate::wiring_check`].
+    CheckWiring,
     /// Take the torque to zero, then switch off.
     Stop,
     /// Forget the latched fault and be off.

@@ -55,6 +55,7 @@ pub mod state;
 pub mod synchronous;
 pub mod tracker;
 pub mod tuning;
+pub mod wiring_check;
 
 pub use angle::{Angle, UnitVector};
 pub use drive::{Drive, Telemetry};

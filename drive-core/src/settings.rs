@@ -60,6 +60,11 @@ impl Motor {
         self.l_m + self.l_lr
     }
 
+    /// Transient inductance sigma L_s, H.
+    pub fn sigma_l_s(&self) -> f32 {
+        self.l_ls + self.l_m * (self.l_lr / self.l_r())
+    }
+
     /// Rotor time constant L_r / r_r, s.
     pub fn t_sec(&self) -> f32 {
         self.l_r() / self.r_r

@@ -13,6 +13,8 @@ pub enum State {
     Calibrating,
     /// Low sides on, to charge the bootstrap capacitors of the high-side gate drives.
     Precharge,
+    /// Short voltage pulses show whether sensors and phases belong together.
+    CheckingWiring,
     /// Current on the direct axis only, until the flux stands.
     Magnetising,
     /// Flux built up, tracking without torque: is it the flux that is tracked?
@@ -49,6 +51,7 @@ impl fmt::Display for State {
             Self::Off => "off",
             Self::Calibrating => "calibrating",
             Self::Precharge => "precharging",
+            Self::CheckingWiring => "checking the wiring",
             Self::Magnetising => "magnetising",
             Self::Verifying => "verifying the lock",
             Self::Torque => "regulating torque",

@@ -43,7 +43,7 @@ impl Machine for Desk {
     fn save(&mut self, _: &Everything) -> Result<(), saved::Failed> {
         Ok(())
     }
-    fn begin_trace(&mut self, records: u16, _: u16) -> bool {
+    fn begin_trace(&mut self, records: u16, _: u16, _: &trace::Choice) -> bool {
         assert!(records <= console::grammar::LONGEST_TRACE);
         self.traced = records;
         true
@@ -52,7 +52,7 @@ impl Machine for Desk {
         false
     }
     fn traced(&self, i: u16) -> Option<trace::Record> {
-        (i < self.traced).then(|| trace::Record::of(self.drive.telemetry()))
+        (i < self.traced).then(|| [0.0; trace::MOST])
     }
     fn set_log_level(&mut self, _: Level) {}
     fn stack(&self) -> (usize, usize) {

@@ -5,6 +5,8 @@ use core::fmt;
 use drive_core::Mode;
 use drive_core::settings::AngleSource;
 
+use crate::trace::{self, Choice};
+
 use super::keys::{self, Key, NotTaken};
 
 /// Most periods that a trace records.
@@ -47,6 +49,8 @@ pub enum Request {
         records: u16,
         /// One of how many periods.
         divider: u16,
+        /// Of these signals.
+        choice: Choice,
     },
     /// How much is logged.
     Log(Level),
@@ -91,6 +95,8 @@ pub enum Misunderstood {
         /// Largest.
         max: u16,
     },
+    /// No such signal, or too many.
+    Signal,
     /// No such setting.
     Key,
     /// The value does not suit the setting.
@@ -106,6 +112,10 @@ impl fmt::Display for Misunderstood {
             Self::Number => f.write_str("not a number"),
             Self::OneOf(words) => write!(f, "not one of: {words}"),
             Self::Whole { min, max } => write!(f, "not a whole number from {min} to {max}"),
+            Self::Signal => {
+                write!(f, "unknown signal, or more than {}; there are:", trace::MOST)?;
+                trace::SIGNALS.iter().try_for_each(|name| write!(f, " {name}"))
+            }
             Self::Key => f.write_str("no such setting; `get` lists them"),
             Self::Value(why) => why.fmt(f),
         }
@@ -128,7 +138,7 @@ pub const HELP: [&str; 18] = [
     "defaults                  back to the settings of the image; the drive must be off",
     "faults                    the latched fault and what ended the last run",
     "clear                     forget the latched fault",
-    "trace N [DIVIDER]         record N periods, every DIVIDER-th, and print them as CSV",
+    "trace N [DIVIDER] [NAME]  record N periods, every DIVIDER-th, of the signals named; print as CSV",
     "log off|error|warn|info   how much goes to the log",
     "version                   which firmware this is",
     "one line in, one line out; set command.timeout_s stops the drive when no line comes",
@@ -172,10 +182,25 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         "defaults" => Request::Defaults,
         "faults" => Request::Faults,
         "clear" => Request::Clear,
-        "trace" => Request::Trace {
-            records: whole(word("the number of records")?, LONGEST_TRACE)?,
-            divider: word("").map_or(Ok(1), |text| whole(text, 1000))?,
-        },
+        "trace" => {
+            let records = whole(word("the number of records")?, LONGEST_TRACE)?;
+            let mut next = word("").ok();
+            let mut divider = 1;
+            if let Some(text) = next
+                && text.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+            {
+                divider = whole(text, 1000)?;
+                next = word("").ok();
+            }
+            let mut choice = if next.is_some() { Choice::NONE } else { Choice::USUAL };
+            while let Some(name) = next {
+                if !choice.add(name) {
+                    return Err(Misunderstood::Signal);
+                }
+                next = word("").ok();
+            }
+            Request::Trace { records, divider, choice }
+        }
         "log" => {
             let name = word("the level")?;
             let level = LEVELS.iter().find(|(known, _)| *known == name);
@@ -251,6 +276,8 @@ mod tests {
     #[test]
     fn commands_are_understood() {
         let key = keys::find("motor.r_s").unwrap();
+        let mut two = Choice::NONE;
+        assert!(two.add("i_q") && two.add("turns"));
         let table = [
             ("help", Request::Help),
             ("  status\t", Request::Status),
@@ -265,8 +292,10 @@ mod tests {
             ("get", Request::Get(None)),
             ("get motor.r_s", Request::Get(Some(key))),
             ("set motor.r_s 5.5", Request::Set(key, keys::Value::Number(5.5))),
-            ("trace 100", Request::Trace { records: 100, divider: 1 }),
-            ("trace 1024 10", Request::Trace { records: 1024, divider: 10 }),
+            ("trace 100", Request::Trace { records: 100, divider: 1, choice: Choice::USUAL }),
+            ("trace 1024 10", Request::Trace { records: 1024, divider: 10, choice: Choice::USUAL }),
+            ("trace 5 i_q turns", Request::Trace { records: 5, divider: 1, choice: two }),
+            ("trace 5 2 i_q turns", Request::Trace { records: 5, divider: 2, choice: two }),
             ("log warn", Request::Log(Level::Warn)),
             ("version", Request::Version),
         ];
@@ -298,6 +327,9 @@ mod tests {
             ("trace 1025", trace),
             ("trace 5 0", Whole { min: 1, max: 1000 }),
             ("trace -5", trace),
+            ("trace 5 i_x", Signal),
+            ("trace 5 2 3", Signal),
+            ("trace 5 i_d i_d i_d i_d i_d i_d i_d i_d i_d", Signal),
             ("log loud", OneOf("off error warn info")),
         ];
         for (line, why) in table {

@@ -24,6 +24,8 @@ pub struct Everything {
 pub struct Commands {
     /// The drive is stopped when no line was understood for so long, s; 0 for never.
     pub timeout_s: f32,
+    /// Whether a start has checked the wiring since the defaults were set.
+    pub wiring_checked: bool,
 }
 
 /// Longest time-out of commands, s.
@@ -62,7 +64,10 @@ impl Everything {
     }
 
     /// What the firmware asks of settings beside the drive.
-    fn check(&self) -> Result<(), SettingsError> {
+    ///
+    /// # Errors
+    /// The first value outside its range.
+    pub fn check(&self) -> Result<(), SettingsError> {
         let (shortest, longest) = crate::board::DEAD_TIME_RANGE_S;
         for (name, value, min, max) in [
             ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
@@ -197,7 +202,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 52] = [
+pub static KEYS: [Key; 53] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -263,6 +268,7 @@ pub static KEYS: [Key; 52] = [
     number!("speed.ramp_rpm_per_s", "rpm/s", drive.speed.ramp_rpm_per_s),
     number!("speed.phase_margin_deg", "deg", drive.speed.phase_margin_deg),
     number!("command.timeout_s", "s", command.timeout_s),
+    word!("wiring_checked", |s| s.command.wiring_checked, "no" = false => false, "yes" = true => true),
 ];
 
 /// The setting with this [number](Key::id).

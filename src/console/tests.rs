@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use drive_core::{Drive, Fault, Hardware, Mode, Sample, Telemetry};
+use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
 use super::*;
@@ -39,7 +39,7 @@ impl Machine for Desk {
     }
     fn status(&self) -> Option<Status> {
         self.running.then(|| Status {
-            periods: 1,
+            periods: self.orders.len() as u32,
             state: self.drive.state(),
             sample: Sample::default(),
             telemetry: *self.drive.telemetry(),
@@ -62,9 +62,8 @@ impl Machine for Desk {
         self.saved = Some(*settings);
         Ok(())
     }
-    fn begin_trace(&mut self, records: u16, _: u16) -> bool {
-        let record = trace::Record::of(&Telemetry::default());
-        self.trace = vec![record; usize::from(records)];
+    fn begin_trace(&mut self, records: u16, _: u16, _: &Choice) -> bool {
+        self.trace = vec![[0.0; trace::MOST]; usize::from(records)];
         true
     }
     fn tracing(&self) -> bool {
@@ -118,8 +117,10 @@ struct Talk {
 
 impl Talk {
     fn new() -> Self {
+        let mut settings = Everything::of_the_board();
+        settings.command.wiring_checked = true;
         Self {
-            console: Console::new(Everything::of_the_board()),
+            console: Console::new(settings),
             desk: Desk::new(),
             wire: Wire { room: usize::MAX, ..Wire::default() },
             now_ms: 0,
@@ -193,6 +194,53 @@ fn a_session() {
 }
 
 #[test]
+fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("defaults"), "ok");
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    assert_eq!(talk.desk.orders[1..], [Order::CheckWiring, Order::Start(Mode::Torque)]);
+    assert_eq!(talk.ask("stop"), "ok");
+    // It was not got past: it is checked again.
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    // No current in it: a motor that is not there.
+    let sample = Sample { current_a: 1838, current_b: 1832, dc_link: 2827, ..Sample::default() };
+    while !matches!(talk.desk.drive.state(), State::Fault(_)) {
+        talk.desk.drive.step(&sample);
+    }
+    assert_eq!(talk.desk.drive.state(), State::Fault(Fault::WiringNoCurrent));
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
+    // Without the check, past it.
+    assert_eq!(talk.ask("clear"), "ok");
+    assert_eq!(talk.ask("set wiring_checked yes"), "ok");
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
+fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
+    let mut settings = Everything::of_the_board();
+    // The simulated converter is calibrated for its own reference.
+    settings.drive.scales = drive_core::settings::Scales::default();
+    let mut talk = Talk::new();
+    talk.console = Console::new(settings);
+    talk.desk.drive = Drive::new(settings.build().unwrap());
+    let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    let mut pending = drive_core::Compare::OFF;
+    while talk.desk.drive.state() != State::Magnetising {
+        assert!(talk.desk.drive.state() != State::Off, "{}", talk.desk.drive.state());
+        let compare = talk.desk.drive.step(&plant.sample());
+        pending.enabled &= compare.enabled;
+        plant.advance(&pending, f64::from(PERIOD_S));
+        pending = compare;
+    }
+    assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = yes (one of: no yes)");
+    talk.ask("stop");
+    talk.desk.drive = Drive::new(settings.build().unwrap());
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
 fn settings_out_of_range_are_refused_with_the_range() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000");
@@ -220,9 +268,11 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let all = talk.say("get\n");
     assert_eq!(all.len(), KEYS.len() + 1);
     let trace = talk.say("trace 3\n");
-    assert_eq!(trace[0], trace::HEADER);
-    assert_eq!(trace[1], "0,0.00,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
+    assert_eq!(trace[0], "record,phi_deg,i_d,i_q,i_q_ref,v_d,v_q,delta_i,turns");
+    assert_eq!(trace[1], "0,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
     assert_eq!(trace.len(), 5);
+    let trace = talk.say("trace 1 5 i_q dc_link\n");
+    assert_eq!(trace, ["record,i_q,dc_link", "0,0.0000,0.0000", "ok"]);
     // Nothing leaves, and meanwhile a line comes.
     talk.wire.room = 0;
     talk.wire.sent.extend(b"get\n");

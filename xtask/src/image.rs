@@ -11,6 +11,7 @@ use object::read::elf::{FileHeader, SectionHeader, Sym};
 
 use crate::control;
 use crate::run::{self, Step};
+use crate::stack;
 use crate::toolchain::{self, PROFILE, TARGET, Target};
 
 /// The name probe-rs has for the controller of the board.
@@ -69,7 +70,9 @@ pub fn report_size(elf: &Path) -> Result<()> {
         sum(&sections, |s| matches!(s.name.as_str(), ".data" | ".bss" | ".uninit" | ".ccm_data"));
     println!("code {code}, constants {constants}, static RAM {ram} with {trace} for the trace");
     limit("code and constants", code + constants, CODE_LIMIT)?;
-    limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT)
+    limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT)?;
+    let stack = regions(&memory)?.iter().find(|r| r.name == "STACK").map_or(0, |r| r.length);
+    limit("stack in the worst case", stack::worst_case(&bytes).context("stack")?.into(), stack)
 }
 
 /// Most that code and constants may take, bytes.
@@ -187,9 +190,9 @@ mod tests {
                 ("FLASH", 0x0800_0000, 240),
                 ("CONTROL", 0x0803_c000, 16),
                 // Overflows where there is no memory.
-                ("STACK", 0x2000_0000, 8),
+                ("STACK", 0x2000_0000, 12),
                 // To 96, not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_2000, 88),
+                ("RAM", 0x2000_3000, 84),
                 ("CCM", 0x1000_0000, 32),
             ]
         );

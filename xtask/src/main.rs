@@ -5,6 +5,7 @@ mod control;
 mod fuzz;
 mod image;
 mod run;
+mod stack;
 mod toolchain;
 
 use std::process::ExitCode;

@@ -25,10 +25,20 @@ impl Drive {
         match command {
             Command::Start(mode) => self.start(mode),
             Command::Relock => self.relock(),
+            Command::CheckWiring => match self.state {
+                State::Off => {
+                    self.wiring_unchecked = true;
+                    Ok(Taken::AsGiven)
+                }
+                State::Fault(fault) => Err(Refused::Fault(fault)),
+                state => Err(Refused::State(state)),
+            },
             Command::Stop => {
                 match self.state {
                     State::Off | State::Fault(_) | State::Stopping => {}
-                    State::Calibrating | State::Precharge => self.enter(State::Off),
+                    State::Calibrating | State::Precharge | State::CheckingWiring => {
+                        self.enter(State::Off);
+                    }
                     _ => self.enter(State::Stopping),
                 }
                 Ok(Taken::AsGiven)

@@ -18,6 +18,7 @@ use crate::schedule::Schedule;
 use crate::sensing::Sensing;
 use crate::tracker::{Pll, Tracker};
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
+use crate::wiring_check::WiringCheck;
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
@@ -48,6 +49,7 @@ pub struct Coefficients {
     pub(crate) saliency_check: Option<SaliencyCheck>,
     /// The watch on the lock, if it is wanted.
     pub(crate) lock_monitor: Option<LockMonitor>,
+    pub(crate) wiring: WiringCheck,
     pub(crate) current_loop: DqPi,
     pub(crate) reference_filter: [ReferenceFilter; 2],
     /// Delay of the measured current beside the filter, samples.
@@ -215,6 +217,7 @@ impl Settings {
             injection_axis,
             lock_monitor,
             saliency_check: self.saliency_check(),
+            wiring: WiringCheck::new(m.sigma_l_s(), PERIOD_S),
             estimator: self.estimator(
                 lag_share,
                 turns_per_step(self.limits.speed_rpm),
