@@ -190,9 +190,9 @@ mod tests {
                 ("FLASH", 0x0800_0000, 240),
                 ("CONTROL", 0x0803_c000, 16),
                 // Overflows where there is no memory.
-                ("STACK", 0x2000_0000, 12),
+                ("STACK", 0x2000_0000, 16),
                 // To 96, not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_3000, 84),
+                ("RAM", 0x2000_4000, 80),
                 ("CCM", 0x1000_0000, 32),
             ]
         );
