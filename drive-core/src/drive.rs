@@ -13,6 +13,7 @@ use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::{FluxAngle, IndirectState};
 use crate::injection::{Carrier, CarrierPeriod};
+use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
@@ -83,6 +84,7 @@ struct ControlState {
     carrier_watch: CarrierWatch,
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
+    inverter_drop: InverterDropState,
 }
 
 /// What the drive saw and did in the last step.
@@ -106,6 +108,8 @@ pub struct Telemetry {
     pub saliency: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
+    /// Voltage per phase that the power stage drops beyond its dead time, as measured at the start, V.
+    pub inverter_drop: f32,
     /// Position in mechanical turns from the start.
     pub turns: f32,
 }
@@ -243,9 +247,20 @@ impl Drive {
         // Dead time: the sign of the current that is going to flow decides.
         let expected =
             current.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.mean_current);
-        let compensation = c.dead_time.step(expected.to_abc(), measured.dc_link);
+        let signs = c.dead_time.signs(expected.to_abc());
+        let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
         s.current_loop.realised((modulated.realised - total).to_dq(applied));
+
+        if self.state == State::Magnetising {
+            c.inverter_drop.step(
+                &mut s.inverter_drop,
+                (self.elapsed, c.sequence.magnetise),
+                (current, voltage, s.indirect.magnetising),
+                signs.to_alpha_beta().to_dq(applied),
+                measured.dc_link,
+            );
+        }
 
         // Angles for the next sample.
         if c.demodulate {
@@ -283,6 +298,7 @@ impl Drive {
             delta_i: s.estimator.delta_i,
             saliency: s.estimator.saliency.q,
             dc_link: measured.dc_link,
+            inverter_drop: s.inverter_drop.volts,
             turns: c.position.turns(&s.position, sample.encoder),
         };
 
@@ -356,7 +372,8 @@ impl Drive {
     /// The current while the flux is built up, and while the saliency is checked, A.
     fn magnetise(&mut self) -> Result<Dq, Fault> {
         let (r, s) = (&mut self.references, &mut self.control);
-        let magnetising = Dq { d: r.current.d, q: 0.0 };
+        let level = self.c.inverter_drop.level(self.elapsed);
+        let magnetising = Dq { d: level * r.current.d, q: 0.0 };
         let phase =
             match (self.elapsed.checked_sub(self.c.sequence.magnetise), self.c.saliency_check) {
                 (None, _) => return Ok(magnetising),

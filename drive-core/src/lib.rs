@@ -37,6 +37,7 @@ pub mod filters;
 pub mod frames;
 pub mod indirect;
 pub mod injection;
+pub mod inverter_drop;
 pub mod io;
 pub mod modulation;
 pub mod pi;

@@ -6,6 +6,7 @@ use crate::demodulator::Demodulator;
 use crate::estimator::{ConstantReference, Estimator, Method};
 use crate::indirect::Indirect;
 use crate::injection::{CARRIER_SAMPLES, Injection};
+use crate::inverter_drop::InverterDrop;
 use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
@@ -42,6 +43,7 @@ pub struct Coefficients {
     pub(crate) lag_share: f32,
     pub(crate) modulator: Modulator,
     pub(crate) dead_time: DeadTime,
+    pub(crate) inverter_drop: InverterDrop,
     pub(crate) prediction: Prediction,
     pub(crate) position: Position,
     pub(crate) protection: Protection,
@@ -203,6 +205,14 @@ impl Settings {
             } else {
                 DeadTime::NONE
             },
+            inverter_drop: InverterDrop::new(
+                self.sequence.magnetise_s,
+                m.t_sec(),
+                PERIOD_S,
+                (self.sequence.i_d, self.limits.current_a),
+                m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
+                m.r_s,
+            ),
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
             position: Position::new(
                 m.torque_per_ampere(self.sequence.i_d) / m.inertia,

@@ -186,7 +186,7 @@ keys! {
         /// Whether a start with synchronous checks that the motor has a saliency.
         check: bool = true, [switch], "";
         /// Natural frequency of the loop behind synchronous.
-        bandwidth_hz: f64 = 4.0, [0.1 .. 30], "Hz";
+        bandwidth_hz: f64 = 3.5, [0.1 .. 30], "Hz";
     }
     /// The flux angle.
     "angle." angle: Angle {
