@@ -1,6 +1,7 @@
 //! The whole drive: one step per PWM period.
 
 mod commands;
+mod learn;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +16,7 @@ use crate::indirect::{FluxAngle, IndirectState};
 use crate::injection::{Carrier, CarrierPeriod};
 use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
+use crate::learning::{Learned, LearningState};
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
 use crate::position::PositionState;
@@ -48,6 +50,7 @@ pub struct Drive {
     sensing: SensingState,
     control: ControlState,
     telemetry: Telemetry,
+    learned: Option<Learned>,
 }
 
 /// What was asked for.
@@ -85,6 +88,7 @@ struct ControlState {
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
     inverter_drop: InverterDropState,
+    learning: LearningState,
 }
 
 /// What the drive saw and did in the last step.
@@ -126,6 +130,7 @@ impl Drive {
             sensing: SensingState::default(),
             control: ControlState::default(),
             telemetry: Telemetry::default(),
+            learned: None,
         }
     }
 
@@ -216,11 +221,15 @@ impl Drive {
         };
         // Flux angle at the sample. The current is seen from where the flux was when the filtered
         // current flowed; the voltage is put where the flux will be when it acts.
-        let flux = match c.source {
-            AngleSource::Encoder => {
-                c.indirect.angle(&mut s.indirect, sample.encoder).map_err(|_| Fault::Encoder)?
-            }
-            AngleSource::Injection => s.estimator.flux(),
+        let count = match (self.mode, c.source) {
+            // The shaft is locked.
+            (Mode::Learning, _) => Some(0),
+            (_, AngleSource::Encoder) => Some(sample.encoder),
+            (_, AngleSource::Injection) => None,
+        };
+        let flux = match count {
+            Some(count) => c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?,
+            None => s.estimator.flux(),
         };
         let theta = FluxAngle { phi: flux.phi + r.injection_turn, step: flux.step };
 
@@ -267,12 +276,12 @@ impl Drive {
             let e = &mut s.estimator;
             c.estimator.observe(e, measured.current, theta, carrier.index, reference.q);
         }
-        let rotor_step = match c.source {
-            AngleSource::Encoder => {
+        let rotor_step = match count {
+            Some(_) => {
                 c.indirect.update(&mut s.indirect, current);
                 s.indirect.rotor_step
             }
-            AngleSource::Injection => {
+            None => {
                 // The slip of what is asked for: that of the measured current would feed the angle
                 // error back.
                 c.indirect.update(&mut s.indirect, reference);
@@ -347,6 +356,7 @@ impl Drive {
         let r = &mut self.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
+            State::Learning => self.learn()?,
             State::Position => {
                 let i_q = self.c.position.step(&mut self.control.position, r.turns, sample.encoder);
                 r.current.q = i_q;

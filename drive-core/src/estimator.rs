@@ -8,7 +8,8 @@ use crate::angle::Angle;
 use crate::demodulator::{Demodulator, DemodulatorState};
 use crate::frames::AlphaBeta;
 use crate::indirect::FluxAngle;
-use crate::schedule::Schedule;
+use crate::learning::Learned;
+use crate::schedule::{ReferenceTable, Schedule};
 use crate::synchronous::{Saliency, SynchronousState};
 use crate::tracker::{Pll, Tracker, TrackerState};
 
@@ -21,6 +22,24 @@ pub struct ConstantReference {
     pub slope: f32,
     /// Where it becomes constant, A.
     pub from: f32,
+}
+
+/// What the current difference is compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PrintedReference {
+    /// The constant of section 3.3.
+    Constant(ConstantReference),
+    /// Learned over i_q, A.
+    Learned(ReferenceTable),
+}
+
+impl PrintedReference {
+    fn at(&self, i_q: f32) -> f32 {
+        match self {
+            Self::Constant(reference) => reference.at(i_q),
+            Self::Learned(table) => table.at(i_q),
+        }
+    }
 }
 
 impl ConstantReference {
@@ -44,7 +63,7 @@ pub enum Method {
         /// How the difference is taken.
         demodulator: Demodulator,
         /// What it is compared with.
-        reference: ConstantReference,
+        reference: PrintedReference,
         /// What turns the axis.
         tracker: Tracker,
     },
@@ -111,6 +130,20 @@ impl EstimatorState {
 }
 
 impl Estimator {
+    /// Compares with what was learned from now on.
+    pub fn take(&mut self, learned: &Learned) {
+        match &mut self.method {
+            Method::Printed { reference, .. } => {
+                *reference = PrintedReference::Learned(learned.reference);
+            }
+            Method::Synchronous { schedule, .. } => {
+                let b = learned.current_saliency;
+                let b = b.accepted.then_some(b.value);
+                *schedule = schedule.with(&learned.reference, b);
+            }
+        }
+    }
+
     /// Demodulates one sample: the current, A; the injection axis and how fast it turns, turns per
     /// period; the number of the sample in the carrier period; the reference of the quadrature
     /// current, A.

@@ -53,6 +53,8 @@ faults! {
     ConverterOverrun = 23, "a conversion was lost";
     ClockFailure = 24, "the clock failed";
     NoSaliency = 25, "the motor shows too little saliency for the injection";
+    ShaftNotLocked = 27, "the shaft moved, or the flux did not turn, while learning";
+    NothingLearned = 28, "what was learned is not believable";
 }
 
 impl Fault {
@@ -106,6 +108,8 @@ mod tests {
             (23, Fault::ConverterOverrun),
             (24, Fault::ClockFailure),
             (25, Fault::NoSaliency),
+            (27, Fault::ShaftNotLocked),
+            (28, Fault::NothingLearned),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

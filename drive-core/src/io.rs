@@ -95,6 +95,9 @@ pub enum Mode {
     Position,
     /// Identification of the motor. Not available yet: refused.
     Commissioning,
+    /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::learning`]), then
+    /// stops.
+    Learning,
 }
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
@@ -140,6 +143,8 @@ pub enum Refused {
     ModeNotAvailable(Mode),
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
+    /// Learning needs the injection with a demodulation that tracks.
+    NeedsInjection,
     /// A fault is latched; clear it first.
     Fault(crate::Fault),
     /// The value is outside the allowed range.
@@ -158,6 +163,9 @@ impl core::fmt::Display for Refused {
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
             Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
+            Self::NeedsInjection => {
+                write!(f, "this mode needs the injection, demodulated rectified or synchronously")
+            }
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
                 write!(f, "the value is outside the allowed range {min} to {max}")

@@ -39,6 +39,7 @@ pub mod indirect;
 pub mod injection;
 pub mod inverter_drop;
 pub mod io;
+pub mod learning;
 pub mod modulation;
 pub mod pi;
 pub mod plausibility;

@@ -10,9 +10,9 @@
 use core::fmt;
 
 /// Points of the tables, from i_q = 0 on.
-const POINTS: usize = 16;
+pub const POINTS: usize = 16;
 /// Their distance, A.
-const STEP_A: f32 = 0.25;
+pub const STEP_A: f32 = 0.25;
 /// Largest saliency that is believed.
 const LARGEST: f32 = 0.3;
 
@@ -80,6 +80,22 @@ impl ReferenceTable {
         };
         Ok(Self { q: core::array::from_fn(|n| at(n as f32 * STEP_A)) })
     }
+
+    /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
+    pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
+        let believable = q.iter().all(|q| q.abs() <= LARGEST);
+        (q[0] == 0.0 && believable).then_some(Self { q })
+    }
+
+    /// Its values at multiples of [`STEP_A`].
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.q
+    }
+
+    /// The reference at a quadrature current, A.
+    pub fn at(&self, i_q: f32) -> f32 {
+        odd(i_q, between(&self.q, place(i_q)))
+    }
 }
 
 impl Default for ReferenceTable {
@@ -94,11 +110,33 @@ impl Default for ReferenceTable {
     }
 }
 
+/// The interval of the tables in which a current lies, A, and the share of it that is past. The last
+/// value is held beyond the end.
+fn place(i_q: f32) -> (usize, f32) {
+    let x = i_q.abs() * (1.0 / STEP_A);
+    // Saturating cast.
+    let n = (x as usize).min(POINTS - 2);
+    let past = x - n as f32;
+    (n, if past < 1.0 { past } else { 1.0 })
+}
+
+fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
+    table[n] + (table[n + 1] - table[n]) * past
+}
+
+fn odd(i_q: f32, q: f32) -> f32 {
+    if i_q < 0.0 { -q } else { q }
+}
+
 /// Reference and gain over i_q, for the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
-    q: [f32; POINTS],
+    table: ReferenceTable,
     share: [f32; POINTS],
+    /// What it was made for.
+    flux_saliency: f32,
+    current_saliency: f32,
+    i_d: f32,
     /// Angle error per difference of the saliency, rad.
     pub per_saliency: f32,
 }
@@ -114,19 +152,25 @@ impl Schedule {
             let current_part = b * (i_q * i_q - i_d * i_d) / length;
             a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 })
         };
-        Self { q: table.q, share: core::array::from_fn(share), per_saliency: -0.5 / a }
+        Self {
+            table: *table,
+            share: core::array::from_fn(share),
+            flux_saliency: a,
+            current_saliency: b,
+            i_d,
+            per_saliency: -0.5 / a,
+        }
+    }
+
+    /// The same with another reference and, where there is one, another saliency per ampere, 1/A.
+    pub fn with(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
+        Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
     }
 
     /// Reference of `q`, and share of the proportional part, at a quadrature current, A.
     pub fn at(&self, i_q: f32) -> (f32, f32) {
-        let x = i_q.abs() * (1.0 / STEP_A);
-        // Saturating cast; the last interval is held beyond its end.
-        let n = (x as usize).min(POINTS - 2);
-        let past = x - n as f32;
-        let share = if past < 1.0 { past } else { 1.0 };
-        let between = |table: &[f32; POINTS]| table[n] + (table[n + 1] - table[n]) * share;
-        let q = between(&self.q);
-        (if i_q < 0.0 { -q } else { q }, between(&self.share))
+        let place = place(i_q);
+        (odd(i_q, between(&self.table.q, place)), between(&self.share, place))
     }
 }
 

@@ -184,12 +184,21 @@ pub struct PrintedChain {
     pub k_s: f32,
     /// Zero z_s of the tracker (Eq. 3.44).
     pub z_s: f32,
+    /// Reference of the current difference over the torque current, A, learned with the shaft locked;
+    /// takes the place of the constant one.
+    pub learned: Option<ReferenceTable>,
 }
 
 impl Default for PrintedChain {
     /// Sections 3.3 and 3.11.
     fn default() -> Self {
-        Self { reference_a: 0.010, full_reference_iq_a: 1.0, k_s: 0.132_546, z_s: 0.90 }
+        Self {
+            reference_a: 0.010,
+            full_reference_iq_a: 1.0,
+            k_s: 0.132_546,
+            z_s: 0.90,
+            learned: None,
+        }
     }
 }
 

@@ -89,6 +89,9 @@ impl Drive {
             (State::Off, Mode::Position) if self.c.source != AngleSource::Encoder => {
                 return Err(Refused::NeedsEncoder);
             }
+            (State::Off, Mode::Learning) if !self.can_learn() => {
+                return Err(Refused::NeedsInjection);
+            }
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
         }
@@ -105,7 +108,9 @@ impl Drive {
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
             State::Off | State::Stopping => Err(Refused::State(self.state)),
-            _ if self.mode != mode => Err(Refused::State(State::of_mode(self.mode))),
+            _ if self.mode != mode || mode == Mode::Learning => {
+                Err(Refused::State(State::of_mode(self.mode)))
+            }
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),
         }

@@ -3,10 +3,11 @@
 use super::{AngleSource, CurrentPlant, PERIOD_S, Settings, SettingsError, Tracking};
 use crate::dead_time::DeadTime;
 use crate::demodulator::Demodulator;
-use crate::estimator::{ConstantReference, Estimator, Method};
+use crate::estimator::{ConstantReference, Estimator, Method, PrintedReference};
 use crate::indirect::Indirect;
 use crate::injection::{CARRIER_SAMPLES, Injection};
 use crate::inverter_drop::InverterDrop;
+use crate::learning::Learning;
 use crate::modulation::Modulator;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
@@ -44,6 +45,7 @@ pub struct Coefficients {
     pub(crate) modulator: Modulator,
     pub(crate) dead_time: DeadTime,
     pub(crate) inverter_drop: InverterDrop,
+    pub(crate) learning: Learning,
     pub(crate) prediction: Prediction,
     pub(crate) position: Position,
     pub(crate) protection: Protection,
@@ -213,6 +215,7 @@ impl Settings {
                 m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
                 m.r_s,
             ),
+            learning: Learning::new(m.t_sec(), PERIOD_S, self.sequence.i_d, self.limits.current_a),
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
             position: Position::new(
                 m.torque_per_ampere(self.sequence.i_d) / m.inertia,
@@ -254,11 +257,14 @@ impl Settings {
         let printed = |demodulator| Estimator {
             method: Method::Printed {
                 demodulator,
-                reference: ConstantReference {
-                    full: p.reference_a,
-                    slope: p.reference_a / p.full_reference_iq_a,
-                    from: p.full_reference_iq_a,
-                },
+                reference: p.learned.map_or(
+                    PrintedReference::Constant(ConstantReference {
+                        full: p.reference_a,
+                        slope: p.reference_a / p.full_reference_iq_a,
+                        from: p.full_reference_iq_a,
+                    }),
+                    PrintedReference::Learned,
+                ),
                 tracker: Tracker::new(p.k_s, p.z_s, limit),
             },
             lag: lag_share * (BPF_GROUP_DELAY + carrier_lag),

@@ -224,6 +224,12 @@ keys! {
         /// Magnetising inductance; follows motor.lm.
         lm: Option<f64> = None, [1e-4 .. 100], "H";
     }
+    /// What the drive does before the experiment.
+    "drive." drive: DriveSteps {
+        /// In steady runs (monte-carlo, speed-torque-sweep): whether the drive learns first, with the
+        /// shaft locked, as a user would have it do.
+        learn: bool = false, [switch], "";
+    }
     /// How much is simulated.
     "" extent: Extent {
         /// Runs of a statistical experiment; unset: the experiment's own number.

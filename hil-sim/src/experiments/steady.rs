@@ -7,6 +7,7 @@ use drive_core::{Command, Mode, State};
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
+use crate::learn;
 use crate::plant::Load;
 use crate::rig::Rig;
 use crate::stats::Stats;
@@ -46,6 +47,9 @@ pub fn steady_run(config: &Config, case: Case, seconds: f64) -> Result<SteadyRun
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
     let mut rig = Rig::from_config(&config, case.seed)?;
+    if config.drive.learn {
+        learn::with(&mut rig)?;
+    }
     rig.start(Mode::Torque)?;
     rig.command(Command::Torque(case.iq as f32))?;
     rig.run(0.5, |_| {});
