@@ -3,7 +3,6 @@
 mod common;
 
 use common::{IDEAL, all, config};
-use drive_core::schedule::{ReferenceTable, Schedule};
 use hil_sim::Outcome;
 use hil_sim::experiments::{self, Context};
 use hil_sim::progress::Progress;
@@ -93,23 +92,6 @@ fn no_angle_is_lost_within_150_and_300_rpm() {
         // 1.6 pooled, 9 to 12 largest of 1000.
         assert!(outcome.metrics.get("angle_error_rms_deg").unwrap() <= 2.3);
         assert!(outcome.metrics.get("angle_error_max_deg").unwrap() <= 14.0);
-    }
-}
-
-/// The reference that the drive has by default is what learning finds on the default motor.
-#[test]
-fn learning_finds_the_default_reference() {
-    let changes = ["measurement.noise_a=0", "measurement.lsb_a=0.00014"];
-    let learned = hil_sim::learn::reference(&config(&changes), 1).unwrap();
-    let points: Vec<_> = learned.iter().map(|p| (p.i_q as f32, p.q as f32)).collect();
-    let schedule = |table: &ReferenceTable| Schedule::new(table, -0.035, 0.0338, 0.7);
-    let mut table = points.clone();
-    table[0].1 = 0.0;
-    let found = schedule(&ReferenceTable::new(&table).unwrap());
-    let default = schedule(&ReferenceTable::default());
-    for (i_q, _) in points {
-        // 0.0002 of saliency are 0.16°.
-        assert!((found.at(i_q).0 - default.at(i_q).0).abs() < 2e-4, "{i_q} A");
     }
 }
 

@@ -13,11 +13,16 @@
 //! q_d = d 2/sqrt3 sin(2 theta - 30°) - d/sqrt3
 //! ```
 //!
-//! A shaft that moves induces a voltage that is the same for both signs of the torque current, where
-//! all others change sign with it.
+//! A shaft that is turned induces a voltage on the quadrature axis that is the same for both signs of
+//! the torque current, where all others change sign with it. A shaft that is free follows the current
+//! after a moment and the flux lies along the current: then the whole stator inductance acts on the
+//! direct axis, where it is the leakage `sigma L_s` alone on a locked shaft. (The inverter's drop must
+//! be compensated for that to be seen.)
+
+use core::f32::consts::TAU;
 
 use crate::angle::{Angle, UnitVector};
-use crate::frames::SQRT_3;
+use crate::frames::{Dq, SQRT_3};
 use crate::schedule::{POINTS, ReferenceTable, STEP_A};
 
 /// Time for flux and averages to settle at a point, in rotor time constants.
@@ -29,6 +34,9 @@ const LAG: f32 = 19.0;
 /// Voltage that may be the same for both signs of the torque current, V: the noise of the mean is
 /// below 0.05 V, a shaft at 22 rpm with the flux of the default motor gives 0.5 V.
 const MOVED_V: f32 = 0.5;
+/// Voltage of a free shaft on the direct axis from which on it is judged, V. Half of it counts as
+/// moved.
+const JUDGED_V: f32 = 1.0;
 /// A twelfth of a turn, 30°.
 const TWELFTH: Angle = Angle::from_bits(357_913_941);
 
@@ -52,6 +60,12 @@ pub struct Learning {
     points: usize,
     /// Direct current, A.
     i_d: f32,
+    /// sigma L_s, H.
+    leakage: f32,
+    /// L_m^2 / L_r, H.
+    coupled: f32,
+    /// rad/s of a turn per period.
+    per_step: f32,
 }
 
 /// Sums over one point.
@@ -66,7 +80,7 @@ struct Sums {
     signal: f32,
     in_phase: f32,
     quadrature: f32,
-    voltage: f32,
+    voltage: Dq,
 }
 
 /// State of the learning.
@@ -77,8 +91,11 @@ pub struct LearningState {
     sums: Sums,
     /// Mean signal at plus and minus every current.
     signal: [[f32; POINTS]; 2],
-    /// Mean voltage on the quadrature axis at plus, V.
-    voltage: f32,
+    /// Mean voltage at plus, V.
+    voltage: Dq,
+    /// Direct voltage of the first current without the leakage's, V, and slip times torque current,
+    /// rad/s A.
+    first: Option<(f32, f32)>,
     /// Sums of the components of the negative sequence over the points.
     in_phase: f32,
     quadrature: f32,
@@ -132,8 +149,14 @@ pub struct Learned {
 }
 
 impl Learning {
-    /// For the rotor time constant and the control period, s, the direct and the largest current, A.
-    pub fn new(t_sec: f32, period_s: f32, i_d: f32, largest_a: f32) -> Self {
+    /// For the rotor time constant and the control period, s, the direct and the largest current, A,
+    /// sigma L_s and L_m^2 / L_r, H.
+    pub fn new(
+        t_sec: f32,
+        period_s: f32,
+        (i_d, largest_a): (f32, f32),
+        (leakage, coupled): (f32, f32),
+    ) -> Self {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
         Self {
@@ -141,6 +164,9 @@ impl Learning {
             average: (periods(AVERAGE_S.0), periods(AVERAGE_S.1)),
             points: (most as usize).min(POINTS - 1),
             i_d,
+            leakage,
+            coupled,
+            per_step: TAU / period_s,
         }
     }
 
@@ -156,14 +182,14 @@ impl Learning {
     }
 
     /// One period: the demodulated signal, the injection axis and how fast it turns, turns per period,
-    /// and the voltage on the quadrature axis, V.
+    /// and the voltage, V.
     pub fn step(
         &self,
         state: &mut LearningState,
         signal: f32,
         theta: Angle,
         flux_step: f32,
-        voltage: f32,
+        voltage: Dq,
     ) -> Next {
         if state.point >= self.points() {
             return Next::Done;
@@ -213,7 +239,13 @@ impl Learning {
             state.voltage = voltage;
             return true;
         }
-        (0.5 * (voltage + state.voltage)).abs() <= MOVED_V
+        let even = (voltage + state.voltage) * 0.5;
+        let x = self.per_step * s.turned * mean * self.current(point);
+        let direct = even.d + self.leakage * x;
+        let (first_v, first_x) = *state.first.get_or_insert((direct, x));
+        let of_free = self.coupled * (x - first_x);
+        let follows = of_free > JUDGED_V && direct - first_v < -0.5 * of_free;
+        even.q.abs() <= MOVED_V && !follows
     }
 
     /// What follows from all points. `normalised`: the signal is the saliency, not a current.
@@ -277,5 +309,105 @@ impl LearningState {
     /// Points that are done.
     pub fn done(&self) -> usize {
         self.point
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use core::f64::consts::TAU as TURN;
+
+    const PERIOD: f32 = 1.0 / 6000.0;
+
+    fn learning() -> Learning {
+        Learning::new(0.186, PERIOD, (0.7, 3.5), (0.0515, 0.153))
+    }
+
+    /// Goes through all points with the signal that `q(i_q, theta)` gives and the voltage `v(i_q)`.
+    fn learn(q: impl Fn(f64, f64) -> f64, v: impl Fn(f32) -> Dq) -> (Next, LearningState) {
+        let (learning, mut state) = (learning(), LearningState::default());
+        let (mut i_q, mut theta) = (0.0_f32, 0.25_f64);
+        for _ in 0..3_000_000 {
+            let step = i_q / (0.7 * 0.186) * PERIOD / TAU;
+            theta += f64::from(step);
+            let seen = (theta - 19.0 * f64::from(step)) * TURN;
+            let signal = q(i_q.into(), seen) as f32;
+            let angle = Angle::from_turns(theta as f32);
+            match learning.step(&mut state, signal, angle, step, v(i_q)) {
+                Next::Current(next) => i_q = next,
+                other => return (other, state),
+            }
+        }
+        panic!("it does not end");
+    }
+
+    fn locked(i_q: f32) -> Dq {
+        Dq::new(3.8 - 0.0515 * i_q * i_q / (0.7 * 0.186), 6.2 * i_q)
+    }
+
+    fn reference(i_q: f64) -> f64 {
+        2.0 * 0.034 * 0.7 * i_q / i_q.hypot(0.7)
+    }
+
+    /// What gains that differ by `mismatch` add.
+    fn negative_sequence(mismatch: f64, theta: f64) -> f64 {
+        let d = 0.5 * mismatch;
+        d / 0.75_f64.sqrt() * ((2.0 * theta - TURN / 12.0).sin() - 0.5)
+    }
+
+    #[test]
+    fn splits_the_reference_from_the_mismatch() {
+        for mismatch in [0.0, 0.01, -0.05] {
+            let q = |i_q, theta: f64| reference(i_q) + negative_sequence(mismatch, theta);
+            let (next, state) = learn(q, locked);
+            assert_eq!(next, Next::Done);
+            let learned = learning().result(&state, true, 0.0);
+            assert!(learned.accepted && learned.gain_mismatch.accepted, "{learned:?}");
+            // A half turn ends within a period: 1/800 at the highest slip.
+            assert!((f64::from(learned.gain_mismatch.value) - mismatch).abs() < 1e-4);
+            assert!((learned.current_saliency.value - 0.034).abs() < 1e-4);
+            for n in 1..=learned.points {
+                let i_q = 0.25 * n as f32;
+                let difference = f64::from(learned.reference.at(i_q)) - reference(i_q.into());
+                assert!(difference.abs() < 1e-4, "{i_q} A: {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_not_accepted() {
+        let result =
+            |q: &dyn Fn(f64, f64) -> f64| learning().result(&learn(q, locked).1, true, 0.0);
+        // A negative sequence that no gain makes, and a mismatch that no sensor has.
+        let learned = result(&|i_q, theta| reference(i_q) + 0.005 * (2.0 * theta + 1.05).sin());
+        assert!(learned.accepted && !learned.gain_mismatch.accepted, "{learned:?}");
+        let learned = result(&|i_q, theta| reference(i_q) + negative_sequence(0.2, theta));
+        assert!(!learned.gain_mismatch.accepted, "{learned:?}");
+        // A reference that is not odd, too large, or not a number.
+        for q in [0.01, 1.0, f64::NAN] {
+            assert!(!result(&|i_q, _| reference(i_q) + q).accepted, "{q}");
+        }
+        assert!(!result(&|i_q, _| 0.2 * i_q).accepted);
+        // A saliency that does not follow the law of the current.
+        let learned = result(&|i_q: f64, _| 0.02 * (4.0 * i_q).sin());
+        assert!(learned.accepted && !learned.current_saliency.accepted, "{learned:?}");
+    }
+
+    #[test]
+    fn a_moving_shaft_is_noticed() {
+        let q = |i_q, _| reference(i_q);
+        let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
+        let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
+        assert_eq!(learn(q, turned).0, Next::Moved);
+        assert_eq!(learn(q, free).0, Next::Moved);
+    }
+
+    #[test]
+    fn a_flux_that_does_not_turn_ends_it() {
+        let (learning, mut state) = (learning(), LearningState::default());
+        let stuck = (0..200_000)
+            .any(|_| learning.step(&mut state, 0.0, Angle::ZERO, 0.0, Dq::ZERO) == Next::Stuck);
+        assert!(stuck);
     }
 }

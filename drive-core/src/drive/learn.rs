@@ -36,7 +36,7 @@ impl Drive {
         let normalised = matches!(c.estimator.method, Method::Synchronous { .. });
         let signal = if normalised { t.saliency } else { t.delta_i };
         let theta = t.phi + Angle::QUARTER;
-        match c.learning.step(&mut s.learning, signal, theta, t.flux_step, t.voltage.q) {
+        match c.learning.step(&mut s.learning, signal, theta, t.flux_step, t.voltage) {
             Next::Current(i_q) => self.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
             Next::Done => {

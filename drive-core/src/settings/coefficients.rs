@@ -215,7 +215,12 @@ impl Settings {
                 m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
                 m.r_s,
             ),
-            learning: Learning::new(m.t_sec(), PERIOD_S, self.sequence.i_d, self.limits.current_a),
+            learning: Learning::new(
+                m.t_sec(),
+                PERIOD_S,
+                (self.sequence.i_d, self.limits.current_a),
+                (m.l_ls + m.l_m - rotor_flux.coupled_inductance, rotor_flux.coupled_inductance),
+            ),
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
             position: Position::new(
                 m.torque_per_ampere(self.sequence.i_d) / m.inertia,
