@@ -81,7 +81,8 @@ fn after_learning_a_mismatch_costs_no_accuracy() {
 /// A shaft that turns, freely or driven slowly, is noticed, and nothing is changed.
 #[test]
 fn a_shaft_that_moves_is_refused() {
-    let config = config(&[]);
+    // Without the check at the start, which refuses a turning shaft by itself.
+    let config = config(&["injection.check=false"]);
     for load in [Load::Free { torque: 0.0 }, Load::Speed { speed: 6.0 }] {
         let mut rig = Rig::from_config(&config, 5).unwrap();
         rig.set_load(load).unwrap();
@@ -89,7 +90,7 @@ fn a_shaft_that_moves_is_refused() {
         println!("{load:?} after {:.1} s: {error}", rig.time());
         assert_eq!(rig.drive.state(), State::Fault(Fault::ShaftNotLocked));
         assert!(rig.drive.learned().is_none());
-        assert!(rig.time() < 25.0);
+        assert!(rig.time() < 35.0);
     }
 }
 

@@ -178,7 +178,7 @@ impl Learning {
     /// The torque current of a point, A.
     fn current(&self, point: usize) -> f32 {
         let i_q = (point / 2 + 1) as f32 * STEP_A;
-        if point % 2 == 0 { i_q } else { -i_q }
+        if point.is_multiple_of(2) { i_q } else { -i_q }
     }
 
     /// One period: the demodulated signal, the injection axis and how fast it turns, turns per period,
@@ -235,7 +235,7 @@ impl Learning {
         state.in_phase += 2.0 * s.in_phase * mean;
         state.quadrature += 2.0 * s.quadrature * mean;
         let voltage = s.voltage * mean;
-        if point % 2 == 0 {
+        if point.is_multiple_of(2) {
             state.voltage = voltage;
             return true;
         }
@@ -271,8 +271,9 @@ impl Learning {
             if n <= self.points {
                 held = 0.5 * (p - m);
                 let even = 0.5 * (p + m) - offset;
-                if n > 0 && !(even.abs() <= asymmetry) {
-                    asymmetry = even.abs(); // not-a-number stays
+                // Not-a-number is found in the reference.
+                if n > 0 && even.abs() > asymmetry {
+                    asymmetry = even.abs();
                 }
                 let i_q = n as f32 * STEP_A;
                 let x = 2.0 * self.i_d * i_q / libm::sqrtf(self.i_d * self.i_d + i_q * i_q);
