@@ -144,7 +144,8 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         "start" => Request::Start(match word("") {
             Err(_) | Ok("torque") => Mode::Torque,
             Ok("position") => Mode::Position,
-            Ok(_) => return Err(Misunderstood::OneOf("torque position")),
+            Ok("learning") => Mode::Learning,
+            Ok(_) => return Err(Misunderstood::OneOf("torque position learning")),
         }),
         "stop" => Request::Stop,
         "torque" => Request::Torque(number(word("the current")?)?),
@@ -251,6 +252,7 @@ mod tests {
             ("  status\t", Request::Status),
             ("start", Request::Start(Mode::Torque)),
             ("start position", Request::Start(Mode::Position)),
+            ("start learning", Request::Start(Mode::Learning)),
             ("stop", Request::Stop),
             ("torque -1.5", Request::Torque(-1.5)),
             ("position 5e1", Request::Position(50.0)),

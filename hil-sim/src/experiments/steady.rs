@@ -34,8 +34,7 @@ pub struct SteadyRun {
     pub lost: bool,
 }
 
-/// How fast the dynamometer gets up to speed, rpm/s. While it does, the angle lags by the electrical
-/// acceleration over the square of the tracking loop's natural frequency: 11° at 4 Hz.
+/// How fast the dynamometer gets up to speed, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
 
 /// Torque at standstill, up to speed, one second to settle, then `seconds` of judging.
