@@ -114,7 +114,7 @@ impl fmt::Display for Misunderstood {
 pub const HELP: [&str; 17] = [
     "help                      this list",
     "status                    what the drive is doing",
-    "start [torque|position]   calibrate, charge the bootstraps, magnetise, then regulate",
+    "start [torque|position|learning]   calibrate, charge the bootstraps, magnetise, then regulate",
     "stop                      torque to zero, then off",
     "torque A                  current on the quadrature axis, A peak",
     "position TURNS            position, mechanical turns from where it started",
@@ -279,7 +279,7 @@ mod tests {
             ("Stop", Command),
             ("stopp", Command),
             ("stop now", TooMuch),
-            ("start backwards", OneOf("torque position")),
+            ("start backwards", OneOf("torque position learning")),
             ("torque", Missing("the current")),
             ("torque 1 2", TooMuch),
             ("torque 1,5", Number),
