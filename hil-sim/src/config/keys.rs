@@ -257,6 +257,15 @@ keys! {
         /// shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
     }
+    /// What monte-carlo draws anew for every run beside the operating point.
+    "spread." spread: Spread {
+        /// Largest relative error of each parameter that the drive believes of its motor.
+        motor: f64 = 0.0, [0 .. 0.5], "";
+        /// Largest relative change of the sensors' noise.
+        noise: f64 = 0.0, [0 .. 1], "";
+        /// Largest relative error of the gain of each current channel.
+        gain: f64 = 0.0, [0 .. 0.1], "";
+    }
     /// How much is simulated.
     "" extent: Extent {
         /// Runs of a statistical experiment; unset: the experiment's own number.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::steady::{Case, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -14,7 +15,7 @@ use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "monte-carlo",
     stands_for: "the claim behind Figures 38 and 39",
-    about: "Random torque current (0.5 A to 3 A, both signs) and speed; `--set runs=N`.",
+    about: "Random torque current (0.5 A to 3 A, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
     run,
 };
 
@@ -31,20 +32,21 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let bound = context.config.load.speed_rpm.abs();
     let bound = if bound > 0.0 { bound } else { SPEED_RPM };
     let bar = context.progress.bar("monte-carlo", runs.into());
-    let cases: Vec<Case> = (0..u64::from(runs))
+    let cases: Vec<(Case, Config)> = (0..u64::from(runs))
         .map(|number| {
             // A generator of its own for every run: each can be repeated alone by its seed.
             let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
             let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
             let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
             let iq = sign * random.random_range(IQ_A.0..=IQ_A.1);
-            Case { rpm: random.random_range(-bound..=bound), iq, seed }
+            let case = Case { rpm: random.random_range(-bound..=bound), iq, seed };
+            (case, spread(context.config, &mut random))
         })
         .collect();
     let results: Vec<SteadyRun> = cases
         .par_iter()
-        .map(|&case| {
-            let result = steady_run(context.config, case, context.seconds.unwrap_or(2.0));
+        .map(|(case, config)| {
+            let result = steady_run(config, *case, context.seconds.unwrap_or(2.0));
             bar.advance(1);
             result
         })
@@ -52,7 +54,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let kept: Vec<(&Case, &SteadyRun)> =
-        cases.iter().zip(&results).filter(|(_, r)| !r.lost).collect();
+        cases.iter().map(|(case, _)| case).zip(&results).filter(|(_, r)| !r.lost).collect();
     let mut largest: Vec<f64> = kept.iter().map(|(_, r)| r.error.largest()).collect();
     largest.sort_by(f64::total_cmp);
     let squares = kept.iter().map(|(_, r)| r.error.rms().powi(2)).sum::<f64>();
@@ -67,7 +69,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("runs", results.len() as f64);
 
     let mut table = Table::new("Lost runs", &["seed", "iq (A)", "speed (rpm)"]);
-    for (case, _) in cases.iter().zip(&results).filter(|(_, r)| r.lost) {
+    for ((case, _), _) in cases.iter().zip(&results).filter(|(_, r)| r.lost) {
         table.row([
             Cell::from(case.seed.to_string()),
             Cell::fixed(case.iq, 3),
@@ -107,4 +109,25 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          runs are in no other figure."
     ));
     Ok(outcome)
+}
+
+/// The configuration with what `spread` asks for drawn at random.
+fn spread(config: &Config, random: &mut Xoshiro256PlusPlus) -> Config {
+    let mut drawn = config.clone();
+    let mut factor = |largest: f64| 1.0 + random.random_range(-largest..=largest);
+    let (spread, believed) = (&config.spread, config.believed_motor());
+    let motor = &mut drawn.drive_motor;
+    for (place, value) in [
+        (&mut motor.rs, believed.rs),
+        (&mut motor.rr, believed.rr),
+        (&mut motor.lls, believed.lls),
+        (&mut motor.llr, believed.llr),
+        (&mut motor.lm, believed.lm),
+    ] {
+        *place = Some(value * factor(spread.motor));
+    }
+    drawn.measurement.noise_a *= factor(spread.noise);
+    drawn.measurement.gain_error_a += factor(spread.gain) - 1.0;
+    drawn.measurement.gain_error_b += factor(spread.gain) - 1.0;
+    drawn
 }
