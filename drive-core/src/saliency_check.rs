@@ -49,14 +49,15 @@ pub enum Phase {
 
 /// Time to settle and to average, s; together well below the rotor time constant.
 const SETTLE_S: f32 = 0.020;
-const AVERAGE_S: f32 = 0.060;
-/// The mean over the decaying flux, seen at 60°, is 0.64 of what is expected.
-const EXPECTED_SHARE: f32 = 0.64;
-/// Least share of the expected saliency. The mean is 0.64 with all of it, 0.32 with half of it, 0.065 with a tenth and 0 with none, each ±0.034 rms by noise of
-/// 5 mA: the limit lies in the middle between a tenth and half.
-const LEAST_SHARE: f32 = 0.194;
-/// The share of the saliency that the mean is.
-const SEEN_SHARE: f32 = 0.64;
+const AVERAGE_S: f32 = 0.120;
+/// The mean over the decaying flux, seen at 60°, as a share of the saliency at nominal flux.
+const SEEN_SHARE: f32 = 0.535;
+/// Least share of the expected saliency. The mean is 0.54 with all of it, 0.27 with half of it, 0.05
+/// with a tenth and 0 with none, each ±0.024 rms by noise of 5 mA: the limit lies in the middle between
+/// a tenth and half, more than four deviations from both. (A longer mean would be of less flux.)
+const LEAST_SHARE: f32 = 0.161;
+/// Time to build the flux up again, in rotor time constants: it comes back to 5 %.
+const RESTORE_T: f32 = 2.4;
 
 impl SaliencyCheck {
     /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
@@ -65,9 +66,9 @@ impl SaliencyCheck {
         Self {
             settle: periods(SETTLE_S),
             average: periods(AVERAGE_S),
-            restore: periods(2.0 * t_sec),
+            restore: periods(RESTORE_T * t_sec),
             least: LEAST_SHARE * flux_saliency,
-            expected: EXPECTED_SHARE * flux_saliency,
+            expected: SEEN_SHARE * flux_saliency,
         }
     }
 
