@@ -37,7 +37,7 @@ impl Options {
         // The converters have another reference than the source's.
         let gain = f64::from(numbers::CURRENT_A.gain / drive_core::sensing::Line::CHANNEL_A.gain);
         plant.measurement.lsb_a = MeasurementSettings::default().lsb_a * gain;
-        plant.inverter.dead_time_us = f64::from(numbers::DEAD_TIME_S) * 1e6;
+        plant.inverter.dead_time_us = f64::from(numbers::dead_time(numbers::DEAD_TIME_S).1) * 1e6;
         plant.inverter.timer_top = numbers::PWM_TOP;
         plant
     }
@@ -46,7 +46,8 @@ impl Options {
     pub fn new(config: &Config, seed: u64) -> Self {
         let us = numbers::CYCLES_PER_US;
         let gates = GateLimits {
-            dead_time: (numbers::DEAD_TIME_NS * us).div_ceil(1000),
+            // What the firmware asks for; the timer makes it a little longer.
+            dead_time: (f64::from(numbers::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
             // A microsecond, less what rounding to counts takes.
             pulse: us - 2,
         };
@@ -592,6 +593,6 @@ impl Board {
             chip.adc.inputs[converter][usize::from(channel)] = code;
         }
         chip.tim2.set_position(s.encoder);
-        chip.compare_currents(s.current_a, s.current_b);
+        chip.compare(s.current_a, s.current_b, s.dc_link);
     }
 }

@@ -409,16 +409,20 @@ impl Chip {
             && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
     }
 
-    /// The comparators see the currents: comparator 3 has PA0 or PC1 at its positive input, comparator 1
-    /// PA1 only, which is the dc link here.
-    pub fn compare_currents(&mut self, current_a: u16, current_b: u16) {
-        let code = if self.comp.input_of(2) == 0 { current_a } else { current_b };
-        self.comp.inputs[2] = code;
-        self.comp.references[2] =
-            self.dac.code(if self.comp.reference_of(2) == 4 { 1 } else { 0 }, 1);
-        if self.comp.output(2) {
-            self.tim1.comparator_break(2);
+    /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
+    /// dc link here, comparator 3 PA0 or PC1.
+    pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
+        self.comp.inputs[0] = dc_link;
+        self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
+        for n in [0, 2] {
+            // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
+            self.comp.references[n] = match self.comp.reference_of(n) {
+                4 => self.dac.code(1, 1),
+                5 => self.dac.code(0, 1),
+                _ => u16::MAX,
+            };
         }
+        self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
     }
 
     /// Lets happen what is due by now, up to the top of the PWM counter.

@@ -9,7 +9,7 @@ use virtual_board::chip::Reset;
 use virtual_board::{Board, Counting, Image, Options};
 
 /// Periods that the firmware needs from reset to its greeting, at most.
-const START: u64 = 15_000;
+const START: u64 = 24_000;
 
 /// Periods between two reports of the control to the console.
 const REPORT: u64 = 601;
