@@ -169,12 +169,14 @@ impl Pwm {
         self.on = false;
     }
 
-    /// Whether the power stage has pulled the break input since the last call, or still pulls it.
+    /// Whether the power stage, the comparator or a fault inside the chip has pulled the break since the last
+    /// call, or still pulls it.
     pub fn take_break(&mut self) -> bool {
-        let pulled = self.timer.sr().read().bif().bit_is_set();
+        let status = self.timer.sr().read();
+        let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
         if pulled {
             // Stays set while the input is low.
-            self.timer.sr().write(|w| w.bif().clear());
+            self.timer.sr().write(|w| w.bif().clear().sbif().clear());
         }
         pulled
     }

@@ -68,7 +68,7 @@ pub struct Block {
 }
 
 /// The chip but for its core and memories.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Chip {
     /// Time, ticks.
     pub now: u64,
@@ -92,6 +92,8 @@ pub struct Chip {
     pub blocks: Vec<Block>,
     /// Whether blocks are kept.
     pub keep_blocks: bool,
+    /// Whether registers that are not known read as 0.
+    pub forgiving: bool,
     last_block: Option<(u32, u32)>,
     /// Core-private registers.
     pub scs: Scs,
@@ -140,6 +142,7 @@ impl Chip {
             instructions: 0,
             blocks: Vec::new(),
             keep_blocks: false,
+            forgiving: false,
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
@@ -167,6 +170,7 @@ impl Chip {
         self.accesses = old.accesses;
         self.instructions = old.instructions;
         self.keep_blocks = old.keep_blocks;
+        self.forgiving = old.forgiving;
         let mut flags = old.rcc.reset_flags();
         if cause == Reset::Power {
             flags = 0;
@@ -266,6 +270,9 @@ impl Chip {
     }
 
     fn is_unknown(&mut self, address: u32, written: Option<u32>) -> u32 {
+        if self.forgiving {
+            return 0;
+        }
         self.unknown.get_or_insert(Unknown { address, written, at: self.at });
         self.attention = true;
         0
@@ -292,6 +299,9 @@ impl Chip {
         if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let (value, torn) = self.flash.load(address);
             if torn {
+                if self.syscfg.flash_error_breaks() {
+                    self.tim1.system_break();
+                }
                 self.scs.pend(scs::NMI);
                 self.attention = true;
             }
@@ -375,6 +385,13 @@ impl Chip {
             }
         }
         Some(())
+    }
+
+    /// The core locks up: to the break of TIM1, if the firmware wants that.
+    pub fn lock_up(&mut self) {
+        if self.syscfg.lock_up_breaks() {
+            self.tim1.system_break();
+        }
     }
 
     /// Interrupt requests that are levels.

@@ -157,6 +157,11 @@ impl Tim1 {
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
     }
 
+    /// Lets an update come at the next end of the count, whatever the repetition counter says.
+    pub fn extra_update(&mut self) {
+        self.repetitions = 0;
+    }
+
     /// Compare values in force.
     pub fn in_force(&self) -> [u32; 3] {
         [self.active[0], self.active[1], self.active[2]]
