@@ -25,12 +25,17 @@ impl DeadTime {
     /// No compensation.
     pub const NONE: Self = Self { ratio: 0.0, per_ampere: 0.0 };
 
-    /// The voltage to add, V per phase, when the currents `i` are expected to flow, A, at a dc link
-    /// of `v_dc`, V.
-    pub fn step(&self, i: Abc, v_dc: f32) -> Abc {
-        let full = self.ratio * v_dc;
-        let share = |i: f32| full * (i * self.per_ampere).clamp(-1.0, 1.0);
-        Abc { a: share(i.a), b: share(i.b), c: share(i.c) }
+    /// The signs of the currents `i` that are expected to flow, A, through zero linearly; all zero
+    /// when nothing is to be compensated.
+    pub fn signs(&self, i: Abc) -> Abc {
+        let sign = |i: f32| (i * self.per_ampere).clamp(-1.0, 1.0);
+        Abc { a: sign(i.a), b: sign(i.b), c: sign(i.c) }
+    }
+
+    /// The voltage to add, V per phase, at these signs and a dc link of `v_dc`, V, with `drop` V that
+    /// are lost beside the dead time (see [`crate::inverter_drop`]).
+    pub fn voltage(&self, signs: Abc, v_dc: f32, drop: f32) -> Abc {
+        signs * (self.ratio * v_dc + drop)
     }
 }
 
@@ -41,10 +46,13 @@ mod tests {
     #[test]
     fn full_voltage_beyond_the_threshold_and_smooth_through_zero() {
         let dt = DeadTime::new(2.2e-6, 1.0 / 6000.0, 0.05);
-        let v = dt.step(Abc::new(1.0, -0.5, 0.025), 311.0);
+        let step = |dt: &DeadTime, i| dt.voltage(dt.signs(i), 311.0, 0.0);
+        let v = step(&dt, Abc::new(1.0, -0.5, 0.025));
         assert!((v.a - 4.105).abs() < 1e-3 && (v.b + 4.105).abs() < 1e-3);
         assert!((v.c - 0.5 * 4.105).abs() < 1e-3);
-        assert_eq!(dt.step(Abc::ZERO, 311.0), Abc::ZERO);
-        assert_eq!(DeadTime::NONE.step(Abc::new(1.0, 1.0, 1.0), 311.0), Abc::ZERO);
+        assert_eq!(step(&dt, Abc::ZERO), Abc::ZERO);
+        assert_eq!(step(&DeadTime::NONE, Abc::new(1.0, 1.0, 1.0)), Abc::ZERO);
+        let more = dt.voltage(dt.signs(Abc::new(1.0, -0.5, 0.0)), 311.0, 1.0);
+        assert!((more.a - 5.105).abs() < 1e-3 && (more.b + 5.105).abs() < 1e-3);
     }
 }

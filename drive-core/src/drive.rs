@@ -1,6 +1,7 @@
 //! The whole drive: one step per PWM period.
 
 mod commands;
+mod learn;
 #[cfg(test)]
 mod tests;
 
@@ -13,7 +14,9 @@ use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
 use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
+use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
+use crate::learning::{Learned, LearningState};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::pi::{DqPiState, ReferenceState};
@@ -52,6 +55,7 @@ pub struct Drive {
     wiring_unchecked: bool,
     wiring: WiringCheckState,
     telemetry: Telemetry,
+    learned: Option<Learned>,
 }
 
 /// What was asked for.
@@ -95,6 +99,8 @@ struct ControlState {
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
+    inverter_drop: InverterDropState,
+    learning: LearningState,
 }
 
 /// What the drive saw and did in the last step.
@@ -129,6 +135,8 @@ pub struct Telemetry {
     pub saliency_loss: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
+    /// Voltage per phase that the power stage drops beyond its dead time, as measured at the start, V.
+    pub inverter_drop: f32,
     /// Position in mechanical turns from the start; without the encoder it drifts, see
     /// [`motion`](crate::motion).
     pub turns: f32,
@@ -148,6 +156,7 @@ impl Drive {
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
             telemetry: Telemetry::default(),
+            learned: None,
         }
     }
 
@@ -235,7 +244,8 @@ impl Drive {
     fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
         match self.c.wiring.step(&mut self.wiring, measured.phases)? {
             Next::Apply(voltage, flowing) => {
-                let compensation = self.c.dead_time.step(flowing.to_abc(), measured.dc_link);
+                let signs = self.c.dead_time.signs(flowing.to_abc());
+                let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
                 let [a, b, c] =
                     self.c.modulator.step(voltage, compensation, measured.dc_link).compare;
                 Ok(Compare { a, b, c, enabled: true })
@@ -266,11 +276,15 @@ impl Drive {
         };
         // Flux angle at the sample. The current is seen from where the flux was when the filtered
         // current flowed; the voltage is put where the flux will be when it acts.
-        let flux = match c.source {
-            AngleSource::Encoder => {
-                c.indirect.angle(&mut s.indirect, sample.encoder).map_err(|_| Fault::Encoder)?
-            }
-            AngleSource::Injection => s.estimator.flux(),
+        let count = match (self.mode, c.source) {
+            // The shaft is locked.
+            (Mode::Learning, _) => Some(0),
+            (_, AngleSource::Encoder) => Some(sample.encoder),
+            (_, AngleSource::Injection) => None,
+        };
+        let flux = match count {
+            Some(count) => c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?,
+            None => s.estimator.flux(),
         };
 
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
@@ -298,9 +312,20 @@ impl Drive {
         // Dead time: the sign of the current that is going to flow decides.
         let expected =
             current.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.mean_current);
-        let compensation = c.dead_time.step(expected.to_abc(), measured.dc_link);
+        let signs = c.dead_time.signs(expected.to_abc());
+        let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
         s.current_loop.realised((modulated.realised - total).to_dq(applied));
+
+        if self.state == State::Magnetising {
+            c.inverter_drop.step(
+                &mut s.inverter_drop,
+                (self.elapsed, c.sequence.magnetise),
+                (current, voltage, s.indirect.magnetising),
+                signs.to_alpha_beta().to_dq(applied),
+                measured.dc_link,
+            );
+        }
 
         // Angles for the next sample.
         if c.demodulate {
@@ -308,12 +333,12 @@ impl Drive {
             let i_q = reference.q;
             c.estimator.observe(e, measured.current, theta_axis, flux.step, carrier, i_q);
         }
-        let rotor_step = match c.source {
-            AngleSource::Encoder => {
+        let rotor_step = match count {
+            Some(_) => {
                 c.indirect.update(&mut s.indirect, current);
                 s.indirect.rotor_step
             }
-            AngleSource::Injection => {
+            None => {
                 // The slip of what is asked for: that of the measured current would feed the angle
                 // error back.
                 c.indirect.update(&mut s.indirect, reference);
@@ -346,6 +371,7 @@ impl Drive {
             carrier_share: s.carrier.share,
             saliency_loss: s.lock.loss,
             dc_link: measured.dc_link,
+            inverter_drop: s.inverter_drop.volts,
             turns: c.motion.turns(&s.motion, rotor_count),
         };
 
@@ -373,7 +399,9 @@ impl Drive {
             }
             // Once a carrier period each: is it the flux that is tracked, and does the carrier fit?
             if carrier.index == MONITORED {
-                if let (Some(monitor), true) = (&c.lock_monitor, s.carrier.is_settled()) {
+                // (While it learns nothing is tracked, and what is compared with is not known yet.)
+                let judged = s.carrier.is_settled() && (held || self.mode != Mode::Learning);
+                if let (Some(monitor), true) = (&c.lock_monitor, judged) {
                     monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
                 }
             } else if carrier.index + 1 == CARRIER_SAMPLES {
@@ -416,6 +444,7 @@ impl Drive {
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
             State::Verifying => return self.verify(),
+            State::Learning => self.learn()?,
             State::Speed | State::Position => {
                 let goal = match self.mode {
                     Mode::Speed => Goal::Speed(r.speed),
@@ -444,7 +473,8 @@ impl Drive {
     /// The current while the flux is built up, and while the saliency is checked, A.
     fn magnetise(&mut self) -> Result<Dq, Fault> {
         let (r, s) = (&mut self.references, &mut self.control);
-        let magnetising = Dq { d: r.current.d, q: 0.0 };
+        let level = self.c.inverter_drop.level(self.elapsed);
+        let magnetising = Dq { d: level * r.current.d, q: 0.0 };
         let phase =
             match (self.elapsed.checked_sub(self.c.sequence.magnetise), self.c.saliency_check) {
                 (None, _) => return Ok(magnetising),
@@ -463,9 +493,8 @@ impl Drive {
                 r.injection_axis = self.c.injection_axis;
             }
             Phase::Passed => {
-                let next =
-                    self.c.lock_monitor.map_or(State::of_mode(self.mode), |_| State::Verifying);
-                self.enter(next);
+                let watched = self.c.lock_monitor.is_some() && self.mode != Mode::Learning;
+                self.enter(if watched { State::Verifying } else { State::of_mode(self.mode) });
             }
             Phase::Failed => return Err(Fault::NoSaliency),
         }

@@ -9,7 +9,8 @@ use crate::demodulator::{CarrierSample, Demodulate, Demodulator};
 use crate::frames::AlphaBeta;
 use crate::indirect::FluxAngle;
 use crate::injection::CarrierPeriod;
-use crate::schedule::Schedule;
+use crate::learning::Learned;
+use crate::schedule::{ReferenceTable, Schedule};
 use crate::settings::Tracking;
 use crate::synchronous::Saliency;
 use crate::tracker::{Pll, Tracker, TrackerState};
@@ -43,8 +44,8 @@ impl ConstantReference {
 pub enum Reference {
     /// Section 3.3.
     Constant(ConstantReference),
-    /// Learned, A; its share is not used.
-    Learned(Schedule),
+    /// Learned over i_q, A.
+    Learned(ReferenceTable),
 }
 
 impl Reference {
@@ -52,7 +53,7 @@ impl Reference {
     fn at(&self, i_q: f32) -> f32 {
         match self {
             Self::Constant(constant) => constant.at(i_q),
-            Self::Learned(table) => table.at(i_q).0,
+            Self::Learned(table) => table.at(i_q),
         }
     }
 }
@@ -135,6 +136,18 @@ impl Estimator {
         state.demodulator = Demodulator::new(self.demodulator, self.rms_samples);
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
         state.tracker.angle = Angle::QUARTER;
+    }
+
+    /// Compares with what was learned from now on.
+    pub fn take(&mut self, learned: &Learned) {
+        match &mut self.angle_loop {
+            AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
+            AngleLoop::Pll { schedule, .. } => {
+                let b = learned.current_saliency;
+                let b = b.accepted.then_some(b.value);
+                *schedule = schedule.with(&learned.reference, b);
+            }
+        }
     }
 
     /// Demodulates one sample: the current, A; the injection axis, and how fast it turns, turns per

@@ -54,6 +54,8 @@ faults! {
     ClockFailure = 24, "the clock failed";
     NoSaliency = 25, "the motor shows too little saliency for the injection";
     LostLock = 26, "the flux is not where the tracked angle says";
+    ShaftNotLocked = 27, "the shaft moved, or the flux did not turn, while learning";
+    NothingLearned = 28, "what was learned is not believable";
     CarrierWeak = 29, "too little carrier current: open phase, or the inverter does not put it out";
     WiringNoCurrent = 30, "wiring check: a sensor sees no current, it or a phase is open";
     WiringPolarityA = 31, "wiring check: current sensor a is the wrong way round";
@@ -115,6 +117,8 @@ mod tests {
             (24, Fault::ClockFailure),
             (25, Fault::NoSaliency),
             (26, Fault::LostLock),
+            (27, Fault::ShaftNotLocked),
+            (28, Fault::NothingLearned),
             (29, Fault::CarrierWeak),
             (30, Fault::WiringNoCurrent),
             (31, Fault::WiringPolarityA),

@@ -97,6 +97,9 @@ pub enum Mode {
     Position,
     /// Identification of the motor. Not available yet: refused.
     Commissioning,
+    /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::learning`]), then
+    /// stops.
+    Learning,
 }
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
@@ -157,7 +160,7 @@ pub enum Refused {
     ModeNotAvailable(Mode),
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
-    /// The injection is needed as angle source.
+    /// The injection is needed as angle source; to learn, with a demodulation that tracks.
     NeedsInjection,
     /// The settings do not want the rotor time constant tracked.
     RotorNotTracked,
@@ -179,7 +182,9 @@ impl core::fmt::Display for Refused {
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
             Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
-            Self::NeedsInjection => write!(f, "this needs the injection as angle source"),
+            Self::NeedsInjection => {
+                write!(f, "this needs the injection, demodulated by a way that tracks")
+            }
             Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {

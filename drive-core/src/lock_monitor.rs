@@ -34,11 +34,9 @@
 use core::fmt;
 
 use crate::fault::Fault;
+use crate::schedule::{POINTS, STEP_A};
 use crate::synchronous::Saliency;
 
-/// Points of the table, from i_q = 0 on, and their distance, A.
-const POINTS: usize = 16;
-const STEP_A: f32 = 0.25;
 /// Range of a believable ratio.
 const RATIO: (f32, f32) = (0.5, 2.0);
 
@@ -107,6 +105,19 @@ impl CarrierTable {
     }
 }
 
+impl CarrierTable {
+    /// From its values at multiples of [`STEP_A`]; none when the first is not 1 or any is out of range.
+    pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
+        let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
+        (ratio[0] == 1.0 && believable).then_some(Self { ratio })
+    }
+
+    /// Its values at multiples of [`STEP_A`].
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.ratio
+    }
+}
+
 impl Default for CarrierTable {
     /// Learned on the simulated motor of Table 5 together with the default
     /// [`ReferenceTable`](crate::schedule::ReferenceTable): it belongs to that motor.
@@ -158,7 +169,7 @@ pub struct LockMonitorSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitorState {
     /// Square of the carrier current at i_q = 0, A^2, mean.
-    baseline: f32,
+    pub baseline: f32,
     /// Saliency of the motor as a share of the expected one.
     pub share: f32,
     /// Loss per relative change of the squared carrier current; 0 until it is first needed.
@@ -198,6 +209,11 @@ impl LockMonitor {
             least: least * least,
             standing: s.standing_step,
         }
+    }
+
+    /// Compares with what was learned from now on.
+    pub fn take(&mut self, table: &CarrierTable) {
+        self.inverse_square = table.ratio.map(|r| 1.0 / (r * r));
     }
 
     /// One carrier period: what is demodulated with `put_out`, the share of the carrier that is put

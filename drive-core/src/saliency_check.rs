@@ -55,6 +55,8 @@ const EXPECTED_SHARE: f32 = 0.64;
 /// Least share of the expected saliency. The mean is 0.64 with all of it, 0.32 with half of it, 0.065 with a tenth and 0 with none, each ±0.034 rms by noise of
 /// 5 mA: the limit lies in the middle between a tenth and half.
 const LEAST_SHARE: f32 = 0.194;
+/// The share of the saliency that the mean is.
+const SEEN_SHARE: f32 = 0.64;
 
 impl SaliencyCheck {
     /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
@@ -67,6 +69,11 @@ impl SaliencyCheck {
             least: LEAST_SHARE * flux_saliency,
             expected: EXPECTED_SHARE * flux_saliency,
         }
+    }
+
+    /// The saliency fixed to the flux, at its nominal value, that a finished check has seen.
+    pub fn seen(&self, state: &SaliencyCheckState) -> f32 {
+        state.sum / (SEEN_SHARE * self.average as f32)
     }
 
     /// Angle of the injection axis from the flux while looking.

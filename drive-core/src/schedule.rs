@@ -12,9 +12,9 @@ use core::fmt;
 use crate::decimal::Shortest;
 
 /// Points of the tables, from i_q = 0 on.
-const POINTS: usize = 16;
+pub const POINTS: usize = 16;
 /// Their distance, A.
-const STEP_A: f32 = 0.25;
+pub const STEP_A: f32 = 0.25;
 /// Share of the proportional part that is left however steep the fast slope. Only errors faster than
 /// the current loop see that slope in full; with all of it taken out the tracking loop has too little
 /// damping at large currents. (4 Hz, a rotor 30 % warmer than believed, 3 A to -3 A: 19.6° at most
@@ -90,6 +90,22 @@ impl ReferenceTable {
         };
         Ok(Self { q: core::array::from_fn(|n| at(n as f32 * STEP_A)) })
     }
+
+    /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
+    pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
+        let believable = q.iter().all(|q| q.abs() <= LARGEST);
+        (q[0] == 0.0 && believable).then_some(Self { q })
+    }
+
+    /// Its values at multiples of [`STEP_A`].
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.q
+    }
+
+    /// The reference at a quadrature current, A.
+    pub fn at(&self, i_q: f32) -> f32 {
+        odd(i_q, between(&self.q, place(i_q)))
+    }
 }
 
 impl Default for ReferenceTable {
@@ -97,18 +113,40 @@ impl Default for ReferenceTable {
     /// `learn-reference`): it belongs to that motor.
     fn default() -> Self {
         const LEARNED: [f32; POINTS] = [
-            0.0, 0.01658, 0.02893, 0.03628, 0.04018, 0.04207, 0.04323, 0.04386, 0.04422, 0.04421,
-            0.04417, 0.04406, 0.04384, 0.04357, 0.04357, 0.04357,
+            0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
+            0.04356, 0.04345, 0.04328, 0.04308, 0.04308, 0.04308,
         ];
         Self { q: LEARNED }
     }
 }
 
+/// The interval of the tables in which a current lies, A, and the share of it that is past. The last
+/// value is held beyond the end.
+fn place(i_q: f32) -> (usize, f32) {
+    let x = i_q.abs() * (1.0 / STEP_A);
+    // Saturating cast.
+    let n = (x as usize).min(POINTS - 2);
+    let past = x - n as f32;
+    (n, if past < 1.0 { past } else { 1.0 })
+}
+
+fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
+    table[n] + (table[n + 1] - table[n]) * past
+}
+
+fn odd(i_q: f32, q: f32) -> f32 {
+    if i_q < 0.0 { -q } else { q }
+}
+
 /// Reference and gain over i_q, for the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
-    q: [f32; POINTS],
+    table: ReferenceTable,
     share: [f32; POINTS],
+    /// What it was made for.
+    flux_saliency: f32,
+    current_saliency: f32,
+    i_d: f32,
     /// Angle error per difference of the saliency, rad.
     pub per_saliency: f32,
 }
@@ -126,19 +164,25 @@ impl Schedule {
                 a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 });
             LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope
         };
-        Self { q: table.q, share: core::array::from_fn(share), per_saliency: -0.5 / a }
+        Self {
+            table: *table,
+            share: core::array::from_fn(share),
+            flux_saliency: a,
+            current_saliency: b,
+            i_d,
+            per_saliency: -0.5 / a,
+        }
+    }
+
+    /// The same with another reference and, where there is one, another saliency per ampere, 1/A.
+    pub fn with(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
+        Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
     }
 
     /// Reference of `q`, and share of the proportional part, at a quadrature current, A.
     pub fn at(&self, i_q: f32) -> (f32, f32) {
-        let x = i_q.abs() * (1.0 / STEP_A);
-        // Saturating cast; the last interval is held beyond its end.
-        let n = (x as usize).min(POINTS - 2);
-        let past = x - n as f32;
-        let share = if past < 1.0 { past } else { 1.0 };
-        let between = |table: &[f32; POINTS]| table[n] + (table[n + 1] - table[n]) * share;
-        let q = between(&self.q);
-        (if i_q < 0.0 { -q } else { q }, between(&self.share))
+        let place = place(i_q);
+        (odd(i_q, between(&self.table.q, place)), between(&self.share, place))
     }
 }
 

@@ -20,6 +20,11 @@ impl Line {
     #[allow(clippy::excessive_precision)]
     pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
 
+    /// The line times a factor.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self { gain: factor * self.gain, offset: factor * self.offset }
+    }
+
     /// Value at a code.
     pub fn at(self, code: u16) -> f32 {
         self.gain * f32::from(code) + self.offset
@@ -66,6 +71,12 @@ pub struct Measured {
 }
 
 impl Sensing {
+    /// Takes out that the gain of channel a is too large by this share of that of b, half on each.
+    pub fn take_mismatch(&mut self, mismatch: f32) {
+        self.current_a = self.current_a.scaled(1.0 - 0.5 * mismatch);
+        self.current_b = self.current_b.scaled(1.0 + 0.5 * mismatch);
+    }
+
     /// Codes to SI units, offsets taken off.
     pub fn step(&self, state: &SensingState, sample: &Sample) -> Measured {
         let a = self.current_a.at(sample.current_a) - state.offset_a;

@@ -91,9 +91,9 @@ pub struct Inverter {
 }
 
 impl Default for Inverter {
-    /// Section 3.9; full compensation from 50 mA on: about the spread of noise and prediction.
+    /// Section 3.9; full compensation from 30 mA on: three times the spread of noise and prediction.
     fn default() -> Self {
-        Self { top: 14_167, dead_time_s: 2.2e-6, compensate: true, full_compensation_a: 0.05 }
+        Self { top: 14_167, dead_time_s: 2.2e-6, compensate: true, full_compensation_a: 0.03 }
     }
 }
 
@@ -246,7 +246,7 @@ impl Default for SynchronousTracking {
     /// For the simulated motor; see [`ReferenceTable::default`].
     fn default() -> Self {
         Self {
-            bandwidth_hz: 4.0,
+            bandwidth_hz: 3.5,
             flux_saliency: -0.035,
             current_saliency: 0.0338,
             reference: ReferenceTable::default(),

@@ -27,6 +27,8 @@ pub enum State {
     Position,
     /// Identifying the motor.
     Commissioning,
+    /// Learning with the shaft locked.
+    Learning,
     /// Taking the torque to zero, then off.
     Stopping,
     /// Outputs off until the fault is cleared.
@@ -41,6 +43,7 @@ impl State {
             Mode::Speed => Self::Speed,
             Mode::Position => Self::Position,
             Mode::Commissioning => Self::Commissioning,
+            Mode::Learning => Self::Learning,
         }
     }
 }
@@ -58,6 +61,7 @@ impl fmt::Display for State {
             Self::Speed => "regulating speed",
             Self::Position => "regulating position",
             Self::Commissioning => "commissioning",
+            Self::Learning => "learning",
             Self::Stopping => "stopping",
             Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),
         })

@@ -187,8 +187,8 @@ mod tests {
         assert_eq!(
             known,
             [
-                ("FLASH", 0x0800_0000, 240),
-                ("CONTROL", 0x0803_c000, 16),
+                ("FLASH", 0x0800_0000, 232),
+                ("CONTROL", 0x0803_a000, 24),
                 // Overflows where there is no memory.
                 ("STACK", 0x2000_0000, 16),
                 // To 96, not 128: CCM is mapped again behind it.

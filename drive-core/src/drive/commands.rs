@@ -126,6 +126,9 @@ impl Drive {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
             (State::Off, Mode::Commissioning) => return Err(Refused::ModeNotAvailable(mode)),
+            (State::Off, Mode::Learning) if !self.can_learn() => {
+                return Err(Refused::NeedsInjection);
+            }
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
         }
@@ -166,7 +169,9 @@ impl Drive {
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
             State::Off | State::Stopping => Err(Refused::State(self.state)),
-            _ if self.mode != mode => Err(Refused::State(State::of_mode(self.mode))),
+            _ if self.mode != mode || mode == Mode::Learning => {
+                Err(Refused::State(State::of_mode(self.mode)))
+            }
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),
         }

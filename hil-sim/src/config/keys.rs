@@ -204,7 +204,7 @@ keys! {
         /// Speed of the rotor at which a sensorless drive with synchronous switches off.
         tracked_rpm: f64 = 700.0, [1 .. 20000], "rpm";
         /// Natural frequency of the loop behind synchronous.
-        bandwidth_hz: f64 = 4.0, [0.1 .. 30], "Hz";
+        bandwidth_hz: f64 = 3.5, [0.1 .. 30], "Hz";
     }
     /// The flux angle.
     "angle." angle: Angle {
@@ -250,6 +250,12 @@ keys! {
         llr: Option<f64> = None, [1e-5 .. 10], "H";
         /// Magnetising inductance; follows motor.lm.
         lm: Option<f64> = None, [1e-4 .. 100], "H";
+    }
+    /// What the drive does before the experiment.
+    "drive." drive: DriveSteps {
+        /// In steady runs (monte-carlo, speed-torque-sweep): whether the drive learns first, with the
+        /// shaft locked, as a user would have it do.
+        learn: bool = false, [switch], "";
     }
     /// How much is simulated.
     "" extent: Extent {

@@ -1,4 +1,7 @@
-//! Learning the reference of the synchronous demodulation.
+//! The drive learns what its angle tracking compares with.
+
+use drive_core::learning::Fitted;
+use drive_core::schedule::STEP_A;
 
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -10,35 +13,66 @@ use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "learn-reference",
     stands_for: "section 3.3, section 5.2",
-    about: "The saliency over the torque current, learned with the shaft locked.",
+    about: "The drive learns reference, sensor mismatch and saliency with the shaft locked.",
     run,
 };
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let learned = learn::reference(context.config, context.seed)?;
+    let learned = learn::on(context.config, context.seed)?;
     let mut outcome = Outcome::default();
-    let heads = ["iq (A)", "q", "scatter", "carrier ratio"];
-    let mut table = Table::new("Reference of the synchronous demodulation", &heads).note(
-        "q is the saliency that the carrier sees at the right angle; the table is odd in iq. The \
-             carrier current, as a ratio to that at 0 A, is even.",
-    );
-    let mut scatter = 0.0_f64;
-    for point in &learned {
-        table.row([
-            Cell::fixed(point.i_q, 2),
-            Cell::fixed(point.q, 5),
-            Cell::fixed(point.scatter, 5),
-            Cell::fixed(point.carrier / learned[0].carrier, 5),
-        ]);
-        scatter = scatter.max(point.scatter);
+    let points: Vec<(f64, f64)> = learned
+        .reference
+        .points()
+        .iter()
+        .take(learned.points + 1)
+        .enumerate()
+        .map(|(n, &q)| (n as f64 * f64::from(STEP_A), f64::from(q)))
+        .collect();
+    let mut table = Table::new(
+        "Over the torque current",
+        &["iq (A)", "reference", "carrier ratio"],
+    )
+    .note("What the carrier shows at the right angle, odd in iq; the carrier current, as a ratio to that at 0 A, even.");
+    for (n, &(i_q, q)) in points.iter().enumerate() {
+        let ratio = learned.carrier.map_or(f64::NAN, |table| f64::from(table.points()[n]));
+        table.row([Cell::fixed(i_q, 2), Cell::fixed(q, 5), Cell::fixed(ratio, 5)]);
     }
-    outcome.metrics.set("scatter_max", scatter);
     outcome.tables.push(table);
-    let line = learned.iter().map(|p| (p.i_q, p.q)).collect();
-    outcome.figures.push(
-        Figure::new("reference", "Saliency over the torque current", "section 3.3")
-            .panel(Panel::new("quadrature current (A)", "q").with(Series::line("learned", line))),
+
+    let mut table = Table::new("Other values", &["value", "found", "misfit", "used"]).note(
+        "The saliency fixed to the flux is what the check at the start saw, within 5 %; it is for \
+         the reader.",
     );
+    let mut fitted = |name: &str, fitted: Fitted| {
+        table.row([
+            Cell::from(name),
+            Cell::fixed(f64::from(fitted.value), 5),
+            Cell::fixed(f64::from(fitted.misfit), 5),
+            Cell::from(if fitted.accepted { "yes" } else { "no" }),
+        ]);
+    };
+    fitted("gain of sensor a over b, less one", learned.gain_mismatch);
+    fitted("saliency of the current (1/A)", learned.current_saliency);
+    table.row([
+        Cell::from("saliency fixed to the flux"),
+        Cell::fixed(f64::from(learned.flux_saliency), 4),
+        Cell::from(""),
+        Cell::from("no"),
+    ]);
+    outcome.tables.push(table);
+
+    let m = &mut outcome.metrics;
+    m.set("asymmetry_max", learned.asymmetry.into());
+    m.set("gain_mismatch", learned.gain_mismatch.value.into());
+    m.set("gain_mismatch_misfit", learned.gain_mismatch.misfit.into());
+    m.set("current_saliency_per_a", learned.current_saliency.value.into());
+    m.set("current_saliency_misfit", learned.current_saliency.misfit.into());
+    m.set("flux_saliency", learned.flux_saliency.into());
+    outcome
+        .figures
+        .push(Figure::new("reference", "Reference over the torque current", "section 3.3").panel(
+            Panel::new("quadrature current (A)", "q").with(Series::line("learned", points)),
+        ));
     outcome.remarks = assumptions(context.config);
     Ok(outcome)
 }

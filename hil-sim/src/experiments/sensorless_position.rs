@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::schedule::ReferenceTable;
 use drive_core::{Mode, State};
 use rayon::prelude::*;
 
@@ -82,11 +81,7 @@ fn hold(
     config.motor.rr = believed * belief.0;
     let mut drive = drive_settings(&config);
     if belief.1 {
-        let table = learn::reference(&config, seed)?;
-        let points: Vec<_> = table.iter().skip(1).map(|p| (p.i_q as f32, p.q as f32)).collect();
-        let points = [&[(0.0, 0.0)], points.as_slice()].concat();
-        let table = ReferenceTable::new(&points).map_err(|e| Error::Refused(e.to_string()))?;
-        drive.injection.synchronous.reference = table;
+        drive.injection.synchronous.reference = learn::on(&config, seed)?.reference;
     }
     let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
     rig.start(Mode::Position)?;

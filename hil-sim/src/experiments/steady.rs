@@ -7,6 +7,7 @@ use drive_core::{Command, Mode, Settings, State};
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
+use crate::learn;
 use crate::plant::Load;
 use crate::rig::{Rig, drive_settings, plant_settings};
 use crate::stats::Stats;
@@ -33,9 +34,7 @@ pub struct SteadyRun {
     pub lost: bool,
 }
 
-/// How fast the dynamometer gets up to speed, rpm/s. While it does, the angle lags by the electrical
-/// acceleration over the square of the tracking loop's natural frequency: 11° at 4 Hz. Against a torque
-/// of the drive that takes most of the flux away, and the lock monitor stops it: so without torque.
+/// How fast the dynamometer gets up to speed, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
 
 /// A drive that has been started, brought up to speed without torque, and given its torque.
@@ -51,6 +50,9 @@ fn at_speed_of(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Err
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
     let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
+    if config.drive.learn {
+        learn::with(&mut rig)?;
+    }
     rig.start(Mode::Torque)?;
     let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
     for n in 1..=steps {

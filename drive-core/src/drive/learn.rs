@@ -1,0 +1,70 @@
+//! Learning with the shaft locked, as a state of the drive.
+
+use super::Drive;
+use crate::angle::Angle;
+use crate::estimator::AngleLoop;
+use crate::fault::Fault;
+use crate::learning::{Learned, Next};
+use crate::settings::{Coefficients, Tracking};
+use crate::state::State;
+
+impl Drive {
+    /// What the last learning found, used or not; none before the first.
+    pub fn learned(&self) -> Option<&Learned> {
+        self.learned.as_ref()
+    }
+
+    /// While it learns: points that are done, and all points.
+    pub fn learning_progress(&self) -> Option<(usize, usize)> {
+        (self.state == State::Learning)
+            .then(|| (self.control.learning.done(), self.c.learning.points()))
+    }
+
+    pub(super) fn can_learn(&self) -> bool {
+        let literal = self.c.estimator.demodulator == Tracking::Literal;
+        self.c.inject && self.c.demodulate && !literal
+    }
+
+    /// The torque current to regulate while learning, A. In the end what was found takes the place of
+    /// what was set, and the drive stops.
+    pub(super) fn learn(&mut self) -> Result<f32, Fault> {
+        let (c, s, t) = (&self.c, &mut self.control, &self.telemetry);
+        let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
+        let signal = if normalised { t.saliency } else { t.delta_i };
+        let theta = t.phi + Angle::QUARTER;
+        match {
+            let seen = (signal, t.carrier_squared);
+            c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage)
+        } {
+            Next::Current(i_q) => self.references.current.q = i_q,
+            Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
+            Next::Done => {
+                let flux = c.saliency_check.map_or(0.0, |check| check.seen(&s.saliency_check));
+                let learned = c.learning.result(&s.learning, normalised, flux, s.lock.baseline);
+                self.learned = Some(learned);
+                if !learned.accepted {
+                    return Err(Fault::NothingLearned);
+                }
+                self.c.take(&learned);
+                self.enter(State::Stopping);
+            }
+        }
+        Ok(self.references.current.q)
+    }
+}
+
+impl Coefficients {
+    /// Puts what was learned and accepted in the place of what was set.
+    pub fn take(&mut self, learned: &Learned) {
+        if !learned.accepted {
+            return;
+        }
+        self.estimator.take(learned);
+        if let (Some(monitor), Some(carrier)) = (&mut self.lock_monitor, &learned.carrier) {
+            monitor.take(carrier);
+        }
+        if learned.gain_mismatch.accepted {
+            self.sensing.take_mismatch(learned.gain_mismatch.value);
+        }
+    }
+}
