@@ -34,6 +34,8 @@ mod sweep;
 mod torque;
 mod tracking;
 
+pub use torque::assumptions;
+
 use crate::config::Config;
 use crate::error::{Error, nearest};
 use crate::outcome::Outcome;

@@ -23,6 +23,7 @@ pub mod cost;
 pub mod cpu;
 pub mod cycles;
 pub mod image;
+pub mod interactive;
 pub mod log;
 pub mod memory;
 pub mod pair;

@@ -200,7 +200,11 @@ pub const CLASSES: &[Class] = &[
         why: PLAUSIBLE,
         sources: BOTH,
         course: Course::Regulating(|board, places, rng| {
-            let area = if rng.random() { places.data } else { (places.stack.0 + places.stack.1 - 1024, 1024) };
+            let area = if rng.random() {
+                places.data
+            } else {
+                (places.stack.0 + places.stack.1 - 1024, 1024)
+            };
             flip(board, rng, area);
         }),
     },
@@ -240,7 +244,11 @@ pub const CLASSES: &[Class] = &[
             let mut bytes = vec![0; rng.random_range(1..3000)];
             let text = rng.random::<bool>();
             for byte in &mut bytes {
-                *byte = if text { b"stausorquepi \n0123.-"[rng.random_range(0..20_usize)] } else { rng.random() };
+                *byte = if text {
+                    b"stausorquepi \n0123.-"[rng.random_range(0..20_usize)]
+                } else {
+                    rng.random()
+                };
             }
             board.send(&bytes);
         }),

@@ -50,7 +50,8 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64) -> Result<Seen> {
         let now = board.chip().now;
         board.run_ticks(next.saturating_sub(now))?;
         while board.next_period().is_some() {}
-        let current = board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
+        let current =
+            board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
         seen.peak_a = seen.peak_a.max(current);
         if let Some(at) = board.went_off {
             seen.off_ms = Some(since(at));
@@ -93,7 +94,11 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
         bail!("outputs off without a reason in the log: {:?}", board.logged()?)
     };
     let log = board.logged()?;
-    ensure!(log.iter().any(|l| l.contains(cause(reset))), "no {:?} in the log {log:?}", cause(reset));
+    ensure!(
+        log.iter().any(|l| l.contains(cause(reset))),
+        "no {:?} in the log {log:?}",
+        cause(reset)
+    );
     if reset == Reset::Software {
         ensure!(log.iter().any(|l| l.contains("the last run ended with")), "no reason: {log:?}");
     }
