@@ -16,7 +16,7 @@ use crate::error::Error;
 /// What a session with the virtual board is asked for.
 #[derive(Args)]
 pub struct Options {
-    /// Motor, seed and duration. Keys of the drive have no effect: the image has its own settings.
+    /// Motor, seed and duration.
     #[command(flatten)]
     pub input: Input,
     /// What is coupled to the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...

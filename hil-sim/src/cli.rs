@@ -53,6 +53,10 @@ enum Command {
         out: PathBuf,
     },
     /// Run the image that is flashed on an emulated controller, with a serial port to talk to it
+    ///
+    /// Builds the image, prints the path of a pseudo-terminal that is its console, and its log. `quit`,
+    /// Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
+    /// count; those of the drive do not, for the image has settings of its own: `set` at the console.
     Board(board::Options),
 }
 

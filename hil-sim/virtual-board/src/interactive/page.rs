@@ -40,9 +40,10 @@ pub fn outcome(
     ));
     outcome.texts.push(("Log: time (s)".into(), text(|source| source == Source::Log)));
     outcome.remarks.push(
-        "Torque, speed and angle error are the simulated motor's; reference, measured current, \
-         estimate and dc link are the drive's, read from its RAM. The angle error is shown and judged \
-         while the outputs are on and the rotor flux is above 0.05 Wb."
+        "Torque, flux, speed and dc link are the simulated motor's and inverter's. Reference, what is \
+         measured and what is estimated are the drive's, read from its RAM while the outputs are on. \
+         The angle error is shown and judged while the outputs are on and the rotor flux is above \
+         0.05 Wb."
             .into(),
     );
     outcome.remarks.extend(hil_sim::experiments::assumptions(config));
@@ -69,6 +70,10 @@ fn figure(record: &Record) -> Figure {
                 .with(line("rotor", Quantity::Speed))
                 .with(line("estimated", Quantity::SpeedEstimate)),
         )
-        .panel(Panel::new(x, "dc link (V)").with(line("measured", Quantity::DcLink)))
-        .panel(Panel::new(x, "outputs on").with(line("", Quantity::Outputs)).y_range(-0.1, 1.1))
+        .panel(
+            Panel::new(x, "dc link (V)")
+                .with(line("inverter", Quantity::DcLink))
+                .with(Series::reference("as measured", record.curve(Quantity::DcLinkSeen))),
+        )
+        .panel(Panel::new(x, "outputs on").with(line("on", Quantity::Outputs)).y_range(-0.1, 1.1))
 }

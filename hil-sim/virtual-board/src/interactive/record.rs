@@ -25,12 +25,21 @@ pub enum Quantity {
     /// The same as the drive estimates it, rpm.
     SpeedEstimate,
     /// Dc-link voltage as the drive sees it, V.
+    DcLinkSeen,
+    /// Dc-link voltage, V.
     DcLink,
     /// Whether the outputs are on, 0 or 1.
     Outputs,
 }
 
-type Means = [f64; 8];
+impl Quantity {
+    /// Whether it is what the drive believes, which stands still while the outputs are off.
+    fn is_belief(self) -> bool {
+        matches!(self, Self::ReferenceQ | Self::CurrentQ | Self::SpeedEstimate | Self::DcLinkSeen)
+    }
+}
+
+type Means = [f64; 9];
 
 /// Means over some control periods.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,7 +62,7 @@ impl Bucket {
 
 /// Most buckets: more than a plot has pixels, and few enough for a page and for a long session.
 const BUCKETS: usize = 30_000;
-/// A flux below this has hardly an angle, Wb: a tenth of the nominal one.
+/// A flux below this has hardly an angle, Wb: under half of what the drive magnetises to.
 const FLUX_WB: f64 = 0.05;
 
 /// What was recorded.
@@ -107,10 +116,12 @@ impl Record {
             (Quantity::Flux, flux),
             (Quantity::Speed, plant.mechanical_speed() * rpm),
             (Quantity::SpeedEstimate, belief.rotor_step * turns_to_rpm),
-            (Quantity::DcLink, belief.dc_link),
+            (Quantity::DcLinkSeen, belief.dc_link),
+            (Quantity::DcLink, plant.dc_link()),
             (Quantity::Outputs, f64::from(u8::from(on))),
         ] {
-            bucket.sums[quantity as usize] = value;
+            let counts = on || !quantity.is_belief();
+            bucket.sums[quantity as usize] = if counts { value } else { 0.0 };
         }
         self.interrupts += 1;
         self.worst_cycles = self.worst_cycles.max(period.cycles);
@@ -144,9 +155,14 @@ impl Record {
         (self.error_squares / self.judged.max(1) as f64).sqrt()
     }
 
-    /// Curve of a quantity over time, s.
+    /// Curve of a quantity over time, s; what the drive believes is not a number while the outputs are
+    /// off.
     pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
-        self.points(|bucket| bucket.sums[quantity as usize] / bucket.periods)
+        self.points(|bucket| {
+            let on = bucket.sums[Quantity::Outputs as usize];
+            let counted = if quantity.is_belief() { on } else { bucket.periods };
+            bucket.sums[quantity as usize] / counted
+        })
     }
 
     /// True minus estimated rotor-flux angle over time, electrical degrees; not a number where it is not
