@@ -65,6 +65,7 @@ impl Control {
             over: Hardware::NONE,
             seen: Hardware::NONE,
             began: 0,
+            reported: None,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -97,6 +98,8 @@ struct Running {
     seen: Hardware,
     /// Cycle count at the start of the period before.
     began: u32,
+    /// The state that was last reported.
+    reported: Option<State>,
 }
 
 #[interrupt]
@@ -192,10 +195,12 @@ impl Running {
         if cycles > self.worst_cycles {
             self.worst_cycles = cycles;
         }
-        if self.periods.is_multiple_of(board::PERIODS_PER_STATUS) {
+        // A new state is reported at once.
+        let state = drive.state();
+        if self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS) {
             let report = Status {
                 periods: self.periods,
-                state: drive.state(),
+                state,
                 sample,
                 telemetry: *drive.telemetry(),
                 worst_cycles: self.worst_cycles,
@@ -206,6 +211,7 @@ impl Running {
             // The main loop may be slow or hang; then this status is lost, but not its events.
             if status.send(report) {
                 self.seen = Hardware::NONE;
+                self.reported = Some(state);
             }
         }
     }

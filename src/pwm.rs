@@ -84,15 +84,16 @@ impl Pwm {
             .cfgr2()
             .modify(|_, w| w.cll().set_bit().spl().set_bit().pvdl().set_bit().eccl().set_bit());
 
-        // The break inputs: pin PA6, low trips like the break itself; the comparator of the dc link, high
-        // trips, so inverted.
-        timer.af1().write(|w| w.bkine().set_bit().bkcmp1e().set_bit().bkcmp1p().set_bit());
+        // The break inputs: pin PA6, low trips, so inverted; the comparator of the dc link, high trips.
+        // All of them go through one OR gate, so behind their own polarity each must be low while all is
+        // well, and the break itself is active high (BKP below).
+        timer.af1().write(|w| w.bkine().set_bit().bkinp().set_bit().bkcmp1e().set_bit());
         timer.bdtr().write(|w| {
             w.dtg().set(dead_time_code);
             // Off means driven to the idle level, which is low (CR2.OISx = 0): not floating.
             w.ossi().idle_level().ossr().idle_level();
-            // A low fault input trips. Nothing but software switches the outputs on again.
-            w.bke().enabled().bkp().active_low().aoe().manual();
+            // Nothing but software switches the outputs on again.
+            w.bke().enabled().bkp().active_high().aoe().manual();
             // SAFETY: BKF is four bits wide; every value is one of the filters.
             unsafe { w.bkf().bits(board::BREAK_FILTER) };
             w.moe().disabled_idle()
@@ -168,12 +169,14 @@ impl Pwm {
         self.on = false;
     }
 
-    /// Whether the power stage has pulled the break input since the last call, or still pulls it.
+    /// Whether the power stage, the comparator or a fault inside the chip has pulled the break since the last
+    /// call, or still pulls it.
     pub fn take_break(&mut self) -> bool {
-        let pulled = self.timer.sr().read().bif().bit_is_set();
+        let status = self.timer.sr().read();
+        let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
         if pulled {
             // Stays set while the input is low.
-            self.timer.sr().write(|w| w.bif().clear());
+            self.timer.sr().write(|w| w.bif().clear().sbif().clear());
         }
         pulled
     }

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;
 
+use crate::board;
 use crate::config::{Config, KEYS, Value};
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
@@ -51,26 +52,33 @@ enum Command {
         #[arg(long, value_name = "DIR", default_value = OUT)]
         out: PathBuf,
     },
+    /// Run the image that is flashed on an emulated controller, with a serial port to talk to it
+    ///
+    /// Builds the image, prints the path of a pseudo-terminal that is its console, and its log. `quit`,
+    /// Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
+    /// count; those of the drive do not, for the image has settings of its own: `set` at the console.
+    Board(board::Options),
 }
 
+/// What a simulation is made of.
 #[derive(Args, Default)]
-struct Input {
+pub struct Input {
     /// Configuration file, TOML
     #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    pub config: Option<PathBuf>,
     /// Sets one key, after the configuration file; can be given many times
     #[arg(long = "set", value_name = "KEY=VALUE")]
-    assignments: Vec<String>,
+    pub assignments: Vec<String>,
     /// Seed of all that is random
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
+    pub seed: u64,
     /// Simulated time, s; the same as --set seconds=S
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    seconds: Option<f64>,
+    pub seconds: Option<f64>,
 }
 
 /// Where pages are written unless another folder is named.
-const OUT: &str = "out";
+pub const OUT: &str = "out";
 
 /// Reads the arguments of the process, does what they ask, and says how it went: 0 done, 1 failed,
 /// 2 something has to be changed in what was asked for.
@@ -83,6 +91,7 @@ pub fn main() -> ExitCode {
             .into_iter()
             .try_for_each(|name| run(name, &input, out.clone(), json)),
         Some(Command::Report { input, out }) => full_report(&input, &out),
+        Some(Command::Board(options)) => board::become_board(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -94,7 +103,11 @@ pub fn main() -> ExitCode {
 }
 
 impl Input {
-    fn config(&self) -> Result<Config, Error> {
+    /// The configuration that it describes.
+    ///
+    /// # Errors
+    /// What is wrong with it, by name.
+    pub fn config(&self) -> Result<Config, Error> {
         let mut config = Config::load(self.config.as_deref(), &self.assignments)?;
         if let Some(seconds) = self.seconds {
             config.set("seconds", &Value::Number(seconds))?;

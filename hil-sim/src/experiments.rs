@@ -35,6 +35,8 @@ mod torque;
 mod torque_drift;
 mod tracking;
 
+pub use torque::assumptions;
+
 use crate::config::Config;
 use crate::error::{Error, nearest};
 use crate::outcome::Outcome;

@@ -1,5 +1,6 @@
 //! The motor, inverter and sensors that the drive is tested against, and the experiments.
 
+pub mod board;
 pub mod cli;
 pub mod config;
 pub mod error;

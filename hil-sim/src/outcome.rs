@@ -23,6 +23,8 @@ pub struct Outcome {
     pub entries: Vec<Entry>,
     /// Figures, likewise.
     pub figures: Vec<Figure>,
+    /// Texts to be read as they are, line by line, with their titles.
+    pub texts: Vec<(String, String)>,
     /// What the reader must know: differences from the source, assumptions, limits.
     pub remarks: Vec<String>,
 }

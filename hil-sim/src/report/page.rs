@@ -77,6 +77,9 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
     for table in &outcome.tables {
         write_table(body, table);
     }
+    for (title, text) in &outcome.texts {
+        let _ = writeln!(body, "<h3>{}</h3>\n<pre>{}</pre>", escape(title), escape(text));
+    }
     if !outcome.remarks.is_empty() {
         body.push_str("<h3>Remarks</h3>\n<ul class=\"remarks\">\n");
         for remark in &outcome.remarks {

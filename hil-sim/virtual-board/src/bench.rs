@@ -1,5 +1,7 @@
 //! The board: the core, its chip, and the motor, from one period to the next.
 
+pub mod snapshot;
+
 use std::collections::VecDeque;
 use std::fmt;
 
@@ -37,7 +39,7 @@ impl Options {
         // The converters have another reference than the source's.
         let gain = f64::from(numbers::CURRENT_A.gain / drive_core::sensing::Line::CHANNEL_A.gain);
         plant.measurement.lsb_a = MeasurementSettings::default().lsb_a * gain;
-        plant.inverter.dead_time_us = f64::from(numbers::DEAD_TIME_S) * 1e6;
+        plant.inverter.dead_time_us = f64::from(numbers::dead_time(numbers::DEAD_TIME_S).1) * 1e6;
         plant.inverter.timer_top = numbers::PWM_TOP;
         plant
     }
@@ -46,7 +48,8 @@ impl Options {
     pub fn new(config: &Config, seed: u64) -> Self {
         let us = numbers::CYCLES_PER_US;
         let gates = GateLimits {
-            dead_time: (numbers::DEAD_TIME_NS * us).div_ceil(1000),
+            // What the firmware asks for; the timer makes it a little longer.
+            dead_time: (f64::from(numbers::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
             // A microsecond, less what rounding to counts takes.
             pulse: us - 2,
         };
@@ -130,6 +133,9 @@ pub struct Worst {
 /// Periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
 
+/// Turns of the loop without time passing: exceptions nest a few deep.
+const IDLE_LIMIT: u32 = 100_000;
+
 /// A change of what the converters see.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
@@ -150,11 +156,17 @@ pub struct Board {
     sample: Sample,
     sleeping: bool,
     hung: bool,
+    /// The core executes nothing before this.
+    stalled_until: u64,
     entered: Option<Entered>,
     periods: VecDeque<Period>,
     order_flag: u32,
     /// Changes every sample, if there.
     pub disturb: Option<Disturbance>,
+    /// When the outputs went off last, ticks.
+    pub went_off: Option<u64>,
+    /// Pulses below the minimum, where they are counted instead of refused; see [`Board::forgive`].
+    pub short_pulses: u64,
     /// Resets since power-on, in order.
     pub resets: Vec<(u64, Reset)>,
     /// The longest control interrupt, when cycles are counted.
@@ -198,10 +210,13 @@ impl Board {
             sample: Sample::default(),
             sleeping: false,
             hung: false,
+            stalled_until: 0,
             entered: None,
             periods: VecDeque::new(),
             order_flag,
             disturb: None,
+            went_off: None,
+            short_pulses: 0,
             resets: Vec::new(),
             worst: Worst::default(),
             preempt_at: None,
@@ -230,6 +245,11 @@ impl Board {
     /// The image.
     pub fn image(&self) -> &Image {
         &self.image
+    }
+
+    /// What the converters see.
+    pub fn sample(&self) -> Sample {
+        self.sample
     }
 
     /// Seconds since power-on.
@@ -291,6 +311,18 @@ impl Board {
         self.hung = true;
     }
 
+    /// The core executes nothing for some ticks, as if the bus were taken.
+    pub fn stall(&mut self, ticks: u64) {
+        self.stalled_until = self.cpu.chip().now + ticks;
+    }
+
+    /// From now on what the model does not know is what the chip makes of it: reserved registers read as 0,
+    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in
+    /// which the firmware is damaged on purpose.
+    pub fn forgive(&mut self) {
+        self.cpu.chip_mut().forgiving = true;
+    }
+
     /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
     pub fn stop_after(&mut self, instructions: u64) {
         self.preempt_at = Some(self.cpu.chip().instructions + instructions);
@@ -315,6 +347,7 @@ impl Board {
         }
         self.sleeping = false;
         self.hung = false;
+        self.stalled_until = 0;
         self.entered = None;
         self.see_outputs();
         self.cpu.reset(memory::FLASH);
@@ -342,7 +375,13 @@ impl Board {
     /// What the board cannot go on with.
     pub fn run_ticks(&mut self, ticks: u64) -> Result<()> {
         let end = self.cpu.chip().now + ticks;
+        let (mut at, mut idle) = (self.cpu.chip().now, 0);
         while self.cpu.chip().now < end {
+            idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
+            at = self.cpu.chip().now;
+            if idle > IDLE_LIMIT {
+                return Err(Failure::Core("no time passes".into()).into());
+            }
             self.events()?;
             if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
                 self.preempt_at = None;
@@ -410,6 +449,12 @@ impl Board {
     fn hard_fault(&mut self, cfsr: u32, address: Option<u32>) -> Result<()> {
         let pc = self.cpu.get(Register::Pc);
         let chip = self.cpu.chip_mut();
+        if chip.scs.running() < 0 && chip.forgiving {
+            // Locked up, until a reset.
+            chip.lock_up();
+            self.hung = true;
+            return Ok(());
+        }
         if chip.scs.running() < 0 {
             let place = self.image.location(pc);
             return Err(
@@ -429,6 +474,10 @@ impl Board {
     fn go(&mut self, end: u64) -> Result<()> {
         let chip = self.cpu.chip_mut();
         chip.deadline = chip.next_event().min(end);
+        if self.stalled_until > chip.now {
+            chip.now = chip.now.max(chip.deadline.min(self.stalled_until));
+            return Ok(());
+        }
         if self.hung || self.sleeping {
             if self.sleeping && chip.scs.wakes() {
                 self.sleeping = false;
@@ -452,7 +501,9 @@ impl Board {
             Stop::Asked => {}
             Stop::Wait => self.sleeping = true,
             Stop::Return(exc_return) => self.leave(exc_return)?,
-            Stop::Fault(Fault::Access(address)) if memory::is_reserved(address) => {
+            Stop::Fault(Fault::Access(address))
+                if memory::is_reserved(address) || self.cpu.chip().forgiving =>
+            {
                 self.hard_fault(1 << 9, Some(address))?;
             }
             Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
@@ -546,6 +597,9 @@ impl Board {
             }
             self.advance_plant(now);
             self.outputs = on;
+            if !on {
+                self.went_off = Some(now);
+            }
         }
     }
 
@@ -573,7 +627,10 @@ impl Board {
         let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
         self.applied = Compare { a, b, c, enabled: true };
         if self.outputs {
-            chip.tim1.check_gates(self.gates).map_err(Failure::Gates)?;
+            match chip.tim1.check_gates(self.gates) {
+                Err(BadGates::Pulse { .. }) if chip.forgiving => self.short_pulses += 1,
+                checked => checked.map_err(Failure::Gates)?,
+            }
         }
         Ok(())
     }
@@ -592,6 +649,6 @@ impl Board {
             chip.adc.inputs[converter][usize::from(channel)] = code;
         }
         chip.tim2.set_position(s.encoder);
-        chip.compare_currents(s.current_a, s.current_b);
+        chip.compare(s.current_a, s.current_b, s.dc_link);
     }
 }

@@ -68,7 +68,7 @@ pub struct Block {
 }
 
 /// The chip but for its core and memories.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Chip {
     /// Time, ticks.
     pub now: u64,
@@ -92,6 +92,8 @@ pub struct Chip {
     pub blocks: Vec<Block>,
     /// Whether blocks are kept.
     pub keep_blocks: bool,
+    /// Whether registers that are not known read as 0.
+    pub forgiving: bool,
     last_block: Option<(u32, u32)>,
     /// Core-private registers.
     pub scs: Scs,
@@ -140,6 +142,7 @@ impl Chip {
             instructions: 0,
             blocks: Vec::new(),
             keep_blocks: false,
+            forgiving: false,
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
@@ -167,6 +170,7 @@ impl Chip {
         self.accesses = old.accesses;
         self.instructions = old.instructions;
         self.keep_blocks = old.keep_blocks;
+        self.forgiving = old.forgiving;
         let mut flags = old.rcc.reset_flags();
         if cause == Reset::Power {
             flags = 0;
@@ -266,6 +270,9 @@ impl Chip {
     }
 
     fn is_unknown(&mut self, address: u32, written: Option<u32>) -> u32 {
+        if self.forgiving {
+            return 0;
+        }
         self.unknown.get_or_insert(Unknown { address, written, at: self.at });
         self.attention = true;
         0
@@ -292,6 +299,9 @@ impl Chip {
         if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let (value, torn) = self.flash.load(address);
             if torn {
+                if self.syscfg.flash_error_breaks() {
+                    self.tim1.system_break();
+                }
                 self.scs.pend(scs::NMI);
                 self.attention = true;
             }
@@ -377,6 +387,13 @@ impl Chip {
         Some(())
     }
 
+    /// The core locks up: to the break of TIM1, if the firmware wants that.
+    pub fn lock_up(&mut self) {
+        if self.syscfg.lock_up_breaks() {
+            self.tim1.system_break();
+        }
+    }
+
     /// Interrupt requests that are levels.
     pub fn update_lines(&mut self) {
         let adc = self.adc.requests();
@@ -409,16 +426,20 @@ impl Chip {
             && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
     }
 
-    /// The comparators see the currents: comparator 3 has PA0 or PC1 at its positive input, comparator 1
-    /// PA1 only, which is the dc link here.
-    pub fn compare_currents(&mut self, current_a: u16, current_b: u16) {
-        let code = if self.comp.input_of(2) == 0 { current_a } else { current_b };
-        self.comp.inputs[2] = code;
-        self.comp.references[2] =
-            self.dac.code(if self.comp.reference_of(2) == 4 { 1 } else { 0 }, 1);
-        if self.comp.output(2) {
-            self.tim1.comparator_break(2);
+    /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
+    /// dc link here, comparator 3 PA0 or PC1.
+    pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
+        self.comp.inputs[0] = dc_link;
+        self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
+        for n in [0, 2] {
+            // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
+            self.comp.references[n] = match self.comp.reference_of(n) {
+                4 => self.dac.code(1, 1),
+                5 => self.dac.code(0, 1),
+                _ => u16::MAX,
+            };
         }
+        self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
     }
 
     /// Lets happen what is due by now, up to the top of the PWM counter.

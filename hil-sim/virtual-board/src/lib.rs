@@ -17,11 +17,13 @@
 //!   take effect when they do, with the mean voltage of the period until then.
 
 pub mod bench;
+pub mod campaign;
 pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod cycles;
 pub mod image;
+pub mod interactive;
 pub mod log;
 pub mod memory;
 pub mod pair;
@@ -31,17 +33,7 @@ pub mod shadow;
 pub mod unicorn;
 
 // The firmware's own board, settings and console: one source for both sides.
-#[allow(dead_code, missing_docs)]
-#[path = "../../../src/board.rs"]
-mod board;
-#[allow(dead_code, missing_docs)]
-mod console;
-#[allow(dead_code, missing_docs)]
-#[path = "../../../src/link.rs"]
-mod link;
-#[allow(dead_code, missing_docs)]
-#[path = "../../../src/trace.rs"]
-mod trace;
+use induction_drive::{board, console, link};
 
 pub use bench::{Board, Failure, Options, Period};
 pub use image::Image;

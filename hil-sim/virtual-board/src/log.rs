@@ -5,6 +5,7 @@ use defmt_decoder::{DecodeError, Table};
 
 use crate::cpu::Cpu;
 use crate::image::Image;
+use crate::memory;
 
 /// Up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;
@@ -27,6 +28,11 @@ impl Log {
         Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.0, bytes: Vec::new() })
     }
 
+    /// Forgets the beginning of a frame.
+    pub fn forget(&mut self) {
+        self.bytes.clear();
+    }
+
     /// What the firmware has logged since the last call.
     ///
     /// # Errors
@@ -40,8 +46,8 @@ impl Log {
         else {
             return Ok(Vec::new());
         };
-        if size == 0 {
-            return Ok(Vec::new()); // not set up yet
+        if size == 0 || size > memory::RAM_SIZE || next >= size || written >= size {
+            return Ok(Vec::new()); // not set up yet, or damaged
         }
         while next != written {
             let end = if written > next { written } else { size };

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use virtual_board::{Image, cycles};
+use virtual_board::{Image, campaign, cycles};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
@@ -16,6 +16,17 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
+    /// Faults, thousands of them: outputs off in time, or control correct.
+    Campaign {
+        /// The ELF.
+        elf: PathBuf,
+        /// How many.
+        #[arg(default_value_t = 2000)]
+        count: u64,
+        /// Seed of the first; each has the next one.
+        #[arg(default_value_t = 1)]
+        seed: u64,
+    },
     /// Counts what the control interrupt costs.
     Cycles {
         /// The ELF.
@@ -41,6 +52,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
+        Task::Campaign { elf, count, seed } => {
+            println!("{}", campaign::bounds());
+            println!("{}", campaign::run(|| Image::open(&elf), count, seed)?);
+        }
         Task::Cycles { elf, against, functions } => {
             let lines = cycles::measure(|| Image::open(&elf))?;
             print!("{}", cycles::table(&lines));

@@ -90,7 +90,7 @@ impl Pair {
     /// As [`Pair::until`]; the answer is not `ok`.
     pub fn order(&mut self, line: &str) -> Result<()> {
         match self.say(line)?.as_str() {
-            "ok" => Ok(()),
+            answer if answer.starts_with("ok") => Ok(()),
             answer => bail!("{line:?}: {answer}"),
         }
     }

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Drive, Settings};
+use drive_core::{Command, Drive, Settings, State};
 
 use crate::bench::Period;
 use crate::console::grammar::{self, Request};
@@ -16,6 +16,8 @@ pub struct Shadow {
     /// The drive.
     pub drive: Drive,
     settings: Everything,
+    /// Dead time that the timer makes since its start, s.
+    dead_time_s: f32,
     orders: VecDeque<Order>,
     /// Control interrupts compared so far.
     pub compared: u64,
@@ -28,13 +30,16 @@ impl Shadow {
     /// Its settings make no drive.
     pub fn new() -> Result<Self> {
         let settings = Everything::of_the_board();
-        let drive = Drive::new(settings.build()?);
-        Ok(Self { drive, settings, orders: VecDeque::new(), compared: 0 })
+        let dead_time_s = crate::board::dead_time(settings.drive.inverter.dead_time_s).1;
+        let drive = Drive::new(settings.build_for(dead_time_s)?);
+        Ok(Self { drive, settings, dead_time_s, orders: VecDeque::new(), compared: 0 })
     }
 
-    /// Its settings.
-    pub fn settings(&self) -> &Settings {
-        &self.settings.drive
+    /// Its settings, with the dead time that the timer makes.
+    pub fn settings(&self) -> Settings {
+        let mut settings = self.settings.drive;
+        settings.inverter.dead_time_s = self.dead_time_s;
+        settings
     }
 
     /// A line that was typed at the console of the board.
@@ -43,18 +48,24 @@ impl Shadow {
     /// It is not one that gives an order.
     pub fn type_line(&mut self, line: &str) -> Result<()> {
         let order = match grammar::parse(line) {
-            Ok(Request::Start(mode)) => Order::Start(mode),
+            Ok(Request::Start(mode)) => {
+                if !self.settings.command.wiring_checked {
+                    self.orders.push_back(Order::CheckWiring);
+                }
+                Order::Start(mode)
+            }
             Ok(Request::Stop) => Order::Stop,
             Ok(Request::Clear) => Order::Clear,
             Ok(Request::Torque(i_q)) => Order::Torque(i_q),
+            Ok(Request::Speed(rpm)) => Order::Speed(rpm),
             Ok(Request::Position(turns)) => Order::Position(turns),
             Ok(Request::Angle(source)) => {
                 self.settings.drive.angle_source = source;
-                Order::Configure(self.settings.build()?)
+                Order::Configure(self.settings.build_for(self.dead_time_s)?)
             }
             Ok(Request::Set(key, value)) => {
                 key.set(&mut self.settings, value);
-                Order::Configure(self.settings.build()?)
+                Order::Configure(self.settings.build_for(self.dead_time_s)?)
             }
             Ok(_) => return Ok(()), // no order to the drive
             Err(why) => bail!("{line}: {why}"),
@@ -78,6 +89,10 @@ impl Shadow {
             );
         }
         self.compared += 1;
+        // As the firmware's console: a drive that is past the check need not check again.
+        if self.drive.state() == State::Magnetising {
+            self.settings.command.wiring_checked = true;
+        }
         if period.took_order {
             let Some(order) = self.orders.pop_front() else { bail!("an order nobody gave") };
             let command: Command<'_> = order.command();

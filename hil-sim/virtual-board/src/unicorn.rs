@@ -9,7 +9,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
-use unicorn_engine::{RegisterARM as R, Unicorn};
+use unicorn_engine::{Context, RegisterARM as R, Unicorn};
 
 use crate::chip::Chip;
 use crate::cost::Costs;
@@ -41,7 +41,20 @@ pub struct Counting {
 pub struct UnicornCpu {
     uc: Unicorn<'static, Chip>,
     faulted: Rc<Cell<Option<u32>>>,
+    trapped: Rc<Cell<bool>>,
 }
+
+/// Registers and memories of a core that stands still.
+pub struct Standing {
+    registers: Context,
+    memories: Vec<(u32, Vec<u8>)>,
+}
+
+/// Pieces that are compared, so that what is the same is not written again: written code is translated
+/// anew.
+const PIECE: usize = 256;
+/// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
+const EXCEPTION_EXIT: [u32; 2] = [8, 3];
 
 impl UnicornCpu {
     /// A core with this chip around it and the memory of the STM32G474RE.
@@ -117,7 +130,19 @@ impl UnicornCpu {
                 stop_if_asked(uc);
             })?;
         }
-        uc.add_intr_hook(|uc, _| {
+        // No code of the firmware is in RAM: who executes there is lost, but time goes on.
+        let ram = (u64::from(memory::RAM), u64::from(memory::RAM + memory::RAM_SIZE - 1));
+        uc.add_block_hook(ram.0, ram.1, |uc, address, size| {
+            let chip = uc.get_data_mut();
+            chip.at = address as u32;
+            chip.instructions(u64::from(size / 2).max(1));
+            stop_if_asked(uc);
+        })?;
+        let trapped = Rc::new(Cell::new(false));
+        let trap = Rc::clone(&trapped);
+        uc.add_intr_hook(move |uc, number| {
+            // Undefined instructions, calls of a supervisor, breakpoints.
+            trap.set(!EXCEPTION_EXIT.contains(&number));
             uc.emu_stop().ok();
         })?;
         let faulted = Rc::new(Cell::new(None));
@@ -126,7 +151,42 @@ impl UnicornCpu {
             note.set(Some(address as u32));
             false
         })?;
-        Ok(Self { uc, faulted })
+        Ok(Self { uc, faulted, trapped })
+    }
+
+    /// Keeps registers and memories; the flash of the code is not changed by anything.
+    ///
+    /// # Errors
+    /// The emulator's.
+    pub fn keep(&self) -> Result<Standing, uc_error> {
+        let registers = self.uc.context_init()?;
+        let memories = [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)]
+            .into_iter()
+            .map(|(base, size)| {
+                let mut bytes = vec![0; size as usize];
+                self.uc.mem_read(u64::from(base), &mut bytes)?;
+                Ok((base, bytes))
+            })
+            .collect::<Result<_, uc_error>>()?;
+        Ok(Standing { registers, memories })
+    }
+
+    /// Goes back to what was kept.
+    ///
+    /// # Errors
+    /// The emulator's.
+    pub fn go_back(&mut self, to: &Standing) -> Result<(), uc_error> {
+        let mut now = vec![0; PIECE];
+        for (base, bytes) in &to.memories {
+            for (n, piece) in bytes.chunks(PIECE).enumerate() {
+                let address = base + (n * PIECE) as u32;
+                self.uc.mem_read(u64::from(address), &mut now[..piece.len()])?;
+                if now != piece {
+                    self.write(address, piece);
+                }
+            }
+        }
+        self.uc.context_restore(&to.registers)
     }
 
     fn control(&self) -> u64 {
@@ -174,6 +234,7 @@ impl Cpu for UnicornCpu {
 
     fn run(&mut self) -> Stop {
         self.faulted.set(None);
+        self.trapped.set(false);
         self.chip_mut().first = true;
         let pc = self.get(Register::Pc);
         let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
@@ -182,6 +243,7 @@ impl Cpu for UnicornCpu {
             return Stop::Return(pc | 1);
         }
         match result {
+            Ok(()) if self.trapped.get() => Stop::Fault(Fault::Instruction),
             Ok(()) if self.chip().wants_attention() => Stop::Asked,
             Ok(()) => Stop::Wait,
             Err(_) => Stop::Fault(self.faulted.get().map_or(Fault::Instruction, Fault::Access)),

@@ -23,7 +23,7 @@ fn started(seed: u64) -> Result<Board> {
 #[test]
 fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
     let mut board = started(1)?;
-    assert!(board.heard().contains("last run: power-on"), "{}", board.heard());
+    assert!(board.heard().contains("last run: reset by power-on"), "{}", board.heard());
     let log = board.logged()?;
     assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
     assert!(log.iter().any(|line| line.contains("off: codes")), "{log:#?}");
@@ -56,7 +56,7 @@ fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Watchdog));
     pair.board.heard();
     pair.board.run_periods(START)?;
-    assert!(pair.board.heard().contains("last run: watchdog"));
+    assert!(pair.board.heard().contains("last run: reset by watchdog"));
     Ok(())
 }
 

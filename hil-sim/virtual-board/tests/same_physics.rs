@@ -60,7 +60,7 @@ fn both(
         pair.run(*periods, |pair, _| board.push(point(&pair.board.plant, &pair.shadow.drive)))?;
     }
 
-    let mut rig = Rig::new(&Options::plant(config), pair.shadow.settings(), seed)?;
+    let mut rig = Rig::new(&Options::plant(config), &pair.shadow.settings(), seed)?;
     rig.start(mode)?;
     let mut host = Vec::new();
     for (_, command, periods) in steps {

@@ -49,7 +49,19 @@ impl Syscfg {
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
         self.0.write(offset, value)
     }
+
+    /// CFGR2.CLL: a lock-up of the core goes to the breaks of the timers.
+    pub fn lock_up_breaks(&self) -> bool {
+        self.0.get(CFGR2) & 1 != 0
+    }
+
+    /// CFGR2.ECCL: an error that the flash cannot correct does.
+    pub fn flash_error_breaks(&self) -> bool {
+        self.0.get(CFGR2) & 1 << 3 != 0
+    }
 }
+
+const CFGR2: u32 = 0x18;
 
 /// External interrupts.
 #[derive(Clone, Debug)]

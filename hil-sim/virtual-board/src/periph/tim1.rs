@@ -117,6 +117,8 @@ pub struct Tim1 {
     trigger_at: u64,
     /// Level of the break pin.
     pub fault_pin_high: bool,
+    /// Outputs of the comparators.
+    comparators: [bool; 7],
     /// Updates to be left out: compare values are not taken over, no flag is set.
     pub drop_update: u32,
 }
@@ -135,6 +137,7 @@ impl Default for Tim1 {
             at_top_next: true,
             trigger_at: NEVER,
             fault_pin_high: true,
+            comparators: [false; 7],
             drop_update: 0,
         }
     }
@@ -152,6 +155,11 @@ impl Tim1 {
         }
         let phase = ((now.saturating_sub(self.from)) % u64::from(2 * self.top)) as u32;
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
+    }
+
+    /// Lets an update come at the next end of the count, whatever the repetition counter says.
+    pub fn extra_update(&mut self) {
+        self.repetitions = 0;
     }
 
     /// Compare values in force.
@@ -182,12 +190,15 @@ impl Tim1 {
     /// Dead time, ticks.
     pub fn dead_time(&self) -> u32 {
         let code = self.store.get(BDTR) & 0xff;
-        match code >> 5 {
-            0..=3 => code,
-            4 | 5 => 2 * (64 + (code & 0x3f)),
-            6 => 8 * (32 + (code & 0x1f)),
-            _ => 16 * (32 + (code & 0x1f)),
-        }
+        // CKD: the dead time counts every clock, every second or every fourth.
+        let clocks = [1, 2, 4, 4][(self.store.get(CR1) >> 8 & 3) as usize];
+        clocks
+            * match code >> 5 {
+                0..=3 => code,
+                4 | 5 => 2 * (64 + (code & 0x3f)),
+                6 => 8 * (32 + (code & 0x1f)),
+                _ => 16 * (32 + (code & 0x1f)),
+            }
     }
 
     /// Looks at the gates of the period with the compare values in force.
@@ -287,28 +298,28 @@ impl Tim1 {
         }
     }
 
-    /// A comparator that is routed to the break says so.
-    pub fn comparator_break(&mut self, comparator: usize) {
-        if self.store.get(AF1) >> (1 + comparator) & 1 != 0 {
-            self.pull();
-        }
+    /// Outputs of the comparators, from now on.
+    pub fn set_comparators(&mut self, outputs: [bool; 7]) {
+        self.comparators = outputs;
+        self.look_at_break();
     }
 
     /// Level of the break pin, from now on.
     pub fn set_fault_pin(&mut self, high: bool) {
         self.fault_pin_high = high;
-        self.look_at_pin();
+        self.look_at_break();
     }
 
-    fn pin_active(&self) -> bool {
-        let bdtr = self.store.get(BDTR);
-        let inverted = self.store.get(AF1) >> 9 & 1 != 0;
-        let level = self.fault_pin_high != inverted;
-        self.store.get(AF1) & 1 != 0 && bdtr & BKE != 0 && level == (bdtr & BKP != 0)
-    }
-
-    fn look_at_pin(&mut self) {
-        if self.pin_active() {
+    /// The break request: the enabled sources, each with its own polarity, go through one OR gate, and BKP
+    /// is the polarity behind it (section 28.3.16, overview of the break circuit).
+    fn look_at_break(&mut self) {
+        let (af1, bdtr) = (self.store.get(AF1), self.store.get(BDTR));
+        let bit = |n: usize| af1 >> n & 1 != 0;
+        let pin = bit(0) && self.fault_pin_high != bit(9);
+        // BKCMP1E is bit 1, BKCMP1P bit 10; comparators 5 to 7 have no polarity.
+        let comparator =
+            (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
+        if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
             self.pull();
         }
     }
@@ -342,7 +353,7 @@ impl Tim1 {
         match offset {
             SR => {
                 self.status &= value;
-                self.look_at_pin();
+                self.look_at_break();
                 return Some(Effect::Look);
             }
             EGR => {
@@ -360,10 +371,11 @@ impl Tim1 {
             }
             BDTR => {
                 self.store.write(BDTR, self.locked(old, value));
-                self.look_at_pin();
+                self.look_at_break();
                 return Some(Effect::None);
             }
             // Locked with levels 2 and 3.
+            AF1 if self.lock() >= 1 => return Some(Effect::None),
             CCER if self.lock() >= 2 => {
                 return self.store.write(CCER, value & !0xaaaa | old & 0xaaaa);
             }

@@ -1,0 +1,127 @@
+//! The virtual board for people and scripts; `cargo sim board` starts it.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{Receiver, channel};
+
+use anyhow::{Context, Result, anyhow};
+use clap::Parser;
+use hil_sim::board::Options;
+use hil_sim::report::{self, Section};
+use hil_sim::{Config, Error};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use virtual_board::interactive::page;
+use virtual_board::interactive::pty::Pty;
+use virtual_board::interactive::script::Script;
+use virtual_board::interactive::session::{End, Outside, Session};
+use virtual_board::{Board, Image};
+
+/// Runs the firmware's image on an emulated board, with a simulated motor and a serial port.
+#[derive(Parser)]
+#[command(name = "board")]
+struct Arguments {
+    #[command(flatten)]
+    options: Options,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse().options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(error.downcast_ref().map_or(1, Error::exit_code))
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<()> {
+    // What can be wrong, before anything is begun.
+    let config = options.config()?;
+    let script = options.script.as_deref().map(Script::open).transpose()?;
+    let image = image(options.elf.as_deref())?;
+    let pty = Pty::open()?;
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
+    }
+    let board = Board::new(image, virtual_board::Options::new(&config, options.input.seed))?;
+
+    say(&format!("console: {}", pty.path().display()));
+    say(&format!(
+        "type `screen {} 115200` elsewhere, or commands here; quit ends",
+        pty.path().display()
+    ));
+    let outside = Outside {
+        terminal: typed_lines(),
+        stop,
+        script,
+        seconds: config.extent.seconds,
+        paced: !options.fast,
+    };
+    let mut session = Session::new(board, pty, outside)?;
+    let end = session.run(|line| say(&line.to_string()));
+    let path = write(options, &config, &session)?;
+    say(&format!("Report: {}", path.display()));
+    match end {
+        End::Failed(error) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+fn image(elf: Option<&Path>) -> Result<Image> {
+    let image = match elf {
+        Some(path) => Image::open(path),
+        None => Image::built(),
+    };
+    image.map_err(|why| Error::Refused(format!("the firmware's ELF: {why:#}")).into())
+}
+
+/// Lines typed at the terminal, read by a thread of their own.
+fn typed_lines() -> Receiver<String> {
+    let (send, receive) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lines() {
+            let Ok(line) = line else { break };
+            if send.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    receive
+}
+
+/// Writes the page, its plots and the JSON object; where the page is.
+fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBuf> {
+    let board = session.board();
+    let mut outcome =
+        page::outcome(config, board.time(), board.resets.len(), &session.record, &session.lines);
+    if session.behind_s > 0.0 {
+        let behind = format!("The board fell behind the clock by {:.1} s.", session.behind_s);
+        outcome.remarks.insert(0, behind);
+    }
+    let section = Section {
+        name: page::NAME,
+        stands_for: "virtual board",
+        about: page::ABOUT,
+        command: options.command(config),
+        outcome: &outcome,
+    };
+    let path = options.out.join(format!("{}.html", page::NAME));
+    report::write_whole(&path, &report::page("Induction drive", &[section])?)?;
+    for figure in &outcome.figures {
+        let file = options.out.join(format!("{}-{}.svg", page::NAME, figure.name));
+        report::write_whole(&file, &report::svg(figure)?)?;
+    }
+    let json = outcome.to_json(page::NAME, options.input.seed).map_err(|e| anyhow!("{e}"))?;
+    report::write_whole(&options.out.join(format!("{}.json", page::NAME)), &json)?;
+    Ok(path)
+}
+
+/// A line on standard output. A reader that has gone away is no reason to stop.
+fn say(line: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+}

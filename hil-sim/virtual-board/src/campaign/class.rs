@@ -1,0 +1,346 @@
+//! The classes of faults: what is done, and how long the drive may be wrong with the outputs on.
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::scene::{Places, Source};
+use crate::bench::Board;
+use crate::board as numbers;
+use crate::chip::TICKS_PER_S;
+use crate::cpu::{Cpu, Register};
+use drive_core::Sample;
+use hil_sim::plant::EncoderFault;
+
+/// What happens in a run of a class.
+#[derive(Clone, Copy)]
+pub enum Course {
+    /// The drive regulates, and this is done to it.
+    Regulating(fn(&mut Board, &Places, &mut dyn Rng)),
+    /// The power goes in one of the operations of `save`.
+    Saving,
+    /// A double word of the saved settings is damaged before a start.
+    DamagedPage,
+    /// The reset pin is pulled: while it regulates, or while it starts.
+    Reset,
+}
+
+/// A class.
+pub struct Class {
+    /// Its name.
+    pub name: &'static str,
+    /// Longest that outputs may be on with wrong control, ms.
+    pub bound_ms: f64,
+    /// Why that long.
+    pub why: &'static str,
+    /// Which angle sources it is tried with.
+    pub sources: &'static [Source],
+    /// What is done.
+    pub course: Course,
+}
+
+const BOTH: &[Source] = &[Source::Injection, Source::Encoder];
+const ENCODER: &[Source] = &[Source::Encoder];
+
+/// A PWM period, ms, and what the software needs to see a sample and switch off.
+const PERIOD_MS: f64 = 1.0 / 6.0;
+const STEP_MS: f64 = 2.0 * PERIOD_MS;
+
+/// All classes.
+pub const CLASSES: &[Class] = &[
+    Class {
+        name: "nothing (for comparison)",
+        bound_ms: 0.0,
+        why: "control is correct throughout",
+        sources: BOTH,
+        course: Course::Regulating(|_, _, _| {}),
+    },
+    Class {
+        name: "current sensor stuck",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let (which, now) = (rng.random(), board.sample());
+            let value = *current(which, &mut { now });
+            board.disturb = Some(Box::new(move |s| *current(which, s) = value));
+        }),
+    },
+    Class {
+        name: "current sensor open",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let which = rng.random();
+            let line = if which { numbers::CURRENT_A } else { numbers::CURRENT_B };
+            let zero = (-line.offset / line.gain).round() as u16;
+            board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
+        }),
+    },
+    Class {
+        name: "current sensor saturated",
+        bound_ms: STEP_MS,
+        why: "the sample after it, and the step that sees it",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let (which, high): (bool, bool) = (rng.random(), rng.random());
+            let code = if high { numbers::ADC_FULL_SCALE } else { 0 };
+            board.disturb = Some(Box::new(move |s| *current(which, s) = code));
+        }),
+    },
+    Class {
+        name: "current sensor noisy",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let which = rng.random();
+            // 5 mA to 2 A rms.
+            let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
+            let codes = amperes / f64::from(numbers::CURRENT_A.gain);
+            let mut noise = seeded(rng);
+            board.disturb = Some(Box::new(move |s| {
+                let draw: f64 = StandardNormal.sample(&mut noise);
+                let code = current(which, s);
+                *code = (f64::from(*code) + codes * draw).clamp(0.0, 4095.0) as u16;
+            }));
+        }),
+    },
+    Class {
+        name: "dc-link sensor stuck, open, saturated, noisy",
+        bound_ms: STEP_MS,
+        why: "the sample after it, and the step that sees it",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.dc_link)),
+    },
+    Class {
+        name: "heat-sink sensor stuck, open, saturated, noisy",
+        bound_ms: STEP_MS,
+        why: "the sample after it, and the step that sees it",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.heat_sink)),
+    },
+    Class {
+        name: "not-a-number in the drive's state",
+        bound_ms: 2.0 * CARRIER_MS + STEP_MS,
+        why: "what is used once in a carrier period shows in the next one",
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| {
+            let (base, size) = places.control;
+            // A word that holds a plausible number; angles and counts are another class.
+            for _ in 0..1000 {
+                let address = base + 4 * rng.random_range(0..size / 4);
+                let value = f32::from_bits(board.word(address).unwrap_or(0)).abs();
+                if (1e-5..1e5).contains(&value) {
+                    board.cpu().write(address, &f32::NAN.to_le_bytes());
+                    return;
+                }
+            }
+        }),
+    },
+    Class {
+        name: "dc-link step",
+        bound_ms: STEP_MS,
+        why: "limits: the sample after it, and the step that sees it",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            board.plant.set_dc_link(rng.random_range(100.0..600.0)).ok();
+        }),
+    },
+    Class {
+        name: "encoder lost, or loses counts",
+        bound_ms: ENCODER_MS,
+        why: "the angle must be wrong by enough to show in the voltage",
+        sources: ENCODER,
+        course: Course::Regulating(|board, _, rng| {
+            let share = rng.random_range(0.05..1.0);
+            let stuck = rng.random::<bool>();
+            let fault = if stuck { EncoderFault::Stuck } else { EncoderFault::Losing(share) };
+            board.plant.set_encoder_fault(fault);
+        }),
+    },
+    Class {
+        name: "break pin",
+        bound_ms: numbers::BREAK_REACTION_NS as f64 * 1e-6,
+        why: "the timer's filter; no software",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, _| board.set_fault_pin(false)),
+    },
+    Class {
+        name: "clock failure",
+        bound_ms: 0.01,
+        why: "the clock security system; no software",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, _| board.set_crystal(false)),
+    },
+    Class {
+        name: "bit flip in the coefficients",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| flip(board, rng, places.coefficients)),
+    },
+    Class {
+        name: "bit flip in the drive's state",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| flip(board, rng, places.control)),
+    },
+    Class {
+        name: "bit flip in code and data of CCM",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| flip(board, rng, places.ccm)),
+    },
+    Class {
+        name: "bit flip in RAM, stack included",
+        bound_ms: PLAUSIBLE_MS,
+        why: PLAUSIBLE,
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| {
+            let area = if rng.random() {
+                places.data
+            } else {
+                (places.stack.0 + places.stack.1 - 1024, 1024)
+            };
+            flip(board, rng, area);
+        }),
+    },
+    Class {
+        name: "timer update dropped",
+        bound_ms: 2.0 * STEP_MS,
+        why: "five updates at most, each seen in its own period",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            board.chip().tim1.drop_update = rng.random_range(1..6);
+        }),
+    },
+    Class {
+        name: "timer update duplicated",
+        bound_ms: STEP_MS,
+        why: "seen in its own period",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, _| board.chip().tim1.extra_update()),
+    },
+    Class {
+        name: "conversion trigger lost",
+        bound_ms: WATCHDOG_MS,
+        why: "one converter: its own period; both: no interrupt, the watchdog is not fed",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let (which, count) = (rng.random_range(0..3), rng.random_range(1..40));
+            board.chip().adc.lose_triggers =
+                [[count, 0], [0, count], [count, count]][which as usize];
+        }),
+    },
+    Class {
+        name: "console garbage and floods",
+        bound_ms: 0.0,
+        why: "nothing of it may be seen",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            let mut bytes = vec![0; rng.random_range(1..3000)];
+            let text = rng.random::<bool>();
+            for byte in &mut bytes {
+                *byte = if text {
+                    b"stausorquepi \n0123.-"[rng.random_range(0..20_usize)]
+                } else {
+                    rng.random()
+                };
+            }
+            board.send(&bytes);
+        }),
+    },
+    Class {
+        name: "interrupt overrun",
+        bound_ms: OVERRUN_MS + 2.0 * STEP_MS,
+        why: "the core stands still for up to 2 ms; then the first interrupt sees that it is late",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, rng| {
+            board.stall((rng.random_range(0.005..OVERRUN_MS) * 1e-3 * TICKS_PER_S as f64) as u64);
+        }),
+    },
+    Class {
+        name: "core hangs",
+        bound_ms: WATCHDOG_MS,
+        why: "the watchdog, 4.2 to 4.9 ms after it was last fed",
+        sources: BOTH,
+        course: Course::Regulating(|board, _, _| board.hang()),
+    },
+    Class {
+        name: "stack overflow",
+        bound_ms: 2.0 * STEP_MS,
+        why: "the next interrupt does not find room for its frame",
+        sources: BOTH,
+        course: Course::Regulating(|board, places, rng| {
+            let room = 8 * rng.random_range(0..13);
+            board.cpu().set(Register::Sp, places.stack.0 + room);
+        }),
+    },
+    Class {
+        name: "damaged page of the settings",
+        bound_ms: 0.0,
+        why: "outputs are off; the other page holds",
+        sources: &[Source::Injection],
+        course: Course::DamagedPage,
+    },
+    Class {
+        name: "power lost in an operation of save",
+        bound_ms: 0.0,
+        why: "outputs are off; the old or the new set holds",
+        sources: &[Source::Injection],
+        course: Course::Saving,
+    },
+    Class {
+        name: "reset pin at any time",
+        bound_ms: 0.001,
+        why: "the reset of the timer; no software",
+        sources: BOTH,
+        course: Course::Reset,
+    },
+];
+
+/// A carrier period, ms.
+const CARRIER_MS: f64 = 10.0 * PERIOD_MS;
+/// See [`Class::bound_ms`].
+const PLAUSIBLE_MS: f64 = 100.0;
+const PLAUSIBLE: &str = "three carrier periods of silence once the axis turned to the sensor; or the voltage that stays unexplained";
+const ENCODER_MS: f64 = 150.0;
+const WATCHDOG_MS: f64 = 6.0;
+const OVERRUN_MS: f64 = 2.0;
+
+fn current(a: bool, sample: &mut Sample) -> &mut u16 {
+    if a { &mut sample.current_a } else { &mut sample.current_b }
+}
+
+fn seeded(rng: &mut dyn Rng) -> rand_xoshiro::Xoshiro256PlusPlus {
+    rand::SeedableRng::seed_from_u64(rng.random())
+}
+
+/// One of dc link and heat sink: stuck, open, saturated or noisy.
+fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: fn(&mut Sample) -> &mut u16) {
+    let held = *of(&mut board.sample());
+    let noisy = 2_f64.powf(rng.random_range(0.0..10.0));
+    let mut noise = seeded(rng);
+    let kind = rng.random_range(0..4);
+    board.disturb = Some(Box::new(move |s| {
+        let code = of(s);
+        let draw: f64 = StandardNormal.sample(&mut noise);
+        *code = match kind {
+            0 => held,
+            1 => 0,
+            2 => numbers::ADC_FULL_SCALE,
+            _ => (f64::from(*code) + noisy * draw).clamp(0.0, 4095.0) as u16,
+        };
+    }));
+}
+
+fn flip(board: &mut Board, rng: &mut dyn Rng, (base, size): (u32, u32)) {
+    let address = base + rng.random_range(0..size);
+    let mut byte = [0];
+    board.cpu().read(address, &mut byte);
+    byte[0] ^= 1 << rng.random_range(0..8);
+    board.cpu().write(address, &byte);
+}

@@ -1,0 +1,131 @@
+//! What a run is judged by: at every instant after the bound, outputs off or control correct.
+
+use std::f64::consts::TAU;
+
+use anyhow::{Result, bail, ensure};
+
+use super::scene::{Places, cause};
+use crate::bench::Board;
+use crate::chip::{Reset, TICKS_PER_S};
+
+/// Largest angle error of a correct control, electrical degrees.
+const ANGLE_DEG: f64 = 15.0;
+/// Resets of which the first was the fault's; more is a loop.
+const MOST_RESETS: usize = 2;
+/// Periods from a reset until it has been reported in the log.
+const REPORTED: u64 = 400;
+/// Periods from the outputs off until that has been reported.
+const FAULT_REPORTED: u64 = 60;
+/// Periods from a reset to the greeting, at most.
+const START: u64 = 30_000;
+const PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
+
+/// What was seen of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// From the fault to the outputs off, ms.
+    pub off_ms: Option<f64>,
+    /// From the fault to the last instant with outputs on and wrong control, ms.
+    pub wrong_ms: f64,
+    /// Largest phase current, A.
+    pub peak_a: f64,
+    /// Largest angle error with the outputs on, degrees.
+    pub angle_deg: f64,
+}
+
+/// Watches for `ms` after the fault, or until the outputs are off.
+///
+/// # Errors
+/// Bad gate signals; what the board cannot go on with.
+pub fn watch(board: &mut Board, places: &Places, ms: f64) -> Result<Seen> {
+    let began = board.chip().now;
+    let trip = f64::from(crate::board::settings().limits.trip_a);
+    let mut seen = Seen::default();
+    board.went_off = None;
+    let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
+    let mut next = began;
+    while since(next) < ms {
+        // The motor's truth and the drive's angle belong to the same sample.
+        next += PERIOD;
+        let now = board.chip().now;
+        board.run_ticks(next.saturating_sub(now))?;
+        while board.next_period().is_some() {}
+        let current =
+            board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
+        seen.peak_a = seen.peak_a.max(current);
+        if let Some(at) = board.went_off {
+            seen.off_ms = Some(since(at));
+            break;
+        }
+        let error = angle_error(board, places);
+        seen.angle_deg = seen.angle_deg.max(error);
+        // Written so that not-a-number is wrong.
+        if !(error <= ANGLE_DEG && current < trip) {
+            seen.wrong_ms = since(next);
+        }
+    }
+    // It may rise on after the outputs have gone off: by nothing, the diodes brake it.
+    Ok(seen)
+}
+
+/// Between the flux and where the drive believes it, degrees.
+fn angle_error(board: &mut Board, places: &Places) -> f64 {
+    let turns = f64::from(board.word(places.phi).unwrap_or(0) as i32) / 2_f64.powi(32);
+    let error = (board.plant.rotor_flux_angle() / TAU - turns).rem_euclid(1.0);
+    error.min(1.0 - error) * 360.0
+}
+
+/// After the outputs have gone off: the reason is in the log, and there is no loop of resets.
+///
+/// # Errors
+/// What is missing.
+pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
+    board.run_periods(FAULT_REPORTED)?;
+    if board.resets.is_empty() {
+        let log = board.logged()?;
+        let told = log.iter().any(|line| line.contains("fault ") || line.contains("WARN"));
+        if told || !board.resets.is_empty() {
+            return Ok(());
+        }
+        // It may be that only the watchdog ends it.
+    }
+    board.run_periods(REPORTED)?;
+    let Some((_, reset)) = board.resets.first().copied() else {
+        bail!("outputs off without a reason in the log: {:?}", board.logged()?)
+    };
+    let log = board.logged()?;
+    ensure!(
+        log.iter().any(|l| l.contains(cause(reset))),
+        "no {:?} in the log {log:?}",
+        cause(reset)
+    );
+    if reset == Reset::Software {
+        ensure!(log.iter().any(|l| l.contains("the last run ended with")), "no reason: {log:?}");
+    }
+    if whole_start {
+        greeting(board)?;
+    }
+    ensure!(board.resets.len() < MOST_RESETS, "reset again and again: {:?}", board.resets);
+    Ok(())
+}
+
+/// Runs until the firmware has said who it is, and a bit.
+///
+/// # Errors
+/// It never does, or is reset again.
+pub fn greeting(board: &mut Board) -> Result<String> {
+    let resets = board.resets.len();
+    let mut heard = String::new();
+    for _ in 0..START / 100 {
+        board.run_periods(100)?;
+        while board.next_period().is_some() {}
+        heard += &board.heard();
+        ensure!(board.resets.len() == resets, "reset while it starts: {:?}", board.resets);
+        if heard.contains("last run: ") && heard.ends_with('\n') {
+            board.run_periods(200)?;
+            ensure!(board.resets.len() == resets, "reset after its start: {:?}", board.resets);
+            return Ok(heard);
+        }
+    }
+    bail!("no greeting, but {heard:?}")
+}

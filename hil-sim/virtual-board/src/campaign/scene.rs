@@ -1,0 +1,188 @@
+//! Where every injection begins: a board that has started, gone back to each time.
+
+use anyhow::{Context, Result, ensure};
+use drive_core::State;
+use hil_sim::Config;
+use hil_sim::plant::Load;
+use induction_drive::console::keys::Everything;
+use induction_drive::saved::{Failed, Flash, Loaded, Saved};
+
+use crate::bench::snapshot::Snapshot;
+use crate::bench::{Board, Options};
+use crate::chip::{Chip, Reset};
+use crate::image::Image;
+use crate::memory::BANK_2;
+use crate::pair::Pair;
+
+/// Current on the quadrature axis before the injection, A.
+const TORQUE: &str = "torque 1.5";
+/// Held speed of the shaft with the encoder, rad/s mechanical: 300 rpm. Without it the shaft is locked,
+/// where the injection alone knows the angle.
+const SPEED: f64 = 31.4;
+/// Periods until the torque stands.
+const SETTLING: u64 = 1200;
+/// What is changed and not saved yet.
+const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
+
+/// Which angle the drive goes by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The injection, with the shaft locked.
+    Injection,
+    /// The encoder, at 300 rpm.
+    Encoder,
+}
+
+/// Places in memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Places {
+    /// The drive's coefficients: address, bytes.
+    pub coefficients: (u32, u32),
+    /// What moves while it regulates: address, bytes.
+    pub control: (u32, u32),
+    /// The estimated flux angle.
+    pub phi: u32,
+    /// Data in RAM, without the stack: address, bytes.
+    pub data: (u32, u32),
+    /// Code and data in CCM: address, bytes.
+    pub ccm: (u32, u32),
+    /// Lowest address and size of the stack.
+    pub stack: (u32, u32),
+}
+
+impl Places {
+    fn of(image: &Image) -> Result<Self> {
+        let running = image.symbol("control7RUNNING")?;
+        let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
+        let drive = running.0 + at("Running", "control")? + at("Control", "drive")?;
+        let size = |name: &str, member: &str| image.member(name, member).map(|found| found.0);
+        let end = |name: &str| image.symbol(name).map(|found| found.0);
+        let (data, data_end) = (end("__sdata")?, end("__euninit")?);
+        let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
+        let ccm = end("__sccm")?;
+        Ok(Self {
+            coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
+            control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
+            phi: drive + at("Drive", "telemetry")? + at("Telemetry", "phi")?,
+            data: (data, data_end - data),
+            ccm: (ccm, running.0 + running.1 - ccm),
+            stack: (stack, stack_end - stack),
+        })
+    }
+}
+
+/// A board, and what it can go back to.
+pub struct Scene {
+    /// The board.
+    pub board: Board,
+    /// Places in its memory.
+    pub places: Places,
+    /// The settings that both pages hold or held, and those that are not saved yet.
+    pub settings: [Everything; 2],
+    off: Snapshot,
+    injection: Snapshot,
+    encoder: Snapshot,
+}
+
+impl Scene {
+    /// Starts a board, once with each angle source.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub fn new(image: Image) -> Result<Self> {
+        let places = Places::of(&image)?;
+        let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
+        pair.order("set wiring_checked yes")?;
+        // Twice: both pages hold a set.
+        for _ in 0..2 {
+            pair.order("save")?;
+        }
+        let old = pair_settings(&mut pair.board)?;
+        pair.order(&format!("set {} {}", CHANGE.0, CHANGE.1))?;
+        let mut new = old;
+        new.command.timeout_s = CHANGE.1;
+        let off = pair.board.keep()?;
+        let injection = started(&mut pair)?;
+        pair.order("stop")?;
+        pair.until_state(State::Off)?;
+        pair.board.plant.set_load(Load::Speed { speed: SPEED })?;
+        pair.order("angle encoder")?;
+        let encoder = started(&mut pair)?;
+        let board = pair.board;
+        Ok(Self { board, places, settings: [old, new], off, injection, encoder })
+    }
+
+    /// Regulating torque.
+    ///
+    /// # Errors
+    /// The emulator's.
+    pub fn regulating(&mut self, source: Source) -> Result<()> {
+        match source {
+            Source::Injection => self.board.go_back(&self.injection),
+            Source::Encoder => self.board.go_back(&self.encoder),
+        }
+    }
+
+    /// Off, with settings that are not saved.
+    ///
+    /// # Errors
+    /// The emulator's.
+    pub fn off(&mut self) -> Result<()> {
+        self.board.go_back(&self.off)
+    }
+}
+
+fn started(pair: &mut Pair) -> Result<Snapshot> {
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    pair.order(TORQUE)?;
+    pair.run(SETTLING, |_, _| {})?;
+    // A control interrupt has just ended; half a period later nothing happens for a while.
+    pair.board.run_ticks(u64::from(crate::board::PWM_TOP) / 2)?;
+    pair.board.keep()
+}
+
+/// The second bank, as the firmware reads it.
+#[derive(Debug)]
+struct Bank<'a>(&'a mut Chip);
+
+impl Flash for Bank<'_> {
+    fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
+        let address = crate::board::settings_address(slot, word);
+        let (low, torn) = self.0.flash.load(address);
+        let (high, _) = self.0.flash.load(address + 4);
+        (!torn).then_some(u64::from(low) | u64::from(high) << 32)
+    }
+
+    fn erase(&mut self, _: usize) -> Result<(), Failed> {
+        Err(Failed::Erase(0)) // looked at only
+    }
+
+    fn program(&mut self, _: usize, _: usize, _: u64) -> Result<(), Failed> {
+        Err(Failed::Program(0))
+    }
+}
+
+/// The settings that the flash holds.
+///
+/// # Errors
+/// It holds none.
+pub fn pair_settings(board: &mut Board) -> Result<Everything> {
+    ensure!(crate::board::settings_address(0, 0) >= BANK_2, "settings outside the second bank");
+    let mut chip = board.chip().clone();
+    match Saved::load(Bank(&mut chip), &Everything::of_the_board()).1 {
+        Loaded::Settings(settings) => Some(settings),
+        _ => None,
+    }
+    .context("no whole settings in the flash")
+}
+
+/// How the log names what reset the chip.
+pub const fn cause(reset: Reset) -> &'static str {
+    match reset {
+        Reset::Power => "reset by power-on",
+        Reset::Pin => "reset by reset pin",
+        Reset::Software => "reset by software",
+        Reset::Watchdog => "reset by watchdog",
+    }
+}

@@ -1,0 +1,10 @@
+//! The board for people and scripts: a pseudo-terminal as its serial port, the log on the terminal, and a
+//! page with plots at the end.
+
+pub mod page;
+pub mod probe;
+pub mod pty;
+pub mod record;
+pub mod script;
+pub mod session;
+pub mod transcript;

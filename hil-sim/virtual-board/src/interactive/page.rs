@@ -1,0 +1,79 @@
+//! What is left of a session: a page with plots, and the same as one JSON object.
+
+use hil_sim::outcome::{Figure, Panel, Series};
+use hil_sim::{Config, Outcome};
+
+use super::record::{Quantity, Record};
+use super::transcript::{Line, Source};
+
+/// Name of the page's files.
+pub const NAME: &str = "board";
+/// What the page is about.
+pub const ABOUT: &str = "The firmware's image on an emulated STM32G474, with the simulated motor at its \
+                         pins and a pseudo-terminal at its serial port.";
+
+/// What came out of a session that took so many simulated seconds.
+pub fn outcome(
+    config: &Config,
+    seconds: f64,
+    resets: usize,
+    record: &Record,
+    lines: &[Line],
+) -> Outcome {
+    let mut outcome = Outcome::default();
+    let m = &mut outcome.metrics;
+    m.set("simulated_s", seconds);
+    m.set("control_interrupts", record.interrupts as f64);
+    m.set("resets", resets as f64);
+    m.set("angle_error_rms_deg", record.error_rms_deg());
+    m.set("angle_error_max_deg", record.largest_error_deg);
+    m.set("phase_current_peak_a", record.peak_current);
+    m.set("worst_interrupt_cycles", f64::from(record.worst_cycles));
+    outcome.figures.push(figure(record));
+    let text = |wanted: fn(Source) -> bool| {
+        let lines = lines.iter().filter(|line| wanted(line.source));
+        lines.map(|line| format!("{line}\n")).collect::<String>()
+    };
+    outcome.texts.push((
+        "Console: time (s), > typed, < said, # the board".into(),
+        text(|source| source != Source::Log),
+    ));
+    outcome.texts.push(("Log: time (s)".into(), text(|source| source == Source::Log)));
+    outcome.remarks.push(
+        "Torque, flux, speed and dc link are the simulated motor's and inverter's. Reference, what is \
+         measured and what is estimated are the drive's, read from its RAM while the outputs are on. \
+         The angle error is shown and judged while the outputs are on and the rotor flux is above \
+         0.05 Wb."
+            .into(),
+    );
+    outcome.remarks.extend(hil_sim::experiments::assumptions(config));
+    outcome
+}
+
+fn figure(record: &Record) -> Figure {
+    let x = "time (s)";
+    let line = |name: &str, quantity| Series::line(name, record.curve(quantity));
+    Figure::new("session", "A session with the drive", "")
+        .panel(
+            Panel::new(x, "angle error (° electrical)")
+                .with(Series::line("true minus estimated flux angle", record.error_deg())),
+        )
+        .panel(
+            Panel::new(x, "quadrature current (A)")
+                .with(line("measured", Quantity::CurrentQ))
+                .with(Series::reference("reference", record.curve(Quantity::ReferenceQ))),
+        )
+        .panel(Panel::new(x, "torque (Nm)").with(line("motor", Quantity::Torque)))
+        .panel(Panel::new(x, "rotor flux (Wb)").with(line("motor", Quantity::Flux)))
+        .panel(
+            Panel::new(x, "speed (rpm)")
+                .with(line("rotor", Quantity::Speed))
+                .with(line("estimated", Quantity::SpeedEstimate)),
+        )
+        .panel(
+            Panel::new(x, "dc link (V)")
+                .with(line("inverter", Quantity::DcLink))
+                .with(Series::reference("as measured", record.curve(Quantity::DcLinkSeen))),
+        )
+        .panel(Panel::new(x, "outputs on").with(line("on", Quantity::Outputs)).y_range(-0.1, 1.1))
+}

@@ -1,0 +1,66 @@
+//! What the drive on the board believes: its telemetry, read from the RAM of the core.
+
+use anyhow::{Context, Result};
+
+use crate::bench::Board;
+use crate::image::Image;
+
+/// Where the telemetry lies.
+pub struct Probe {
+    phi: u32,
+    rotor_step: u32,
+    reference_q: u32,
+    current_q: u32,
+    dc_link: u32,
+}
+
+/// What the drive makes of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Belief {
+    /// Rotor-flux angle, electrical turns.
+    pub phi: f64,
+    /// Electrical speed of the rotor, turns per period.
+    pub rotor_step: f64,
+    /// Filtered reference on the quadrature axis, A.
+    pub reference_q: f64,
+    /// Current on the quadrature axis, A.
+    pub current_q: f64,
+    /// Dc-link voltage, V.
+    pub dc_link: f64,
+}
+
+impl Probe {
+    /// Finds it by the image's debug information.
+    ///
+    /// # Errors
+    /// The image has no such thing.
+    pub fn new(image: &Image) -> Result<Self> {
+        let place =
+            |name: &str, member: &str| Ok::<u32, anyhow::Error>(image.member(name, member)?.1);
+        let running = image.symbol("control7RUNNING").context("the drive in RAM")?.0;
+        let drive = running + place("Running", "control")? + place("Control", "drive")?;
+        let telemetry = drive + place("Drive", "telemetry")?;
+        let at = |member: &str| Ok::<u32, anyhow::Error>(telemetry + place("Telemetry", member)?);
+        let q = place("Dq", "q")?;
+        Ok(Self {
+            phi: at("phi")?,
+            rotor_step: at("rotor_step")?,
+            reference_q: at("reference")? + q,
+            current_q: at("current")? + q,
+            dc_link: at("dc_link")?,
+        })
+    }
+
+    /// Reads it, after a control interrupt.
+    pub fn read(&self, board: &Board) -> Belief {
+        let word = |address| board.word(address).unwrap_or_default();
+        let float = |address| f64::from(f32::from_bits(word(address)));
+        Belief {
+            phi: f64::from(word(self.phi)) / 2_f64.powi(32),
+            rotor_step: float(self.rotor_step),
+            reference_q: float(self.reference_q),
+            current_q: float(self.current_q),
+            dc_link: float(self.dc_link),
+        }
+    }
+}

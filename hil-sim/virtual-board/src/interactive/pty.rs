@@ -1,0 +1,84 @@
+//! A pseudo-terminal: what the serial port of the board is to a program on this computer.
+
+use std::collections::VecDeque;
+use std::ffi::OsStr;
+use std::os::fd::OwnedFd;
+use std::os::unix::ffi::OsStrExt as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::io::Errno;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+/// Bytes kept for a reader that is slow; what comes beyond is lost, as on a port to which nobody listens.
+const KEPT: usize = 64 * 1024;
+
+/// A pseudo-terminal.
+pub struct Pty {
+    ours: OwnedFd,
+    /// Held open, so that programs come and go.
+    _theirs: OwnedFd,
+    path: PathBuf,
+    waiting: VecDeque<u8>,
+}
+
+impl Pty {
+    /// A new one, that changes no byte and echoes none.
+    ///
+    /// # Errors
+    /// The system has none left, or no /dev/pts.
+    pub fn open() -> Result<Self> {
+        let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC);
+        let ours = ours.context("cannot open a pseudo-terminal (/dev/ptmx)")?;
+        grantpt(&ours).and_then(|()| unlockpt(&ours)).context("cannot unlock a pseudo-terminal")?;
+        let name = ptsname(&ours, Vec::new()).context("a pseudo-terminal without a name")?;
+        let path = PathBuf::from(OsStr::from_bytes(name.as_bytes()));
+        let cannot = || format!("cannot open the pseudo-terminal {}", path.display());
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+        let theirs = rustix::fs::open(&path, flags, Mode::empty()).with_context(cannot)?;
+        let mut settings = tcgetattr(&theirs).with_context(cannot)?;
+        settings.make_raw();
+        tcsetattr(&theirs, OptionalActions::Now, &settings).with_context(cannot)?;
+        let flags = fcntl_getfl(&ours).with_context(cannot)?;
+        fcntl_setfl(&ours, flags | OFlags::NONBLOCK).with_context(cannot)?;
+        Ok(Self { ours, _theirs: theirs, path, waiting: VecDeque::new() })
+    }
+
+    /// What a program opens.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What was written to it since the last call, at most a few thousand bytes; never waits.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn read(&mut self) -> Result<Vec<u8>> {
+        let mut buffer = vec![0; 4096];
+        let read = match rustix::io::read(&self.ours, &mut buffer) {
+            Err(Errno::AGAIN | Errno::INTR) => 0,
+            other => other.context("reading from the pseudo-terminal")?,
+        };
+        buffer.truncate(read);
+        Ok(buffer)
+    }
+
+    /// Gives bytes to whoever reads; never waits.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        let room = KEPT - self.waiting.len();
+        self.waiting.extend(&bytes[..bytes.len().min(room)]);
+        while !self.waiting.is_empty() {
+            match rustix::io::write(&self.ours, self.waiting.as_slices().0) {
+                Ok(written) => drop(self.waiting.drain(..written)),
+                Err(Errno::AGAIN | Errno::INTR) => break,
+                Err(error) => return Err(error).context("writing to the pseudo-terminal"),
+            }
+        }
+        Ok(())
+    }
+}

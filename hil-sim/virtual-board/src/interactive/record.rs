@@ -1,0 +1,180 @@
+//! Curves of a session of any length: means over some control periods, over more when there are too many.
+
+use std::f64::consts::TAU;
+
+use drive_core::injection::CARRIER_SAMPLES;
+use hil_sim::plant::Plant;
+use hil_sim::rig::{RATE_HZ, wrapped_degrees};
+
+use super::probe::Belief;
+use crate::bench::Period;
+
+/// A quantity that is recorded, in the order of [`Means`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Filtered reference on the quadrature axis, A.
+    ReferenceQ,
+    /// Current on the quadrature axis as the drive sees it, A.
+    CurrentQ,
+    /// Torque of the motor, Nm.
+    Torque,
+    /// Length of the rotor flux, Wb.
+    Flux,
+    /// Speed of the rotor, rpm.
+    Speed,
+    /// The same as the drive estimates it, rpm.
+    SpeedEstimate,
+    /// Dc-link voltage as the drive sees it, V.
+    DcLinkSeen,
+    /// Dc-link voltage, V.
+    DcLink,
+    /// Whether the outputs are on, 0 or 1.
+    Outputs,
+}
+
+impl Quantity {
+    /// Whether it is what the drive believes, which stands still while the outputs are off.
+    fn is_belief(self) -> bool {
+        matches!(self, Self::ReferenceQ | Self::CurrentQ | Self::SpeedEstimate | Self::DcLinkSeen)
+    }
+}
+
+type Means = [f64; 9];
+
+/// Means over some control periods.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bucket {
+    periods: f64,
+    time: f64,
+    sums: Means,
+    /// Sum of unit vectors that show the angle error: angles have no mean of their own.
+    error: [f64; 2],
+}
+
+impl Bucket {
+    fn add(&mut self, other: &Self) {
+        self.periods += other.periods;
+        self.time += other.time;
+        self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
+        self.error.iter_mut().zip(other.error).for_each(|(sum, more)| *sum += more);
+    }
+}
+
+/// Most buckets: more than a plot has pixels, and few enough for a page and for a long session.
+const BUCKETS: usize = 30_000;
+/// A flux below this has hardly an angle, Wb: under half of what the drive magnetises to.
+const FLUX_WB: f64 = 0.05;
+
+/// What was recorded.
+#[derive(Clone, Debug)]
+pub struct Record {
+    buckets: Vec<Bucket>,
+    open: Bucket,
+    /// Periods in a bucket. One of the carrier at first: its ripple would hide everything else.
+    periods: f64,
+    /// Control interrupts.
+    pub interrupts: u64,
+    /// Those in which the angle was judged: outputs on, and a flux.
+    pub judged: u64,
+    error_squares: f64,
+    /// Largest angle error, electrical degrees.
+    pub largest_error_deg: f64,
+    /// Largest phase current at a sample, A.
+    pub peak_current: f64,
+    /// Estimated cycles of the longest control interrupt.
+    pub worst_cycles: u32,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self {
+            buckets: Vec::new(),
+            open: Bucket::default(),
+            periods: CARRIER_SAMPLES as f64,
+            interrupts: 0,
+            judged: 0,
+            error_squares: 0.0,
+            largest_error_deg: 0.0,
+            peak_current: 0.0,
+            worst_cycles: 0,
+        }
+    }
+}
+
+impl Record {
+    /// Takes a control interrupt: the plant at its sample, and what the drive made of that.
+    pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, belief: &Belief) {
+        let rpm = 60.0 / TAU;
+        let turns_to_rpm = RATE_HZ * 60.0 / plant.motor().machine.pole_pairs();
+        let on = period.compare.enabled;
+        let flux = plant.rotor_flux().norm();
+        let mut bucket = Bucket { periods: 1.0, time, ..Bucket::default() };
+        for (quantity, value) in [
+            (Quantity::ReferenceQ, belief.reference_q),
+            (Quantity::CurrentQ, belief.current_q),
+            (Quantity::Torque, plant.torque()),
+            (Quantity::Flux, flux),
+            (Quantity::Speed, plant.mechanical_speed() * rpm),
+            (Quantity::SpeedEstimate, belief.rotor_step * turns_to_rpm),
+            (Quantity::DcLinkSeen, belief.dc_link),
+            (Quantity::DcLink, plant.dc_link()),
+            (Quantity::Outputs, f64::from(u8::from(on))),
+        ] {
+            let counts = on || !quantity.is_belief();
+            bucket.sums[quantity as usize] = if counts { value } else { 0.0 };
+        }
+        self.interrupts += 1;
+        self.worst_cycles = self.worst_cycles.max(period.cycles);
+        let currents = plant.phase_currents();
+        self.peak_current = currents.into_iter().fold(self.peak_current, |m, i| m.max(i.abs()));
+        if on && flux > FLUX_WB {
+            let error = plant.rotor_flux_angle() - belief.phi * TAU;
+            bucket.error = [error.cos(), error.sin()];
+            let degrees = wrapped_degrees(error);
+            self.judged += 1;
+            self.error_squares += degrees * degrees;
+            self.largest_error_deg = self.largest_error_deg.max(degrees.abs());
+        }
+        self.open.add(&bucket);
+        if self.open.periods >= self.periods {
+            self.buckets.push(std::mem::take(&mut self.open));
+        }
+        if self.buckets.len() >= BUCKETS {
+            self.periods *= 2.0;
+            let pairs = self.buckets.chunks(2).map(|pair| {
+                let mut both = pair[0];
+                pair[1..].iter().for_each(|other| both.add(other));
+                both
+            });
+            self.buckets = pairs.collect();
+        }
+    }
+
+    /// Angle error rms, electrical degrees, where it is judged.
+    pub fn error_rms_deg(&self) -> f64 {
+        (self.error_squares / self.judged.max(1) as f64).sqrt()
+    }
+
+    /// Curve of a quantity over time, s; what the drive believes is not a number while the outputs are
+    /// off.
+    pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
+        self.points(|bucket| {
+            let on = bucket.sums[Quantity::Outputs as usize];
+            let counted = if quantity.is_belief() { on } else { bucket.periods };
+            bucket.sums[quantity as usize] / counted
+        })
+    }
+
+    /// True minus estimated rotor-flux angle over time, electrical degrees; not a number where it is not
+    /// judged.
+    pub fn error_deg(&self) -> Vec<(f64, f64)> {
+        self.points(|bucket| match bucket.error {
+            [0.0, 0.0] => f64::NAN,
+            [cos, sin] => sin.atan2(cos).to_degrees(),
+        })
+    }
+
+    fn points(&self, of: impl Fn(&Bucket) -> f64) -> Vec<(f64, f64)> {
+        self.buckets.iter().map(|bucket| (bucket.time / bucket.periods, of(bucket))).collect()
+    }
+}

@@ -1,0 +1,232 @@
+//! A session: the board goes on in small slices of time; between them bytes go to and fro.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+
+use super::probe::Probe;
+use super::pty::Pty;
+use super::record::Record;
+use super::script::{Due, Script};
+use super::transcript::{Assembler, Line, Source};
+use crate::bench::{Board, Period};
+use crate::board as numbers;
+use crate::chip::TICKS_PER_S;
+
+/// Ticks in a control period.
+const PERIOD: u64 = 2 * numbers::PWM_TOP as u64;
+/// Control periods between two looks at the world outside: 5 ms, less than anyone notices.
+const SLICE: u32 = 30;
+/// The board is looked at this long before a control interrupt, ticks: the one before has ended, and the
+/// motor stands where it was sampled for that.
+const BEFORE: u64 = PERIOD / 8;
+/// Later than this, time that was lost is not made up for: the board would race.
+const LATE: Duration = Duration::from_millis(100);
+
+/// Why a session has ended.
+#[derive(Debug)]
+pub enum End {
+    /// Its time is over.
+    Time,
+    /// `quit`.
+    Quit,
+    /// Ctrl-C, or a request to terminate.
+    Signal,
+    /// The script has ended.
+    Script,
+    /// The board cannot go on, or the script cannot.
+    Failed(anyhow::Error),
+}
+
+/// What talks to the board besides the pseudo-terminal.
+pub struct Outside {
+    /// Lines typed at the terminal.
+    pub terminal: Receiver<String>,
+    /// Set by Ctrl-C.
+    pub stop: Arc<AtomicBool>,
+    /// Typed at its time, if there is one.
+    pub script: Option<Script>,
+    /// Simulated time at which the session ends, s.
+    pub seconds: Option<f64>,
+    /// Whether simulated time follows the clock.
+    pub paced: bool,
+}
+
+/// A board that is talked to.
+pub struct Session {
+    board: Board,
+    pty: Pty,
+    probe: Probe,
+    outside: Outside,
+    typed: Assembler,
+    said: Assembler,
+    resets: usize,
+    last: Option<Period>,
+    /// All lines so far.
+    pub lines: Vec<Line>,
+    /// All curves so far.
+    pub record: Record,
+    /// Time by which the board fell behind the clock, s.
+    pub behind_s: f64,
+}
+
+impl Session {
+    /// A session with a board that has just been powered.
+    ///
+    /// # Errors
+    /// The image has no telemetry.
+    pub fn new(board: Board, pty: Pty, outside: Outside) -> Result<Self> {
+        let probe = Probe::new(board.image())?;
+        Ok(Self {
+            board,
+            pty,
+            probe,
+            outside,
+            typed: Assembler::default(),
+            said: Assembler::default(),
+            resets: 0,
+            last: None,
+            lines: Vec::new(),
+            record: Record::default(),
+            behind_s: 0.0,
+        })
+    }
+
+    /// The board.
+    pub fn board(&self) -> &Board {
+        &self.board
+    }
+
+    /// Goes on until something ends it; every line is shown when it comes.
+    pub fn run(&mut self, mut show: impl FnMut(&Line)) -> End {
+        let (mut clock, mut since) = (Instant::now(), self.board.time());
+        let end = loop {
+            let shown = self.lines.len();
+            let end = self.slice().unwrap_or_else(|error| Some(End::Failed(error)));
+            self.lines[shown..].iter().for_each(&mut show);
+            if let Some(end) = end {
+                break end;
+            }
+            if self.outside.paced {
+                let due = Duration::from_secs_f64(self.board.time() - since);
+                let passed = clock.elapsed();
+                if passed > due + LATE {
+                    self.behind_s += (passed - due).as_secs_f64();
+                    (clock, since) = (Instant::now(), self.board.time());
+                }
+                std::thread::sleep(due.saturating_sub(passed));
+            }
+        };
+        let shown = self.lines.len();
+        for (rest, source) in [(self.typed.rest(), Source::Typed), (self.said.rest(), Source::Said)]
+        {
+            rest.into_iter().for_each(|text| self.add(source, text));
+        }
+        let why = match &end {
+            End::Time => "end: the time is over".to_owned(),
+            End::Quit => "end: quit".to_owned(),
+            End::Signal => "end: interrupted".to_owned(),
+            End::Script => "end: of the script".to_owned(),
+            End::Failed(error) => format!("end: {error:#}"),
+        };
+        self.add(Source::Board, why);
+        self.lines[shown..].iter().for_each(&mut show);
+        end
+    }
+
+    /// Takes what has come, goes on for a slice, and gives what there is; why the session ends, if it does.
+    fn slice(&mut self) -> Result<Option<End>> {
+        let now = self.board.time();
+        if self.outside.stop.load(Ordering::Relaxed) {
+            return Ok(Some(End::Signal));
+        }
+        if self.outside.seconds.is_some_and(|seconds| now >= seconds) {
+            return Ok(Some(End::Time));
+        }
+        let typed = self.pty.read()?;
+        self.send(&typed);
+        loop {
+            match self.outside.terminal.try_recv() {
+                Ok(line) if is_quit(&line) => return Ok(Some(End::Quit)),
+                Ok(line) => self.send_line(&line),
+                // Nobody types any more: others still may.
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
+            }
+        }
+        if let Some(script) = &mut self.outside.script {
+            match script.due(now)? {
+                Due::Type(line) if is_quit(&line) => return Ok(Some(End::Quit)),
+                Due::Type(line) => self.send_line(&line),
+                // An end given by the time is later.
+                Due::End if self.outside.seconds.is_none() => return Ok(Some(End::Script)),
+                Due::End | Due::Nothing => {}
+            }
+        }
+        let went = (0..SLICE).try_for_each(|_| self.period());
+        self.hear()?;
+        went.map(|()| None)
+    }
+
+    fn send_line(&mut self, line: &str) {
+        self.send(line.as_bytes());
+        self.send(b"\n");
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.board.send(bytes);
+            for line in self.typed.push(bytes) {
+                self.add(Source::Typed, line);
+            }
+        }
+    }
+
+    /// Goes on until just before the next control interrupt.
+    fn period(&mut self) -> Result<()> {
+        let now = self.board.chip().now;
+        let next = self.last.map_or(0, |period| period.began + 2 * PERIOD - BEFORE);
+        // Without control interrupts (start, resets) a period at a time.
+        let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
+        self.board.run_ticks(end - now)?;
+        while let Some(period) = self.board.next_period() {
+            let belief = self.probe.read(&self.board);
+            let time = period.began as f64 / TICKS_PER_S as f64;
+            self.record.take(time, &self.board.plant, &period, &belief);
+            self.last = Some(period);
+        }
+        Ok(())
+    }
+
+    /// Takes what console and log have said, and tells of resets.
+    fn hear(&mut self) -> Result<()> {
+        for text in self.board.logged()? {
+            self.add(Source::Log, text);
+        }
+        for n in self.resets..self.board.resets.len() {
+            self.resets = n + 1;
+            let cause = self.board.resets[n].1;
+            self.add(Source::Board, format!("reset: {cause:?}"));
+        }
+        let bytes = std::mem::take(&mut self.board.chip().lpuart.wire.from_chip);
+        for line in self.said.push(&bytes) {
+            self.add(Source::Said, line);
+        }
+        self.pty.write(&bytes)
+    }
+
+    fn add(&mut self, source: Source, text: String) {
+        if let Some(script) = &mut self.outside.script
+            && matches!(source, Source::Said | Source::Log)
+        {
+            script.hear(&text);
+        }
+        self.lines.push(Line { time: self.board.time(), source, text });
+    }
+}
+
+fn is_quit(line: &str) -> bool {
+    line.trim() == "quit"
+}

@@ -1,0 +1,304 @@
+//! `cargo sim board`: a program talks to the drive through the pseudo-terminal, and the rotor does what it
+//! was told.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use hil_sim::Config;
+use serde_json::Value;
+use virtual_board::interactive::script::{Due, Script};
+
+/// Longest wait for an answer on a busy machine; an answer takes 20 ms of simulated time.
+const ANSWER: Duration = Duration::from_secs(20);
+/// Longest wait for a state: a start takes 2 s, a stop 1 s of simulated time.
+const STATE: Duration = Duration::from_secs(40);
+
+fn command(out: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
+    command.arg("--out").arg(out).args(arguments);
+    command
+}
+
+/// A folder of its own for each test.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Lines of a reader, with a limit to waiting for them.
+fn lines(reader: impl std::io::Read + Send + 'static) -> Receiver<String> {
+    let (send, receive) = channel();
+    std::thread::spawn(move || {
+        for line in BufReader::new(reader).lines() {
+            let Ok(line) = line else { break };
+            if send.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    receive
+}
+
+/// A program that talks to a running board as to a serial port.
+struct Talk {
+    board: Child,
+    shown: BufReader<ChildStdout>,
+    port: File,
+    said: Receiver<String>,
+}
+
+impl Talk {
+    fn new(mut command: Command) -> Self {
+        let mut board =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+        let mut shown = BufReader::new(board.stdout.take().unwrap());
+        let mut first = String::new();
+        shown.read_line(&mut first).unwrap();
+        let path = first.trim().strip_prefix("console: ").expect(&first);
+        let port = OpenOptions::new().read(true).write(true).open(path).expect(path);
+        let said = lines(port.try_clone().unwrap());
+        Self { board, shown, port, said }
+    }
+
+    fn next(&self) -> String {
+        self.said.recv_timeout(ANSWER).expect("the console is silent")
+    }
+
+    fn say(&mut self, line: impl AsRef<[u8]>) -> String {
+        self.port.write_all(line.as_ref()).unwrap();
+        self.port.write_all(b"\n").unwrap();
+        self.next().trim_end().to_owned()
+    }
+
+    fn until(&mut self, state: &str) {
+        let began = Instant::now();
+        loop {
+            let status = self.say("status");
+            if status.starts_with(state) {
+                return;
+            }
+            assert!(began.elapsed() < STATE, "not {state}, but {status}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// All that it showed, when it has ended well.
+    fn ended(mut self) -> String {
+        let mut rest = String::new();
+        std::io::Read::read_to_string(&mut self.shown, &mut rest).unwrap();
+        assert_eq!(self.board.wait().unwrap().code(), Some(0), "{rest}");
+        rest
+    }
+}
+
+/// The recorded curves.
+struct Report(Value);
+
+impl Report {
+    fn open(folder: &Path) -> Self {
+        let json = std::fs::read(folder.join("board.json")).expect("a JSON object");
+        Self(serde_json::from_slice(&json).expect("a JSON object"))
+    }
+
+    fn series(&self, name: &str) -> Vec<(f64, f64)> {
+        let series = &self.0["series"][format!("session/{name}")];
+        let numbers = |axis: &str| -> Vec<f64> {
+            let values = series[axis].as_array().expect(name).iter();
+            values.map(|value| value.as_f64().unwrap_or(f64::NAN)).collect()
+        };
+        numbers("x").into_iter().zip(numbers("y")).collect()
+    }
+
+    fn metric(&self, name: &str) -> f64 {
+        self.0["metrics"][name].as_f64().expect(name)
+    }
+}
+
+fn mean_within(series: &[(f64, f64)], from: f64, to: f64) -> f64 {
+    let inside: Vec<f64> = series.iter().filter(|p| p.0 >= from && p.0 < to).map(|p| p.1).collect();
+    assert!(!inside.is_empty(), "nothing from {from} s to {to} s");
+    inside.iter().sum::<f64>() / inside.len() as f64
+}
+
+/// The session of the README, in real time, through the pseudo-terminal.
+#[test]
+fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
+    let folder = folder("talk");
+    let mut talk = Talk::new(command(&folder, &["--seed", "5"]));
+    assert!(talk.next().contains("last run: reset by power-on"));
+    let mut help = vec![talk.say("help")];
+    while help.last().is_some_and(|line| line != "ok") {
+        help.push(talk.next().trim_end().to_owned());
+    }
+    assert!(help.len() > 15 && help.iter().any(|line| line.starts_with("torque A")), "{help:?}");
+    assert!(talk.say("version").starts_with(env!("CARGO_PKG_VERSION")));
+    assert!(talk.say("status").starts_with("off;"));
+    assert!(talk.say("start").starts_with("ok"));
+    talk.until("regulating torque");
+    assert_eq!(talk.say("torque 1"), "ok");
+    std::thread::sleep(Duration::from_secs(2));
+    // Garbage, half a command and a bad number change nothing.
+    assert!(talk.say(b"\xff\x00stop\x07").starts_with("error:"));
+    assert!(talk.say("torqu").starts_with("error:"));
+    assert!(talk.say("torque nan").starts_with("error:"));
+    let status = talk.say("status");
+    assert!(status.starts_with("regulating torque;") && status.contains("of 1.00 A"), "{status}");
+    assert_eq!(talk.say("stop"), "ok");
+    talk.until("off;");
+    talk.board.stdin.as_mut().unwrap().write_all(b"quit\n").unwrap();
+    let shown = talk.ended();
+    assert!(shown.contains("> torque 1\n") && shown.contains("# end: quit"), "{shown}");
+    assert!(shown.contains("INFO"), "the log is shown: {shown}");
+
+    let page = std::fs::read_to_string(folder.join("board.html")).unwrap();
+    assert!(page.contains("<svg") && page.trim_end().ends_with("</html>"));
+    for line in ["&gt; torque nan", "&lt; error: not a number", "\\xff\\x00stop\\x07"] {
+        assert!(page.contains(line), "{line} is not in the page");
+    }
+
+    let report = Report::open(&folder);
+    let torque = report.series("torque (Nm)/motor");
+    let outputs = report.series("outputs on/on");
+    let reference = report.series("quadrature current (A)/reference");
+    // From half a second after the reference is there: settled.
+    let level: Vec<f64> = reference.iter().filter(|p| p.1 > 0.95).map(|p| p.0).collect();
+    let (from, to) = (level[0] + 0.5, level[level.len() - 1]);
+    assert!(to - from > 1.0, "{from} {to}");
+    let error = report.series("angle error (° electrical)/true minus estimated flux angle");
+    assert!(error.iter().filter(|p| p.0 > from && p.0 < to).all(|p| p.1.abs() < 15.0));
+    // 3/2 P L_m/L_r psi i_q (Eq. 4.4 for a true angle); 15 degrees of error are 4 % of it and some
+    // of the direct current besides.
+    let config = Config::default();
+    let m = &config.motor;
+    let flux = mean_within(&report.series("rotor flux (Wb)/motor"), from, to);
+    let expected = 1.5 * f64::from(m.pole_pairs) * m.lm / (m.lm + m.llr) * flux * 1.0;
+    let seen = mean_within(&torque, from, to);
+    println!("torque {seen:.3} Nm, by the equation {expected:.3} Nm, flux {flux:.3} Wb");
+    assert!((seen / expected - 1.0).abs() < 0.1, "{seen} {expected}");
+    // Off at both ends, without torque.
+    for (series, largest) in [(&outputs, 0.0), (&torque, 0.01)] {
+        assert!(series[0].1.abs() <= largest && series[series.len() - 1].1.abs() <= largest);
+    }
+    assert!((mean_within(&outputs, from, to) - 1.0).abs() < 1e-9);
+    assert_eq!(report.metric("resets"), 0.0);
+}
+
+/// A free shaft: what the torque gives is what the rotor has (J dw/dt = T - B w); and the same seed gives
+/// the same session, to the last digit.
+#[test]
+fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
+    let script = "# a pulse of torque\n\
+                  at 1.8: start\n\
+                  wait for torque:\n\
+                  wait 0.2: torque 0.5\n\
+                  wait 0.3: torque 0\n\
+                  wait 0.5: status\n";
+    let runs = ["once", "twice"].map(|name| {
+        let folder = folder(name);
+        let file = folder.join("script.txt");
+        std::fs::write(&file, script).unwrap();
+        let mut command = command(&folder, &["--fast", "--load", "free", "--script"]);
+        let output = command.arg(&file).stdin(Stdio::null()).output().unwrap();
+        let shown = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{shown}");
+        assert!(shown.contains("< regulating torque;") && shown.contains("# end: of the script"));
+        Report::open(&folder)
+    });
+    assert!(runs[0].0 == runs[1].0, "two runs with one seed differ");
+
+    let torque = runs[0].series("torque (Nm)/motor");
+    let speed = runs[0].series("speed (rpm)/rotor");
+    let config = Config::default();
+    let (inertia, friction) = (config.motor.inertia, config.motor.friction);
+    let mut expected = 0.0;
+    for (pair, w) in torque.windows(2).zip(&speed) {
+        let (seconds, w) = (pair[1].0 - pair[0].0, w.1.to_radians() * 6.0);
+        expected += (pair[0].1 - friction * w) / inertia * seconds;
+    }
+    let end = speed[speed.len() - 1].1.to_radians() * 6.0;
+    println!("speed {end:.3} rad/s, by the torque {expected:.3} rad/s");
+    // The curves are means of ten periods; what is left is the rule of rectangles.
+    assert!(end > 3.0 && (end / expected - 1.0).abs() < 0.02, "{end} {expected}");
+}
+
+/// Ctrl-C ends it well, with the page; a held speed is held.
+#[test]
+fn an_interrupt_still_writes_the_page() {
+    let folder = folder("interrupt");
+    let talk = Talk::new(command(&folder, &["--load", "speed", "-150", "--seconds", "60"]));
+    talk.next();
+    let pid = talk.board.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert!(talk.ended().contains("# end: interrupted"));
+    let report = Report::open(&folder);
+    assert!(report.series("speed (rpm)/rotor").iter().all(|p| (p.1 + 150.0).abs() < 1e-6));
+    assert!(report.series("outputs on/on").iter().all(|p| p.1 == 0.0));
+    assert!(folder.join("board.html").exists() && folder.join("board-session.svg").exists());
+}
+
+fn refused(output: &Output, code: i32, parts: &[&str]) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    assert!(output.stdout.is_empty(), "nothing is begun");
+    for part in parts {
+        assert!(said.contains(part), "{part} is not in {said}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_named_before_anything_begins() {
+    let folder = folder("wrong");
+    let run = |arguments: &[&str]| command(&folder, arguments).output().unwrap();
+    refused(&run(&["--elf", "no/such.elf"]), 2, &["no/such.elf", "No such file"]);
+    refused(&run(&["--elf", "Cargo.toml"]), 2, &["Cargo.toml"]);
+    refused(&run(&["--load", "speed"]), 2, &["--load speed RPM"]);
+    refused(&run(&["--load", "speed", "1e9"]), 2, &["load.speed_rpm = 1000000000", "allowed"]);
+    refused(&run(&["--load", "heavy"]), 2, &["load.mode = heavy", "locked, free, speed"]);
+    refused(&run(&["--load", "free", "3"]), 2, &["only speed takes a number"]);
+    refused(&run(&["--seconds", "-1"]), 2, &["seconds = -1", "0.001 to 3600 s"]);
+    refused(&run(&["--script", "none.txt"]), 2, &["none.txt"]);
+    let script = folder.join("bad.txt");
+    std::fs::write(&script, "at 1: start\nat soon: stop\n").unwrap();
+    let script = script.display().to_string();
+    refused(&run(&["--script", &script]), 2, &["line 2", "at soon: stop", "0 to 3600 s"]);
+    assert!(std::fs::read_dir(&folder).unwrap().count() == 1, "no page is written");
+
+    // Room for the ELF to be read, but not for both ends of a pseudo-terminal.
+    let program = env!("CARGO_BIN_EXE_board");
+    let limited = ["-c", "ulimit -n 4; exec \"$0\"", program];
+    refused(&Command::new("sh").args(limited).output().unwrap(), 1, &["pseudo-terminal"]);
+}
+
+#[test]
+fn scripts_keep_their_times_and_wait_for_texts() {
+    let mut script =
+        Script::parse("at 1: a b\n\n# c\nwait 0.5: d: e\nwait for ok\nat 1: f").unwrap();
+    let mut due = |now, heard: Option<&str>| {
+        heard.into_iter().for_each(|line| script.hear(line));
+        script.due(now)
+    };
+    assert_eq!(due(0.9, Some("ok")).unwrap(), Due::Nothing);
+    assert_eq!(due(1.0, None).unwrap(), Due::Type("a b".into()));
+    assert_eq!(due(1.4, None).unwrap(), Due::Nothing);
+    assert_eq!(due(1.5, None).unwrap(), Due::Type("d: e".into()));
+    assert_eq!(due(1.6, Some("error")).unwrap(), Due::Nothing);
+    assert_eq!(due(2.0, Some("well, ok")).unwrap(), Due::Nothing);
+    // Its time has passed.
+    assert_eq!(due(2.1, None).unwrap(), Due::Type("f".into()));
+    assert_eq!(due(2.2, None).unwrap(), Due::Nothing);
+    assert_eq!(due(3.0, None).unwrap(), Due::End);
+
+    let mut silent = Script::parse("wait for ok").unwrap();
+    assert_eq!(silent.due(29.0).unwrap(), Due::Nothing);
+    assert!(silent.due(31.0).unwrap_err().to_string().contains("`ok` within 30 s"));
+    for bad in ["stop", "at 1 stop", "at -1: stop", "at nan: stop", "after 1: stop", "wait: stop"] {
+        let why = Script::parse(bad).unwrap_err();
+        assert!(why.contains("line 1") && why.contains(bad), "{why}");
+    }
+}
