@@ -113,7 +113,6 @@ fn rounded(count: f32) -> u16 {
     (count + 0.5) as u32 as u16
 }
 
-
 fn extremes(v: Abc) -> (f32, f32) {
     let (low, high) = if v.a < v.b { (v.a, v.b) } else { (v.b, v.a) };
     (if v.c < low { v.c } else { low }, if v.c > high { v.c } else { high })

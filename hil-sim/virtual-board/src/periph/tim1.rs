@@ -317,8 +317,8 @@ impl Tim1 {
         let bit = |n: usize| af1 >> n & 1 != 0;
         let pin = bit(0) && self.fault_pin_high != bit(9);
         // BKCMP1E is bit 1, BKCMP1P bit 10; comparators 5 to 7 have no polarity.
-        let comparator = (0..7)
-            .any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
+        let comparator =
+            (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
         if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
             self.pull();
         }
