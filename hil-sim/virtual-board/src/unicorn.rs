@@ -197,7 +197,9 @@ impl UnicornCpu {
     pub fn registers(&self) -> Vec<u64> {
         let mut values: Vec<u64> = (0..13).map(|n| u64::from(self.get(Register::R(n)))).collect();
         let read = |register| self.uc.reg_read(register).unwrap_or(0);
-        values.extend([R::SP, R::LR, R::PC, R::XPSR, R::PRIMASK, R::BASEPRI, R::CONTROL].map(read));
+        values.extend([R::SP, R::LR, R::PC, R::PRIMASK, R::BASEPRI, R::CONTROL].map(read));
+        // Flags and exception number: the emulator says Thumb only while it runs.
+        values.push(read(R::XPSR) & 0xf80f_01ff);
         values.extend(KEPT_FLOAT.map(read));
         if self.uses_float() {
             values.extend(FLOAT.map(read));

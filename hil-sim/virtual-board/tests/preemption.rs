@@ -1,7 +1,5 @@
 //! Whatever the control interrupt preempts goes on as if nothing had been.
 
-mod common;
-
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
