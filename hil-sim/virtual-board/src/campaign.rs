@@ -6,7 +6,7 @@
 //! short a leg fails, as do more than one reset and an end without a reason in the log.
 //!
 //! The reason is looked for in the log, which tells it first thing after a reset; one run in
-//! [`WHOLE_STARTS`] goes on until the console greets, as the design of the control takes seconds.
+//! ten goes on until the console greets, as the design of the control takes seconds.
 
 mod class;
 mod judge;
