@@ -46,7 +46,7 @@ faults! {
     OffsetA = 16, "offset of current sensor a out of range at start";
     OffsetB = 17, "offset of current sensor b out of range at start";
     OverTemperature = 18, "heat sink too hot";
-    Encoder = 19, "encoder jumped further than the rotor can turn";
+    Encoder = 19, "encoder jumped or stood still as the rotor cannot";
     Break = 20, "the power stage pulled the break input";
     AnalogWatchdog = 21, "over-current seen by the analog watchdog";
     DeadlineMiss = 22, "the control interrupt missed its deadline";

@@ -28,6 +28,10 @@ pub struct Indirect {
     smoothing: f32,
     /// Most counts the rotor can turn in a period.
     most_counts: i32,
+    /// Electrical turns that a counter which stands still may have missed.
+    missed: f32,
+    /// Speed from which that is judged, electrical turns per period.
+    judged_from: f32,
 }
 
 /// State of the indirect angle.
@@ -42,6 +46,10 @@ pub struct IndirectState {
     pub magnetising: f32,
     /// Mean electrical speed of the rotor, turns per period.
     pub rotor_step: f32,
+    /// That speed when the counter last moved.
+    moving_step: f32,
+    /// How far the rotor would have gone on since, electrical turns.
+    missed: f32,
 }
 
 /// A flux angle and how fast it turns.
@@ -53,9 +61,15 @@ pub struct FluxAngle {
     pub step: f32,
 }
 
-/// The encoder moved further than the rotor can turn.
+/// The encoder moved, or stood still, as the rotor cannot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Jump;
+pub struct Impossible;
+
+/// Mechanical turns within which no rotor stops from [`JUDGED_FROM`]: 1.4°. That would take 2200 rad/s^2,
+/// 26 N m on 0.012 kg m^2, several times what such a motor makes.
+const STOPS_WITHIN: f32 = 4e-3;
+/// Mechanical turns/s: 100 rpm. Below, a standstill may be a real one.
+const JUDGED_FROM: f32 = 100.0 / 60.0;
 
 /// Most that one command changes 1 / T_sec, as a share of that of the settings: at ten commands a
 /// second a wrong estimate needs 1.5 s for the 30 % of a warm rotor.
@@ -84,6 +98,8 @@ impl Indirect {
             least: 0.2 * nominal_a,
             smoothing: period_s / SPEED_FILTER_S,
             most_counts: 2 + (highest * period_s * counts as f32) as i32,
+            missed: STOPS_WITHIN * f32::from(pole_pairs),
+            judged_from: JUDGED_FROM * f32::from(pole_pairs) * period_s,
         }
     }
 
@@ -114,15 +130,24 @@ impl Indirect {
     /// The flux angle at the present sample from the encoder's counter.
     ///
     /// # Errors
-    /// [`Jump`] when the counter moved further than the rotor can turn in a period.
-    pub fn angle(&self, state: &mut IndirectState, count: u32) -> Result<FluxAngle, Jump> {
+    /// [`Impossible`] when the counter moved further than the rotor can turn in a period, or stands still
+    /// from one period to the next while the rotor was fast: cable off, or supply gone.
+    pub fn angle(&self, state: &mut IndirectState, count: u32) -> Result<FluxAngle, Impossible> {
         let moved = count.wrapping_sub(state.last_count.unwrap_or(count)) as i32;
         if moved > self.most_counts || moved < -self.most_counts {
-            return Err(Jump);
+            return Err(Impossible);
         }
         state.last_count = Some(count);
         let moved = Angle::from_bits(moved.wrapping_mul(self.bits_per_count as i32)).to_turns();
         state.rotor_step += self.smoothing * (moved - state.rotor_step);
+        if moved == 0.0 {
+            state.missed += state.moving_step;
+            if state.missed.abs() > self.missed && state.moving_step.abs() > self.judged_from {
+                return Err(Impossible);
+            }
+        } else {
+            (state.missed, state.moving_step) = (0.0, state.rotor_step);
+        }
         let rotor = Angle::from_bits(count.wrapping_mul(self.bits_per_count) as i32);
         Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_step + state.slip_step })
     }
@@ -157,6 +182,22 @@ mod tests {
     }
 
     #[test]
+    fn a_counter_that_stands_still_while_the_rotor_was_fast_is_refused() {
+        let ind = indirect();
+        // 8 counts a period are 288 rpm: refused after 40 counts that did not come, five periods.
+        // 2 are 72 rpm: it may have stopped.
+        for (counts, periods) in [(8, Some(5)), (-8, Some(5)), (2, None)] {
+            let (mut state, mut count) = (IndirectState::default(), 0_u32);
+            for _ in 0..300 {
+                count = count.wrapping_add_signed(counts);
+                ind.angle(&mut state, count).unwrap();
+            }
+            let refused = (0..3000).position(|_| ind.angle(&mut state, count).is_err());
+            assert_eq!(refused, periods, "{counts}");
+        }
+    }
+
+    #[test]
     fn slip_integrates_the_ratio_of_the_currents() {
         let ind = indirect();
         let mut state = IndirectState::default();
@@ -177,6 +218,6 @@ mod tests {
         let mut state = IndirectState::default();
         ind.angle(&mut state, u32::MAX - 3).unwrap();
         ind.angle(&mut state, 3).unwrap();
-        assert_eq!(ind.angle(&mut state, 5000), Err(Jump));
+        assert_eq!(ind.angle(&mut state, 5000), Err(Impossible));
     }
 }

@@ -24,8 +24,13 @@ Usage: cargo xtask <task>
   flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
   board     builds the image and tests it on the virtual board
   cycles    counts what the control interrupt costs on the virtual board, and fails when it rises
+  campaign [N] [SEED]
+            injects N faults (2000) into the image on the virtual board, the first with SEED (1)
   fuzz [S]  fuzzes console and saved settings, S seconds each (300)
   size      shows what the image takes of each memory, and fails above the limits";
+
+/// Faults of a whole campaign; `test` injects a twentieth.
+const CAMPAIGN: u32 = 2000;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -40,6 +45,14 @@ fn main() -> ExitCode {
         ["flash"] => image::flash(),
         ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
         ["board"] => image::build().and_then(|elf| board::test(&elf)),
+        ["campaign", ref rest @ ..]
+            if rest.len() <= 2 && rest.iter().all(|n| n.parse::<u32>().is_ok()) =>
+        {
+            let number = |n: usize, default| {
+                rest.get(n).and_then(|text| text.parse().ok()).unwrap_or(default)
+            };
+            image::build().and_then(|elf| board::campaign(&elf, number(0, CAMPAIGN), number(1, 1)))
+        }
         ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
         [] | ["help" | "-h" | "--help"] => {
             println!("{HELP}");
@@ -99,6 +112,7 @@ fn test() -> Result<()> {
     let elf = image::build_with(&target)?;
     image::report_size(&elf)?;
     board::test(&elf)?;
+    board::campaign(&elf, CAMPAIGN / 20, 1)?;
     board::cycles(&elf)?;
 
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());

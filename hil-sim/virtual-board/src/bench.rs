@@ -1,5 +1,6 @@
 //! The board: the core, its chip, and the motor, from one period to the next.
 
+pub mod poison;
 pub mod snapshot;
 
 use std::collections::VecDeque;
@@ -163,6 +164,8 @@ pub struct Board {
     order_flag: u32,
     /// Changes every sample, if there.
     pub disturb: Option<Disturbance>,
+    /// Compares what control interrupts preempt before and after, if there.
+    pub poison: Option<poison::Poison>,
     /// When the outputs went off last, ticks.
     pub went_off: Option<u64>,
     /// Pulses below the minimum, where they are counted instead of refused; see [`Board::forgive`].
@@ -215,6 +218,7 @@ impl Board {
             periods: VecDeque::new(),
             order_flag,
             disturb: None,
+            poison: None,
             went_off: None,
             short_pulses: 0,
             resets: Vec::new(),
@@ -438,7 +442,13 @@ impl Board {
         let vector = self.cpu.chip().scs.vector(exception);
         let handler = self.cpu.word(vector).ok_or_else(|| Failure::Core("no vector".into()))?;
         self.cpu.chip_mut().scs.begin(exception);
+        if exception == 16 + IRQ_ADC1_2 {
+            self.remember();
+        }
         let stacked = self.cpu.enter(exception, handler & !1);
+        if exception == 16 + IRQ_ADC1_2 {
+            self.spoil();
+        }
         if !stacked && exception != scs::HARD_FAULT {
             // The stack is at its end: the frame is lost, and the fault is taken instead.
             self.hard_fault(1 << 12, None)?;
@@ -522,6 +532,8 @@ impl Board {
         }
         if ended.is_none() || !self.cpu.leave(exc_return) {
             self.hard_fault(1 << 11, None)?;
+        } else if ended == Some(16 + IRQ_ADC1_2) {
+            self.compare_with_before()?;
         }
         Ok(())
     }

@@ -125,6 +125,16 @@ impl Image {
         }
     }
 
+    /// Address of the symbol with exactly this name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn address(&self, name: &str) -> Result<u32> {
+        let file = object::File::parse(&*self.bytes)?;
+        let symbol = file.symbol_by_name(name);
+        Ok(symbol.with_context(|| format!("the image has no symbol {name}"))?.address() as u32)
+    }
+
     /// Size of the structure named `name`, and where in it its `member` is.
     ///
     /// # Errors

@@ -28,6 +28,9 @@ const FPCA: u64 = 1 << 2;
 const BASIC: [R; 8] = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC, R::XPSR];
 const FLOAT: [R; 9] = [R::D0, R::D1, R::D2, R::D3, R::D4, R::D5, R::D6, R::D7, R::FPSCR];
 
+/// S16 to S31, which functions keep.
+const KEPT_FLOAT: [R; 8] = [R::D8, R::D9, R::D10, R::D11, R::D12, R::D13, R::D14, R::D15];
+
 /// What is counted, at the price of speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counting {
@@ -187,6 +190,33 @@ impl UnicornCpu {
             }
         }
         self.uc.context_restore(&to.registers)
+    }
+
+    /// What an interrupt must leave as it is: R0 to PC, status, masks, CONTROL, S16 to S31, and where
+    /// floating point is used S0 to S15 and FPSCR.
+    pub fn registers(&self) -> Vec<u64> {
+        let mut values: Vec<u64> = (0..13).map(|n| u64::from(self.get(Register::R(n)))).collect();
+        let read = |register| self.uc.reg_read(register).unwrap_or(0);
+        values.extend([R::SP, R::LR, R::PC, R::PRIMASK, R::BASEPRI, R::CONTROL].map(read));
+        // Flags and exception number: the emulator says Thumb only while it runs.
+        values.push(read(R::XPSR) & 0xf80f_01ff);
+        values.extend(KEPT_FLOAT.map(read));
+        if self.uses_float() {
+            values.extend(FLOAT.map(read));
+        }
+        values
+    }
+
+    /// Whether the floating-point registers are in use.
+    pub fn uses_float(&self) -> bool {
+        self.control() & FPCA != 0
+    }
+
+    /// Fills S0 to S15 with what is no number.
+    pub fn spoil_float(&mut self) {
+        for register in FLOAT.into_iter().take(8) {
+            self.uc.reg_write(register, 0x7fa0_dead_7fa0_dead).ok();
+        }
     }
 
     fn control(&self) -> u64 {

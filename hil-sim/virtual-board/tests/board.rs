@@ -6,7 +6,7 @@ use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
 use virtual_board::chip::Reset;
-use virtual_board::{Board, Counting, Image, Options};
+use virtual_board::{Board, Image, Options};
 
 /// Periods that the firmware needs from reset to its greeting, at most.
 const START: u64 = 15_000;
@@ -93,21 +93,5 @@ fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     assert!(heard.contains("clock or flash failure"), "{heard}");
     let log = pair.board.logged()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
-    Ok(())
-}
-
-/// Main loop and serial interrupt are preempted at any instruction, with all interrupts at work, and
-/// nothing of it shows.
-#[test]
-fn every_instruction_can_be_interrupted() -> Result<()> {
-    let mut options = Options::new(&Config::default(), 5);
-    options.counting = Counting { cycles: true, every_instruction: true };
-    let mut pair = virtual_board::Pair::new(Image::built()?, options)?;
-    pair.order("start torque")?;
-    pair.run(REPORT, |_, _| {})?;
-    for _ in 0..100 {
-        let status = pair.say("status")?;
-        assert!(status.contains(" A, "), "{status}");
-    }
     Ok(())
 }

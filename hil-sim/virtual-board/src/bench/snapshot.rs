@@ -49,7 +49,9 @@ impl Board {
     /// The core cannot go back.
     pub fn go_back(&mut self, to: &Snapshot) -> Result<()> {
         self.cpu.go_back(&to.standing).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let forgiving = self.cpu.chip().forgiving;
         *self.cpu.chip_mut() = to.chip.clone();
+        self.cpu.chip_mut().forgiving = forgiving;
         self.plant = to.plant.clone();
         self.plant_at = to.plant_at;
         self.applied = to.applied;

@@ -33,11 +33,11 @@ pub struct Seen {
     pub angle_deg: f64,
 }
 
-/// Watches for `ms` after the fault, or until the outputs are off.
+/// Watches for `ms` after the fault, or until the outputs are off. The angle counts, or the currents alone.
 ///
 /// # Errors
 /// Bad gate signals; what the board cannot go on with.
-pub fn watch(board: &mut Board, places: &Places, ms: f64) -> Result<Seen> {
+pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) -> Result<Seen> {
     let began = board.chip().now;
     let trip = f64::from(crate::board::settings().limits.trip_a);
     let mut seen = Seen::default();
@@ -60,11 +60,11 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64) -> Result<Seen> {
         let error = angle_error(board, places);
         seen.angle_deg = seen.angle_deg.max(error);
         // Written so that not-a-number is wrong.
-        if !(error <= ANGLE_DEG && current < trip) {
+        let straight = error <= ANGLE_DEG || !angle_counts;
+        if !(straight && current < trip) {
             seen.wrong_ms = since(next);
         }
     }
-    // It may rise on after the outputs have gone off: by nothing, the diodes brake it.
     Ok(seen)
 }
 

@@ -56,7 +56,7 @@ impl Places {
         let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
         let drive = running.0 + at("Running", "control")? + at("Control", "drive")?;
         let size = |name: &str, member: &str| image.member(name, member).map(|found| found.0);
-        let end = |name: &str| image.symbol(name).map(|found| found.0);
+        let end = |name: &str| image.address(name);
         let (data, data_end) = (end("__sdata")?, end("__euninit")?);
         let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
         let ccm = end("__sccm")?;

@@ -1,0 +1,59 @@
+//! Whatever the control interrupt preempts goes on as if nothing had been.
+
+use anyhow::Result;
+use drive_core::State;
+use hil_sim::Config;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use virtual_board::bench::poison::Poison;
+use virtual_board::chip::IRQ_ADC1_2;
+use virtual_board::{Counting, Image, Options, Pair};
+
+/// Control interrupts that are looked at.
+const INTERRUPTS: u64 = 100_000;
+/// Most instructions from one that is asked for to the next.
+const APART: u64 = 3000;
+
+/// Main loop and serial interrupt are preempted before any instruction, by the interrupts of the
+/// converters and by others that are asked for at random, a hundred thousand in all, while the drive
+/// regulates and the console talks. Registers and stack are compared after each, with the
+/// floating-point registers poisoned inside; the log is whole.
+#[test]
+fn a_hundred_thousand_interrupts_leave_registers_stack_and_log_intact() -> Result<()> {
+    let mut options = Options::new(&Config::default(), 5);
+    options.counting = Counting { cycles: true, every_instruction: true };
+    let mut pair = Pair::new(Image::built()?, options)?;
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    let mut board = pair.board;
+    board.logged()?;
+    board.poison = Some(Poison::new(board.image().address("_stack_start")?));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+    let (mut periods, mut replies) = (0_u64, 0);
+    while board.poison.as_ref().is_some_and(|poison| poison.intact < INTERRUPTS) {
+        board.stop_after(rng.random_range(1..APART));
+        board.run_ticks(2000)?;
+        board.pend(16 + IRQ_ADC1_2);
+        while board.next_period().is_some() {
+            periods += 1;
+            if periods % 60 == 0 {
+                board
+                    .type_line(["status", "get motor.r_s", "faults"][rng.random_range(0..3_usize)]);
+                replies += 1;
+            }
+        }
+    }
+    let heard = board.heard();
+    let lines = heard.lines().count();
+    assert!(heard.lines().all(|line| !line.starts_with("error")), "{heard}");
+    assert!(lines + 5 > replies, "{lines} answers to {replies} lines");
+    let log = board.logged()?;
+    assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
+    // Ten lines a second.
+    assert!(log.len() as u64 >= periods / 600, "{} lines in {periods} periods", log.len());
+    let floating = board.poison.map_or(0, |poison| poison.in_floating_point);
+    println!(
+        "{periods} periods, {floating} interrupts in code with floating point, {lines} answers"
+    );
+    Ok(())
+}
