@@ -175,6 +175,8 @@ impl Drive {
     ///
     /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
     /// with the outputs off in the same step.
+    // Not inlined: it would be compiled for size, as the firmware around it.
+    #[inline(never)]
     pub fn step(&mut self, sample: &Sample) -> Compare {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Compare::OFF;

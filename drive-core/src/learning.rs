@@ -158,6 +158,7 @@ pub struct Learned {
 impl Learning {
     /// For the rotor time constant and the control period, s, the direct and the largest current, A,
     /// sigma L_s and L_m^2 / L_r, H.
+    #[inline]
     pub fn new(
         t_sec: f32,
         period_s: f32,

@@ -60,6 +60,7 @@ const SEEN_SHARE: f32 = 0.64;
 
 impl SaliencyCheck {
     /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
+    #[inline]
     pub fn new(flux_saliency: f32, t_sec: f32, period_s: f32) -> Self {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
         Self {

@@ -63,6 +63,7 @@ impl ReferenceTable {
     ///
     /// # Errors
     /// See [`TableError`].
+    #[inline]
     pub fn new(points: &[(f32, f32)]) -> Result<Self, TableError> {
         let first = points.first().ok_or(TableError::TooShort)?;
         if *first != (0.0, 0.0) {
@@ -154,6 +155,7 @@ pub struct Schedule {
 impl Schedule {
     /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
     /// current, 1/A, and the direct-axis current, A.
+    #[inline]
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
         let share = |n: usize| {
             let i_q = n as f32 * STEP_A;
