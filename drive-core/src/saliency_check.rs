@@ -22,8 +22,10 @@ pub struct SaliencyCheck {
     restore: u32,
     /// Least mean saliency, signed as it must be.
     least: f32,
-    /// Mean saliency of a motor that has what is expected.
-    expected: f32,
+    /// 1 / mean saliency of a motor that has what is expected.
+    per_expected: f32,
+    /// 1 / samples that are averaged.
+    per_average: f32,
 }
 
 /// State of the check.
@@ -68,7 +70,8 @@ impl SaliencyCheck {
             average: periods(AVERAGE_S),
             restore: periods(2.0 * t_sec),
             least: LEAST_SHARE * flux_saliency,
-            expected: EXPECTED_SHARE * flux_saliency,
+            per_expected: 1.0 / (EXPECTED_SHARE * flux_saliency),
+            per_average: 1.0 / periods(AVERAGE_S) as f32,
         }
     }
 
@@ -92,10 +95,10 @@ impl SaliencyCheck {
             state.sum += q;
             Phase::Look
         } else if elapsed < looked + self.restore {
-            let mean = state.sum / self.average as f32;
+            let mean = state.sum * self.per_average;
             // Beyond the least, on its side of zero. Not-a-number is not.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
-            state.share = mean / self.expected;
+            state.share = mean * self.per_expected;
             if enough { Phase::Restore } else { Phase::Failed }
         } else {
             Phase::Passed

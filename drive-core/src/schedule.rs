@@ -10,6 +10,7 @@
 use core::fmt;
 
 use crate::decimal::Shortest;
+use crate::synchronous::Saliency;
 
 /// Points of the tables, from i_q = 0 on.
 pub const POINTS: usize = 16;
@@ -179,6 +180,12 @@ impl Schedule {
     /// The same with another reference and, where there is one, another saliency per ampere, 1/A.
     pub fn with(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
         Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
+    }
+
+    /// The angle error that a saliency tells of, rad, and the share of the proportional part.
+    pub fn correction(&self, seen: &Saliency) -> (f32, f32) {
+        let (reference, share) = self.at(seen.i_q);
+        (self.per_saliency * (reference - seen.q), share)
     }
 
     /// Reference of `q`, and share of the proportional part, at a quadrature current, A.
