@@ -110,9 +110,13 @@ fn learning_takes_stop_and_no_other_reference() {
     assert_eq!(rig.drive.state(), State::Off);
     assert!(rig.drive.learned().is_none());
 
-    for change in ["injection.demodulator=literal", "injection.amplitude_v=0"] {
-        let mut rig = Rig::from_config(&config(&[change]), 6).unwrap();
-        assert!(rig.command(Command::Start(Mode::Learning)).is_err(), "{change}");
+    let without: [&[&str]; 2] = [
+        &["injection.demodulator=literal"],
+        &["injection.amplitude_v=0", "injection.monitor=false"],
+    ];
+    for changes in without {
+        let mut rig = Rig::from_config(&config(changes), 6).unwrap();
+        assert!(rig.command(Command::Start(Mode::Learning)).is_err(), "{changes:?}");
     }
 }
 

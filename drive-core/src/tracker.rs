@@ -8,6 +8,7 @@
 use core::f32::consts::TAU;
 
 use crate::angle::Angle;
+use crate::tuning;
 
 /// Coefficients of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,8 +78,6 @@ pub struct Pll {
     limit: f32,
 }
 
-/// Third pole of the loop, of its natural frequency.
-const THIRD_POLE: f32 = 0.2;
 /// Largest error that is corrected at once, rad.
 const LARGEST_ERROR: f32 = 0.6;
 
@@ -87,10 +86,11 @@ impl Pll {
     #[inline]
     pub fn new(bandwidth_hz: f32, period_s: f32, limit: f32) -> Self {
         let w = TAU * bandwidth_hz * period_s;
+        let c = tuning::THIRD_POLE as f32;
         Self {
-            proportional: (2.0 + THIRD_POLE) * w / TAU,
-            integral: (1.0 + 2.0 * THIRD_POLE) * w * w / TAU,
-            jerk: THIRD_POLE * w * w * w / TAU,
+            proportional: (2.0 + c) * w / TAU,
+            integral: (1.0 + 2.0 * c) * w * w / TAU,
+            jerk: c * w * w * w / TAU,
             limit,
         }
     }

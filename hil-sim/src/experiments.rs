@@ -32,6 +32,7 @@ mod speed_profile;
 mod steady;
 mod sweep;
 mod torque;
+mod torque_drift;
 mod tracking;
 
 use crate::config::Config;
@@ -90,6 +91,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     lock_monitor::EXPERIMENT,
+    torque_drift::EXPERIMENT,
     tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,

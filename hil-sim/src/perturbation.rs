@@ -10,12 +10,12 @@
 //! shaft                        J/P dw/dt = 3/2 P L_m^2/L_r (i_d i_q' + i_q m) - T_L - B w/P
 //! slip fed forward             s_ff = r / (T_r,believed i_d)     r: filtered reference of i_q
 //! seen                         x = MA20 MA20 ( e + c (r - di_q) )   c = dq/di_q over 2 |a_psi|
-//! tracking                     dw_i/dt = w_n^2 x
-//! angle                        de/dt = w + slip - w_i - s_ff - 2 w_n g x
+//! tracking                     da/dt = c w_n^3 x      dw_i/dt = a + (1 + 2 c) w_n^2 x
+//! angle                        de/dt = w + slip - w_i - s_ff - (2 + c) w_n g x
 //! ```
 //!
 //! The current loop is the drive's: PI, filter, one period of delay, plant of first order. The speed
-//! loop, where there is one, sees the mean of `w_i + 2 w_n g x` over its period.
+//! loop, where there is one, sees the mean of `w_i + (2 + c) w_n g x` over its period.
 
 use std::f64::consts::TAU;
 
@@ -132,7 +132,8 @@ impl Linear {
         let (mut low_pass, mut seen) = (LpfState::default(), [MovingAverage::default(); 2]);
         let (mut filtered, mut current, mut error) = (0.0, 0.0, 0.0);
         let (mut voltage, mut acting) = (0.0, 0.0);
-        let (mut e, mut m, mut w, mut w_i) = (0.0, 0.0, 0.0, 0.0);
+        let (mut e, mut m, mut w) = (0.0, 0.0, 0.0);
+        let (mut w_i, mut acceleration) = (0.0, 0.0);
         let (mut moved, mut speed, mut speed_error) = (0.0, 0.0, 0.0);
         for k in 0..(seconds / t).round() as usize {
             response.angle_deg.push(e * 360.0 / TAU);
@@ -157,8 +158,10 @@ impl Linear {
             // What is seen, and the tracking loop.
             let x = e + self.looks_like * (r - current);
             let x = seen.iter_mut().fold(x, |x, average| average.step(x));
-            w_i += t * self.w_n * self.w_n * x;
-            let rotor = w_i + 2.0 * self.w_n * self.share * x;
+            let (c, w_n) = (tuning::THIRD_POLE, self.w_n);
+            acceleration += t * c * w_n.powi(3) * x;
+            w_i += t * (acceleration + (1.0 + 2.0 * c) * w_n * w_n * x);
+            let rotor = w_i + (2.0 + c) * w_n * self.share * x;
             moved += t * rotor;
             let fed_forward = r / (believed_t_r * i_d);
 
@@ -198,30 +201,35 @@ impl MovingAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drive_core::schedule::ReferenceTable;
 
     fn linear(i_q: f64, settings: &Settings) -> Linear {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());
         Linear::new(&machine, &mechanics, settings, i_q).unwrap()
     }
 
-    /// Without slip of its own a type-2 loop leaves a step of its frequency d with a peak of
-    /// d / (e w_n) when it is critically damped: a rotor resistance 10 % off at a small current, where
-    /// the slip hardly depends on the angle and the delays are short.
+    /// Without slip of its own the tracking loop leaves a step of its frequency d with the error
+    /// d s / ((s + w_n)^2 (s + w_n/5)), whose peak is 0.3240 d / w_n: a rotor resistance 10 % off at a
+    /// small current, where the slip hardly depends on the angle and the delays are short.
     #[test]
-    fn a_wrong_slip_has_the_peak_of_a_type_2_loop() {
+    fn a_wrong_slip_has_the_peak_of_the_tracking_loop() {
         let mut settings = Settings::default();
         settings.motor.r_r *= 0.9;
         // Slow against the delays, fast against the rotor.
         settings.injection.synchronous.bandwidth_hz = 6.0;
+        // No saliency of the current: its transient looks like an angle.
+        settings.injection.synchronous.reference =
+            ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.0)]).unwrap();
         let response = linear(0.01, &settings).response(Disturbance::TorqueCurrent(0.1), 0.4);
         let t_r = 0.2047 / 1.1;
         let wrong = 0.1 * (1.0 - 0.9) / (t_r * 0.7);
-        let expected = wrong / (TAU * 6.0 * std::f64::consts::E) * 360.0 / TAU;
+        let expected = 0.3240 * wrong / (TAU * 6.0) * 360.0 / TAU;
         // The peak comes after 1/w_n = 27 ms; by 10 ms the current stands.
         let peak = response.angle_deg[60..].iter().copied().fold(0.0, f64::max);
         println!("peak {peak} expected {expected}");
-        // Above it, because the averages' 3.2 ms take damping: 1.31 at this bandwidth.
-        assert!((1.0..1.4).contains(&(peak / expected)));
+        // Above it, because the averages' 3.2 ms take damping: 1.14 at this bandwidth, integrated
+        // apart from this model with the averages and the loop alone. The current's rise is the rest.
+        assert!((1.1..1.2).contains(&(peak / expected)));
     }
 
     /// A load step ends with the speed back, and with the current that carries the load.

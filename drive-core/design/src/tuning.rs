@@ -42,7 +42,7 @@ mod motion;
 mod roots;
 
 pub use margins::Margins;
-pub use motion::{MotionDesign, design_motion_loops};
+pub use motion::{MotionDesign, THIRD_POLE, design_motion_loops};
 pub use roots::roots;
 
 use margins::{gain_limit, scan};

@@ -32,10 +32,8 @@ impl Drive {
         let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
         let signal = if normalised { t.saliency } else { t.delta_i };
         let theta = t.phi + Angle::QUARTER;
-        match {
-            let seen = (signal, t.carrier_squared);
-            c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage)
-        } {
+        let seen = (signal, t.carrier_squared);
+        match c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage) {
             Next::Current(i_q) => self.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
             Next::Done => {

@@ -27,6 +27,9 @@ pub struct MotionDesign {
     pub period_s: f64,
 }
 
+/// Third pole of the loop that tracks the flux, in units of its natural frequency, beside two at it.
+pub const THIRD_POLE: f64 = 0.2;
+
 /// Crossover of the speed loop over the zero of its controller (4 in section 3.8 as well), and over
 /// the gain of the position loop.
 const SPREAD: f64 = 4.0;
@@ -43,8 +46,8 @@ const CORNER: f64 = 2.0;
 /// with a lag, its phase is below -180° everywhere.) The crossover is where the `phase_margin_deg` is
 /// met. What takes phase is exact: the current is held for a period and the speed is the mean over
 /// one, which makes the plant g T/2 (z + 1)/(z (z - 1)) with a phase of -90° - ωT; and without an
-/// encoder the rotor is seen through the loop that tracks the flux, (2 w_n s + w_n²)/(s + w_n)², and
-/// the speed through a low-pass with its corner at 2 w_n.
+/// encoder the rotor is seen through the loop that tracks the flux ([`THIRD_POLE`]), and the speed
+/// through a low-pass with its corner at 2 w_n.
 ///
 /// The position gain is a quarter of the crossover. Broken at the current, the loop of the position
 /// mode then has some 8° less; see [`MotionDesign::margins`].
@@ -72,10 +75,10 @@ pub fn design_motion_loops(
 
     let spare = libm::atan(SPREAD) - phase_margin_deg * (PI / 180.0);
     let lag = |omega_t: f64| {
-        let x = tracking.map_or(0.0, |w_n| omega_t / (period_s * w_n));
-        omega_t + 2.0 * libm::atan(x) - libm::atan(2.0 * x) - low_pass(smoothing, omega_t).arg()
+        let tracked = tracking.map_or(Complex::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
+        omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
-    // It grows with the frequency: one solution.
+    // Below the solution it is smaller, above larger.
     let (mut low, mut high) = (0.0, PI);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
@@ -101,6 +104,14 @@ pub fn design_motion_loops(
     Ok(design)
 }
 
+/// What the tracking loop makes of the rotor's angle, at a frequency in units of its natural one:
+/// 1 - s^3 / ((s + 1)^2 (s + c)).
+fn tracked(omega: f64) -> Complex {
+    let s = Complex::new(0.0, omega);
+    let (pole, third) = (s + Complex::ONE, s + Complex::new(THIRD_POLE, 0.0));
+    Complex::ONE - s * s * s / (pole * pole * third)
+}
+
 /// share / (1 - (1 - share) z^-1)
 fn low_pass(share: f64, omega_t: f64) -> Complex {
     let kept = Complex::unit(-omega_t) * (1.0 - share);
@@ -121,11 +132,7 @@ impl MotionDesign {
             / ((z - Complex::ONE) * (z - Complex::ONE));
         match self.tracking {
             None => rigid,
-            Some(w_n) => {
-                let s = Complex::new(0.0, omega_t / (t * w_n));
-                let pole = s + Complex::ONE;
-                rigid * (s * 2.0 + Complex::ONE) / (pole * pole)
-            }
+            Some(w_n) => rigid * tracked(omega_t / (t * w_n)),
         }
     }
 
