@@ -18,6 +18,7 @@ pub struct DeadTime {
 
 impl DeadTime {
     /// For a dead time and a period in s, full from `full_at_a` A on.
+    #[inline]
     pub fn new(dead_time_s: f32, period_s: f32, full_at_a: f32) -> Self {
         Self { ratio: dead_time_s / period_s, per_ampere: 1.0 / full_at_a }
     }

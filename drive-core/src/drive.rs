@@ -13,7 +13,7 @@ use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
-use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
+use crate::injection::{Carrier, CarrierPeriod};
 use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::learning::{Learned, LearningState};
@@ -175,6 +175,8 @@ impl Drive {
     ///
     /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
     /// with the outputs off in the same step.
+    // Not inlined: it would be compiled for size, as the firmware around it.
+    #[inline(never)]
     pub fn step(&mut self, sample: &Sample) -> Compare {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Compare::OFF;
@@ -375,13 +377,11 @@ impl Drive {
             turns: c.motion.turns(&s.motion, rotor_count),
         };
 
-        // What was computed must make sense before it is put out.
+        // What was computed must make sense before it is put out. (The current is in the voltage.)
         let sum = wanted.d
             + wanted.q
             + voltage.d
             + voltage.q
-            + current.d
-            + current.q
             + s.estimator.delta_i
             + s.estimator.saliency.q
             + flux.step
@@ -404,7 +404,7 @@ impl Drive {
                 if let (Some(monitor), true) = (&c.lock_monitor, judged) {
                     monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
                 }
-            } else if carrier.index + 1 == CARRIER_SAMPLES {
+            } else if carrier.index == FITTED {
                 let largest = c.modulator.circle(measured.dc_link);
                 if s.carrier.fit(&c.injection, voltage, largest).is_err() {
                     return Err(Fault::CarrierNoRoom);
@@ -536,9 +536,11 @@ impl Drive {
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
 
-/// Sample of the carrier period in which the lock is watched: not the last, where the rest of what is
-/// done once a carrier period is done.
+/// Samples of the carrier period in which the lock is watched and the carrier fitted. What is done once
+/// a carrier period is spread over it: in the first the saliency is looked at, in the last the
+/// carrier is looked for in both channels.
 const MONITORED: usize = 4;
+const FITTED: usize = 6;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

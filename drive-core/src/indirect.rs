@@ -81,6 +81,7 @@ const SPEED_FILTER_S: f32 = 5e-3;
 impl Indirect {
     /// `counts` of the encoder per mechanical turn, pole pairs, rotor time constant and period in
     /// s, the nominal magnetising current in A and the highest speed, mechanical turns per s.
+    #[inline]
     pub fn new(
         counts: u32,
         pole_pairs: u8,

@@ -40,6 +40,7 @@ pub struct Injection {
 impl Injection {
     /// For an amplitude in V, the current response of the motor, A/V, sampled at ten times the carrier
     /// frequency, and the time constant of the analog filter in samples.
+    #[inline]
     pub fn new(amplitude_v: f32, plant: FirstOrder, analog: f32) -> Self {
         // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
         // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of

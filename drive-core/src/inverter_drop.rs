@@ -62,6 +62,7 @@ pub struct InverterDropState {
 impl InverterDrop {
     /// For the duration of the magnetisation and the rotor time constant, s, the period of the
     /// control, s, the magnetising current and the largest one, A, r_r (L_m/L_r)^2 and r_s, ohm.
+    #[inline]
     pub fn new(
         magnetise_s: f32,
         t_sec: f32,

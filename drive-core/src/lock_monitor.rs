@@ -79,6 +79,7 @@ impl CarrierTable {
     ///
     /// # Errors
     /// See [`CarrierTableError`].
+    #[inline]
     pub fn new(points: &[(f32, f32)]) -> Result<Self, CarrierTableError> {
         let first = points.first().ok_or(CarrierTableError::TooShort)?;
         if *first != (0.0, 1.0) {
@@ -198,6 +199,7 @@ const WEAK_PERIODS: u8 = 8;
 
 impl LockMonitor {
     /// See [`LockMonitorSettings`].
+    #[inline]
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {

@@ -37,6 +37,7 @@ impl Modulator {
     ///
     /// `compensated`: whether a dead-time compensation is going to be added, which takes twice its
     /// amplitude from the dc link.
+    #[inline]
     pub fn new(top: u16, period_s: f32, dead_time_s: f32, compensated: bool) -> Self {
         let ratio = dead_time_s / period_s;
         Self {

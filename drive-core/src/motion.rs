@@ -89,6 +89,7 @@ pub struct MotionState {
 impl Motion {
     /// With the controllers of a design; `counts` of the position per mechanical turn, largest speed
     /// in turns/s, largest acceleration of the reference in turns/s^2, largest current in A.
+    #[inline]
     pub fn new(design: &MotionDesign, counts: u32, limit: f32, ramp: f32, i_q_limit: f32) -> Self {
         let rate = (1.0 / design.period_s) as f32;
         Self {

@@ -122,6 +122,7 @@ const EMF_SHARE: f32 = 1.0;
 
 impl Prediction {
     /// For the current response of the motor, A/V, its rotor flux, and an allowed voltage, V.
+    #[inline]
     pub fn new(plant: FirstOrder, flux: RotorFlux, allowed_v: f32) -> Self {
         Self {
             per_ampere: (1.0 / plant.k) as f32,

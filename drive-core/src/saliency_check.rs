@@ -22,8 +22,10 @@ pub struct SaliencyCheck {
     restore: u32,
     /// Least mean saliency, signed as it must be.
     least: f32,
-    /// Mean saliency of a motor that has what is expected.
-    expected: f32,
+    /// 1 / mean saliency of a motor that has what is expected.
+    per_expected: f32,
+    /// 1 / samples that are averaged.
+    per_average: f32,
 }
 
 /// State of the check.
@@ -47,7 +49,7 @@ pub enum Phase {
     Failed,
 }
 
-/// Time to settle and to average, s; together well below the rotor time constant.
+/// Time to settle and to average, s; together below the rotor time constant.
 const SETTLE_S: f32 = 0.020;
 const AVERAGE_S: f32 = 0.120;
 /// The mean over the decaying flux, seen at 60°, as a share of the saliency at nominal flux.
@@ -61,6 +63,7 @@ const RESTORE_T: f32 = 2.4;
 
 impl SaliencyCheck {
     /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
+    #[inline]
     pub fn new(flux_saliency: f32, t_sec: f32, period_s: f32) -> Self {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
         Self {
@@ -68,7 +71,8 @@ impl SaliencyCheck {
             average: periods(AVERAGE_S),
             restore: periods(RESTORE_T * t_sec),
             least: LEAST_SHARE * flux_saliency,
-            expected: SEEN_SHARE * flux_saliency,
+            per_expected: 1.0 / (SEEN_SHARE * flux_saliency),
+            per_average: 1.0 / periods(AVERAGE_S) as f32,
         }
     }
 
@@ -92,10 +96,10 @@ impl SaliencyCheck {
             state.sum += q;
             Phase::Look
         } else if elapsed < looked + self.restore {
-            let mean = state.sum / self.average as f32;
+            let mean = state.sum * self.per_average;
             // Beyond the least, on its side of zero. Not-a-number is not.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
-            state.share = mean / self.expected;
+            state.share = mean * self.per_expected;
             if enough { Phase::Restore } else { Phase::Failed }
         } else {
             Phase::Passed

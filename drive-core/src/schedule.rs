@@ -10,6 +10,7 @@
 use core::fmt;
 
 use crate::decimal::Shortest;
+use crate::synchronous::Saliency;
 
 /// Points of the tables, from i_q = 0 on.
 pub const POINTS: usize = 16;
@@ -64,6 +65,7 @@ impl ReferenceTable {
     ///
     /// # Errors
     /// See [`TableError`].
+    #[inline]
     pub fn new(points: &[(f32, f32)]) -> Result<Self, TableError> {
         let first = points.first().ok_or(TableError::TooShort)?;
         if *first != (0.0, 0.0) {
@@ -155,6 +157,7 @@ pub struct Schedule {
 impl Schedule {
     /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
     /// current, 1/A, and the direct-axis current, A.
+    #[inline]
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
         let share = |n: usize| {
             let i_q = n as f32 * STEP_A;
@@ -178,6 +181,12 @@ impl Schedule {
     /// The same with another reference and, where there is one, another saliency per ampere, 1/A.
     pub fn with(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
         Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
+    }
+
+    /// The angle error that a saliency tells of, rad, and the share of the proportional part.
+    pub fn correction(&self, seen: &Saliency) -> (f32, f32) {
+        let (reference, share) = self.at(seen.i_q);
+        (self.per_saliency * (reference - seen.q), share)
     }
 
     /// Reference of `q`, and share of the proportional part, at a quadrature current, A.

@@ -45,11 +45,22 @@ pub struct Saliency {
     pub i_q: f32,
 }
 
+/// Sums over 400 samples that [`Saliency::of`] is made of.
+pub type Sums = [i32; SIGNALS];
+
 impl Demodulate for SynchronousState {
     type Seen = Saliency;
 
     #[inline]
     fn step(&mut self, sample: &CarrierSample) -> Saliency {
+        Saliency::of(self.average(sample))
+    }
+}
+
+impl SynchronousState {
+    /// Mixes one sample and averages.
+    #[inline]
+    pub fn average(&mut self, sample: &CarrierSample) -> Sums {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (along, across) = (along * (2.0 * UNITS), across * (2.0 * UNITS));
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
@@ -60,8 +71,14 @@ impl Demodulate for SynchronousState {
         let index = if self.index < LENGTH { self.index } else { 0 };
         self.index = index + 1;
         let once = self.stages[0].step(index, mixed);
-        let twice = self.stages[1].step(index, once);
+        self.stages[1].step(index, once)
+    }
+}
 
+impl Saliency {
+    /// What the averages tell.
+    #[inline]
+    pub fn of(twice: Sums) -> Self {
         const MEAN: f32 = 1.0 / (UNITS * (LENGTH * LENGTH) as f32);
         let [x_re, x_im, y_re, y_im, i_q] = twice.map(|x| x as f32 * MEAN);
         let squared = x_re * x_re + x_im * x_im;

@@ -36,6 +36,7 @@ pub struct TrackerState {
 impl Tracker {
     /// `k_s` in rad/A and `z_s` as in Eq. 3.44; `limit` is the largest speed, turns per period,
     /// below 1/2.
+    #[inline]
     pub fn new(k_s: f32, z_s: f32, limit: f32) -> Self {
         Self { gain: k_s / TAU, zero: z_s, limit }
     }
@@ -82,6 +83,7 @@ const LARGEST_ERROR: f32 = 0.6;
 
 impl Pll {
     /// For a bandwidth in Hz, the period of the control, s, and the largest speed, turns per period.
+    #[inline]
     pub fn new(bandwidth_hz: f32, period_s: f32, limit: f32) -> Self {
         let w = TAU * bandwidth_hz * period_s;
         let c = tuning::THIRD_POLE as f32;

@@ -10,6 +10,7 @@ use crate::filters::LPF;
 ///
 /// # Errors
 /// See there.
+#[inline]
 pub fn design_current_loop(
     identified: FirstOrder,
     physical: FirstOrder,

@@ -84,6 +84,7 @@ const AXES: [AlphaBeta; 3] = [
 
 impl WiringCheck {
     /// For the transient inductance of the motor, H, and the control period, s.
+    #[inline]
     pub fn new(sigma_ls: f32, period_s: f32) -> Self {
         let volt_periods = EXPECTED_A * sigma_ls / period_s;
         let rise = (volt_periods / HIGHEST_V) as u32 + 1;

@@ -145,6 +145,8 @@ impl Settings {
     /// # Errors
     /// The first value outside its range, by name, with the range; or why a design rule cannot be
     /// met.
+    // `inline`, as the other design code: compiled where it is called, in the firmware for size.
+    #[inline]
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         self.check()?;
         let m = &self.motor;
@@ -297,6 +299,7 @@ impl Settings {
         })
     }
 
+    #[inline]
     fn motion_design(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
         let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
@@ -312,6 +315,7 @@ impl Settings {
         )
     }
 
+    #[inline]
     fn motion(&self, design: &MotionDesign) -> Motion {
         let counts = match self.angle_source {
             AngleSource::Encoder => self.scales.encoder_counts,
@@ -333,6 +337,7 @@ impl Settings {
 
     /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
     /// `carrier_a` the amplitude of that current, A.
+    #[inline]
     fn estimator(
         &self,
         lag_share: f32,
