@@ -190,9 +190,9 @@ mod tests {
                 ("FLASH", 0x0800_0000, 232),
                 ("CONTROL", 0x0803_a000, 24),
                 // Overflows where there is no memory.
-                ("STACK", 0x2000_0000, 16),
+                ("STACK", 0x2000_0000, 20),
                 // To 96, not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_4000, 80),
+                ("RAM", 0x2000_5000, 76),
                 ("CCM", 0x1000_0000, 32),
             ]
         );

@@ -18,6 +18,7 @@ use crate::plausibility::{Prediction, RotorFlux};
 use crate::saliency_check::SaliencyCheck;
 use crate::schedule::Schedule;
 use crate::sensing::Sensing;
+use crate::sos::Complex;
 use crate::tracker::{Pll, Tracker};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
 use crate::wiring_check::WiringCheck;
@@ -134,7 +135,7 @@ fn periods(seconds: f32) -> u32 {
 /// left out, it is 0.9° at 600 rpm.
 fn carrier_lag(plant: FirstOrder) -> f32 {
     let turn = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-    let (c, s) = (libm::cos(turn), libm::sin(turn));
+    let Complex { re: c, im: s } = Complex::unit(turn);
     let (re, im) = (c - plant.p, s);
     ((1.0 - plant.p * c) / (re * re + im * im) - 0.5) as f32
 }

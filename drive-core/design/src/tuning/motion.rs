@@ -4,7 +4,7 @@ use core::f64::consts::{PI, TAU};
 
 use super::margins::{Margins, scan};
 use super::{TuningError, check, check_period, pi_response, zero_at};
-use crate::complex::Complex;
+use crate::complex::{Complex, sin_cos};
 
 /// What [`design_motion_loops`] gives, and for what.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,9 +89,10 @@ pub fn design_motion_loops(
         }
     }
     let crossover = low / period_s;
+    let (sin, cos) = sin_cos(0.5 * low);
     let mut design = MotionDesign {
         k_c: 1.0,
-        z_c: zero_at(libm::tan(0.5 * low) / SPREAD),
+        z_c: zero_at(sin / cos / SPREAD),
         k_x: 0.0,
         crossover,
         acceleration,
