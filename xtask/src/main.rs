@@ -51,7 +51,8 @@ fn main() -> ExitCode {
             let number = |n: usize, default| {
                 rest.get(n).and_then(|text| text.parse().ok()).unwrap_or(default)
             };
-            image::build().and_then(|elf| board::campaign(&elf, number(0, CAMPAIGN), number(1, 1)))
+            image::build()
+                .and_then(|elf| board::campaign(&elf, number(0, CAMPAIGN), number(1, 1), false))
         }
         ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
         [] | ["help" | "-h" | "--help"] => {
@@ -112,7 +113,7 @@ fn test() -> Result<()> {
     let elf = image::build_with(&target)?;
     image::report_size(&elf)?;
     board::test(&elf)?;
-    board::campaign(&elf, CAMPAIGN / 20, 1)?;
+    board::campaign(&elf, CAMPAIGN / 20, 1, true)?;
     board::cycles(&elf)?;
 
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());

@@ -46,6 +46,15 @@ const ENCODER: &[Source] = &[Source::Encoder];
 const PERIOD_MS: f64 = 1.0 / 6.0;
 const STEP_MS: f64 = 2.0 * PERIOD_MS;
 
+/// Classes in which some faults are known not to be dealt with, and what is missing.
+pub const OPEN: &[(&str, &str)] = &[
+    ("current sensor noisy", "nothing looks for noise: from some 10 mA rms on it turns the angle"),
+    ("not-a-number in the drive's state", "what is used once in a while shows late"),
+    ("bit flip in the coefficients", "they have no checksum: only what comes of it is seen"),
+    ("bit flip in code and data of CCM", "it has no checksum: only what comes of it is seen"),
+    ("conversion trigger lost", "lost for longer than the drive takes to start again"),
+];
+
 /// All classes.
 pub const CLASSES: &[Class] = &[
     Class {
