@@ -50,7 +50,7 @@ struct Found {
 /// A campaign of `count` faults, the n-th with seed `seed + n`; `open` opens the image. Gives the table.
 ///
 /// # Errors
-/// The table with what failed; not what failed in a class that is known to be [`OPEN`], where those are
+/// The table with what failed; not what failed in a class that is known to be open, where those are
 /// `forgiven`.
 pub fn run(
     open: impl Fn() -> Result<Image> + Sync,

@@ -9,7 +9,7 @@ use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 use super::probe::Belief;
 use crate::bench::Period;
 
-/// A quantity that is recorded, in the order of [`Means`].
+/// A quantity that is recorded, in the order of `Means`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Filtered reference on the quadrature axis, A.
