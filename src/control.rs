@@ -143,7 +143,8 @@ impl Running {
         }
         pwm.clear_updated();
         let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
-        if latency > self.worst_latency {
+        // (The first has waited for the interrupt to be let run.)
+        if self.periods > 0 && latency > self.worst_latency {
             self.worst_latency = latency;
         }
         let codes = adc.read();
