@@ -270,6 +270,7 @@ impl Console {
             },
             Request::Start(mode) => self.start(mode, machine),
             Request::Stop => self.give(Order::Stop, machine),
+            Request::Relock => self.give(Order::Relock, machine),
             Request::Torque(i_q) => self.give(Order::Torque(i_q), machine),
             Request::Speed(rpm) => self.give(Order::Speed(rpm), machine),
             Request::Position(turns) => self.give(Order::Position(turns), machine),

@@ -13,6 +13,8 @@ pub enum Order {
     CheckWiring,
     /// See [`Command::Stop`].
     Stop,
+    /// See [`Command::Relock`].
+    Relock,
     /// See [`Command::Clear`].
     Clear,
     /// See [`Command::Torque`].
@@ -32,6 +34,7 @@ impl Order {
             Self::Start(mode) => Command::Start(*mode),
             Self::CheckWiring => Command::CheckWiring,
             Self::Stop => Command::Stop,
+            Self::Relock => Command::Relock,
             Self::Clear => Command::Clear,
             Self::Torque(i_q) => Command::Torque(*i_q),
             Self::Speed(rpm) => Command::Speed(*rpm),

@@ -23,6 +23,8 @@ pub enum Request {
     Start(Mode),
     /// Torque to zero, then off.
     Stop,
+    /// Magnetise again and verify that the flux is tracked.
+    Relock,
     /// Current on the quadrature axis, A.
     Torque(f32),
     /// Speed, rpm.
@@ -123,11 +125,12 @@ impl fmt::Display for Misunderstood {
 }
 
 /// One line per command, for `help`.
-pub const HELP: [&str; 18] = [
+pub const HELP: [&str; 19] = [
     "help                      this list",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position, or learn",
     "stop                      torque to zero, then off",
+    "relock                    no torque, magnetise again, verify the lock, go on",
     "torque A                  current on the quadrature axis, A peak",
     "speed RPM                 speed, mechanical rpm",
     "position TURNS            position, mechanical turns from where it started",
@@ -162,6 +165,7 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
             Ok(_) => return Err(Misunderstood::OneOf("torque speed position learning")),
         }),
         "stop" => Request::Stop,
+        "relock" => Request::Relock,
         "torque" => Request::Torque(number(word("the current")?)?),
         "speed" => Request::Speed(number(word("the speed")?)?),
         "position" => Request::Position(number(word("the position")?)?),
@@ -286,6 +290,7 @@ mod tests {
             ("start position", Request::Start(Mode::Position)),
             ("start learning", Request::Start(Mode::Learning)),
             ("stop", Request::Stop),
+            ("relock", Request::Relock),
             ("torque -1.5", Request::Torque(-1.5)),
             ("start speed", Request::Start(Mode::Speed)),
             ("speed -150", Request::Speed(-150.0)),

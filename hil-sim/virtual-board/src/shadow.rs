@@ -55,6 +55,7 @@ impl Shadow {
                 Order::Start(mode)
             }
             Ok(Request::Stop) => Order::Stop,
+            Ok(Request::Relock) => Order::Relock,
             Ok(Request::Clear) => Order::Clear,
             Ok(Request::Torque(i_q)) => Order::Torque(i_q),
             Ok(Request::Speed(rpm)) => Order::Speed(rpm),
