@@ -34,7 +34,7 @@
 use core::fmt;
 
 use crate::fault::Fault;
-use crate::schedule::{POINTS, STEP_A};
+use crate::schedule::{POINTS, between, place, sampled};
 use crate::synchronous::Saliency;
 
 /// Range of a believable ratio.
@@ -98,22 +98,18 @@ impl CarrierTable {
                 return Err(CarrierTableError::OutOfRange(n + 1, ratio));
             }
         }
-        let at = |i_q: f32| match points.windows(2).find(|pair| i_q <= pair[1].0) {
-            Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
-            None => points[points.len() - 1].1,
-        };
-        Ok(Self { ratio: core::array::from_fn(|n| at(n as f32 * STEP_A)) })
+        Ok(Self { ratio: sampled(points) })
     }
 }
 
 impl CarrierTable {
-    /// From its values at multiples of [`STEP_A`]; none when the first is not 1 or any is out of range.
+    /// From its values at multiples of [`STEP_A`](crate::schedule::STEP_A); none when the first is not 1 or any is out of range.
     pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
 
-    /// Its values at multiples of [`STEP_A`].
+    /// Its values at multiples of [`STEP_A`](crate::schedule::STEP_A).
     pub fn points(&self) -> &[f32; POINTS] {
         &self.ratio
     }
@@ -256,12 +252,7 @@ impl LockMonitor {
 
     /// 1 / ratio^2 at a quadrature current, A.
     fn inverse_square(&self, i_q: f32) -> f32 {
-        let x = i_q.abs() * (1.0 / STEP_A);
-        // Saturating cast; the last interval is held beyond its end.
-        let n = (x as usize).min(POINTS - 2);
-        let past = x - n as f32;
-        let t = &self.inverse_square;
-        t[n] + (t[n + 1] - t[n]) * if past < 1.0 { past } else { 1.0 }
+        between(&self.inverse_square, place(i_q))
     }
 
     /// Whether the shaft stands by an electrical speed, turns per control period.

@@ -84,14 +84,7 @@ impl ReferenceTable {
                 return Err(TableError::TooLarge(n + 1, pair[1].1));
             }
         }
-        let at = |i_q: f32| {
-            let pair = points.windows(2).find(|pair| i_q <= pair[1].0);
-            match pair {
-                Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
-                None => points[points.len() - 1].1,
-            }
-        };
-        Ok(Self { q: core::array::from_fn(|n| at(n as f32 * STEP_A)) })
+        Ok(Self { q: sampled(points) })
     }
 
     /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
@@ -123,9 +116,22 @@ impl Default for ReferenceTable {
     }
 }
 
+/// A table of the line through points `(i_q in A, value)`, of which there are two at least and whose
+/// currents increase; constant beyond the last.
+#[inline]
+pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
+    core::array::from_fn(|n| {
+        let i_q = n as f32 * STEP_A;
+        match points.windows(2).find(|pair| i_q <= pair[1].0) {
+            Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
+            None => points[points.len() - 1].1,
+        }
+    })
+}
+
 /// The interval of the tables in which a current lies, A, and the share of it that is past. The last
 /// value is held beyond the end.
-fn place(i_q: f32) -> (usize, f32) {
+pub(crate) fn place(i_q: f32) -> (usize, f32) {
     let x = i_q.abs() * (1.0 / STEP_A);
     // Saturating cast.
     let n = (x as usize).min(POINTS - 2);
@@ -133,7 +139,8 @@ fn place(i_q: f32) -> (usize, f32) {
     (n, if past < 1.0 { past } else { 1.0 })
 }
 
-fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
+/// The value at a [`place`] of a table.
+pub(crate) fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
     table[n] + (table[n + 1] - table[n]) * past
 }
 
