@@ -108,6 +108,8 @@ pub struct Period {
     pub took_order: bool,
     /// Estimated cycles, with entry, exit and bus, when they are counted.
     pub cycles: u32,
+    /// How many of them go by before the last compare value is written; the exit is among them.
+    pub to_compares: u32,
 }
 
 /// What is known of a control interrupt while it runs.
@@ -120,14 +122,14 @@ struct Entered {
     accesses: u64,
 }
 
-/// The longest control interrupt.
+/// The longest way through the control interrupt.
 #[derive(Clone, Debug, Default)]
 pub struct Worst {
     /// Estimated cycles.
     pub cycles: u32,
     /// Accesses to registers.
     pub accesses: u32,
-    /// What it executed.
+    /// What was executed.
     pub blocks: Vec<Block>,
 }
 
@@ -174,6 +176,8 @@ pub struct Board {
     pub resets: Vec<(u64, Reset)>,
     /// The longest control interrupt, when cycles are counted.
     pub worst: Worst,
+    /// The longest way to the compare values.
+    pub worst_to_compares: Worst,
     /// The core is stopped before the n-th instruction in the flash from here on, if set, and
     /// [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
@@ -223,6 +227,7 @@ impl Board {
             short_pulses: 0,
             resets: Vec::new(),
             worst: Worst::default(),
+            worst_to_compares: Worst::default(),
             preempt_at: None,
         };
         board.see();
@@ -575,16 +580,23 @@ impl Board {
         let Some(entered) = self.entered.take() else { return };
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
-        let accesses = (chip.accesses - entered.accesses) as u32;
-        let spent: u32 = chip
-            .blocks
-            .iter()
-            .map(|block| block.cycles + if block.taken { crate::cost::TAKEN } else { 0 })
-            .sum();
-        let cycles = spent + crate::cost::EXCEPTION + accesses * crate::cost::BUS;
-        if spent > 0 && cycles > self.worst.cycles {
-            self.worst = Worst { cycles, accesses, blocks: std::mem::take(&mut chip.blocks) };
-        }
+        let (compared, up_to) = chip.compared;
+        let way = |blocks: &[Block], accesses: u64| {
+            let accesses = (accesses - entered.accesses) as u32;
+            (
+                crate::cost::of(blocks) + crate::cost::EXCEPTION + accesses * crate::cost::BUS,
+                accesses,
+            )
+        };
+        let (cycles, accesses) = way(&chip.blocks, chip.accesses);
+        let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
+        let note = |worst: &mut Worst, cycles, accesses, blocks: &[Block]| {
+            if cycles > worst.cycles && !blocks.is_empty() {
+                *worst = Worst { cycles, accesses, blocks: blocks.to_vec() };
+            }
+        };
+        note(&mut self.worst, cycles, accesses, &chip.blocks);
+        note(&mut self.worst_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
@@ -594,6 +606,7 @@ impl Board {
                 compare,
                 took_order,
                 cycles,
+                to_compares,
             };
             self.periods.push_back(period);
         }

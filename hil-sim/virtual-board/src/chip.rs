@@ -92,6 +92,8 @@ pub struct Chip {
     pub blocks: Vec<Block>,
     /// Whether blocks are kept.
     pub keep_blocks: bool,
+    /// Blocks and accesses up to the compare value of a leg that was written last.
+    pub compared: (usize, u64),
     /// Whether registers that are not known read as 0.
     pub forgiving: bool,
     last_block: Option<(u32, u32)>,
@@ -142,6 +144,7 @@ impl Chip {
             instructions: 0,
             blocks: Vec::new(),
             keep_blocks: false,
+            compared: (0, 0),
             forgiving: false,
             last_block: None,
             scs: Scs::default(),
@@ -228,6 +231,7 @@ impl Chip {
     /// Blocks since the last call.
     pub fn begin_interrupt(&mut self) {
         self.blocks.clear();
+        self.compared = (0, self.accesses);
         self.last_block = None;
     }
 
@@ -264,6 +268,9 @@ impl Chip {
         } else {
             self.write_word(address, value)
         };
+        if COMPARES.contains(&address) {
+            self.compared = (self.blocks.len(), self.accesses);
+        }
         if done.is_none() {
             self.is_unknown(address, Some(value));
         }
@@ -494,6 +501,8 @@ const LPUART1: u32 = 0x4000_8000;
 const SYSCFG: u32 = 0x4001_0000;
 const EXTI: u32 = 0x4001_0400;
 const TIM1: u32 = 0x4001_2c00;
+/// Compare values of the three legs.
+const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
 const RCC: u32 = 0x4002_1000;
 const FLASH_REGISTERS: u32 = 0x4002_2000;
 const GPIO_FIRST: u32 = 0x4800_0000;

@@ -5,12 +5,19 @@
 //! integer division as 6, and a floating-point result that the next instruction needs costs one
 //! more. An estimate: no board has confirmed it.
 
+use crate::chip::Block;
+
 /// More cycles for a branch that is taken: the pipeline fills again.
 pub const TAKEN: u32 = 2;
 /// Exception entry and exit with the saving and restoring of the floating-point registers.
 pub const EXCEPTION: u32 = 12 + 12 + 18 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
+
+/// Cycles of blocks, with the branches that were taken.
+pub fn of(blocks: &[Block]) -> u32 {
+    blocks.iter().map(|block| block.cycles + if block.taken { TAKEN } else { 0 }).sum()
+}
 
 /// Costs of blocks of a memory, learnt when they are first executed.
 #[derive(Debug)]

@@ -1,4 +1,5 @@
-//! What the control interrupt costs: its longest path over whole runs, block by block.
+//! What the control interrupt costs: its longest way over whole runs, from its entry to the compare values,
+//! block by block, and the whole of it.
 //!
 //! A block is what [`drive_core::Drive::step`] is made of; an instruction belongs to the outermost of the
 //! functions it was inlined into that is one of them.
@@ -47,7 +48,7 @@ const BLOCKS: [(&str, &[&str]); 9] = [
     ),
     ("sequence", &["drive_core::drive"]),
 ];
-/// What belongs to none: timer, mailboxes, report.
+/// What belongs to none: the timer.
 const REST: &str = "firmware";
 /// Entry, exit, registers; and waiting for the bus of the peripherals.
 const ENTRY: [&str; 2] = ["exception", "bus"];
@@ -59,12 +60,15 @@ const TOLERANCE: f64 = 1.05;
 pub struct Line {
     /// `sensored` or `sensorless`.
     pub name: &'static str,
-    /// Instructions on the longest path.
+    /// Instructions on the longest way to the compare values.
     pub instructions: u32,
     /// Estimated cycles of it.
     pub cycles: u32,
-    /// Estimated cycles of the interrupt in the middle of all while the drive regulates.
+    /// Estimated cycles of the way in the middle of all while the drive regulates.
     pub median: u32,
+    /// Estimated cycles of the longest interrupt, with what comes after the compare values: report, trace,
+    /// orders.
+    pub whole: u32,
     /// Cycles by block.
     pub blocks: BTreeMap<&'static str, u32>,
     /// Cycles by block and innermost function.
@@ -106,11 +110,12 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     let mut cycles = Vec::new();
     // From here on: while the drive was off, it was configured, which has all the time there is.
     pair.board.worst = Worst::default();
+    pair.board.worst_to_compares = Worst::default();
     for line in orders {
         // Taken, or taken as far as the limits allow.
         pair.say(line)?;
         pair.board.type_line("trace 500 2");
-        pair.run(6000, |_, period| cycles.push(period.cycles))?;
+        pair.run(6000, |_, period| cycles.push(period.to_compares))?;
     }
     pair.board.send(b"\n");
     pair.run(60, |_, _| {})?;
@@ -118,10 +123,11 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     pair.until_state(State::Off)?;
     cycles.sort_unstable();
     let median = *cycles.get(cycles.len() / 2).context("no control interrupts")?;
-    let worst = std::mem::take(&mut pair.board.worst);
-    attribute(name, pair.board.image(), &worst, median, |address, bytes| {
-        pair_read(pair, address, bytes)
-    })
+    let whole = pair.board.worst.cycles;
+    let worst = std::mem::take(&mut pair.board.worst_to_compares);
+    let (instructions, (blocks, functions)) =
+        attribute(pair.board.image(), &worst, |address, bytes| pair_read(pair, address, bytes))?;
+    Ok(Line { name, instructions, cycles: worst.cycles, median, whole, blocks, functions })
 }
 
 fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
@@ -132,13 +138,11 @@ fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
     }
 }
 
-fn attribute(
-    name: &'static str,
-    image: &Image,
-    worst: &Worst,
-    median: u32,
-    read: impl Fn(u32, &mut [u8]),
-) -> Result<Line> {
+/// Cycles by block, and by block and innermost function.
+type Shares = (BTreeMap<&'static str, u32>, BTreeMap<(&'static str, String), u32>);
+
+/// Instructions of a way, and what belongs to what.
+fn attribute(image: &Image, worst: &Worst, read: impl Fn(u32, &mut [u8])) -> Result<(u32, Shares)> {
     let mut blocks = BTreeMap::from([(ENTRY[0], EXCEPTION), (ENTRY[1], worst.accesses * BUS)]);
     let mut functions = BTreeMap::new();
     let mut belongs: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
@@ -155,6 +159,18 @@ fn attribute(
             let place = belongs.entry(at).or_insert_with(|| block_of(image, at));
             *blocks.entry(place.0).or_default() += instruction.cycles;
             *functions.entry(place.clone()).or_default() += instruction.cycles;
+            if std::env::var_os("LISTING").is_some() {
+                let fr = image.frames(at);
+                println!(
+                    "L {at:#x} {} {} | {}",
+                    instruction.cycles,
+                    place.0,
+                    fr.iter()
+                        .map(|f| format!("{} {}", f.function, f.place))
+                        .collect::<Vec<_>>()
+                        .join(" < ")
+                );
+            }
             count += 1;
         }
     }
@@ -162,7 +178,7 @@ fn attribute(
     if cycles != worst.cycles {
         bail!("{cycles} cycles by blocks, but {} counted", worst.cycles);
     }
-    Ok(Line { name, instructions: count, cycles, median, blocks, functions })
+    Ok((count, (blocks, functions)))
 }
 
 /// The block of an instruction, and the innermost function it is of.
@@ -183,14 +199,15 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
 /// The lines as a table.
 pub fn table(lines: &[Line]) -> String {
     let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(ENTRY);
-    let mut text = format!("{:<12}{:>14}{:>8}{:>8}", "line", "instructions", "cycles", "median");
+    let mut text =
+        format!("{:<12}{:>14}{:>8}{:>8}{:>8}", "line", "instructions", "cycles", "median", "whole");
     blocks().for_each(|block| {
         let _ = write!(text, "{block:>17}");
     });
     text.push('\n');
     for line in lines {
-        let (i, c, m) = (line.instructions, line.cycles, line.median);
-        let _ = write!(text, "{:<12}{i:>14}{c:>8}{m:>8}", line.name);
+        let (i, c, m, w) = (line.instructions, line.cycles, line.median, line.whole);
+        let _ = write!(text, "{:<12}{i:>14}{c:>8}{m:>8}{w:>8}", line.name);
         for block in blocks() {
             let _ = write!(text, "{:>17}", line.blocks.get(block).copied().unwrap_or(0));
         }
@@ -220,9 +237,11 @@ pub fn compare(lines: &[Line], before: &str) -> Result<()> {
             .map(|text| text.split_whitespace().collect::<Vec<_>>())
             .find(|words| words.first() == Some(&line.name))
             .with_context(|| format!("the table has no line {}", line.name))?;
-        for (what, place, now) in
-            [("instructions", 1, line.instructions), ("cycles", 2, line.cycles)]
-        {
+        for (what, place, now) in [
+            ("instructions", 1, line.instructions),
+            ("cycles", 2, line.cycles),
+            ("whole", 4, line.whole),
+        ] {
             let was: u32 = words.get(place).context("the table is cut off")?.parse()?;
             if f64::from(now) > TOLERANCE * f64::from(was) {
                 bail!("{}: {now} {what}, {was} before: more than 5 % more", line.name);

@@ -106,19 +106,17 @@ impl UnicornCpu {
         let flash = (u64::from(memory::FLASH), u64::from(memory::BANK_2 - 1));
         if counting.every_instruction {
             uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
-                let chip = uc.get_data_mut();
-                chip.at = address as u32;
-                chip.instructions(1);
-                stop_if_asked(uc);
+                if !stopped(uc, address) {
+                    uc.get_data_mut().instructions(1);
+                }
             })?;
         } else {
             let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
-                let instructions = cost_of(&mut lengths, uc, address as u32, size);
-                let chip = uc.get_data_mut();
-                chip.at = address as u32;
-                chip.instructions(u64::from(instructions));
-                stop_if_asked(uc);
+                if !stopped(uc, address) {
+                    let instructions = cost_of(&mut lengths, uc, address as u32, size);
+                    uc.get_data_mut().instructions(u64::from(instructions));
+                }
             })?;
         }
         if counting.cycles {
@@ -126,20 +124,18 @@ impl UnicornCpu {
                 Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
             let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
             uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
-                let cycles = cost_of(&mut costs, uc, address as u32, size);
-                let chip = uc.get_data_mut();
-                chip.at = address as u32;
-                chip.block(address as u32, size, cycles);
-                stop_if_asked(uc);
+                if !stopped(uc, address) {
+                    let cycles = cost_of(&mut costs, uc, address as u32, size);
+                    uc.get_data_mut().block(address as u32, size, cycles);
+                }
             })?;
         }
         // No code of the firmware is in RAM: who executes there is lost, but time goes on.
         let ram = (u64::from(memory::RAM), u64::from(memory::RAM + memory::RAM_SIZE - 1));
         uc.add_block_hook(ram.0, ram.1, |uc, address, size| {
-            let chip = uc.get_data_mut();
-            chip.at = address as u32;
-            chip.instructions(u64::from(size / 2).max(1));
-            stop_if_asked(uc);
+            if !stopped(uc, address) {
+                uc.get_data_mut().instructions(u64::from(size / 2).max(1));
+            }
         })?;
         let trapped = Rc::new(Cell::new(false));
         let trap = Rc::clone(&trapped);
@@ -232,12 +228,17 @@ impl UnicornCpu {
     }
 }
 
-/// Stops the core where the chip wants attention.
+/// Stops the core where the chip wants attention: before what begins here, which is met again, and then
+/// counted, when the core goes on.
 #[inline]
-fn stop_if_asked(uc: &mut Unicorn<Chip>) {
-    if uc.get_data_mut().stops_here() {
+fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
+    let chip = uc.get_data_mut();
+    chip.at = address as u32;
+    let stops = chip.stops_here();
+    if stops {
         uc.emu_stop().ok();
     }
+    stops
 }
 
 /// What a block costs.
