@@ -42,7 +42,16 @@ pub struct Codes {
     pub dc_link: u16,
     /// Heat sink.
     pub heat_sink: u16,
-    /// Whether both converters had finished.
+}
+
+/// What the converters have to tell.
+#[derive(Clone, Copy)]
+pub struct Events {
+    /// A current was outside its window since the last look.
+    pub over_current: bool,
+    /// The sequence of the first has ended: the interrupt may have come for a watchdog.
+    pub ended: bool,
+    /// That of the second, too.
     pub complete: bool,
 }
 
@@ -81,36 +90,28 @@ impl Adc {
         Ok(Self { one, two })
     }
 
-    /// Whether a current was outside its window since the last call; takes the interrupt request back.
-    pub fn take_over_current(&mut self) -> bool {
-        let mut over = false;
-        for converter in [&*self.one, &*self.two] {
-            if converter.isr().read().awd1().bit() {
-                converter.isr().write(|w| w.awd1().clear());
-                over = true;
-            }
+    /// What both converters have to tell; takes back what is only told once.
+    pub fn look(&mut self) -> Events {
+        let (one, two) = (self.one.isr().read(), self.two.isr().read());
+        let over_current = one.awd1().bit() || two.awd1().bit();
+        if over_current {
+            self.one.isr().write(|w| w.awd1().clear());
+            self.two.isr().write(|w| w.awd1().clear());
         }
-        over
-    }
-
-    /// Whether the sequence has ended: the interrupt may have come for a watchdog.
-    pub fn ended(&self) -> bool {
-        self.one.isr().read().jeos().bit()
+        let ended = one.jeos().bit();
+        Events { over_current, ended, complete: ended && two.jeos().bit() }
     }
 
     /// The codes of the sequence that has just ended; takes the interrupt request back.
     pub fn read(&mut self) -> Codes {
-        let complete = self.one.isr().read().jeos().bit() && self.two.isr().read().jeos().bit();
         // Before the data are read: a sequence that ends from here on asks again.
-        for converter in [&*self.one, &*self.two] {
-            converter.isr().write(|w| w.jeoc().clear().jeos().clear());
-        }
+        self.one.isr().write(|w| w.jeoc().clear().jeos().clear());
+        self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
         Codes {
             current_a: self.one.jdr1().read().jdata().bits(),
             current_b: self.two.jdr1().read().jdata().bits(),
             dc_link: self.one.jdr2().read().jdata().bits(),
             heat_sink: self.two.jdr2().read().jdata().bits(),
-            complete,
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use cortex_m::singleton;
 use drive_core::settings::SettingsError;
-use drive_core::{Coefficients, Drive};
+use drive_core::{Coefficients, Drive, Taken};
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
@@ -189,9 +189,9 @@ fn start_control(
         defmt::error!("settings: {}", defmt::Display2Format(&error));
         NotStarted::Settings
     })?;
-    let status = singleton!(: Mailbox<Status> = Mailbox::new()).ok_or(NotStarted::Twice)?;
-    let orders = singleton!(: Mailbox<Order> = Mailbox::new()).ok_or(NotStarted::Twice)?;
-    let answers = singleton!(: Mailbox<Answer> = Mailbox::new()).ok_or(NotStarted::Twice)?;
+    let status = singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(NotStarted::Twice)?;
+    let orders = singleton!(: Mailbox<Order> = Mailbox::new(Order::Stop)).ok_or(NotStarted::Twice)?;
+    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Taken::AsGiven))).ok_or(NotStarted::Twice)?;
     // Named, so that `cargo xtask size` can tell it from the rest.
     let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
     let (send_status, status) = status.split();

@@ -122,40 +122,42 @@ impl Running {
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
         // when the current is converted, before the sequence has ended.
-        if adc.take_over_current() {
+        let converters = adc.look();
+        if converters.over_current {
             pwm.trip();
             self.over = Hardware::ANALOG_WATCHDOG;
         }
-        if !adc.ended() {
+        if !converters.ended {
             return;
         }
 
         // The timer counts down since it was at the top, where the sampling ended and an update came; one
         // period ago it was there before. Anything else is a period that was skipped, or came late.
+        let timer = pwm.look();
         let since_top = pwm.since_top();
         let since_last = began.wrapping_sub(core::mem::replace(&mut self.began, began));
-        if self.periods > 0
-            && (!pwm.updated()
-                || since_top > u32::from(board::PWM_TOP)
-                || since_last > 3 * u32::from(board::PWM_TOP))
-        {
-            self.late = Hardware::DEADLINE_MISS;
-        }
-        pwm.clear_updated();
-        let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
         // (The first has waited for the interrupt to be let run.)
-        if self.periods > 0 && latency > self.worst_latency {
-            self.worst_latency = latency;
+        if self.periods > 0 {
+            if !timer.updated
+                || since_top > u32::from(board::PWM_TOP)
+                || since_last > 3 * u32::from(board::PWM_TOP)
+            {
+                self.late = Hardware::DEADLINE_MISS;
+            }
+            let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
+            if latency > self.worst_latency {
+                self.worst_latency = latency;
+            }
         }
-        let codes = adc.read();
         let mut hardware = self.late.and(self.over);
         self.over = Hardware::NONE;
-        if pwm.take_break() {
+        if timer.pulled {
             hardware = hardware.and(Hardware::BREAK);
         }
-        if !codes.complete {
+        if !converters.complete {
             hardware = hardware.and(Hardware::CONVERTER_OVERRUN);
         }
+        let codes = adc.read();
         let sample = Sample {
             current_a: codes.current_a,
             current_b: codes.current_b,
@@ -168,9 +170,9 @@ impl Running {
         let was_off = is_off(drive);
         pwm.apply(drive.step(&sample));
 
-        // The timer has taken over before all compare values were written, or the next sequence has ended.
+        // The timer was at its top again before all compare values were written.
         self.late = Hardware::NONE;
-        if pwm.updated() || pwm.since_top() < since_top || adc.ended() {
+        if pwm.updated() {
             self.late = Hardware::DEADLINE_MISS;
         }
         // With the outputs off a miss harms nobody, and is only told.
@@ -187,7 +189,7 @@ impl Running {
             // There is room: the main loop takes the last answer before it sends an order.
             answers.send(answer);
         }
-        trace.step(drive.telemetry());
+        trace.step(|| drive.telemetry());
 
         self.seen = self.seen.and(hardware);
         self.periods = self.periods.wrapping_add(1);
@@ -199,18 +201,18 @@ impl Running {
         // A new state is reported at once.
         let state = drive.state();
         if self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS) {
-            let report = Status {
-                periods: self.periods,
-                state,
-                sample,
-                telemetry: *drive.telemetry(),
-                worst_cycles: self.worst_cycles,
-                last_cycles: cycles,
-                worst_latency: self.worst_latency,
-                hardware: self.seen,
-            };
             // The main loop may be slow or hang; then this status is lost, but not its events.
-            if status.send(report) {
+            let sent = status.send_with(|report| {
+                report.periods = self.periods;
+                report.state = state;
+                report.sample = sample;
+                report.telemetry = drive.telemetry();
+                report.worst_cycles = self.worst_cycles;
+                report.last_cycles = cycles;
+                report.worst_latency = self.worst_latency;
+                report.hardware = self.seen;
+            });
+            if sent {
                 self.seen = Hardware::NONE;
                 self.reported = Some(state);
             }

@@ -48,7 +48,7 @@ impl Order {
 pub type Answer = Result<Taken, Refused>;
 
 /// What the main loop hears from the interrupt, `board::PERIODS_PER_STATUS` apart.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Status {
     /// Control periods since the start, wrapping.
     pub periods: u32,

@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 pub struct Mailbox<T> {
     /// Who may touch the message: the receiver if set, else the sender.
     full: AtomicBool,
-    message: UnsafeCell<Option<T>>,
+    message: UnsafeCell<T>,
 }
 
 // SAFETY: sender and receiver take turns, as `full` says, so that they never touch the message at
@@ -26,9 +26,9 @@ pub struct Sender<'a, T>(&'a Mailbox<T>);
 pub struct Receiver<'a, T>(&'a Mailbox<T>);
 
 impl<T> Mailbox<T> {
-    /// An empty mailbox.
-    pub const fn new() -> Self {
-        Self { full: AtomicBool::new(false), message: UnsafeCell::new(None) }
+    /// An empty mailbox; in the place of the message lies what nobody reads.
+    pub const fn new(unread: T) -> Self {
+        Self { full: AtomicBool::new(false), message: UnsafeCell::new(unread) }
     }
 
     /// Its two ends.
@@ -40,12 +40,17 @@ impl<T> Mailbox<T> {
 impl<T> Sender<'_, T> {
     /// Sends `message`, if the last one has been taken out; says whether it did.
     pub fn send(&mut self, message: T) -> bool {
+        self.send_with(|place| *place = message)
+    }
+
+    /// The same with a message that is written where it is to lie, over one from before.
+    pub fn send_with(&mut self, write: impl FnOnce(&mut T)) -> bool {
         if self.0.full.load(Ordering::Acquire) {
             return false;
         }
         // SAFETY: the receiver leaves the message alone while the mailbox is not full, and `&mut
         // self` keeps out other senders.
-        unsafe { *self.0.message.get() = Some(message) };
+        write(unsafe { &mut *self.0.message.get() });
         self.0.full.store(true, Ordering::Release);
         true
     }
@@ -59,22 +64,17 @@ impl<T> Receiver<'_, T> {
         }
         // SAFETY: the sender leaves the message alone while the mailbox is full, and `&mut self`
         // keeps out other receivers.
-        let message = unsafe { &*self.0.message.get() };
-        let result = message.as_ref().map(with);
+        let result = with(unsafe { &*self.0.message.get() });
         self.0.full.store(false, Ordering::Release);
-        result
+        Some(result)
     }
 
     /// Takes the message out, if there is one.
-    pub fn take(&mut self) -> Option<T> {
-        if !self.0.full.load(Ordering::Acquire) {
-            return None;
-        }
-        // SAFETY: the sender leaves the message alone while the mailbox is full, and `&mut self`
-        // keeps out other receivers.
-        let message = unsafe { (*self.0.message.get()).take() };
-        self.0.full.store(false, Ordering::Release);
-        message
+    pub fn take(&mut self) -> Option<T>
+    where
+        T: Copy,
+    {
+        self.take_with(|message| *message)
     }
 }
 
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_full_mailbox_keeps_what_it_has() {
-        let mut mailbox = Mailbox::new();
+        let mut mailbox = Mailbox::new(0);
         let (mut sender, mut receiver) = mailbox.split();
         assert_eq!(receiver.take(), None);
         assert!(sender.send(1));
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn messages_arrive_whole_and_in_order_across_threads() {
-        let mut mailbox = Mailbox::new();
+        let mut mailbox = Mailbox::new([0; 8]);
         let (mut sender, mut receiver) = mailbox.split();
         std::thread::scope(|scope| {
             scope.spawn(move || {

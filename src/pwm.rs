@@ -28,6 +28,16 @@ pub struct Pins {
 #[derive(Clone, Copy, defmt::Format)]
 pub struct NotInStep;
 
+/// What the timer has to tell.
+#[derive(Clone, Copy)]
+pub struct Events {
+    /// It has taken over compare values since the last look.
+    pub updated: bool,
+    /// The power stage, the comparator or a fault inside the chip has pulled the break since the last look,
+    /// or still pulls it.
+    pub pulled: bool,
+}
+
 /// The timer of the power stage.
 pub struct Pwm {
     timer: pac::TIM1,
@@ -169,16 +179,13 @@ impl Pwm {
         self.on = false;
     }
 
-    /// Whether the power stage, the comparator or a fault inside the chip has pulled the break since the last
-    /// call, or still pulls it.
-    pub fn take_break(&mut self) -> bool {
+    /// What the timer has to tell; takes back what is only told once.
+    pub fn look(&mut self) -> Events {
         let status = self.timer.sr().read();
         let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
-        if pulled {
-            // Stays set while the input is low.
-            self.timer.sr().write(|w| w.bif().clear().sbif().clear());
-        }
-        pulled
+        // The break stays set while its input is low.
+        self.timer.sr().write(|w| w.uif().clear().bif().clear().sbif().clear());
+        Events { updated: status.uif().bit_is_set(), pulled }
     }
 
     /// Ticks since the counter was at its top, if it is on its way down; else as much as half a
@@ -192,14 +199,9 @@ impl Pwm {
         }
     }
 
-    /// Whether the timer has taken over compare values since [`clear_updated`](Self::clear_updated).
+    /// Whether the timer has taken over compare values since the last look.
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()
-    }
-
-    /// See [`updated`](Self::updated).
-    pub fn clear_updated(&mut self) {
-        self.timer.sr().write(|w| w.uif().clear());
     }
 }
 

@@ -149,7 +149,7 @@ impl<const N: usize> Trace<N> {
 
 impl<const N: usize> Recorder<'_, N> {
     /// One period.
-    pub fn step(&mut self, telemetry: &Telemetry) {
+    pub fn step(&mut self, telemetry: impl FnOnce() -> Telemetry) {
         if self.0.stage.load(Ordering::Acquire) != RECORDING {
             return;
         }
@@ -161,7 +161,7 @@ impl<const N: usize> Recorder<'_, N> {
         }
         inner.wait = inner.divider.saturating_sub(1);
         if let Some(place) = inner.records.get_mut(inner.next) {
-            *place = inner.choice.of(telemetry);
+            *place = inner.choice.of(&telemetry());
             inner.next += 1;
         }
         if inner.next >= inner.wanted {
@@ -218,9 +218,9 @@ mod tests {
         for period in 0..5 {
             assert!(reader.recording());
             assert_eq!(reader.get(0), None);
-            recorder.step(&Telemetry { turns: period as f32, ..Telemetry::default() });
+            recorder.step(|| Telemetry { turns: period as f32, ..Telemetry::default() });
         }
-        recorder.step(&Telemetry::default());
+        recorder.step(Telemetry::default);
         let turns = |i| reader.get(i).map(|record: Record| record[7]);
         assert_eq!(
             [turns(0), turns(1), turns(2), turns(3)],
@@ -234,7 +234,7 @@ mod tests {
         let (mut recorder, mut reader) = trace.split();
         assert!(reader.begin(100, 1, &Choice::USUAL));
         for _ in 0..4 {
-            recorder.step(&Telemetry::default());
+            recorder.step(Telemetry::default);
         }
         assert!(!reader.recording());
         assert!(reader.get(3).is_some() && reader.get(4).is_none());

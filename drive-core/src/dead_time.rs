@@ -12,31 +12,48 @@ use crate::frames::Abc;
 pub struct DeadTime {
     /// Lost share of the dc link, dead time / period.
     ratio: f32,
-    /// 1 / (current at which the compensation is full), 1/A.
+    /// Sign, in units of [`Signs`], per current, 1/A.
     per_ampere: f32,
+}
+
+/// Signs of three currents, through zero linearly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signs(Abc);
+
+/// Units of [`Signs`]: a conversion to an integer ends at ±2^31 by itself, in one instruction, where
+/// comparisons take ten.
+const ONE: f32 = 2_147_483_648.0;
+
+impl Signs {
+    /// As numbers from -1 to 1.
+    pub fn to_abc(self) -> Abc {
+        self.0 * (1.0 / ONE)
+    }
 }
 
 impl DeadTime {
     /// For a dead time and a period in s, full from `full_at_a` A on.
     #[inline]
     pub fn new(dead_time_s: f32, period_s: f32, full_at_a: f32) -> Self {
-        Self { ratio: dead_time_s / period_s, per_ampere: 1.0 / full_at_a }
+        Self { ratio: dead_time_s / period_s, per_ampere: ONE / full_at_a }
     }
 
     /// No compensation.
     pub const NONE: Self = Self { ratio: 0.0, per_ampere: 0.0 };
 
-    /// The signs of the currents `i` that are expected to flow, A, through zero linearly; all zero
-    /// when nothing is to be compensated.
-    pub fn signs(&self, i: Abc) -> Abc {
-        let sign = |i: f32| (i * self.per_ampere).clamp(-1.0, 1.0);
-        Abc { a: sign(i.a), b: sign(i.b), c: sign(i.c) }
+    /// The signs of the currents `i` that are expected to flow, A; all zero when nothing is to be
+    /// compensated.
+    #[inline]
+    pub fn signs(&self, i: Abc) -> Signs {
+        let sign = |i: f32| (i * self.per_ampere) as i32 as f32;
+        Signs(Abc { a: sign(i.a), b: sign(i.b), c: sign(i.c) })
     }
 
     /// The voltage to add, V per phase, at these signs and a dc link of `v_dc`, V, with `drop` V that
     /// are lost beside the dead time (see [`crate::inverter_drop`]).
-    pub fn voltage(&self, signs: Abc, v_dc: f32, drop: f32) -> Abc {
-        signs * (self.ratio * v_dc + drop)
+    #[inline]
+    pub fn voltage(&self, signs: Signs, v_dc: f32, drop: f32) -> Abc {
+        signs.0 * ((self.ratio * v_dc + drop) * (1.0 / ONE))
     }
 }
 

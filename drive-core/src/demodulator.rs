@@ -44,7 +44,9 @@ use crate::filters::{BPF, BpfState, PP, PpState};
 use crate::frames::{AlphaBeta, DmQm};
 use crate::injection::CarrierPeriod;
 use crate::settings::Tracking;
-use crate::synchronous::{Saliency, SynchronousState};
+use crate::synchronous::Saliency;
+#[cfg(doc)]
+use crate::synchronous::SynchronousState;
 
 /// What a demodulation is given at each sample.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +77,7 @@ pub trait Demodulate {
     fn step(&mut self, sample: &CarrierSample) -> Self::Seen;
 }
 
-/// The state of the way that was chosen.
+/// The state of the way that was chosen; the synchronous one stands beside it.
 #[derive(Clone, Copy, Debug)]
 pub enum Demodulator {
     /// As printed.
@@ -86,19 +88,16 @@ pub enum Demodulator {
     RmsImpedance(RmsImpedance),
     /// Fritsch et al.
     Envelope(Envelope),
-    /// Mixed with the carrier, averaged, normalised.
-    Synchronous(SynchronousState),
 }
 
 impl Demodulator {
     /// At rest; `rms_samples` is the length of the rms filters of [`RmsImpedance`].
     pub fn new(tracking: Tracking, rms_samples: u8) -> Self {
         match tracking {
-            Tracking::Literal => Self::Literal(Literal::default()),
+            Tracking::Literal | Tracking::Synchronous => Self::default(),
             Tracking::Rectified => Self::Rectified(Rectified::default()),
             Tracking::RmsImpedance => Self::RmsImpedance(RmsImpedance::new(rms_samples)),
             Tracking::Envelope => Self::Envelope(Envelope::default()),
-            Tracking::Synchronous => Self::Synchronous(SynchronousState::default()),
         }
     }
 }

@@ -10,6 +10,7 @@ use core::f32::consts::TAU;
 use crate::angle::{Angle, UnitVector};
 use crate::estimator::EstimatorState;
 use crate::fault::Fault;
+use crate::demodulator::CarrierSample;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
@@ -54,7 +55,7 @@ pub struct Drive {
     /// Whether the next start checks the wiring.
     wiring_unchecked: bool,
     wiring: WiringCheckState,
-    telemetry: Telemetry,
+    seen: Seen,
     learned: Option<Learned>,
 }
 
@@ -91,6 +92,7 @@ struct ControlState {
     indirect: IndirectState,
     estimator: EstimatorState,
     carrier: Carrier,
+    axes: Axes,
     reference: [ReferenceState; 2],
     current_loop: DqPiState,
     rotor: RotorCount,
@@ -101,6 +103,42 @@ struct ControlState {
     lock: LockMonitorState,
     inverter_drop: InverterDropState,
     learning: LearningState,
+}
+
+/// What turns slowly against the flux, as unit vectors seen from where it is at the sample; new in the
+/// first sample of a carrier period.
+#[derive(Clone, Copy, Debug)]
+struct Axes {
+    /// The injection axis, seen from the flux.
+    injection: UnitVector,
+    /// The same where the flux was when the carrier current flowed that is sampled now.
+    carrier: UnitVector,
+    /// The flux when the filtered current flowed.
+    seen: UnitVector,
+    /// The flux when the voltage will act.
+    applied: UnitVector,
+}
+
+impl Default for Axes {
+    fn default() -> Self {
+        let [along, across] = [(1.0, 0.0), (0.0, 1.0)].map(|(cos, sin)| UnitVector { cos, sin });
+        Self { injection: across, carrier: across, seen: along, applied: along }
+    }
+}
+
+/// What of a step stands nowhere else in the state; see [`Telemetry`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    phi: Angle,
+    flux_step: f32,
+    rotor_step: f32,
+    reference: Dq,
+    current: Dq,
+    voltage: Dq,
+    measured: AlphaBeta,
+    realised: AlphaBeta,
+    dc_link: f32,
+    rotor_count: u32,
 }
 
 /// What the drive saw and did in the last step.
@@ -155,7 +193,7 @@ impl Drive {
             control: ControlState::default(),
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
-            telemetry: Telemetry::default(),
+            seen: Seen::default(),
             learned: None,
         }
     }
@@ -166,8 +204,27 @@ impl Drive {
     }
 
     /// What it saw and did in the last step.
-    pub fn telemetry(&self) -> &Telemetry {
-        &self.telemetry
+    #[inline]
+    pub fn telemetry(&self) -> Telemetry {
+        let (t, s) = (&self.seen, &self.control);
+        Telemetry {
+            phi: t.phi,
+            flux_step: t.flux_step,
+            rotor_step: t.rotor_step,
+            reference: t.reference,
+            current: t.current,
+            voltage: t.voltage,
+            measured: t.measured,
+            realised: t.realised,
+            delta_i: s.estimator.delta_i,
+            saliency: s.estimator.saliency().q,
+            carrier_squared: s.estimator.saliency().carrier_squared,
+            carrier_share: s.carrier.share,
+            saliency_loss: s.lock.loss,
+            dc_link: t.dc_link,
+            inverter_drop: s.inverter_drop.volts,
+            turns: self.c.motion.turns(&s.motion, t.rotor_count),
+        }
     }
 
     /// One PWM period: from the sample of instant `k T` to the compare values of the period that
@@ -276,8 +333,7 @@ impl Drive {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
             q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
         };
-        // Flux angle at the sample. The current is seen from where the flux was when the filtered
-        // current flowed; the voltage is put where the flux will be when it acts.
+        // Flux angle at the sample.
         let count = match (self.mode, c.source) {
             // The shaft is locked.
             (Mode::Learning, _) => Some(0),
@@ -289,61 +345,72 @@ impl Drive {
             None => s.estimator.flux(),
         };
 
+        let index = s.carrier.next();
+        if index == TURNED_AT {
+            s.axes = c.axes(flux.step, r.injection_axis);
+        }
+        let axes = &s.axes;
+        let carrier = if c.inject {
+            s.carrier.at(&c.injection, index)
+        } else {
+            CarrierPeriod::default()
+        };
+
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
-        let carrier =
-            if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
         let phi = flux.phi.unit_vector();
-        let theta_axis = phi.turned_by(r.injection_axis);
-        let rest = measured.current - AlphaBeta::along(theta_axis, carrier.sampled);
+        let carrier_axis = phi.turned_by(axes.carrier);
+        let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step_alpha_beta(&mut s.low_pass, rest);
 
-        let lag = c.lag_share * (lpf_lag_samples(flux.step * TAU) + c.current_lag);
-        let seen = phi.turned_slightly(-flux.step * lag);
-        let applied = phi.turned_slightly(flux.step * VOLTAGE_LEAD);
-
         // Current loop.
+        let seen = phi.turned_by(axes.seen);
         let current = filtered.to_dq(seen);
         let voltage =
             c.current_loop.step(&mut s.current_loop, reference - current) + r.test_voltage;
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
-        let axis = applied.turned_by(r.injection_axis);
-        let total = voltage.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.voltage);
+        let applied = phi.turned_by(axes.applied);
+        let total = (voltage + axes.injection * carrier.voltage).to_alpha_beta(applied);
 
         // Dead time: the sign of the current that is going to flow decides.
-        let expected =
-            current.to_alpha_beta(applied) + AlphaBeta::along(axis, carrier.mean_current);
+        let expected = (current + axes.injection * carrier.mean_current).to_alpha_beta(applied);
         let signs = c.dead_time.signs(expected.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
-        s.current_loop.realised((modulated.realised - total).to_dq(applied));
+        if modulated.limited {
+            s.current_loop.realised((modulated.realised - total).to_dq(applied));
+        }
 
         if self.state == State::Magnetising {
             c.inverter_drop.step(
                 &mut s.inverter_drop,
                 (self.elapsed, c.sequence.magnetise),
                 (current, voltage, s.indirect.magnetising),
-                signs.to_alpha_beta().to_dq(applied),
+                signs.to_abc().to_alpha_beta().to_dq(applied),
                 measured.dc_link,
             );
         }
 
         // Angles for the next sample.
         if c.demodulate {
-            let e = &mut s.estimator;
-            let i_q = reference.q;
-            c.estimator.observe(e, measured.current, theta_axis, flux.step, carrier, i_q);
+            let sample = CarrierSample {
+                current: measured.current,
+                axis: carrier_axis,
+                carrier,
+                i_q: reference.q,
+            };
+            c.estimator.observe(&mut s.estimator, &sample, flux.step);
         }
         let rotor_step = match count {
             Some(_) => {
-                c.indirect.update(&mut s.indirect, current);
+                c.indirect.update(&mut s.indirect, current, index);
                 s.indirect.rotor_step
             }
             None => {
                 // The slip of what is asked for: that of the measured current would feed the angle
                 // error back.
-                c.indirect.update(&mut s.indirect, reference);
+                c.indirect.update(&mut s.indirect, reference, index);
                 // The acceleration that is asked for is known: the angle does not lag by it.
                 s.estimator.rotor_step += c.step_per_speed * s.motion.acceleration;
                 // The flux is held still until it stands.
@@ -358,7 +425,7 @@ impl Drive {
             }
         };
 
-        self.telemetry = Telemetry {
+        self.seen = Seen {
             phi: flux.phi,
             flux_step: flux.step,
             rotor_step,
@@ -367,14 +434,8 @@ impl Drive {
             voltage,
             measured: measured.current,
             realised: modulated.realised,
-            delta_i: s.estimator.delta_i,
-            saliency: s.estimator.saliency.q,
-            carrier_squared: s.estimator.saliency.carrier_squared,
-            carrier_share: s.carrier.share,
-            saliency_loss: s.lock.loss,
             dc_link: measured.dc_link,
-            inverter_drop: s.inverter_drop.volts,
-            turns: c.motion.turns(&s.motion, rotor_count),
+            rotor_count,
         };
 
         // What was computed must make sense before it is put out. (The current is in the voltage.)
@@ -383,7 +444,7 @@ impl Drive {
             + voltage.d
             + voltage.q
             + s.estimator.delta_i
-            + s.estimator.saliency.q
+            + s.estimator.saliency().q
             + flux.step
             + rotor_step;
         if !sum.is_finite() {
@@ -393,22 +454,32 @@ impl Drive {
             return Err(Fault::OverSpeed);
         }
         if c.inject {
-            let amplitude = s.carrier.share * c.injection.current_amplitude;
-            if let Some(fault) = s.carrier_watch.step(measured, carrier, theta_axis, amplitude) {
-                return Err(fault);
-            }
-            // Once a carrier period each: is it the flux that is tracked, and does the carrier fit?
-            if carrier.index == MONITORED {
-                // (While it learns nothing is tracked, and what is compared with is not known yet.)
-                let judged = s.carrier.is_settled() && (held || self.mode != Mode::Learning);
-                if let (Some(monitor), true) = (&c.lock_monitor, judged) {
-                    monitor.step(&mut s.lock, &s.estimator.saliency, s.carrier.share, held)?;
+            match index {
+                // Is it the flux that is tracked? (While it learns nothing is tracked, and what is
+                // compared with is not known yet.)
+                MONITORED_AT => {
+                    let judged = s.carrier.is_settled() && (held || self.mode != Mode::Learning);
+                    if let (Some(monitor), true) = (&c.lock_monitor, judged) {
+                        let seen = s.estimator.synchronous.seen;
+                        monitor.step(&mut s.lock, &seen, s.carrier.share, held)?;
+                    }
                 }
-            } else if carrier.index == FITTED {
-                let largest = c.modulator.circle(measured.dc_link);
-                if s.carrier.fit(&c.injection, voltage, largest).is_err() {
-                    return Err(Fault::CarrierNoRoom);
+                // Do both sensors see the carrier?
+                WATCHED_AT => {
+                    let amplitude = s.carrier.share * c.injection.current_amplitude;
+                    let current = s.estimator.synchronous.carrier_current();
+                    if let Some(fault) = s.carrier_watch.step(current, carrier_axis, amplitude) {
+                        return Err(fault);
+                    }
                 }
+                // Does the carrier fit beside the fundamental?
+                FITTED_AT => {
+                    let largest = c.modulator.circle(measured.dc_link);
+                    if s.carrier.fit(&c.injection, voltage, largest).is_err() {
+                        return Err(Fault::CarrierNoRoom);
+                    }
+                }
+                _ => {}
             }
         }
         let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
@@ -480,7 +551,7 @@ impl Drive {
                 (None, _) => return Ok(magnetising),
                 (Some(_), None) => Phase::Passed,
                 (Some(n), Some(check)) => {
-                    check.step(&mut s.saliency_check, n, s.estimator.saliency.q)
+                    check.step(&mut s.saliency_check, n, s.estimator.saliency().q)
                 }
             };
         match phase {
@@ -533,14 +604,31 @@ impl Drive {
     }
 }
 
+impl Coefficients {
+    /// The current is seen from where the flux was when the filtered current flowed; the voltage is put
+    /// where the flux will be when it acts. `step` is how far the flux turns in a period, turns.
+    #[inline]
+    fn axes(&self, step: f32, injection: UnitVector) -> Axes {
+        let along = UnitVector { cos: 1.0, sin: 0.0 };
+        let lag = self.lag_share * (lpf_lag_samples(step * TAU) + self.current_lag);
+        Axes {
+            injection,
+            carrier: injection.turned_slightly(-step * self.estimator.lag),
+            seen: along.turned_slightly(-step * lag),
+            applied: along.turned_slightly(step * VOLTAGE_LEAD),
+        }
+    }
+}
+
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
 
-/// Samples of the carrier period in which the lock is watched and the carrier fitted. What is done once
-/// a carrier period is spread over it: in the first the saliency is looked at, in the last the
-/// carrier is looked for in both channels.
-const MONITORED: usize = 4;
-const FITTED: usize = 6;
+/// Samples of the carrier period in which there is done what is done once in it. It is spread: 1 to 4 are
+/// those of the [synchronous demodulation](crate::synchronous), 8 that of the magnetising current.
+const TURNED_AT: usize = 0;
+const MONITORED_AT: usize = 5;
+const WATCHED_AT: usize = 6;
+const FITTED_AT: usize = 7;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

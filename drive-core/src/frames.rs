@@ -170,6 +170,14 @@ impl AlphaBeta {
     }
 }
 
+impl Mul<f32> for UnitVector {
+    type Output = Dq;
+    /// A vector of this length along an axis that is seen from the flux.
+    fn mul(self, length: f32) -> Dq {
+        Dq { d: self.cos * length, q: self.sin * length }
+    }
+}
+
 impl Dq {
     /// Inverse Park transformation: back from the frame whose d axis lies along `axis`.
     pub fn to_alpha_beta(self, axis: UnitVector) -> AlphaBeta {

@@ -9,6 +9,7 @@ use core::f32::consts::TAU;
 
 use crate::angle::Angle;
 use crate::frames::Dq;
+use crate::injection::CARRIER_SAMPLES;
 use crate::online::LIMITS;
 
 /// Coefficients of the encoder and the slip.
@@ -44,6 +45,8 @@ pub struct IndirectState {
     pub slip_step: f32,
     /// Magnetising current, A: the rotor flux over L_m.
     pub magnetising: f32,
+    /// Slip per quadrature current at that flux, electrical turns per period and A.
+    slip_per_ampere: f32,
     /// Mean electrical speed of the rotor, turns per period.
     pub rotor_step: f32,
     /// That speed when the counter last moved.
@@ -153,14 +156,24 @@ impl Indirect {
         Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_step + state.slip_step })
     }
 
-    /// Integrates the slip over one period with the current in the flux frame, A.
-    pub fn update(&self, state: &mut IndirectState, current: Dq) {
-        state.magnetising += self.rate * (current.d - state.magnetising);
-        let divisor = if state.magnetising > self.least { state.magnetising } else { self.least };
-        state.slip_step = self.rate * (1.0 / TAU) * current.q / divisor;
+    /// Integrates the slip over one period with the current in the flux frame, A. The magnetising current
+    /// follows once a carrier period, in its sample `index`.
+    #[inline]
+    pub fn update(&self, state: &mut IndirectState, current: Dq, index: usize) {
+        if index == MAGNETISED_AT {
+            let i_m = state.magnetising
+                + CARRIER_SAMPLES as f32 * self.rate * (current.d - state.magnetising);
+            state.magnetising = i_m;
+            let divisor = if i_m > self.least { i_m } else { self.least };
+            state.slip_per_ampere = self.rate * (1.0 / TAU) / divisor;
+        }
+        state.slip_step = state.slip_per_ampere * current.q;
         state.slip += Angle::within_turn(state.slip_step);
     }
 }
+
+/// Sample of the carrier period in which the magnetising current follows; see [`crate::drive`].
+const MAGNETISED_AT: usize = 8;
 
 #[cfg(test)]
 mod tests {
@@ -203,11 +216,11 @@ mod tests {
         let ind = indirect();
         let mut state = IndirectState::default();
         // flux built up for 10 time constants, then i_q = 2 i_d for 0.1 s
-        for _ in 0..12_000 {
-            ind.update(&mut state, Dq::new(0.7, 0.0));
+        for n in 0..12_000 {
+            ind.update(&mut state, Dq::new(0.7, 0.0), n % CARRIER_SAMPLES);
         }
-        for _ in 0..600 {
-            ind.update(&mut state, Dq::new(0.7, 1.4));
+        for n in 0..600 {
+            ind.update(&mut state, Dq::new(0.7, 1.4), n % CARRIER_SAMPLES);
         }
         let phi = ind.angle(&mut state, 0).unwrap().phi.to_radians();
         assert!((phi - 0.1 * 2.0 / 0.186).abs() < 1e-3, "{phi}");

@@ -160,12 +160,20 @@ impl Carrier {
         self.unchanged > FORGOTTEN
     }
 
-    /// The next PWM period's share.
-    pub fn step(&mut self, injection: &Injection) -> CarrierPeriod {
+    /// Goes on to the next PWM period: its number in the carrier period, 0 to 9, which counts with or
+    /// without a carrier.
+    #[inline]
+    pub fn next(&mut self) -> usize {
         // Below ten by construction: this is for a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
-        let full = &injection.periods[index];
+        index
+    }
+
+    /// The carrier in PWM period `index`.
+    #[inline]
+    pub fn at(&self, injection: &Injection, index: usize) -> CarrierPeriod {
+        let full = &injection.periods[if index < CARRIER_SAMPLES { index } else { 0 }];
         CarrierPeriod {
             voltage: self.share * full.voltage,
             mean_current: self.share * full.mean_current,
@@ -197,7 +205,8 @@ mod tests {
         let mut carrier = Carrier::default();
         let (mut i, mut peak) = (0.0_f64, 0.0_f64);
         for n in 0..6000 {
-            let now = carrier.step(&injection);
+            let index = carrier.next();
+            let now = carrier.at(&injection, index);
             // `i` is the current at the start of the period in which the voltage acts, one sample
             // after the one it was computed from.
             let next = plant.p * i + plant.k * f64::from(now.voltage);

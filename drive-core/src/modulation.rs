@@ -30,6 +30,8 @@ pub struct Modulated {
     /// without the pulses that were dropped or extended. Rounding to counts (11 mV at 311 V) is not
     /// in it: a controller fed with that would stall on increments below half a count.
     pub realised: AlphaBeta,
+    /// Whether that is anything but what was asked for.
+    pub limited: bool,
 }
 
 impl Modulator {
@@ -65,7 +67,7 @@ impl Modulator {
         // Shortest pulses fit in above and below: nothing to limit. Not-a-number fails the test.
         if (high - low) * per_volt <= self.top - 2.0 * self.shortest {
             let counts = self.centred(leg, low + high, per_volt);
-            return Modulated { compare: counts.map(rounded), realised: wanted };
+            return Modulated { compare: counts.map(rounded), realised: wanted, limited: false };
         }
         self.limited(wanted, compensation, v_dc)
     }
@@ -84,7 +86,7 @@ impl Modulator {
         let volts = v_dc / self.top;
         let [a, b, c] = counts;
         let realised = (Abc::new(a, b, c) * volts - compensation).to_alpha_beta();
-        Modulated { compare: counts.map(rounded), realised }
+        Modulated { compare: counts.map(rounded), realised, limited: true }
     }
 
     /// Counts of the legs, V, with `ends`, the sum of the lowest and the highest of them, at half the

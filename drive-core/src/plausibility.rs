@@ -12,8 +12,7 @@ use core::f32::consts::TAU;
 use crate::angle::UnitVector;
 use crate::fault::Fault;
 use crate::frames::{AlphaBeta, Dq, SQRT_3};
-use crate::injection::{CARRIER_SAMPLES, CarrierPeriod};
-use crate::sensing::Measured;
+use crate::synchronous::CarrierCurrent;
 use crate::tuning::FirstOrder;
 
 /// Share of the expected carrier amplitude below which a channel counts as silent.
@@ -26,46 +25,31 @@ const SILENT_PERIODS: u8 = 3;
 /// Watches for the carrier in both channels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CarrierWatch {
-    /// Correlation of channels a and b with cosine and sine since the carrier period began.
-    sums: [(f32, f32); 2],
     silent: [u8; 2],
     settled: u8,
 }
 
 impl CarrierWatch {
-    /// One sample: phase currents in A, the carrier, the injection axis, and the amplitude of the
+    /// Once a carrier period: the carrier current in it, the injection axis, and the amplitude of the
     /// carrier current expected along it, A.
-    #[inline]
-    pub fn step(
-        &mut self,
-        measured: &Measured,
-        carrier: CarrierPeriod,
-        axis: UnitVector,
-        expected: f32,
-    ) -> Option<Fault> {
-        for (sum, i) in self.sums.iter_mut().zip([measured.phases.a, measured.phases.b]) {
-            sum.0 += carrier.cos * i;
-            sum.1 += carrier.sin * i;
-        }
-        if carrier.index + 1 < CARRIER_SAMPLES { None } else { self.judge(axis, expected) }
-    }
-
-    /// At the end of a carrier period.
     #[inline(never)]
-    fn judge(&mut self, axis: UnitVector, expected: f32) -> Option<Fault> {
-        // cos(theta) and cos(theta - 120°): what of the injection lies along phases a and b
-        let along = [axis.cos, 0.5 * (SQRT_3 * axis.sin - axis.cos)];
-        let sums = core::mem::take(&mut self.sums);
+    pub fn step(&mut self, seen: CarrierCurrent, axis: UnitVector, expected: f32) -> Option<Fault> {
+        // Of the axes: what of the injection lies along phases a and b, cos(theta) and cos(theta - 120°);
+        // and of what lies 90° ahead of it.
+        let phases = |x: f32, y: f32| [x, 0.5 * (SQRT_3 * y - x)];
+        let along = phases(axis.cos, axis.sin);
+        let across = phases(-axis.sin, axis.cos);
         // The first two carrier periods are not settled.
         if self.settled < 2 {
             self.settled += 1;
             return None;
         }
-        for ((sum, along), silent) in sums.into_iter().zip(along).zip(&mut self.silent) {
-            let amplitude_squared = (sum.0 * sum.0 + sum.1 * sum.1) * 0.04; // (2/10)^2
+        for ((along, across), silent) in along.into_iter().zip(across).zip(&mut self.silent) {
+            let re = along * seen.along.0 + across * seen.across.0;
+            let im = along * seen.along.1 + across * seen.across.1;
             let due = SILENT * expected * along;
             let judged = along.abs() > LEAST_SHARE;
-            let quiet = judged && amplitude_squared < due * due;
+            let quiet = judged && re * re + im * im < due * due;
             *silent = if quiet { silent.saturating_add(1) } else { 0 };
         }
         if self.silent[0] >= SILENT_PERIODS {

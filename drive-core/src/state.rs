@@ -5,9 +5,10 @@ use core::fmt;
 use crate::{Fault, Mode};
 
 /// What the drive is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
     /// Outputs off.
+    #[default]
     Off,
     /// Outputs off, offsets of the current sensors being measured.
     Calibrating,

@@ -14,24 +14,72 @@
 //! their zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through
 //! the printed band-pass, is gone. They delay `q` by 19 samples (3.2 ms).
 //!
-//! The averages are sums of integers, 2^-17 A a unit; see [`crate::moving_sum`].
+//! The averages are looked at once a carrier period. Their weights rise by one a sample for twenty samples
+//! and then fall, so over the ten samples of a carrier period they are a constant and a ramp: two sums
+//! a signal are kept in every period, `S = sum x` and `D = sum S`, and once a carrier period
+//!
+//! ```text
+//! 400 X = D[0] + (10 S + D)[1] + (20 S - D)[2] + (10 S - D)[3]        [n]: n carrier periods ago
+//! ```
+//!
+//! All sums begin anew with every carrier period, so that no rounding adds up. The work of a carrier
+//! period is spread over its first four samples; the saliency is there in the fourth.
 
 use crate::demodulator::{CarrierSample, Demodulate};
 use crate::injection::CARRIER_SAMPLES;
-use crate::moving_sum::MovingSum;
 
-/// Samples of one moving average: two carrier periods.
-const LENGTH: usize = 2 * CARRIER_SAMPLES;
-/// Units per ampere. The largest sum, 400 samples of 2 * 4.5 A * sqrt2, is 6.7e8.
-const UNITS: f32 = 131_072.0;
-/// Signals that are averaged: X and Y as complex numbers, and the reference current.
-const SIGNALS: usize = 5;
+/// Samples of the carrier period in which X, Y and then the saliency of the one before are computed, and in
+/// which the reference current is looked at: the middle.
+const X_AT: usize = 1;
+const Y_AT: usize = 2;
+/// See [`SynchronousState::seen`].
+pub const SEEN_AT: usize = 3;
+const REFERENCE_AT: usize = 4;
+
+/// Of the mixed current along and across the axis: real and imaginary parts.
+type Mixed = [f32; 4];
+
+/// The two sums over a carrier period; A.
+#[derive(Clone, Copy, Debug, Default)]
+struct Period {
+    sum: Mixed,
+    ramp: Mixed,
+}
+
+/// What an average of one signal takes along of earlier carrier periods, A: transposed form.
+#[derive(Clone, Copy, Debug, Default)]
+struct Average {
+    earlier: [f32; 3],
+}
+
+impl Average {
+    /// Takes a carrier period in; the average, times [`WEIGHTS`].
+    #[inline]
+    fn step(&mut self, sum: f32, ramp: f32) -> f32 {
+        const N: f32 = CARRIER_SAMPLES as f32;
+        let [one, two, three] = self.earlier;
+        let (level, falling) = (N * sum, N * sum - ramp);
+        self.earlier = [level + ramp + two, level + falling + three, falling];
+        ramp + one
+    }
+}
+
+/// Sum of the weights of the averages: two times twenty samples.
+const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    index: usize,
-    stages: [MovingSum<SIGNALS, LENGTH>; 2],
+    /// The carrier period that goes on, and the one before.
+    period: Period,
+    last: Period,
+    averages: [Average; 4],
+    /// X and Y, times [`WEIGHTS`], A.
+    mean: Mixed,
+    i_q: f32,
+    i_q_earlier: [f32; 3],
+    /// What was seen last; new in every sample [`SEEN_AT`] of the carrier.
+    pub seen: Saliency,
 }
 
 /// What the demodulation gives.
@@ -45,49 +93,86 @@ pub struct Saliency {
     pub i_q: f32,
 }
 
-/// Sums over 400 samples that [`Saliency::of`] is made of.
-pub type Sums = [i32; SIGNALS];
+/// The carrier current of one carrier period as complex amplitudes `(re, im)`, A.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarrierCurrent {
+    /// Along the injection axis.
+    pub along: (f32, f32),
+    /// 90° ahead of it.
+    pub across: (f32, f32),
+}
 
 impl Demodulate for SynchronousState {
     type Seen = Saliency;
 
     #[inline]
     fn step(&mut self, sample: &CarrierSample) -> Saliency {
-        Saliency::of(self.average(sample))
+        self.mix(sample);
+        self.conclude(sample.carrier.index, sample.i_q);
+        self.seen
     }
 }
 
 impl SynchronousState {
-    /// Mixes one sample and averages.
+    /// Mixes one sample.
     #[inline]
-    pub fn average(&mut self, sample: &CarrierSample) -> Sums {
+    pub fn mix(&mut self, sample: &CarrierSample) {
         let (along, across) = sample.current.seen_from(sample.axis);
-        let (along, across) = (along * (2.0 * UNITS), across * (2.0 * UNITS));
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
-        // Saturating casts: not-a-number gives 0, and the drive finds it elsewhere.
-        let mixed =
-            [along * c, -along * s, across * c, -across * s, sample.i_q * UNITS].map(|x| x as i32);
-        // Below 20 by construction: this is for a flipped bit.
-        let index = if self.index < LENGTH { self.index } else { 0 };
-        self.index = index + 1;
-        let once = self.stages[0].step(index, mixed);
-        self.stages[1].step(index, once)
+        let mixed = [along * c, along * s, across * c, across * s];
+        let period = &mut self.period;
+        if sample.carrier.index == 0 {
+            self.last = *period;
+            *period = Period { sum: mixed, ramp: mixed };
+        } else {
+            for n in 0..4 {
+                period.sum[n] += mixed[n];
+                period.ramp[n] += period.sum[n];
+            }
+        }
     }
-}
 
-impl Saliency {
-    /// What the averages tell.
+    /// What is due in this sample of the carrier period, with the reference of the quadrature current, A.
     #[inline]
-    pub fn of(twice: Sums) -> Self {
-        const MEAN: f32 = 1.0 / (UNITS * (LENGTH * LENGTH) as f32);
-        let [x_re, x_im, y_re, y_im, i_q] = twice.map(|x| x as f32 * MEAN);
+    pub fn conclude(&mut self, index: usize, i_q: f32) {
+        match index {
+            X_AT => self.average(0),
+            Y_AT => self.average(2),
+            SEEN_AT => self.see(),
+            REFERENCE_AT => self.i_q = i_q,
+            _ => {}
+        }
+    }
+
+    /// Averages the signals `first` and `first + 1`.
+    fn average(&mut self, first: usize) {
+        for n in [first, first + 1] {
+            self.mean[n] = self.averages[n].step(self.last.sum[n], self.last.ramp[n]);
+        }
+    }
+
+    fn see(&mut self) {
+        // The same average of its samples in the middle of the carrier periods: 1, 3, 3, 1 eighths.
+        let (i_q, [one, two, three]) = (0.125 * self.i_q, self.i_q_earlier);
+        self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
+        // The mean of the mixed current is half the amplitude.
+        const MEAN: f32 = 2.0 / WEIGHTS;
+        let [x_re, x_im, y_re, y_im] = self.mean.map(|x| x * MEAN);
         let squared = x_re * x_re + x_im * x_im;
         let product = x_re * y_re + x_im * y_im;
-        Saliency {
-            q: if squared > LEAST { -product / squared } else { 0.0 },
+        self.seen = Saliency {
+            // Not-a-number is not below the least.
+            q: if squared < LEAST { 0.0 } else { -product / squared },
             carrier_squared: squared,
-            i_q,
-        }
+            i_q: i_q + one,
+        };
+    }
+
+    /// The carrier current in the carrier period before this one.
+    #[inline]
+    pub fn carrier_current(&self) -> CarrierCurrent {
+        let [x_re, x_im, y_re, y_im] = self.last.sum.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
+        CarrierCurrent { along: (x_re, x_im), across: (y_re, y_im) }
     }
 }
 
@@ -106,27 +191,30 @@ mod tests {
     /// Sample `k` of a current, injected along `axis`.
     fn sample(current: AlphaBeta, axis: Angle, k: usize, i_q: f32) -> CarrierSample {
         let k = k % CARRIER_SAMPLES;
-        let carrier =
-            CarrierPeriod { cos: CARRIER_COS[k], sin: CARRIER_SIN[k], ..CarrierPeriod::default() };
+        let carrier = CarrierPeriod {
+            cos: CARRIER_COS[k],
+            sin: CARRIER_SIN[k],
+            index: k,
+            ..CarrierPeriod::default()
+        };
         CarrierSample { current, axis: axis.unit_vector(), carrier, i_q }
     }
 
     /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
     /// on top of a fundamental of 3 A.
-    fn steady(amplitude: f64, turn: f64, phase: f64) -> Saliency {
+    fn steady(amplitude: f64, turn: f64, phase: f64) -> SynchronousState {
         let theta = 0.7;
         let axis = Angle::from_radians(theta as f32);
         let mut state = SynchronousState::default();
-        let mut last = Saliency::default();
-        for k in 0..500 {
+        for k in 0..504 {
             let carrier = amplitude * (TAU * f64::from(k) / 10.0 + phase).cos();
             let i = AlphaBeta::new(
                 (carrier * (theta + turn).cos() + 2.0) as f32,
                 (carrier * (theta + turn).sin() - 2.2) as f32,
             );
-            last = state.step(&sample(i, axis, k as usize, 1.5));
+            state.step(&sample(i, axis, k as usize, 1.5));
         }
-        last
+        state
     }
 
     #[test]
@@ -135,7 +223,8 @@ mod tests {
         // q = -sin(2x) / (2 cos^2 x) = -tan x.
         for (amplitude, phase) in [(0.26, 0.0), (0.26, 1.0), (0.05, 2.0), (0.5, -0.4)] {
             for x in [-0.1, -0.01, 0.0, 0.03] {
-                let s = steady(amplitude, x, phase);
+                let state = steady(amplitude, x, phase);
+                let s = state.seen;
                 assert!(
                     (f64::from(s.q) + x.tan()).abs() < 2e-4,
                     "{amplitude} {phase} {x}: {}",
@@ -144,31 +233,62 @@ mod tests {
                 let carrier = f64::from(s.carrier_squared).sqrt();
                 assert!((carrier / (amplitude * x.cos()) - 1.0).abs() < 1e-3);
                 assert!((s.i_q - 1.5).abs() < 1e-4);
+                let c = state.carrier_current();
+                let amplitudes = [(c.along, x.cos()), (c.across, x.sin())];
+                for ((re, im), share) in amplitudes {
+                    let found = f64::from(re).hypot(f64::from(im));
+                    assert!((found - amplitude * share.abs()).abs() < 1e-5, "{found}");
+                }
+            }
+        }
+    }
+
+    /// Against the moving averages of the definition, in f64, on noise.
+    #[test]
+    fn the_averages_are_two_moving_averages_of_twenty_samples() {
+        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
+        let moving = |x: &[f64]| -> Vec<f64> {
+            (0..x.len()).map(|n| x[n.saturating_sub(19)..=n].iter().sum::<f64>() / 20.0).collect()
+        };
+        let (mut x, mut mixed) = (1_u32, [Vec::new(), Vec::new()]);
+        for k in 0..1000_usize {
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let noise = (x >> 8) as f32 / 4e6 - 2.0;
+            let given = sample(AlphaBeta::new(noise, 0.0), axis, k, 0.0);
+            state.step(&given);
+            let (c, s) = (f64::from(given.carrier.cos), f64::from(given.carrier.sin));
+            let along = f64::from(noise) * f64::from(given.axis.cos);
+            mixed[0].push(2.0 * along * c);
+            mixed[1].push(2.0 * along * s);
+            if k % 10 == SEEN_AT && k > 50 {
+                // As of the last sample of the carrier period before.
+                let at = k - SEEN_AT - 1;
+                let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[at]);
+                let found = f64::from(state.seen.carrier_squared);
+                assert!((found - (re * re + im * im)).abs() < 1e-5 * (1e-2 + found), "{k}");
             }
         }
     }
 
     #[test]
-    fn the_sums_do_not_drift() {
+    fn nothing_is_left_of_what_was_four_carrier_periods_ago() {
         let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
-        let mut x = 1_u32;
-        for k in 0..600_000_usize {
-            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let noise = (x >> 8) as f32 / 4e6 - 2.0;
-            state.step(&sample(AlphaBeta::new(noise, -noise), axis, k, noise));
+        for (k, x) in [(0, f32::NAN), (7, f32::INFINITY), (100_007, 3.0), (100_015, -4e3)] {
+            state.step(&sample(AlphaBeta::new(x, -x), axis, k, x));
+            let mut rest = Saliency::default();
+            for k in k + 1..k + 54 {
+                rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
+            }
+            assert_eq!(rest, Saliency::default(), "{x}");
         }
-        let mut rest = Saliency::default();
-        for k in 0..40_usize {
-            rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
-        }
-        assert_eq!(rest, Saliency::default());
     }
 
     #[test]
-    fn no_carrier_and_no_number_do_no_harm() {
-        assert_eq!(steady(0.0, 0.0, 0.0).q, 0.0);
+    fn no_carrier_is_no_saliency_and_no_number_is_seen() {
+        assert_eq!(steady(0.0, 0.0, 0.0).seen.q, 0.0);
         let mut state = SynchronousState::default();
-        let nan = AlphaBeta::new(f32::NAN, f32::INFINITY);
-        assert!(state.step(&sample(nan, Angle::ZERO, 77, f32::NAN)).q.is_finite());
+        state.step(&sample(AlphaBeta::new(f32::NAN, 0.0), Angle::ZERO, 7, 0.0));
+        let seen = (8..14).map(|k| state.step(&sample(AlphaBeta::ZERO, Angle::ZERO, k, 0.0)).q);
+        assert!(seen.last().is_some_and(f32::is_nan));
     }
 }

@@ -8,6 +8,7 @@
 use core::f32::consts::TAU;
 
 use crate::angle::Angle;
+use crate::motion::limited;
 use crate::tuning;
 
 /// Coefficients of the tracker.
@@ -95,25 +96,45 @@ impl Pll {
         }
     }
 
-    /// Moves on by one period with an angle error, rad, the schedule's share of the proportional part,
-    /// and the slip, turns per period. The rotor's
-    /// speed is kept in `rotor_step`. False when a speed has reached its limit or is not a number:
-    /// the angle is lost.
+    /// What an angle error, rad, turns, with the schedule's share of the proportional part.
+    #[inline]
+    pub fn push(&self, error: f32, share: f32) -> Push {
+        let error = limited(error, LARGEST_ERROR);
+        Push {
+            angle: self.proportional * share * error,
+            speed: self.integral * error,
+            acceleration: self.jerk * error,
+        }
+    }
+
+    /// Moves on by one period, pushed by the error that was seen last, with the slip, turns per period. The
+    /// rotor's speed is kept in `rotor_step`. False when a speed has reached its limit or is not a
+    /// number: the angle is lost.
+    #[inline]
     pub fn step(
         &self,
         state: &mut TrackerState,
         rotor_step: &mut f32,
-        error: f32,
-        share: f32,
+        push: Push,
         slip_step: f32,
     ) -> bool {
-        let error = error.clamp(-LARGEST_ERROR, LARGEST_ERROR);
-        state.acceleration += self.jerk * error;
-        *rotor_step += self.integral * error + state.acceleration;
+        state.acceleration += push.acceleration;
+        *rotor_step += push.speed + state.acceleration;
         state.step = *rotor_step + slip_step;
-        state.angle += Angle::within_turn(state.step + self.proportional * share * error);
+        state.angle += Angle::within_turn(state.step + push.angle);
         state.step < self.limit && state.step > -self.limit
     }
+}
+
+/// What an angle error adds in every period, in turns per period, per period and period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Push {
+    /// To the angle.
+    pub angle: f32,
+    /// To the speed.
+    pub speed: f32,
+    /// To the acceleration.
+    pub acceleration: f32,
 }
 
 #[cfg(test)]

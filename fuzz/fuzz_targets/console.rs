@@ -27,7 +27,7 @@ impl Machine for Desk {
             periods: 1,
             state: self.drive.state(),
             sample: Sample::default(),
-            telemetry: *self.drive.telemetry(),
+            telemetry: self.drive.telemetry(),
             worst_cycles: u32::MAX,
             last_cycles: 0,
             worst_latency: u32::MAX,

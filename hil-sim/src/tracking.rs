@@ -99,7 +99,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
             let telemetry = rig.drive.telemetry();
             online.push(telemetry.measured, telemetry.realised);
         }
-        let telemetry = *rig.drive.telemetry();
+        let telemetry = rig.drive.telemetry();
         let seen = telemetry.rotor_step * (TAU * RATE_HZ) as f32;
         let speed = if encoder { Speed::Known(seen) } else { Speed::Guess(seen) };
         let estimate = online.refine(telemetry.reference, speed);

@@ -42,7 +42,7 @@ impl Machine for Desk {
             periods: self.orders.len() as u32,
             state: self.drive.state(),
             sample: Sample::default(),
-            telemetry: *self.drive.telemetry(),
+            telemetry: self.drive.telemetry(),
             worst_cycles: 900,
             last_cycles: 800,
             worst_latency: 50,

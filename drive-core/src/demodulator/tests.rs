@@ -5,6 +5,7 @@ use core::f64::consts::{SQRT_2, TAU};
 
 use super::*;
 use crate::angle::Angle;
+use crate::synchronous::SynchronousState;
 
 /// Gain (-0.490 dB) and phase of the band-pass at 600 Hz, and of the post-processing filter at dc.
 const BPF_GAIN: f64 = 0.9452;
@@ -156,7 +157,8 @@ fn delays_are_those_of_the_filters() {
         ("rms 20", delay(RmsImpedance::new(20)), 8.83 + 9.5 + 24.46),
         ("rms 60", delay(RmsImpedance::new(60)), 8.83 + 29.5 + 24.46),
         ("envelope", delay(Envelope::default()), 8.83 + 1.0 + 4.5),
-        ("synchronous", delay(SynchronousState::default()), 19.0),
+        // 4.5 for being looked at once a carrier period, and 4 for being there in its fourth sample.
+        ("synchronous", delay(SynchronousState::default()), 19.0 + 4.5 + 4.0),
     ];
     for (name, found, expected) in found {
         println!("{name}: {found:.2} samples, {expected:.2} expected");

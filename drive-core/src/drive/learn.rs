@@ -28,11 +28,12 @@ impl Drive {
     /// The torque current to regulate while learning, A. In the end what was found takes the place of
     /// what was set, and the drive stops.
     pub(super) fn learn(&mut self) -> Result<f32, Fault> {
-        let (c, s, t) = (&self.c, &mut self.control, &self.telemetry);
+        let (c, s, t) = (&self.c, &mut self.control, &self.seen);
         let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
-        let signal = if normalised { t.saliency } else { t.delta_i };
+        let saliency = *s.estimator.saliency();
+        let signal = if normalised { saliency.q } else { s.estimator.delta_i };
         let theta = t.phi + Angle::QUARTER;
-        let seen = (signal, t.carrier_squared);
+        let seen = (signal, saliency.carrier_squared);
         match c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage) {
             Next::Current(i_q) => self.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),

@@ -381,12 +381,8 @@ impl Settings {
                 0.0
             },
             angle_loop,
-            lag: lag_share
-                * match inj.demodulator {
-                    // They rotate behind the band-pass.
-                    Tracking::Literal | Tracking::Rectified => BPF_GROUP_DELAY + carrier_lag,
-                    _ => carrier_lag,
-                },
+            lag: lag_share * carrier_lag,
+            band_pass_lag: lag_share * BPF_GROUP_DELAY,
         }
     }
 }
