@@ -117,7 +117,7 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, status, orders, answers, trace } =
+        let Control { drive, pwm, adc, encoder, orders, answers, trace, .. } =
             &mut self.control;
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
@@ -199,23 +199,32 @@ impl Running {
             self.worst_cycles = cycles;
         }
         // A new state is reported at once.
+        if self.reported != Some(self.control.drive.state())
+            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS)
+        {
+            self.report(sample, cycles);
+        }
+    }
+
+    /// Reports to the main loop. It may be slow or hang; then this status is lost, but not its events.
+    // Not inlined: the interrupt would have to save registers for it in every period.
+    #[inline(never)]
+    fn report(&mut self, sample: Sample, cycles: u32) {
+        let Control { drive, status, .. } = &mut self.control;
         let state = drive.state();
-        if self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS) {
-            // The main loop may be slow or hang; then this status is lost, but not its events.
-            let sent = status.send_with(|report| {
-                report.periods = self.periods;
-                report.state = state;
-                report.sample = sample;
-                report.telemetry = drive.telemetry();
-                report.worst_cycles = self.worst_cycles;
-                report.last_cycles = cycles;
-                report.worst_latency = self.worst_latency;
-                report.hardware = self.seen;
-            });
-            if sent {
-                self.seen = Hardware::NONE;
-                self.reported = Some(state);
-            }
+        let sent = status.send_with(|report| {
+            report.periods = self.periods;
+            report.state = state;
+            report.sample = sample;
+            report.telemetry = drive.telemetry();
+            report.worst_cycles = self.worst_cycles;
+            report.last_cycles = cycles;
+            report.worst_latency = self.worst_latency;
+            report.hardware = self.seen;
+        });
+        if sent {
+            self.seen = Hardware::NONE;
+            self.reported = Some(state);
         }
     }
 }

@@ -149,10 +149,16 @@ impl<const N: usize> Trace<N> {
 
 impl<const N: usize> Recorder<'_, N> {
     /// One period.
+    #[inline]
     pub fn step(&mut self, telemetry: impl FnOnce() -> Telemetry) {
-        if self.0.stage.load(Ordering::Acquire) != RECORDING {
-            return;
+        if self.0.stage.load(Ordering::Acquire) == RECORDING {
+            self.record(telemetry);
         }
+    }
+
+    // Not inlined: the interrupt would have to save registers for it in every period.
+    #[inline(never)]
+    fn record(&mut self, telemetry: impl FnOnce() -> Telemetry) {
         // SAFETY: the interrupt's while recording; `&mut self` keeps others out.
         let inner = unsafe { &mut *self.0.inner.get() };
         if inner.wait > 0 {

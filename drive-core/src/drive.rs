@@ -45,17 +45,14 @@ use crate::wiring_check::{Next, WiringCheckState};
 #[derive(Clone, Debug)]
 pub struct Drive {
     c: Coefficients,
+    control: ControlState,
     state: State,
     mode: Mode,
     /// Control periods spent in this state.
     elapsed: u32,
-    references: References,
-    sensing: SensingState,
-    control: ControlState,
     /// Whether the next start checks the wiring.
     wiring_unchecked: bool,
     wiring: WiringCheckState,
-    seen: Seen,
     learned: Option<Learned>,
 }
 
@@ -86,22 +83,29 @@ impl Default for References {
 }
 
 /// Everything that moves while the drive regulates; fresh at every start.
+// In this order: what every step needs lies together, within the 1020 bytes that a floating-point load
+// of the core reaches from one base. Without that every sixth instruction of a step computes an address.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 struct ControlState {
+    references: References,
+    sensing: SensingState,
+    seen: Seen,
     low_pass: LpfState,
     indirect: IndirectState,
-    estimator: EstimatorState,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],
     current_loop: DqPiState,
     rotor: RotorCount,
+    prediction: PredictionState,
     motion: MotionState,
     carrier_watch: CarrierWatch,
-    prediction: PredictionState,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
     inverter_drop: InverterDropState,
+    /// Those demodulations that are not the usual one are large: at its end.
+    estimator: EstimatorState,
     learning: LearningState,
 }
 
@@ -188,12 +192,9 @@ impl Drive {
             state: State::Off,
             mode: Mode::Torque,
             elapsed: 0,
-            references: References::default(),
-            sensing: SensingState::default(),
             control: ControlState::default(),
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
-            seen: Seen::default(),
             learned: None,
         }
     }
@@ -206,7 +207,7 @@ impl Drive {
     /// What it saw and did in the last step.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
-        let (t, s) = (&self.seen, &self.control);
+        let (t, s) = (&self.control.seen, &self.control);
         Telemetry {
             phi: t.phi,
             flux_step: t.flux_step,
@@ -238,7 +239,7 @@ impl Drive {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Compare::OFF;
         }
-        let measured = self.c.sensing.step(&self.sensing, sample);
+        let measured = self.c.sensing.step(&self.control.sensing, sample);
         let result = match self.protect(sample, &measured) {
             Some(fault) => Err(fault),
             None => match self.state {
@@ -281,7 +282,7 @@ impl Drive {
     }
 
     fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
-        if self.c.sensing.calibrate(&mut self.sensing, sample)?.is_some() {
+        if self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
             self.enter(State::Precharge);
         }
         Ok(Compare::OFF)
@@ -328,7 +329,7 @@ impl Drive {
         let rotor_count = self.rotor_count(sample);
         let wanted = self.reference(rotor_count)?;
         let held = self.state == State::Magnetising;
-        let (c, r, s) = (&self.c, &self.references, &mut self.control);
+        let (c, s) = (&self.c, near(&mut self.control));
         let reference = Dq {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
             q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
@@ -347,7 +348,7 @@ impl Drive {
 
         let index = s.carrier.next();
         if index == TURNED_AT {
-            s.axes = c.axes(flux.step, r.injection_axis);
+            s.axes = c.axes(flux.step, s.references.injection_axis);
         }
         let axes = &s.axes;
         let carrier = if c.inject {
@@ -367,7 +368,8 @@ impl Drive {
         let seen = phi.turned_by(axes.seen);
         let current = filtered.to_dq(seen);
         let voltage =
-            c.current_loop.step(&mut s.current_loop, reference - current) + r.test_voltage;
+            c.current_loop.step(&mut s.current_loop, reference - current)
+                + s.references.test_voltage;
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
         let applied = phi.turned_by(axes.applied);
@@ -425,7 +427,7 @@ impl Drive {
             }
         };
 
-        self.seen = Seen {
+        s.seen = Seen {
             phi: flux.phi,
             flux_step: flux.step,
             rotor_step,
@@ -511,7 +513,7 @@ impl Drive {
 
     /// The current to regulate in this state, A; moves on to the next state where it is time.
     fn reference(&mut self, rotor_count: u32) -> Result<Dq, Fault> {
-        let r = &mut self.references;
+        let r = &mut self.control.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
             State::Verifying => return self.verify(),
@@ -534,16 +536,17 @@ impl Drive {
                     self.state = State::Off;
                     0.0
                 };
-                self.references.current.q
+                self.control.references.current.q
             }
             _ => r.current.q,
         };
-        Ok(Dq { d: self.references.current.d, q: i_q })
+        Ok(Dq { d: self.control.references.current.d, q: i_q })
     }
 
     /// The current while the flux is built up, and while the saliency is checked, A.
     fn magnetise(&mut self) -> Result<Dq, Fault> {
-        let (r, s) = (&mut self.references, &mut self.control);
+        let s = &mut self.control;
+        let r = &mut s.references;
         let level = self.c.inverter_drop.level(self.elapsed);
         let magnetising = Dq { d: level * r.current.d, q: 0.0 };
         let phase =
@@ -581,12 +584,12 @@ impl Drive {
             }
             self.enter(State::of_mode(self.mode));
         }
-        Ok(Dq { d: self.references.current.d, q: 0.0 })
+        Ok(Dq { d: self.control.references.current.d, q: 0.0 })
     }
 
     /// Which of settings, references and state is to blame when a result is not finite.
     fn not_finite(&self) -> Option<Fault> {
-        let r = &self.references;
+        let r = &self.control.references;
         if !self.c.is_finite() {
             Some(Fault::NonFiniteSettings)
         } else if !(r.current.is_finite() && (r.speed + r.turns).is_finite()) {
@@ -618,6 +621,13 @@ impl Coefficients {
             applied: along.turned_slightly(step * VOLTAGE_LEAD),
         }
     }
+}
+
+/// The same, at an address that the compiler does not know: relative to it all of the state is near, while
+/// relative to the drive, or as an absolute address, each load and store computes its own.
+#[inline(always)]
+fn near(control: &mut ControlState) -> &mut ControlState {
+    core::hint::black_box(control)
 }
 
 /// Periods from the sample to the middle of the period in which its voltage acts.

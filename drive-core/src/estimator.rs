@@ -93,10 +93,11 @@ pub struct Estimator {
 }
 
 /// State.
+// In this order: the large one that is hardly used comes last.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 pub struct EstimatorState {
     tracker: TrackerState,
-    demodulator: Demodulator,
     /// The carrier current, and what the synchronous demodulation sees.
     pub synchronous: SynchronousState,
     /// Mean speed of the flux, turns per period, for the lag of the printed chain: the present one
@@ -109,6 +110,7 @@ pub struct EstimatorState {
     /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.4 ms older,
     /// on average, than what the averages themselves delay by 3.2 ms: little for a loop of 4 Hz.
     push: Push,
+    demodulator: Demodulator,
 }
 
 /// Share of the newest value in the mean speed of the flux: 50 ms.

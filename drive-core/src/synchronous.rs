@@ -23,18 +23,17 @@
 //! ```
 //!
 //! All sums begin anew with every carrier period, so that no rounding adds up. The work of a carrier
-//! period is spread over its first four samples; the saliency is there in the fourth.
+//! period is spread over the first samples of the next; the saliency is there in the fourth.
 
 use crate::demodulator::{CarrierSample, Demodulate};
 use crate::injection::CARRIER_SAMPLES;
 
-/// Samples of the carrier period in which X, Y and then the saliency of the one before are computed, and in
-/// which the reference current is looked at: the middle.
+/// Samples of the carrier period in which X, Y and then the saliency of the one before are computed.
 const X_AT: usize = 1;
 const Y_AT: usize = 2;
-/// See [`SynchronousState::seen`].
-pub const SEEN_AT: usize = 3;
-const REFERENCE_AT: usize = 4;
+const Q_AT: usize = 3;
+/// Sample in which the reference current is looked at, the middle, and averaged; with that all is seen.
+pub const SEEN_AT: usize = 4;
 
 /// Of the mixed current along and across the axis: real and imaginary parts.
 type Mixed = [f32; 4];
@@ -78,7 +77,7 @@ pub struct SynchronousState {
     mean: Mixed,
     i_q: f32,
     i_q_earlier: [f32; 3],
-    /// What was seen last; new in every sample [`SEEN_AT`] of the carrier.
+    /// What was seen last; whole and new in every sample [`SEEN_AT`] of the carrier.
     pub seen: Saliency,
 }
 
@@ -138,8 +137,8 @@ impl SynchronousState {
         match index {
             X_AT => self.average(0),
             Y_AT => self.average(2),
-            SEEN_AT => self.see(),
-            REFERENCE_AT => self.i_q = i_q,
+            Q_AT => self.see(),
+            SEEN_AT => self.see_reference(i_q),
             _ => {}
         }
     }
@@ -151,21 +150,24 @@ impl SynchronousState {
         }
     }
 
-    fn see(&mut self) {
-        // The same average of its samples in the middle of the carrier periods: 1, 3, 3, 1 eighths.
+    /// The same average of the reference, of its samples in the middle of the carrier periods: 1, 3, 3, 1
+    /// eighths.
+    fn see_reference(&mut self, now: f32) {
         let (i_q, [one, two, three]) = (0.125 * self.i_q, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
+        self.seen.i_q = i_q + one;
+        self.i_q = now;
+    }
+
+    fn see(&mut self) {
         // The mean of the mixed current is half the amplitude.
         const MEAN: f32 = 2.0 / WEIGHTS;
         let [x_re, x_im, y_re, y_im] = self.mean.map(|x| x * MEAN);
         let squared = x_re * x_re + x_im * x_im;
         let product = x_re * y_re + x_im * y_im;
-        self.seen = Saliency {
-            // Not-a-number is not below the least.
-            q: if squared < LEAST { 0.0 } else { -product / squared },
-            carrier_squared: squared,
-            i_q: i_q + one,
-        };
+        // Not-a-number is not below the least.
+        self.seen.q = if squared < LEAST { 0.0 } else { -product / squared };
+        self.seen.carrier_squared = squared;
     }
 
     /// The carrier current in the carrier period before this one.
@@ -206,7 +208,7 @@ mod tests {
         let theta = 0.7;
         let axis = Angle::from_radians(theta as f32);
         let mut state = SynchronousState::default();
-        for k in 0..504 {
+        for k in 0..505 {
             let carrier = amplitude * (TAU * f64::from(k) / 10.0 + phase).cos();
             let i = AlphaBeta::new(
                 (carrier * (theta + turn).cos() + 2.0) as f32,
@@ -260,9 +262,9 @@ mod tests {
             let along = f64::from(noise) * f64::from(given.axis.cos);
             mixed[0].push(2.0 * along * c);
             mixed[1].push(2.0 * along * s);
-            if k % 10 == SEEN_AT && k > 50 {
+            if k % 10 == Q_AT && k > 50 {
                 // As of the last sample of the carrier period before.
-                let at = k - SEEN_AT - 1;
+                let at = k - Q_AT - 1;
                 let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[at]);
                 let found = f64::from(state.seen.carrier_squared);
                 assert!((found - (re * re + im * im)).abs() < 1e-5 * (1e-2 + found), "{k}");
@@ -276,7 +278,7 @@ mod tests {
         for (k, x) in [(0, f32::NAN), (7, f32::INFINITY), (100_007, 3.0), (100_015, -4e3)] {
             state.step(&sample(AlphaBeta::new(x, -x), axis, k, x));
             let mut rest = Saliency::default();
-            for k in k + 1..k + 54 {
+            for k in k + 1..k + 65 {
                 rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
             }
             assert_eq!(rest, Saliency::default(), "{x}");

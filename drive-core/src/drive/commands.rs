@@ -6,7 +6,6 @@ use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::limited;
-use crate::sensing::SensingState;
 use crate::settings::AngleSource;
 use crate::state::State;
 
@@ -51,34 +50,34 @@ impl Drive {
             }
             Command::Torque(i_q) => {
                 self.takes_references(Mode::Torque, i_q)?;
-                let i_d = self.references.current.d;
+                let i_d = self.control.references.current.d;
                 let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
                 let taken = limited(i_q, largest);
-                self.references.current.q = taken;
+                self.control.references.current.q = taken;
                 Ok(as_taken(i_q, taken))
             }
             Command::Speed(rpm) => {
                 self.takes_references(Mode::Speed, rpm)?;
                 let taken = limited(rpm, self.c.motion.limit * 60.0);
-                self.references.speed = taken / 60.0;
+                self.control.references.speed = taken / 60.0;
                 Ok(as_taken(rpm, taken))
             }
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
                 let taken = limited(turns, self.c.motion.furthest);
-                self.references.turns = taken;
+                self.control.references.turns = taken;
                 Ok(as_taken(turns, taken))
             }
             Command::Magnetising(i_d) => {
                 self.takes_references(self.mode, i_d)?;
-                let i_q = self.references.current.q;
+                let i_q = self.control.references.current.q;
                 let min = 0.2 * self.c.sequence.i_d;
                 let max = libm::sqrtf(self.c.protection.current_squared - i_q * i_q);
                 if i_d < min {
                     return Err(Refused::OutOfRange { min, max });
                 }
                 let taken = limited(i_d, max);
-                self.references.current.d = taken;
+                self.control.references.current.d = taken;
                 Ok(as_taken(i_d, taken))
             }
             Command::TurnInjection(degrees) => {
@@ -87,7 +86,7 @@ impl Drive {
                     return Err(Refused::NeedsEncoder);
                 }
                 let turn = self.c.injection_turn + Angle::from_degrees(degrees);
-                self.references.injection_axis = turn.unit_vector();
+                self.control.references.injection_axis = turn.unit_vector();
                 Ok(Taken::AsGiven)
             }
             Command::TestVoltage(voltage) => {
@@ -96,7 +95,7 @@ impl Drive {
                 if !(inside(voltage.d) && inside(voltage.q)) {
                     return Err(Refused::OutOfRange { min: -LARGEST_TEST_V, max: LARGEST_TEST_V });
                 }
-                self.references.test_voltage = voltage;
+                self.control.references.test_voltage = voltage;
                 Ok(Taken::AsGiven)
             }
             Command::RotorTimeConstant(tau_r) => {
@@ -114,7 +113,6 @@ impl Drive {
             Command::Configure(coefficients) => match self.state {
                 State::Off | State::Fault(_) => {
                     self.c = *coefficients;
-                    self.sensing = SensingState::default();
                     Ok(Taken::AsGiven)
                 }
                 state => Err(Refused::State(state)),
@@ -133,13 +131,12 @@ impl Drive {
             (state, _) => return Err(Refused::State(state)),
         }
         self.mode = mode;
-        self.references = References {
+        self.control = ControlState::default();
+        self.control.references = References {
             current: Dq::new(self.c.sequence.i_d, 0.0),
             injection_axis: self.c.injection_axis,
             ..References::default()
         };
-        self.sensing = SensingState::default();
-        self.control = ControlState::default();
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
         Ok(Taken::AsGiven)
@@ -153,8 +150,8 @@ impl Drive {
             state if state == State::of_mode(self.mode) => {}
             state => return Err(Refused::State(state)),
         }
-        self.references = References {
-            current: Dq::new(self.references.current.d, 0.0),
+        self.control.references = References {
+            current: Dq::new(self.control.references.current.d, 0.0),
             injection_axis: self.c.injection_axis,
             ..References::default()
         };

@@ -28,14 +28,15 @@ impl Drive {
     /// The torque current to regulate while learning, A. In the end what was found takes the place of
     /// what was set, and the drive stops.
     pub(super) fn learn(&mut self) -> Result<f32, Fault> {
-        let (c, s, t) = (&self.c, &mut self.control, &self.seen);
+        let (c, s) = (&self.c, &mut self.control);
+        let t = s.seen;
         let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
         let saliency = *s.estimator.saliency();
         let signal = if normalised { saliency.q } else { s.estimator.delta_i };
         let theta = t.phi + Angle::QUARTER;
         let seen = (signal, saliency.carrier_squared);
         match c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage) {
-            Next::Current(i_q) => self.references.current.q = i_q,
+            Next::Current(i_q) => self.control.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
             Next::Done => {
                 let flux = c.saliency_check.map_or(0.0, |check| check.seen(&s.saliency_check));
@@ -48,7 +49,7 @@ impl Drive {
                 self.enter(State::Stopping);
             }
         }
-        Ok(self.references.current.q)
+        Ok(self.control.references.current.q)
     }
 }
 

@@ -311,7 +311,7 @@ fn a_relock_is_for_a_sensorless_drive_that_runs() {
     drive.command(Command::Torque(1.0)).unwrap();
     assert_eq!(drive.command(Command::Relock), Ok(Taken::AsGiven));
     assert_eq!(drive.state(), State::Magnetising);
-    assert_eq!(drive.references.current, Dq::new(0.7, 0.0));
+    assert_eq!(drive.control.references.current, Dq::new(0.7, 0.0));
     assert!(run_to(&mut drive, &mut load, State::Verifying));
     assert!(run_to(&mut drive, &mut load, State::Torque));
 }
@@ -322,7 +322,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
     let cases: [(Break, Fault); 6] = [
         (|d| d.c.current_loop.d.k_c = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.c.sensing.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
-        (|d| d.references.current.q = f32::NAN, Fault::NonFiniteCommand),
+        (|d| d.control.references.current.q = f32::NAN, Fault::NonFiniteCommand),
         (
             |d| d.control.current_loop.preset(Dq::new(f32::NAN, 0.0), Dq::ZERO),
             Fault::NonFiniteState,
@@ -374,7 +374,7 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(Command::Torque(1.0)), Ok(Taken::AsGiven));
     assert_eq!(d.command(Command::Torque(f32::NAN)), Err(Refused::NotFinite));
     assert_eq!(d.command(Command::Torque(f32::INFINITY)), Err(Refused::NotFinite));
-    assert_eq!(d.references.current.q, 1.0, "refused commands change nothing");
+    assert_eq!(d.control.references.current.q, 1.0, "refused commands change nothing");
     // sqrt(3.5^2 - 0.7^2)
     let Ok(Taken::Limited(most)) = d.command(Command::Torque(-99.0)) else { panic!() };
     assert!((most + 3.429).abs() < 1e-3);
@@ -391,11 +391,11 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(Command::Speed(-120.0)), Ok(Taken::AsGiven));
     assert_eq!(d.command(Command::Speed(f32::NAN)), Err(Refused::NotFinite));
     assert_eq!(d.command(Command::Torque(1.0)), Err(Refused::State(State::Speed)));
-    assert_eq!(d.references.speed, -2.0, "refused commands change nothing");
+    assert_eq!(d.control.references.speed, -2.0, "refused commands change nothing");
     assert_eq!(d.command(Command::Speed(1e6)), Ok(Taken::Limited(300.0)));
     d.command(Command::Stop).unwrap();
     d.command(Command::Start(Mode::Position)).unwrap();
-    assert_eq!(d.references.speed, 0.0, "a start takes the references back");
+    assert_eq!(d.control.references.speed, 0.0, "a start takes the references back");
     assert_eq!(d.command(Command::Speed(1.0)), Err(Refused::State(State::Position)));
     assert_eq!(d.command(Command::Position(-1e9)), Ok(Taken::Limited(-1000.0)));
 }
@@ -405,12 +405,12 @@ fn a_test_voltage_is_put_out_bounded_and_taken_back() {
     let (mut d, _) = running();
     let volts = Dq::new(20.0, -10.0);
     assert_eq!(d.command(Command::TestVoltage(volts)), Ok(Taken::AsGiven));
-    assert_eq!(d.references.test_voltage, volts);
+    assert_eq!(d.control.references.test_voltage, volts);
     let refused = d.command(Command::TestVoltage(Dq::new(0.0, 61.0)));
     assert_eq!(refused, Err(Refused::OutOfRange { min: -60.0, max: 60.0 }));
     let refused = d.command(Command::TestVoltage(Dq::new(f32::NAN, 0.0)));
     assert_eq!(refused, Err(Refused::NotFinite));
-    assert_eq!(d.references.test_voltage, volts, "refused commands change nothing");
+    assert_eq!(d.control.references.test_voltage, volts, "refused commands change nothing");
     d.command(Command::Stop).unwrap();
     assert!(matches!(d.command(Command::TestVoltage(volts)), Err(Refused::State(_))));
 }

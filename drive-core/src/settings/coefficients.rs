@@ -33,42 +33,44 @@ const VERIFY_S: f32 = 0.3;
 const STANDING_RPM: f32 = 30.0;
 
 /// Everything the control step needs, made from [`Settings`] outside the interrupt.
+// In this order: what every step needs comes first and lies together; see the drive's state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Coefficients {
     pub(crate) sensing: Sensing,
+    pub(crate) protection: Protection,
     pub(crate) source: AngleSource,
-    pub(crate) indirect: Indirect,
-    pub(crate) track_rotor: bool,
     /// Inject a carrier at all.
     pub(crate) inject: bool,
     /// Demodulate and, with the injection as source, track.
     pub(crate) demodulate: bool,
-    pub(crate) injection: Injection,
-    /// Injection axis seen from the flux, as an angle and a unit vector.
-    pub(crate) injection_turn: Angle,
-    pub(crate) injection_axis: UnitVector,
-    pub(crate) estimator: Estimator,
-    /// The check of a sensorless start, if it is wanted.
-    pub(crate) saliency_check: Option<SaliencyCheck>,
-    /// The watch on the lock, if it is wanted.
-    pub(crate) lock_monitor: Option<LockMonitor>,
-    pub(crate) wiring: WiringCheck,
-    pub(crate) current_loop: DqPi,
+    pub(crate) track_rotor: bool,
     pub(crate) reference_filter: [ReferenceFilter; 2],
+    pub(crate) current_loop: DqPi,
+    pub(crate) modulator: Modulator,
+    pub(crate) dead_time: DeadTime,
+    pub(crate) prediction: Prediction,
+    pub(crate) indirect: Indirect,
+    /// Electrical turns per period for one mechanical turn/s.
+    pub(crate) step_per_speed: f32,
     /// Delay of the measured current beside the filter, samples.
     pub(crate) current_lag: f32,
     /// 1 where the delays of the current are compensated, 0 where not.
     pub(crate) lag_share: f32,
-    pub(crate) modulator: Modulator,
-    pub(crate) dead_time: DeadTime,
+    pub(crate) sequence: SequenceSteps,
+    pub(crate) estimator: Estimator,
+    pub(crate) injection: Injection,
+    /// The watch on the lock, if it is wanted.
+    pub(crate) lock_monitor: Option<LockMonitor>,
+    pub(crate) motion: Motion,
+    /// Injection axis seen from the flux, as an angle and a unit vector.
+    pub(crate) injection_turn: Angle,
+    pub(crate) injection_axis: UnitVector,
+    /// The check of a sensorless start, if it is wanted.
+    pub(crate) saliency_check: Option<SaliencyCheck>,
+    pub(crate) wiring: WiringCheck,
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
-    pub(crate) prediction: Prediction,
-    pub(crate) motion: Motion,
-    /// Electrical turns per period for one mechanical turn/s.
-    pub(crate) step_per_speed: f32,
-    pub(crate) protection: Protection,
-    pub(crate) sequence: SequenceSteps,
     /// What the design of the current controllers came to, d and q.
     pub designs: [CurrentLoopDesign; 2],
     /// What the design of the speed and the position loop came to.
