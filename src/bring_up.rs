@@ -189,9 +189,12 @@ fn start_control(
         defmt::error!("settings: {}", defmt::Display2Format(&error));
         NotStarted::Settings
     })?;
-    let status = singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(NotStarted::Twice)?;
-    let orders = singleton!(: Mailbox<Order> = Mailbox::new(Order::Stop)).ok_or(NotStarted::Twice)?;
-    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Taken::AsGiven))).ok_or(NotStarted::Twice)?;
+    let status =
+        singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(NotStarted::Twice)?;
+    let orders =
+        singleton!(: Mailbox<Order> = Mailbox::new(Order::Stop)).ok_or(NotStarted::Twice)?;
+    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Taken::AsGiven)))
+        .ok_or(NotStarted::Twice)?;
     // Named, so that `cargo xtask size` can tell it from the rest.
     let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
     let (send_status, status) = status.split();

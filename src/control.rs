@@ -117,8 +117,7 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, orders, answers, trace, .. } =
-            &mut self.control;
+        let Control { drive, pwm, adc, encoder, orders, answers, trace, .. } = &mut self.control;
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
         // when the current is converted, before the sequence has ended.

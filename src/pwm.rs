@@ -162,9 +162,9 @@ impl Pwm {
             // First of all.
             self.trip();
         }
-        for (leg, value) in [compare.a, compare.b, compare.c].into_iter().enumerate() {
-            self.timer.ccr(leg).write(|w| w.ccr().set(u32::from(value)));
-        }
+        self.timer.ccr1().write(|w| w.ccr().set(u32::from(compare.a)));
+        self.timer.ccr2().write(|w| w.ccr().set(u32::from(compare.b)));
+        self.timer.ccr3().write(|w| w.ccr().set(u32::from(compare.c)));
         // Once, when the drive switches on: written again in every period, it would undo a break
         // that came since the sample.
         if compare.enabled && !self.on {

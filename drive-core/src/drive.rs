@@ -8,20 +8,20 @@ mod tests;
 use core::f32::consts::TAU;
 
 use crate::angle::{Angle, UnitVector};
+use crate::demodulator::CarrierSample;
 use crate::estimator::EstimatorState;
 use crate::fault::Fault;
-use crate::demodulator::CarrierSample;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
-use crate::injection::{Carrier, CarrierPeriod};
+use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
 use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::learning::{Learned, LearningState};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::pi::{DqPiState, ReferenceState};
-use crate::plausibility::{CarrierWatch, PredictionState};
+use crate::plausibility::{CarrierWatch, PREDICTED_AT, Prediction, PredictionState};
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
@@ -257,20 +257,29 @@ impl Drive {
     }
 
     /// What must hold in every period with the outputs on or about to be.
+    #[inline]
     fn protect(&self, sample: &Sample, measured: &Measured) -> Option<Fault> {
-        let p = &self.c.protection;
+        let (sensing, state) = (&self.c.sensing, &self.control.sensing);
+        let fine = sample.hardware == Hardware::NONE
+            && sensing.is_well_inside(state, sample, measured.phases.c);
+        if fine { None } else { self.what_is_wrong(sample, measured) }
+    }
+
+    /// The first thing that is wrong, if anything is.
+    #[inline(never)]
+    fn what_is_wrong(&self, sample: &Sample, measured: &Measured) -> Option<Fault> {
         if sample.hardware != Hardware::NONE {
             return Some(of_hardware(sample.hardware));
         }
         if let Some(fault) = self.c.sensing.check(sample) {
             return Some(fault);
         }
-        let i = measured.phases;
-        if i.a.abs() > p.trip_a {
+        let (p, i, trip_a) = (&self.c.protection, measured.phases, self.c.sensing.trip_a);
+        if i.a.abs() > trip_a {
             Some(Fault::OverCurrentA)
-        } else if i.b.abs() > p.trip_a {
+        } else if i.b.abs() > trip_a {
             Some(Fault::OverCurrentB)
-        } else if i.c.abs() > p.trip_a {
+        } else if i.c.abs() > trip_a {
             Some(Fault::OverCurrentC)
         } else if measured.dc_link > p.dc_over {
             Some(Fault::DcLinkOverVoltage)
@@ -334,6 +343,9 @@ impl Drive {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
             q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
         };
+        s.seen.reference = reference;
+        s.seen.rotor_count = rotor_count;
+
         // Flux angle at the sample.
         let count = match (self.mode, c.source) {
             // The shaft is locked.
@@ -346,16 +358,14 @@ impl Drive {
             None => s.estimator.flux(),
         };
 
+        (s.seen.phi, s.seen.flux_step) = (flux.phi, flux.step);
         let index = s.carrier.next();
         if index == TURNED_AT {
             s.axes = c.axes(flux.step, s.references.injection_axis);
         }
         let axes = &s.axes;
-        let carrier = if c.inject {
-            s.carrier.at(&c.injection, index)
-        } else {
-            CarrierPeriod::default()
-        };
+        let carrier =
+            if c.inject { s.carrier.at(&c.injection, index) } else { CarrierPeriod::default() };
 
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
@@ -367,9 +377,9 @@ impl Drive {
         // Current loop.
         let seen = phi.turned_by(axes.seen);
         let current = filtered.to_dq(seen);
-        let voltage =
-            c.current_loop.step(&mut s.current_loop, reference - current)
-                + s.references.test_voltage;
+        let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
+            + s.references.test_voltage;
+        (s.seen.current, s.seen.voltage) = (current, voltage);
 
         // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
         let applied = phi.turned_by(axes.applied);
@@ -380,6 +390,8 @@ impl Drive {
         let signs = c.dead_time.signs(expected.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
+        (s.seen.measured, s.seen.realised) = (measured.current, modulated.realised);
+        s.seen.dc_link = measured.dc_link;
         if modulated.limited {
             s.current_loop.realised((modulated.realised - total).to_dq(applied));
         }
@@ -427,29 +439,11 @@ impl Drive {
             }
         };
 
-        s.seen = Seen {
-            phi: flux.phi,
-            flux_step: flux.step,
-            rotor_step,
-            reference,
-            current,
-            voltage,
-            measured: measured.current,
-            realised: modulated.realised,
-            dc_link: measured.dc_link,
-            rotor_count,
-        };
+        s.seen.rotor_step = rotor_step;
 
-        // What was computed must make sense before it is put out. (The current is in the voltage.)
-        let sum = wanted.d
-            + wanted.q
-            + voltage.d
-            + voltage.q
-            + s.estimator.delta_i
-            + s.estimator.saliency().q
-            + flux.step
-            + rotor_step;
-        if !sum.is_finite() {
+        // What was computed must make sense before it is put out. (The current and the reference of the step
+        // before are in the voltage, and what the demodulation sees is in the speed.)
+        if !(voltage.d + voltage.q + flux.step + rotor_step).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
         }
         if rotor_step.abs() > c.protection.rotor_step {
@@ -484,14 +478,15 @@ impl Drive {
                 _ => {}
             }
         }
-        let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
-        if let Some(fault) = c.prediction.step(
-            &mut s.prediction,
-            measured.current,
-            modulated.realised,
-            rotor.to_alpha_beta(seen),
-        ) {
-            return Err(fault);
+        // Does the current follow the voltage?
+        Prediction::collect(&mut s.prediction, index, measured.current, modulated.realised);
+        if index == PREDICTED_AT {
+            let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
+            let middle = seen.turned_slightly(-0.5 * CARRIER_SAMPLES as f32 * flux.step);
+            let rotor = rotor.to_alpha_beta(middle);
+            if let Some(fault) = c.prediction.judge(&mut s.prediction, measured.current, rotor) {
+                return Err(fault);
+            }
         }
 
         if self.state == State::Off {

@@ -12,6 +12,7 @@ use core::f32::consts::TAU;
 use crate::angle::UnitVector;
 use crate::fault::Fault;
 use crate::frames::{AlphaBeta, Dq, SQRT_3};
+use crate::injection::CARRIER_SAMPLES;
 use crate::synchronous::CarrierCurrent;
 use crate::tuning::FirstOrder;
 
@@ -91,15 +92,23 @@ pub struct RotorFlux {
 /// State of the comparison.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PredictionState {
+    /// Sum of the currents since the carrier period began, A, and the last one before.
+    currents: AlphaBeta,
     last: AlphaBeta,
-    /// Voltages of the present period and the one before, V.
-    applied: [AlphaBeta; 2],
+    /// Sum of the computed voltages since they were last taken, and what was taken, V.
+    voltages: AlphaBeta,
+    taken: AlphaBeta,
     unexplained: AlphaBeta,
 }
 
-/// Share of the newest value in the filtered unexplained voltage: 2.7 ms at 6 kHz, which takes the
-/// carrier out.
-const SMOOTHING: f32 = 1.0 / 16.0;
+/// Samples of the carrier period in which the sum of the voltages begins anew: what is computed in a sample
+/// acts between the next one and the one after that, and so explains the current two samples later.
+const VOLTAGES_FROM: usize = 8;
+/// Sample in which the comparison is made: the last.
+pub const PREDICTED_AT: usize = CARRIER_SAMPLES - 1;
+
+/// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
+const SMOOTHING: f32 = 0.475;
 /// Share of the expected back-emf that may be wrong as well. All of it: 15° of angle error at 2 A
 /// make the flux 1.7 times what the drive believes.
 const EMF_SHARE: f32 = 1.0;
@@ -124,22 +133,44 @@ impl Prediction {
         Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_step }
     }
 
-    /// One sample: the current, A; the voltage just computed, which acts in the next period, V; and
-    /// the expected voltage of the rotor, V.
-    pub fn step(
+    /// One sample: its number in the carrier period; the current, A; the voltage just computed, which
+    /// acts in the next period, V.
+    #[inline]
+    pub fn collect(
+        state: &mut PredictionState,
+        index: usize,
+        current: AlphaBeta,
+        computed: AlphaBeta,
+    ) {
+        state.currents += current;
+        if index == VOLTAGES_FROM {
+            state.taken = state.voltages;
+            state.voltages = computed;
+        } else {
+            state.voltages += computed;
+        }
+    }
+
+    /// In the last sample of a carrier period, over which the carrier's own current and voltage are zero in
+    /// the mean: the current, A, and the expected voltage of the rotor, V, in the middle of the period.
+    ///
+    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over ten of them.
+    #[inline(never)]
+    pub fn judge(
         &self,
         state: &mut PredictionState,
         current: AlphaBeta,
-        computed: AlphaBeta,
         rotor: AlphaBeta,
     ) -> Option<Fault> {
-        let needed = (current - state.last * self.pole) * self.per_ampere;
-        let unexplained = needed - state.applied[1] - rotor;
+        const MEAN: f32 = 1.0 / CARRIER_SAMPLES as f32;
+        let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
+        let unexplained = (changed * self.per_ampere - state.taken) * MEAN - rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
-        state.last = current;
-        state.applied = [computed, state.applied[0]];
+        (state.last, state.currents) = (current, AlphaBeta::ZERO);
         // The two uncertainties are independent: their squares add.
         let allowed = self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * rotor.length_squared();
-        (state.unexplained.length_squared() > allowed).then_some(Fault::CurrentNotAsPredicted)
+        let explained = state.unexplained.length_squared() <= allowed;
+        // (Not-a-number is not.)
+        (!explained).then_some(Fault::CurrentNotAsPredicted)
     }
 }

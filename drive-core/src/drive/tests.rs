@@ -347,7 +347,11 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         drive.command(Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
         break_it(&mut drive);
-        let compare = drive.step(&load.sample());
+        let mut compare = drive.step(&load.sample());
+        if number == 2 {
+            // A reference is behind its filter, which gives it out in the next step.
+            compare = drive.step(&load.sample());
+        }
         assert_eq!((compare, drive.state()), (Compare::OFF, State::Fault(fault)), "case {number}");
         drive.command(Command::Clear).unwrap();
         drive.command(Command::Configure(&good.build().unwrap())).unwrap();

@@ -17,7 +17,7 @@ use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
 use crate::saliency_check::SaliencyCheck;
 use crate::schedule::Schedule;
-use crate::sensing::Sensing;
+use crate::sensing::{Sensing, Window};
 use crate::sos::Complex;
 use crate::tracker::{Pll, Tracker};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
@@ -107,7 +107,6 @@ impl Coefficients {
 /// Limits in the units of the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Protection {
-    pub trip_a: f32,
     pub dc_over: f32,
     pub dc_under: f32,
     /// Electrical turns per period.
@@ -219,6 +218,12 @@ impl Settings {
                 heat_sink_trip: self.scales.heat_sink_trip,
                 calibration_samples: periods(self.sequence.calibrate_s) as u16,
                 largest_offset: 0.2,
+                trip_a: self.limits.trip_a,
+                dc_window: Window::new(
+                    self.scales.dc_link,
+                    [self.limits.dc_under_v, self.limits.dc_over_v],
+                    self.scales.full_scale,
+                ),
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
@@ -284,7 +289,6 @@ impl Settings {
             motion: self.motion(&motion_design),
             step_per_speed: turns_per_step(60.0),
             protection: Protection {
-                trip_a: self.limits.trip_a,
                 dc_over: self.limits.dc_over_v,
                 dc_under: self.limits.dc_under_v,
                 rotor_step: turns_per_step(highest_rpm),

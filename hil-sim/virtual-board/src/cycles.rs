@@ -20,7 +20,7 @@ use crate::pair::Pair;
 /// Blocks, and the paths of functions that belong to them; the first that fits counts.
 const BLOCKS: [(&str, &[&str]); 9] = [
     ("sensing", &["drive_core::sensing", "induction_drive::adc", "induction_drive::encoder"]),
-    ("protection", &["Drive>::protect", "drive_core::plausibility"]),
+    ("protection", &["Drive>::protect", "drive_core::plausibility", "drive_core::lock_monitor"]),
     ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
     ("tracker", &["drive_core::tracker"]),
     (
@@ -46,7 +46,7 @@ const BLOCKS: [(&str, &[&str]); 9] = [
             "idsp::",
         ],
     ),
-    ("sequence", &["drive_core::drive"]),
+    ("sequence", &["drive_core::drive", "drive_core::motion"]),
 ];
 /// What belongs to none: the timer.
 const REST: &str = "firmware";
