@@ -240,20 +240,22 @@ impl Drive {
             return Compare::OFF;
         }
         let measured = self.c.sensing.step(&self.control.sensing, sample);
+        let mut compare = Compare::OFF;
         let result = match self.protect(sample, &measured) {
             Some(fault) => Err(fault),
             None => match self.state {
                 State::Calibrating => self.calibrate(sample),
-                State::Precharge => Ok(self.precharge(sample)),
-                State::CheckingWiring => self.check_wiring(sample, &measured),
-                _ => self.regulate(sample, &measured),
+                State::Precharge => self.precharge(sample, &mut compare),
+                State::CheckingWiring => self.check_wiring(sample, &measured, &mut compare),
+                _ => self.regulate(sample, &measured, &mut compare),
             },
         };
         self.elapsed = self.elapsed.saturating_add(1);
-        result.unwrap_or_else(|fault| {
+        if let Err(fault) = result {
             self.enter(State::Fault(fault));
-            Compare::OFF
-        })
+            return Compare::OFF;
+        }
+        compare
     }
 
     /// What must hold in every period with the outputs on or about to be.
@@ -290,14 +292,14 @@ impl Drive {
         }
     }
 
-    fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
+    fn calibrate(&mut self, sample: &Sample) -> Result<(), Fault> {
         if self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
             self.enter(State::Precharge);
         }
-        Ok(Compare::OFF)
+        Ok(())
     }
 
-    fn precharge(&mut self, sample: &Sample) -> Compare {
+    fn precharge(&mut self, sample: &Sample, compare: &mut Compare) -> Result<(), Fault> {
         if self.elapsed >= self.c.sequence.precharge {
             if self.wiring_unchecked {
                 self.wiring = WiringCheckState::default();
@@ -306,37 +308,54 @@ impl Drive {
                 self.magnetising_from_here(sample);
             }
         }
-        Compare::LOW_SIDES_ON
+        *compare = Compare::LOW_SIDES_ON;
+        Ok(())
     }
 
     /// Short voltage pulses, without control.
-    fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        match self.c.wiring.step(&mut self.wiring, measured.phases)? {
+    fn check_wiring(
+        &mut self,
+        sample: &Sample,
+        measured: &Measured,
+        compare: &mut Compare,
+    ) -> Result<(), Fault> {
+        *compare = match self.c.wiring.step(&mut self.wiring, measured.phases)? {
             Next::Apply(voltage, flowing) => {
                 let signs = self.c.dead_time.signs(flowing.to_abc());
                 let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
                 let [a, b, c] =
                     self.c.modulator.step(voltage, compensation, measured.dc_link).compare;
-                Ok(Compare { a, b, c, enabled: true })
+                Compare { a, b, c, enabled: true }
             }
             Next::Passed => {
                 self.wiring_unchecked = false;
                 self.magnetising_from_here(sample);
-                Ok(Compare::LOW_SIDES_ON)
+                Compare::LOW_SIDES_ON
             }
-        }
+        };
+        Ok(())
     }
 
     fn magnetising_from_here(&mut self, sample: &Sample) {
-        let count = self.rotor_count(sample);
+        self.count_rotor(sample);
+        let count = self.control.seen.rotor_count;
         self.c.motion.start(&mut self.control.motion, count);
         self.enter(State::Magnetising);
     }
 
     /// Regulates the current. This is the control law, top to bottom.
-    fn regulate(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        let rotor_count = self.rotor_count(sample);
-        let wanted = self.reference(rotor_count)?;
+    fn regulate(
+        &mut self,
+        sample: &Sample,
+        measured: &Measured,
+        compare: &mut Compare,
+    ) -> Result<(), Fault> {
+        // What is done once a carrier period goes by this number.
+        let index = self.control.carrier.next();
+        if self.c.source == AngleSource::Encoder || index == COUNTED_AT {
+            self.count_rotor(sample);
+        }
+        let wanted = self.reference()?;
         let held = self.state == State::Magnetising;
         let (c, s) = (&self.c, near(&mut self.control));
         let reference = Dq {
@@ -344,7 +363,6 @@ impl Drive {
             q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
         };
         s.seen.reference = reference;
-        s.seen.rotor_count = rotor_count;
 
         // Flux angle at the sample.
         let count = match (self.mode, c.source) {
@@ -359,7 +377,6 @@ impl Drive {
         };
 
         (s.seen.phi, s.seen.flux_step) = (flux.phi, flux.step);
-        let index = s.carrier.next();
         if index == TURNED_AT {
             s.axes = c.axes(flux.step, s.references.injection_axis);
         }
@@ -446,7 +463,7 @@ impl Drive {
         if !(voltage.d + voltage.q + flux.step + rotor_step).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
         }
-        if rotor_step.abs() > c.protection.rotor_step {
+        if index == SPEED_AT && rotor_step.abs() > c.protection.rotor_step {
             return Err(Fault::OverSpeed);
         }
         if c.inject {
@@ -457,7 +474,7 @@ impl Drive {
                     let judged = s.carrier.is_settled() && (held || self.mode != Mode::Learning);
                     if let (Some(monitor), true) = (&c.lock_monitor, judged) {
                         let seen = s.estimator.synchronous.seen;
-                        monitor.step(&mut s.lock, &seen, s.carrier.share, held)?;
+                        monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, held)?;
                     }
                 }
                 // Do both sensors see the carrier?
@@ -489,25 +506,26 @@ impl Drive {
             }
         }
 
-        if self.state == State::Off {
-            return Ok(Compare::OFF); // stopped
+        // If it has not stopped.
+        if self.state != State::Off {
+            let [a, b, c] = modulated.compare;
+            *compare = Compare { a, b, c, enabled: true };
         }
-        let [a, b, c] = modulated.compare;
-        Ok(Compare { a, b, c, enabled: true })
+        Ok(())
     }
 
     /// Where the rotor is, counted as by an encoder: by the encoder, or by the flux less the slip.
     #[inline]
-    fn rotor_count(&mut self, sample: &Sample) -> u32 {
+    fn count_rotor(&mut self, sample: &Sample) {
         let s = &mut self.control;
-        match self.c.source {
+        s.seen.rotor_count = match self.c.source {
             AngleSource::Encoder => sample.encoder,
             AngleSource::Injection => s.rotor.follow(s.estimator.flux().phi - s.indirect.slip),
-        }
+        };
     }
 
     /// The current to regulate in this state, A; moves on to the next state where it is time.
-    fn reference(&mut self, rotor_count: u32) -> Result<Dq, Fault> {
+    fn reference(&mut self) -> Result<Dq, Fault> {
         let r = &mut self.control.references;
         let i_q = match self.state {
             State::Magnetising => return self.magnetise(),
@@ -518,7 +536,8 @@ impl Drive {
                     Mode::Speed => Goal::Speed(r.speed),
                     _ => Goal::Position(r.turns),
                 };
-                r.current.q = self.c.motion.step(&mut self.control.motion, goal, rotor_count);
+                let count = self.control.seen.rotor_count;
+                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count);
                 r.current.q
             }
             State::Stopping => {
@@ -631,9 +650,11 @@ const VOLTAGE_LEAD: f32 = 1.5;
 /// Samples of the carrier period in which there is done what is done once in it. It is spread: 1 to 4 are
 /// those of the [synchronous demodulation](crate::synchronous), 8 that of the magnetising current.
 const TURNED_AT: usize = 0;
+const COUNTED_AT: usize = 3;
 const MONITORED_AT: usize = 5;
 const WATCHED_AT: usize = 6;
 const FITTED_AT: usize = 7;
+const SPEED_AT: usize = 8;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

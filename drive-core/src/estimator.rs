@@ -200,18 +200,18 @@ impl Estimator {
     /// [`Lost`] when the speed has reached its limit.
     #[inline]
     pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
-        let held = match &self.angle_loop {
+        match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);
                 let rotor_step = state.tracker.step - slip_step;
                 state.rotor_step += ROTOR_SMOOTHING * (rotor_step - state.rotor_step);
-                held
+                if held { Ok(()) } else { Err(Lost) }
             }
-            AngleLoop::Pll { pll, .. } => {
-                pll.step(&mut state.tracker, &mut state.rotor_step, state.push, slip_step)
+            AngleLoop::Pll { .. } => {
+                Pll::step(&mut state.tracker, &mut state.rotor_step, state.push, slip_step);
+                Ok(())
             }
-        };
-        if held { Ok(()) } else { Err(Lost) }
+        }
     }
 }

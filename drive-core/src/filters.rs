@@ -29,7 +29,7 @@ use crate::sos::{AlphaBetaState, Sos, SosState};
 /// large: for control take [`LPF`]. It passes everything above 650 Hz: it is no anti-alias or
 /// noise filter. 600 Hz lies 6.5 Hz inside the -40 dB edge, so sidebands of an injection seen in
 /// alpha-beta leak through above about 6 Hz electrical.
-pub const LPF_AS_PRINTED: Sos<4> = Sos::from_f64(&[
+pub const LPF_AS_PRINTED: Sos<4> = Sos::with_gain_last(&[
     [
         0.5901366412539047,
         -1.0118518814687643,
@@ -61,7 +61,7 @@ pub const LPF_AS_PRINTED: Sos<4> = Sos::from_f64(&[
 ]);
 
 /// [`LPF_AS_PRINTED`] divided by its gain at dc: the gain at dc of the rounded coefficients is
-/// 1 to 2e-8 (at 60 Hz: 1.0013), and everything else moves by the same +0.50 dB.
+/// 1 to 3e-7 (at 60 Hz: 1.0013), and everything else moves by the same +0.50 dB.
 pub const LPF: Sos<4> = LPF_AS_PRINTED.with_unit_dc_gain();
 
 /// "BPF" (Table 8): a 4th-order band pass around the injected 600 Hz.

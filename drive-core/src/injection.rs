@@ -82,6 +82,8 @@ pub struct Carrier {
     index: usize,
     /// Share of the amplitude that is put out: 1 unless the fundamental leaves less.
     pub share: f32,
+    /// 1 over its square.
+    pub per_share_squared: f32,
     /// Carrier periods since the share changed.
     unchanged: u8,
 }
@@ -89,7 +91,7 @@ pub struct Carrier {
 impl Default for Carrier {
     /// At its beginning, all of it.
     fn default() -> Self {
-        Self { index: 0, share: 1.0, unchanged: u8::MAX }
+        Self { index: 0, share: 1.0, per_share_squared: 1.0, unchanged: u8::MAX }
     }
 }
 
@@ -150,8 +152,12 @@ impl Carrier {
         } else {
             self.share
         };
-        self.unchanged = if share == self.share { self.unchanged.saturating_add(1) } else { 0 };
-        self.share = share;
+        if share == self.share {
+            self.unchanged = self.unchanged.saturating_add(1);
+        } else {
+            self.unchanged = 0;
+            (self.share, self.per_share_squared) = (share, 1.0 / (share * share));
+        }
         if share < LEAST_SHARE { Err(NoRoom) } else { Ok(()) }
     }
 

@@ -214,8 +214,8 @@ impl LockMonitor {
         self.inverse_square = table.ratio.map(|r| 1.0 / (r * r));
     }
 
-    /// One carrier period: what is demodulated with `put_out`, the share of the carrier that is put
-    /// out. While the axis is `held` the flux is where it must be, with i_q = 0, and the baseline is
+    /// One carrier period: what is demodulated, and `per_share_squared`, one over the square of the share of
+    /// the carrier that is put out. While the axis is `held` the flux is where it must be, with i_q = 0, and the baseline is
     /// taken.
     ///
     /// # Errors
@@ -225,10 +225,10 @@ impl LockMonitor {
         &self,
         state: &mut LockMonitorState,
         seen: &Saliency,
-        put_out: f32,
+        per_share_squared: f32,
         held: bool,
     ) -> Result<(), Fault> {
-        let carrier = seen.carrier_squared / (put_out * put_out);
+        let carrier = seen.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
         if state.weak >= WEAK_PERIODS {
             return Err(Fault::CarrierWeak);
@@ -337,7 +337,7 @@ mod tests {
         let monitor = monitor();
         let mut state = ready(&monitor);
         for _ in 0..600 {
-            assert_eq!(monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 0.6, false), Ok(()));
+            assert_eq!(monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 1.0 / 0.36, false), Ok(()));
         }
         assert!(state.loss.abs() < 1e-3, "{}", state.loss);
     }

@@ -80,6 +80,8 @@ pub struct MotionState {
     pub acceleration: f32,
     /// Speed of the rotor, turns/s.
     speed: f32,
+    /// The speed that position or command want, turns/s.
+    wanted: f32,
     origin: u32,
     last: Option<u32>,
     phase: u8,
@@ -119,30 +121,36 @@ impl Motion {
 
     /// Called every control period; every 60th time it computes a new current on the quadrature
     /// axis from the goal and the position `count`. Returns that current, A.
+    ///
+    /// The work is spread over three periods: speed, what is wanted of it, current.
     pub fn step(&self, state: &mut MotionState, goal: Goal, count: u32) -> f32 {
-        if state.phase > 0 {
-            state.phase -= 1;
-            return state.output;
+        match state.phase {
+            0 => {
+                let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
+                state.last = Some(count);
+                let speed = moved * self.turns_per_count * self.rate;
+                state.speed += self.smoothing * (speed - state.speed);
+            }
+            1 => {
+                state.wanted = match goal {
+                    Goal::Speed(speed) => speed,
+                    Goal::Position(turns) => self.braking_curve(turns - self.turns(state, count)),
+                };
+            }
+            2 => {
+                let change = limited(state.wanted, self.limit) - state.reference;
+                let step = limited(change, self.ramp);
+                state.reference += step;
+                state.acceleration = step * (1.0 / DIVIDER as f32);
+
+                let error = state.reference - state.speed;
+                let wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
+                state.output = limited(wanted, self.i_q_limit);
+                state.pi.realised(state.output - wanted);
+            }
+            _ => {}
         }
-        state.phase = DIVIDER - 1;
-
-        let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
-        state.last = Some(count);
-        let speed = moved * self.turns_per_count * self.rate;
-        state.speed += self.smoothing * (speed - state.speed);
-
-        let wanted = match goal {
-            Goal::Speed(speed) => speed,
-            Goal::Position(turns) => self.braking_curve(turns - self.turns(state, count)),
-        };
-        let step = limited(limited(wanted, self.limit) - state.reference, self.ramp);
-        state.reference += step;
-        state.acceleration = step * (1.0 / DIVIDER as f32);
-
-        let wanted =
-            self.pi.step(&mut state.pi, state.reference - state.speed) + self.forward * step;
-        state.output = limited(wanted, self.i_q_limit);
-        state.pi.realised(state.output - wanted);
+        state.phase = if state.phase < DIVIDER - 1 { state.phase + 1 } else { 0 };
         state.output
     }
 

@@ -37,6 +37,24 @@ impl<const N: usize> Sos<N> {
         Self { sections }
     }
 
+    /// The same with `b0` = 1 in all sections but the last, which has the gain of all: where the
+    /// coefficients are constants a multiplication by 1 is none.
+    pub const fn with_gain_last(rows: &[[f64; 5]; N]) -> Self {
+        let mut rows = *rows;
+        let mut n = 0;
+        while n + 1 < N {
+            let b0 = rows[n][0];
+            let mut k = 0;
+            while k < 3 {
+                rows[n][k] /= b0;
+                rows[N - 1][k] *= b0;
+                k += 1;
+            }
+            n += 1;
+        }
+        Self::from_f64(&rows)
+    }
+
     /// The same filter with H(1) = 1. The gain goes into the last section, so nothing before it
     /// changes its range; one more rounding of three coefficients.
     pub const fn with_unit_dc_gain(mut self) -> Self {

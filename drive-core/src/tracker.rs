@@ -75,24 +75,21 @@ pub struct Pll {
     integral: f32,
     /// The same of the acceleration.
     jerk: f32,
-    /// Largest speed, turns per period.
-    limit: f32,
 }
 
 /// Largest error that is corrected at once, rad.
 const LARGEST_ERROR: f32 = 0.6;
 
 impl Pll {
-    /// For a bandwidth in Hz, the period of the control, s, and the largest speed, turns per period.
+    /// For a bandwidth in Hz and the period of the control, s.
     #[inline]
-    pub fn new(bandwidth_hz: f32, period_s: f32, limit: f32) -> Self {
+    pub fn new(bandwidth_hz: f32, period_s: f32) -> Self {
         let w = TAU * bandwidth_hz * period_s;
         let c = tuning::THIRD_POLE as f32;
         Self {
             proportional: (2.0 + c) * w / TAU,
             integral: (1.0 + 2.0 * c) * w * w / TAU,
             jerk: c * w * w * w / TAU,
-            limit,
         }
     }
 
@@ -108,21 +105,13 @@ impl Pll {
     }
 
     /// Moves on by one period, pushed by the error that was seen last, with the slip, turns per period. The
-    /// rotor's speed is kept in `rotor_step`. False when a speed has reached its limit or is not a
-    /// number: the angle is lost.
+    /// rotor's speed is kept in `rotor_step`. (The drive looks at its limit and whether it is a number.)
     #[inline]
-    pub fn step(
-        &self,
-        state: &mut TrackerState,
-        rotor_step: &mut f32,
-        push: Push,
-        slip_step: f32,
-    ) -> bool {
+    pub fn step(state: &mut TrackerState, rotor_step: &mut f32, push: Push, slip_step: f32) {
         state.acceleration += push.acceleration;
         *rotor_step += push.speed + state.acceleration;
         state.step = *rotor_step + slip_step;
         state.angle += Angle::within_turn(state.step + push.angle);
-        state.step < self.limit && state.step > -self.limit
     }
 }
 

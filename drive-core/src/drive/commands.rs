@@ -1,6 +1,7 @@
 //! The commands: what is taken, limited, or refused in which state.
 
 use super::{ControlState, Drive, References};
+
 use crate::angle::Angle;
 use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};

@@ -363,7 +363,7 @@ impl Settings {
                     t.current_saliency,
                     self.sequence.i_d,
                 ),
-                pll: Pll::new(t.bandwidth_hz, PERIOD_S, limit),
+                pll: Pll::new(t.bandwidth_hz, PERIOD_S),
             },
             _ => AngleLoop::Pii {
                 reference: match p.learned {
