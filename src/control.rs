@@ -109,6 +109,19 @@ fn ADC1_2() {
     unsafe { (*RUNNING.0.get()).assume_init_mut() }.period();
 }
 
+// Not inlined: the interrupt would have to save registers for it in every period.
+#[inline(never)]
+fn take_order(
+    drive: &mut Drive,
+    orders: &mut Receiver<'static, Order>,
+    answers: &mut Sender<'static, Answer>,
+) {
+    if let Some(answer) = orders.take_with(|order| drive.command(order.command())) {
+        // There is room: the main loop takes the last answer before it sends an order.
+        answers.send(answer);
+    }
+}
+
 /// Whether the outputs are off, and stay off until the next order.
 fn is_off(drive: &Drive) -> bool {
     matches!(drive.state(), State::Off | State::Fault(_))
@@ -182,12 +195,10 @@ impl Running {
         }
 
         // An order comes between two steps: it acts from the next one on.
-        let answered = orders.take_with(|order| drive.command(order.command()));
-        IS_OFF.store(is_off(drive), Ordering::Relaxed);
-        if let Some(answer) = answered {
-            // There is room: the main loop takes the last answer before it sends an order.
-            answers.send(answer);
+        if orders.is_waiting() {
+            take_order(drive, orders, answers);
         }
+        IS_OFF.store(is_off(drive), Ordering::Relaxed);
         trace.step(|| drive.telemetry());
 
         self.seen = self.seen.and(hardware);

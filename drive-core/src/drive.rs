@@ -264,28 +264,32 @@ impl Drive {
         let (sensing, state) = (&self.c.sensing, &self.control.sensing);
         let fine = sample.hardware == Hardware::NONE
             && sensing.is_well_inside(state, sample, measured.phases.c);
-        if fine { None } else { self.what_is_wrong(sample, measured) }
+        if fine {
+            None
+        } else {
+            self.what_is_wrong(sample, measured.phases.a, measured.phases.b, measured.dc_link)
+        }
     }
 
-    /// The first thing that is wrong, if anything is.
+    /// The first thing that is wrong, if anything is, with the currents in A and the dc link in V.
     #[inline(never)]
-    fn what_is_wrong(&self, sample: &Sample, measured: &Measured) -> Option<Fault> {
+    fn what_is_wrong(&self, sample: &Sample, a: f32, b: f32, dc_link: f32) -> Option<Fault> {
         if sample.hardware != Hardware::NONE {
             return Some(of_hardware(sample.hardware));
         }
         if let Some(fault) = self.c.sensing.check(sample) {
             return Some(fault);
         }
-        let (p, i, trip_a) = (&self.c.protection, measured.phases, self.c.sensing.trip_a);
-        if i.a.abs() > trip_a {
+        let (p, trip_a) = (&self.c.protection, self.c.sensing.trip_a);
+        if a.abs() > trip_a {
             Some(Fault::OverCurrentA)
-        } else if i.b.abs() > trip_a {
+        } else if b.abs() > trip_a {
             Some(Fault::OverCurrentB)
-        } else if i.c.abs() > trip_a {
+        } else if (a + b).abs() > trip_a {
             Some(Fault::OverCurrentC)
-        } else if measured.dc_link > p.dc_over {
+        } else if dc_link > p.dc_over {
             Some(Fault::DcLinkOverVoltage)
-        } else if measured.dc_link < p.dc_under {
+        } else if dc_link < p.dc_under {
             Some(Fault::DcLinkUnderVoltage)
         } else {
             None
@@ -647,13 +651,13 @@ fn near(control: &mut ControlState) -> &mut ControlState {
 /// Periods from the sample to the middle of the period in which its voltage acts.
 const VOLTAGE_LEAD: f32 = 1.5;
 
-/// Samples of the carrier period in which there is done what is done once in it. It is spread: 1 to 4 are
+/// Samples of the carrier period in which there is done what is done once in it. It is spread: 1 to 5 are
 /// those of the [synchronous demodulation](crate::synchronous), 8 that of the magnetising current.
 const TURNED_AT: usize = 0;
 const COUNTED_AT: usize = 3;
-const MONITORED_AT: usize = 5;
-const WATCHED_AT: usize = 6;
-const FITTED_AT: usize = 7;
+const FITTED_AT: usize = 5;
+const MONITORED_AT: usize = 6;
+const WATCHED_AT: usize = 7;
 const SPEED_AT: usize = 8;
 
 /// The most telling of the events: what switched off first comes first.

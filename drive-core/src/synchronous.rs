@@ -32,8 +32,10 @@ use crate::injection::CARRIER_SAMPLES;
 const X_AT: usize = 1;
 const Y_AT: usize = 2;
 const Q_AT: usize = 3;
-/// Sample in which the reference current is looked at, the middle, and averaged; with that all is seen.
+/// From this sample on all that can be seen is there.
 pub const SEEN_AT: usize = 4;
+/// Sample in which the reference current is looked at: it is then as old as the other signals are.
+const REFERENCE_AT: usize = 5;
 
 /// Of the mixed current along and across the axis: real and imaginary parts.
 type Mixed = [f32; 4];
@@ -75,9 +77,8 @@ pub struct SynchronousState {
     averages: [Average; 4],
     /// X and Y, times [`WEIGHTS`], A.
     mean: Mixed,
-    i_q: f32,
     i_q_earlier: [f32; 3],
-    /// What was seen last; whole and new in every sample [`SEEN_AT`] of the carrier.
+    /// What was seen last; whole and new from sample [`SEEN_AT`] of the carrier on.
     pub seen: Saliency,
 }
 
@@ -138,7 +139,7 @@ impl SynchronousState {
             X_AT => self.average(0),
             Y_AT => self.average(2),
             Q_AT => self.see(),
-            SEEN_AT => self.see_reference(i_q),
+            REFERENCE_AT => self.see_reference(i_q),
             _ => {}
         }
     }
@@ -150,13 +151,11 @@ impl SynchronousState {
         }
     }
 
-    /// The same average of the reference, of its samples in the middle of the carrier periods: 1, 3, 3, 1
-    /// eighths.
+    /// The same average of the reference, of one sample in each of the carrier periods: 1, 3, 3, 1 eighths.
     fn see_reference(&mut self, now: f32) {
-        let (i_q, [one, two, three]) = (0.125 * self.i_q, self.i_q_earlier);
+        let (i_q, [one, two, three]) = (0.125 * now, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
         self.seen.i_q = i_q + one;
-        self.i_q = now;
     }
 
     fn see(&mut self) {
