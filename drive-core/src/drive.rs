@@ -14,14 +14,14 @@ use crate::fault::Fault;
 use crate::filters::{LPF, LpfState, lpf_lag_samples};
 use crate::frames::{AlphaBeta, Dq};
 use crate::indirect::IndirectState;
-use crate::injection::{CARRIER_SAMPLES, Carrier, CarrierPeriod};
+use crate::injection::{Carrier, CarrierPeriod};
 use crate::inverter_drop::InverterDropState;
 use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::learning::{Learned, LearningState};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::pi::{DqPiState, ReferenceState};
-use crate::plausibility::{CarrierWatch, PREDICTED_AT, Prediction, PredictionState};
+use crate::plausibility::{CarrierWatch, JUDGED_EVERY, Prediction, PredictionState, is_judged};
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
 use crate::sensing::{Measured, SensingState};
 use crate::settings::{AngleSource, Coefficients};
@@ -109,8 +109,8 @@ struct ControlState {
     learning: LearningState,
 }
 
-/// What turns slowly against the flux, as unit vectors seen from where it is at the sample; new in the
-/// first sample of a carrier period.
+/// What turns slowly against the flux, as unit vectors seen from where it is at the sample; new once a
+/// carrier period.
 #[derive(Clone, Copy, Debug)]
 struct Axes {
     /// The injection axis, seen from the flux.
@@ -124,6 +124,7 @@ struct Axes {
 }
 
 impl Default for Axes {
+    /// With the flux at rest.
     fn default() -> Self {
         let [along, across] = [(1.0, 0.0), (0.0, 1.0)].map(|(cos, sin)| UnitVector { cos, sin });
         Self { injection: across, carrier: across, seen: along, applied: along }
@@ -355,7 +356,7 @@ impl Drive {
         compare: &mut Compare,
     ) -> Result<(), Fault> {
         // What is done once a carrier period goes by this number.
-        let index = self.control.carrier.next();
+        let index = self.control.carrier.advance();
         if self.c.source == AngleSource::Encoder || index == COUNTED_AT {
             self.count_rotor(sample);
         }
@@ -501,9 +502,9 @@ impl Drive {
         }
         // Does the current follow the voltage?
         Prediction::collect(&mut s.prediction, index, measured.current, modulated.realised);
-        if index == PREDICTED_AT {
+        if is_judged(index) {
             let rotor = c.prediction.rotor_voltage(s.indirect.magnetising, rotor_step);
-            let middle = seen.turned_slightly(-0.5 * CARRIER_SAMPLES as f32 * flux.step);
+            let middle = seen.turned_slightly(-0.5 * JUDGED_EVERY as f32 * flux.step);
             let rotor = rotor.to_alpha_beta(middle);
             if let Some(fault) = c.prediction.judge(&mut s.prediction, measured.current, rotor) {
                 return Err(fault);
@@ -652,13 +653,14 @@ fn near(control: &mut ControlState) -> &mut ControlState {
 const VOLTAGE_LEAD: f32 = 1.5;
 
 /// Samples of the carrier period in which there is done what is done once in it. It is spread: 1 to 5 are
-/// those of the [synchronous demodulation](crate::synchronous), 8 that of the magnetising current.
-const TURNED_AT: usize = 0;
+/// those of the [synchronous demodulation](crate::synchronous), 8 that of the magnetising current, and in
+/// 0 and 5 the current is [judged](is_judged).
 const COUNTED_AT: usize = 3;
-const FITTED_AT: usize = 5;
 const MONITORED_AT: usize = 6;
 const WATCHED_AT: usize = 7;
-const SPEED_AT: usize = 8;
+const FITTED_AT: usize = 8;
+const TURNED_AT: usize = 9;
+const SPEED_AT: usize = 9;
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {

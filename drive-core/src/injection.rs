@@ -169,7 +169,7 @@ impl Carrier {
     /// Goes on to the next PWM period: its number in the carrier period, 0 to 9, which counts with or
     /// without a carrier.
     #[inline]
-    pub fn next(&mut self) -> usize {
+    pub fn advance(&mut self) -> usize {
         // Below ten by construction: this is for a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
@@ -211,7 +211,7 @@ mod tests {
         let mut carrier = Carrier::default();
         let (mut i, mut peak) = (0.0_f64, 0.0_f64);
         for n in 0..6000 {
-            let index = carrier.next();
+            let index = carrier.advance();
             let now = carrier.at(&injection, index);
             // `i` is the current at the start of the period in which the voltage acts, one sample
             // after the one it was computed from.

@@ -92,7 +92,7 @@ pub struct RotorFlux {
 /// State of the comparison.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PredictionState {
-    /// Sum of the currents since the carrier period began, A, and the last one before.
+    /// Sum of the currents since it was judged last, A, and the last one before.
     currents: AlphaBeta,
     last: AlphaBeta,
     /// Sum of the computed voltages since they were last taken, and what was taken, V.
@@ -101,14 +101,25 @@ pub struct PredictionState {
     unexplained: AlphaBeta,
 }
 
-/// Samples of the carrier period in which the sum of the voltages begins anew: what is computed in a sample
-/// acts between the next one and the one after that, and so explains the current two samples later.
-const VOLTAGES_FROM: usize = 8;
-/// Sample in which the comparison is made: the last.
-pub const PREDICTED_AT: usize = CARRIER_SAMPLES - 1;
+/// Samples from one comparison to the next: half a carrier period. Over a whole one the carrier would be zero
+/// in the mean, but a sensor that lies would drive the current for twice as long.
+pub const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
+
+/// Whether the comparison is made in this sample of the carrier period.
+#[inline]
+pub fn is_judged(index: usize) -> bool {
+    matches!(index, 0 | JUDGED_EVERY)
+}
+
+/// Whether the sum of the voltages begins anew in this sample: what is computed in a sample acts between the
+/// next one and the one after that, and so explains the current two samples later.
+#[inline]
+fn begins(index: usize) -> bool {
+    matches!(index, 4 | 9)
+}
 
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
-const SMOOTHING: f32 = 0.475;
+const SMOOTHING: f32 = 0.276;
 /// Share of the expected back-emf that may be wrong as well. All of it: 15° of angle error at 2 A
 /// make the flux 1.7 times what the drive believes.
 const EMF_SHARE: f32 = 1.0;
@@ -143,7 +154,7 @@ impl Prediction {
         computed: AlphaBeta,
     ) {
         state.currents += current;
-        if index == VOLTAGES_FROM {
+        if begins(index) {
             state.taken = state.voltages;
             state.voltages = computed;
         } else {
@@ -151,10 +162,10 @@ impl Prediction {
         }
     }
 
-    /// In the last sample of a carrier period, over which the carrier's own current and voltage are zero in
-    /// the mean: the current, A, and the expected voltage of the rotor, V, in the middle of the period.
+    /// In the sample in which it [is](is_judged): the current, A, and the expected voltage of the rotor, V,
+    /// in the middle of the samples since the last time.
     ///
-    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over ten of them.
+    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over [`JUDGED_EVERY`] of them.
     #[inline(never)]
     pub fn judge(
         &self,
@@ -162,7 +173,7 @@ impl Prediction {
         current: AlphaBeta,
         rotor: AlphaBeta,
     ) -> Option<Fault> {
-        const MEAN: f32 = 1.0 / CARRIER_SAMPLES as f32;
+        const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
         let unexplained = (changed * self.per_ampere - state.taken) * MEAN - rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;

@@ -125,9 +125,9 @@ impl SynchronousState {
             self.last = *period;
             *period = Period { sum: mixed, ramp: mixed };
         } else {
-            for n in 0..4 {
-                period.sum[n] += mixed[n];
-                period.ramp[n] += period.sum[n];
+            for ((sum, ramp), x) in period.sum.iter_mut().zip(&mut period.ramp).zip(mixed) {
+                *sum += x;
+                *ramp += *sum;
             }
         }
     }

@@ -138,6 +138,7 @@ impl Drive {
             injection_axis: self.c.injection_axis,
             ..References::default()
         };
+        self.control.axes = self.c.axes(0.0, self.c.injection_axis);
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
         Ok(Taken::AsGiven)
