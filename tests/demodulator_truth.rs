@@ -183,5 +183,6 @@ fn the_printed_chain_cannot_track() {
     let mut rig = regulating(&config, 1, 1.0, 0.5);
     let mut worst = 0.0_f64;
     rig.run(3.0, |p| worst = worst.max(p.angle_error_deg.abs()));
-    assert!(worst > 45.0, "{worst} deg: the printed chain held the angle");
+    // A chain that tracks stays within 13 degrees.
+    assert!(worst > 30.0, "{worst} deg: the printed chain held the angle");
 }

@@ -63,7 +63,7 @@ impl Places {
         Ok(Self {
             coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
             control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
-            phi: drive + at("Drive", "telemetry")? + at("Telemetry", "phi")?,
+            phi: drive + at("Drive", "control")? + at("ControlState", "seen")? + at("Seen", "phi")?,
             data: (data, data_end - data),
             ccm: (ccm, running.0 + running.1 - ccm),
             stack: (stack, stack_end - stack),

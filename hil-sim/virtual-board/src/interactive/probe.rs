@@ -1,11 +1,11 @@
-//! What the drive on the board believes: its telemetry, read from the RAM of the core.
+//! What the drive on the board believes: what its telemetry is made of, read from the RAM of the core.
 
 use anyhow::{Context, Result};
 
 use crate::bench::Board;
 use crate::image::Image;
 
-/// Where the telemetry lies.
+/// Where that lies.
 pub struct Probe {
     phi: u32,
     rotor_step: u32,
@@ -39,8 +39,8 @@ impl Probe {
             |name: &str, member: &str| Ok::<u32, anyhow::Error>(image.member(name, member)?.1);
         let running = image.symbol("control7RUNNING").context("the drive in RAM")?.0;
         let drive = running + place("Running", "control")? + place("Control", "drive")?;
-        let telemetry = drive + place("Drive", "telemetry")?;
-        let at = |member: &str| Ok::<u32, anyhow::Error>(telemetry + place("Telemetry", member)?);
+        let seen = drive + place("Drive", "control")? + place("ControlState", "seen")?;
+        let at = |member: &str| Ok::<u32, anyhow::Error>(seen + place("Seen", member)?);
         let q = place("Dq", "q")?;
         Ok(Self {
             phi: at("phi")?,
