@@ -174,6 +174,10 @@ pub struct Board {
     pub resets: Vec<(u64, Reset)>,
     /// The longest control interrupt, when cycles are counted.
     pub worst: Worst,
+    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    pended: Option<u64>,
+    /// Longest from there to its first instruction, ticks.
+    pub latest_start: u64,
     /// The core is stopped before the n-th instruction in the flash from here on, if set, and
     /// [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
@@ -223,6 +227,8 @@ impl Board {
             short_pulses: 0,
             resets: Vec::new(),
             worst: Worst::default(),
+            pended: None,
+            latest_start: 0,
             preempt_at: None,
         };
         board.see();
@@ -334,6 +340,10 @@ impl Board {
 
     /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
     pub fn pend(&mut self, exception: u16) {
+        // One that runs already is not waited for by anything but itself.
+        if exception == 16 + IRQ_ADC1_2 && self.entered.is_none() {
+            self.pended = Some(self.cpu.chip().now);
+        }
         self.chip().scs.pend(exception);
     }
 
@@ -568,6 +578,9 @@ impl Board {
             hardware,
         };
         let (began, accesses) = (chip.now, chip.accesses);
+        if let Some(at) = self.pended.take() {
+            self.latest_start = self.latest_start.max(began - at);
+        }
         self.entered = Some(Entered { began, sample, ended: ended[0], had_order, accesses });
     }
 
