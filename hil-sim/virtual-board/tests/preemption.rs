@@ -25,8 +25,8 @@ const LATEST_START: u64 = CYCLES_PER_US as u64;
 /// regulates and the console talks. Registers and stack are compared after each, with the
 /// floating-point registers poisoned inside; the log is whole. None of them waits for what it preempts.
 #[test]
-fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log_intact() -> Result<()>
-{
+fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log_intact()
+-> Result<()> {
     let mut options = Options::new(&Config::default(), 5);
     options.counting = Counting { cycles: true, every_instruction: true };
     let mut pair = Pair::new(Image::built()?, options)?;
@@ -58,7 +58,8 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
     // Ten lines a second.
     assert!(log.len() as u64 >= periods / 600, "{} lines in {periods} periods", log.len());
-    let latest = heard.lines().filter_map(|line| line.split_once("latest start ")?.1.split_once(' '));
+    let latest =
+        heard.lines().filter_map(|line| line.split_once("latest start ")?.1.split_once(' '));
     let told: f64 = latest.last().context("no status")?.0.parse()?;
     let seen = board.latest_start;
     println!("the latest start {seen} cycles after it was asked for; {told} us by the status");
