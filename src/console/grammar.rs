@@ -1,6 +1,6 @@
 //! What can be asked for: a line in, a [`Request`] or a reason why not out.
 
-use core::fmt;
+use core::{fmt, str};
 
 use drive_core::Mode;
 use drive_core::settings::AngleSource;
@@ -151,8 +151,9 @@ pub const HELP: [&str; 19] = [
 ///
 /// # Errors
 /// Why not. A line is understood as a whole or not at all.
+#[inline(never)]
 pub fn parse(line: &str) -> Result<Request, Misunderstood> {
-    let mut words = line.split_ascii_whitespace();
+    let mut words = Words(line.split_ascii_whitespace());
     let mut word = |what| words.next().ok_or(Misunderstood::Missing(what));
     let request = match word("a command")? {
         "help" => Request::Help,
@@ -215,6 +216,17 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         _ => return Err(Misunderstood::Command),
     };
     if words.next().is_some() { Err(Misunderstood::TooMuch) } else { Ok(request) }
+}
+
+/// The words of a line.
+struct Words<'a>(str::SplitAsciiWhitespace<'a>);
+
+impl<'a> Words<'a> {
+    /// Not inlined: it is asked for at twenty places, never in a hurry.
+    #[inline(never)]
+    fn next(&mut self) -> Option<&'a str> {
+        self.0.next()
+    }
 }
 
 /// A number: digits with or without sign, point and power of ten (`-0.5`, `1e-3`).

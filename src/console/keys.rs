@@ -189,16 +189,35 @@ macro_rules! whole {
 macro_rules! word {
     ($name:literal, |$s:ident| $place:expr, $($word:literal = $value:pat => $make:expr),+) => {{
         const WORDS: &[&str] = &[$($word),+];
-        let get: fn(&Everything) -> u8 = |$s| match $place { $($value => place($word, WORDS),)+ };
+        let get: fn(&Everything) -> u8 =
+            |$s| match $place { $($value => const { place($word, WORDS) },)+ };
         let set: fn(&mut Everything, u8) =
-            |$s, index| { $(if index == place($word, WORDS) { $place = $make; })+ };
+            |$s, index| { $(if index == const { place($word, WORDS) } { $place = $make; })+ };
         Key { name: $name, unit: "", access: Access::Word { words: WORDS, get, set } }
     }};
 }
 
-/// The place of a word among words.
-fn place(word: &str, words: &[&str]) -> u8 {
-    words.iter().take_while(|other| **other != word).fold(0, |place, _| place + 1)
+macro_rules! yes_or_no {
+    ($name:literal, $($path:ident).+) => {
+        word!($name, |s| s.$($path).+, "no" = false => false, "yes" = true => true)
+    };
+}
+
+/// The place of a word among words, when compiling.
+const fn place(word: &str, words: &[&str]) -> u8 {
+    let (word, mut place) = (word.as_bytes(), 0);
+    while place < words.len() {
+        let other = words[place].as_bytes();
+        let mut same = 0;
+        while same < word.len() && same < other.len() && word[same] == other[same] {
+            same += 1;
+        }
+        if same == word.len() && same == other.len() {
+            break;
+        }
+        place += 1;
+    }
+    place as u8
 }
 
 /// All settings, in the order in which they are shown.
@@ -211,8 +230,7 @@ pub static KEYS: [Key; 53] = [
     whole!("motor.pole_pairs", u8, checked = true, drive.motor.pole_pairs),
     number!("motor.inertia", "kg m2", drive.motor.inertia),
     number!("inverter.dead_time_s", "s", drive.inverter.dead_time_s),
-    word!("inverter.compensate", |s| s.drive.inverter.compensate,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("inverter.compensate", drive.inverter.compensate),
     number!("inverter.full_compensation_a", "A", drive.inverter.full_compensation_a),
     number!("scales.current_a.gain", "A", drive.scales.current_a.gain),
     number!("scales.current_a.offset", "A", drive.scales.current_a.offset),
@@ -229,7 +247,7 @@ pub static KEYS: [Key; 53] = [
     word!("current_plant", |s| s.drive.current_plant,
         "identified" = CurrentPlant::Identified { .. } => CurrentPlant::default(),
         "motor" = CurrentPlant::Motor => CurrentPlant::Motor),
-    word!("ignore_delays", |s| s.drive.ignore_delays, "no" = false => false, "yes" = true => true),
+    yes_or_no!("ignore_delays", drive.ignore_delays),
     number!("injection.amplitude_v", "V", drive.injection.amplitude_v),
     word!("injection.demodulator", |s| s.drive.injection.demodulator,
         "literal" = Tracking::Literal => Tracking::Literal,
@@ -245,15 +263,12 @@ pub static KEYS: [Key; 53] = [
     number!("injection.bandwidth_hz", "Hz", drive.injection.synchronous.bandwidth_hz),
     number!("injection.flux_saliency", "", drive.injection.synchronous.flux_saliency),
     number!("injection.current_saliency", "1/A", drive.injection.synchronous.current_saliency),
-    word!("injection.check", |s| s.drive.injection.synchronous.check,
-        "no" = false => false, "yes" = true => true),
-    word!("injection.monitor", |s| s.drive.injection.synchronous.monitor,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("injection.check", drive.injection.synchronous.check),
+    yes_or_no!("injection.monitor", drive.injection.synchronous.monitor),
     number!("injection.allowed_loss", "", drive.injection.synchronous.allowed_loss),
     number!("injection.loss_s", "s", drive.injection.synchronous.loss_s),
     number!("injection.tracked_rpm", "rpm", drive.injection.synchronous.tracked_rpm),
-    word!("injection.beside_encoder", |s| s.drive.injection.beside_encoder,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("injection.beside_encoder", drive.injection.beside_encoder),
     number!("limits.current_a", "A", drive.limits.current_a),
     number!("limits.trip_a", "A", drive.limits.trip_a),
     number!("limits.dc_over_v", "V", drive.limits.dc_over_v),
@@ -268,7 +283,7 @@ pub static KEYS: [Key; 53] = [
     number!("speed.ramp_rpm_per_s", "rpm/s", drive.speed.ramp_rpm_per_s),
     number!("speed.phase_margin_deg", "deg", drive.speed.phase_margin_deg),
     number!("command.timeout_s", "s", command.timeout_s),
-    word!("wiring_checked", |s| s.command.wiring_checked, "no" = false => false, "yes" = true => true),
+    yes_or_no!("wiring_checked", command.wiring_checked),
 ];
 
 /// The setting with this [number](Key::id).
