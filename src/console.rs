@@ -4,13 +4,18 @@
 //! `trace` answer with many lines and end with `ok`; the next line that comes in cuts them short.
 //! Whatever is not understood changes nothing.
 
+#[cfg(not(target_os = "none"))]
+#[doc(hidden)]
+pub mod doubles;
 pub mod grammar;
 pub mod keys;
+mod learned;
 pub mod line;
 
 use core::fmt::{self, Write};
 
 use drive_core::decimal::{Fixed, Shortest};
+use drive_core::learning::Learned;
 use drive_core::settings::{PERIOD_S, Scales, SettingsError};
 use drive_core::{Coefficients, Mode, Refused, State, Taken};
 
@@ -70,6 +75,8 @@ pub trait Machine {
     fn tracing(&self) -> bool;
     /// A record of the last trace.
     fn traced(&self, i: u16) -> Option<trace::Record>;
+    /// Shows what a learning has found since the last call, used or not.
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned));
     /// Sets how much is logged.
     fn set_log_level(&mut self, level: Level);
     /// Most bytes of the stack used so far, and its size.
@@ -96,6 +103,7 @@ enum List {
     Help(u16),
     Get(u16),
     Trace(u16),
+    Learned(u16),
 }
 
 impl List {
@@ -104,6 +112,7 @@ impl List {
             Self::Help(i) => Self::Help(i + 1),
             Self::Get(i) => Self::Get(i + 1),
             Self::Trace(i) => Self::Trace(i + 1),
+            Self::Learned(i) => Self::Learned(i + 1),
         }
     }
 }
@@ -146,6 +155,8 @@ pub struct Console {
     checking: Option<u32>,
     /// What the last trace recorded.
     traced: Choice,
+    /// What the last learning found, if it is not believable.
+    unbelievable: Option<Learned>,
 }
 
 /// Most bytes that are read at one go: a flood must not keep the main loop.
@@ -163,6 +174,7 @@ impl Console {
             heard_ms: 0,
             checking: None,
             traced: Choice::NONE,
+            unbelievable: None,
         }
     }
 
@@ -177,6 +189,10 @@ impl Console {
     pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl Machine, now_ms: u32) {
         self.watch_silence(machine, now_ms);
         self.watch_wiring(machine);
+        machine.learned(&mut |found| {
+            self.settings.learn(found);
+            self.unbelievable = if found.accepted { None } else { Some(*found) };
+        });
         if port.take_damage() {
             self.lines.spoil(Garbled::Lost);
         }
@@ -313,6 +329,13 @@ impl Console {
                 self.out.line(format_args!("{}", Shown::new(key, &self.settings)));
             }
             Request::Get(None) => self.list = Some(List::Get(0)),
+            Request::Learned => {
+                if self.unbelievable.is_some() || self.settings.learned.is_some() {
+                    self.list = Some(List::Learned(0));
+                } else {
+                    self.out.line(format_args!("ok: nothing learned with these settings"));
+                }
+            }
             Request::Save => {
                 if !machine.is_off() {
                     return self.out.error(&MUST_BE_OFF);
@@ -361,11 +384,13 @@ impl Console {
         }
     }
 
-    /// Takes other settings, if the drive is off and the design rules take them.
-    fn configure(&mut self, settings: Everything, machine: &mut impl Machine) {
+    /// Takes other settings, if the drive is off and the design rules take them. What was learned with
+    /// others is forgotten.
+    fn configure(&mut self, mut settings: Everything, machine: &mut impl Machine) {
         if !machine.is_off() {
             return self.out.error(&MUST_BE_OFF);
         }
+        settings.forget_unless_as(&self.settings);
         match machine.build(&settings) {
             Err(why) => self.out.error(&why),
             Ok(coefficients) => match machine.order(Order::Configure(coefficients)) {
@@ -373,8 +398,13 @@ impl Console {
                 Ok(_) => {
                     let waits = settings.drive.inverter.dead_time_s
                         != self.settings.drive.inverter.dead_time_s;
+                    let forgotten = self.settings.learned.is_some() && settings.learned.is_none();
                     self.settings = settings;
-                    self.out.line(format_args!("{}", if waits { FROM_RESET } else { "ok" }));
+                    self.out.line(format_args!(
+                        "ok{}{}",
+                        if waits { FROM_RESET } else { "" },
+                        if forgotten { FORGOTTEN } else { "" },
+                    ));
                 }
             },
         }
@@ -397,6 +427,12 @@ impl Console {
                 self.out.line(format_args!("record{names}"));
                 Some(())
             }
+            List::Learned(i) => {
+                // If the last was not believable, it is not what is used.
+                let found = self.unbelievable.as_ref().or(self.settings.learned.as_ref());
+                let line = found.and_then(|f| learned::line(f, self.unbelievable.is_some(), i));
+                line.map(|line| self.out.line(format_args!("{line}")))
+            }
             List::Trace(i) => machine.traced(i - 1).map(|record| {
                 let values = fmt::from_fn(|f| {
                     let mut values = record.iter().take(self.traced.count());
@@ -414,7 +450,8 @@ impl Console {
 }
 
 /// The timer locks its dead time until a reset.
-const FROM_RESET: &str = "ok: the dead time holds from the next reset on, if saved";
+const FROM_RESET: &str = ": the dead time holds from the next reset on, if saved";
+const FORGOTTEN: &str = ": what was learned belonged to other settings and is forgotten";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
 
 /// Speed in rpm from turns per period.

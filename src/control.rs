@@ -10,6 +10,7 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
+use drive_core::learning::Learned;
 use drive_core::{Drive, Hardware, Sample, State};
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
@@ -38,6 +39,8 @@ pub struct Control {
     pub orders: Receiver<'static, Order>,
     /// What the drive makes of it.
     pub answers: Sender<'static, Answer>,
+    /// What a learning found.
+    pub learned: Sender<'static, Learned>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
 }
@@ -114,10 +117,16 @@ fn is_off(drive: &Drive) -> bool {
     matches!(drive.state(), State::Off | State::Fault(_))
 }
 
+/// Not inlined: it is seldom called, and the registers it needs would be saved in every period.
+#[inline(never)]
+fn obey(drive: &mut Drive, order: &Order) -> Answer {
+    drive.command(order.command())
+}
+
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, status, orders, answers, trace } =
+        let Control { drive, pwm, adc, encoder, status, orders, answers, learned, trace } =
             &mut self.control;
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
@@ -181,7 +190,7 @@ impl Running {
         }
 
         // An order comes between two steps: it acts from the next one on.
-        let answered = orders.take_with(|order| drive.command(order.command()));
+        let answered = orders.take_with(|order| obey(drive, order));
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         if let Some(answer) = answered {
             // There is room: the main loop takes the last answer before it sends an order.
@@ -209,6 +218,12 @@ impl Running {
                 worst_latency: self.worst_latency,
                 hardware: self.seen,
             };
+            if self.reported == Some(State::Learning)
+                && let Some(found) = drive.learned()
+            {
+                // There is room: the main loop takes it at once, the next comes a minute later.
+                learned.send(*found);
+            }
             // The main loop may be slow or hang; then this status is lost, but not its events.
             if status.send(report) {
                 self.seen = Hardware::NONE;

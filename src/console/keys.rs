@@ -6,7 +6,8 @@ use core::fmt;
 
 use drive_core::Settings;
 use drive_core::decimal::Shortest;
-use drive_core::settings::{AngleSource, CurrentPlant, Inverter, SettingsError, Tracking};
+use drive_core::learning::Learned;
+use drive_core::settings::{AngleSource, CurrentPlant, Inverter, SettingsError, Tracking, learned};
 
 use super::grammar::number;
 
@@ -17,6 +18,8 @@ pub struct Everything {
     pub drive: Settings,
     /// Of the firmware around it.
     pub command: Commands,
+    /// What was learned on the motor with these settings, and accepted; it comes on top of them.
+    pub learned: Option<Learned>,
 }
 
 /// What the firmware makes of commands.
@@ -35,7 +38,21 @@ impl Everything {
     /// What is set in the image. Not inlined: every number of it is an instruction or two.
     #[inline(never)]
     pub fn of_the_board() -> Self {
-        Self { drive: crate::board::settings(), command: Commands::default() }
+        Self { drive: crate::board::settings(), command: Commands::default(), learned: None }
+    }
+
+    /// What a learning has found holds from now on, if it was accepted.
+    pub fn learn(&mut self, found: &Learned) {
+        if found.accepted {
+            self.learned = Some(learned::together(self.learned.as_ref(), found));
+        }
+    }
+
+    /// Forgets what was learned, if it was learned with other settings than these.
+    pub fn forget_unless_as(&mut self, before: &Self) {
+        if !self.drive.learns_as(&before.drive) {
+            self.learned = None;
+        }
     }
 
     /// Every value against its range; the coefficients if all are inside.
@@ -43,8 +60,7 @@ impl Everything {
     /// # Errors
     /// The first value outside, or the rule of design that cannot be met.
     pub fn build(&self) -> Result<drive_core::Coefficients, SettingsError> {
-        self.check()?;
-        self.drive_with(crate::board::dead_time(self.drive.inverter.dead_time_s).1).build()
+        self.build_for(crate::board::dead_time(self.drive.inverter.dead_time_s).1)
     }
 
     /// The drive's settings, for a timer that makes this dead time, s.
@@ -60,7 +76,11 @@ impl Everything {
     /// As there.
     pub fn build_for(&self, dead_time_s: f32) -> Result<drive_core::Coefficients, SettingsError> {
         self.check()?;
-        self.drive_with(dead_time_s).build()
+        let mut coefficients = self.drive_with(dead_time_s).build()?;
+        if let Some(learned) = &self.learned {
+            coefficients.take(learned);
+        }
+        Ok(coefficients)
     }
 
     /// What the firmware asks of settings beside the drive.
@@ -292,7 +312,7 @@ pub fn find_id(id: u32) -> Option<&'static Key> {
 }
 
 /// FNV-1a: a number for a word.
-fn number_of(word: &str) -> u32 {
+pub(crate) fn number_of(word: &str) -> u32 {
     word.bytes().fold(0x811c_9dc5, |hash, b| (hash ^ u32::from(b)).wrapping_mul(0x0100_0193))
 }
 
