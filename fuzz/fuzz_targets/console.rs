@@ -2,7 +2,12 @@
 //! its answer, and an order that reached the drive came from a line that was answered without error.
 #![no_main]
 
-use drive_core::{Sample, State};
+use std::sync::OnceLock;
+
+use drive_core::learning::{Fitted, Learned};
+use drive_core::lock_monitor::CarrierTable;
+use drive_core::schedule::ReferenceTable;
+use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
 use induction_drive::console::doubles::{Desk, Wire};
 use induction_drive::console::keys::Everything;
@@ -10,13 +15,19 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     let settings = Everything::of_the_board();
-    let mut desk = Desk::new(&settings);
+    // (The design rules take longer than all else.)
+    static DRIVE: OnceLock<Drive> = OnceLock::new();
+    let drive = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));
+    let mut desk = Desk::new(drive.clone());
     let mut console = Console::new(settings);
     let mut wire = Wire::default();
     let mut now_ms = 0_u32;
-    // Bytes above 0xf0 are not sent: they are pauses, room, damage, and samples for the drive.
+    // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
+    // drive.
     for &byte in bytes {
         match byte {
+            0xf8 => desk.found = Some(found(false)),
+            0xf9 => desk.found = Some(found(true)),
             0xfa => wire.damaged = true,
             0xfb => now_ms = now_ms.wrapping_add(20_000),
             0xfc => now_ms = now_ms.wrapping_add(u32::MAX / 2),
@@ -39,3 +50,18 @@ fuzz_target!(|bytes: &[u8]| {
     let running = !matches!(desk.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", desk.drive.state());
 });
+
+/// What a learning may have found.
+fn found(accepted: bool) -> Learned {
+    let fitted = Fitted { value: 0.05, misfit: 0.001, accepted };
+    Learned {
+        reference: ReferenceTable::default(),
+        carrier: accepted.then(CarrierTable::default),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: fitted,
+        current_saliency: fitted,
+        flux_saliency: -0.035,
+        accepted,
+    }
+}

@@ -38,14 +38,10 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// One with these settings.
-    ///
-    /// # Panics
-    /// The settings make no drive.
-    #[allow(clippy::expect_used)]
-    pub fn new(settings: &Everything) -> Self {
+    /// One with this drive.
+    pub fn new(drive: Drive) -> Self {
         Self {
-            drive: Drive::new(settings.build().expect("settings that make a drive")),
+            drive,
             running: true,
             sample: Sample::default(),
             records: 0,

@@ -19,7 +19,7 @@ impl Talk {
         settings.command.wiring_checked = true;
         Self {
             console: Console::new(settings),
-            desk: Desk::new(&settings),
+            desk: Desk::new(Drive::new(settings.build().unwrap())),
             wire: Wire { room: usize::MAX, ..Wire::default() },
             now_ms: 0,
         }
