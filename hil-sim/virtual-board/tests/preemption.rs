@@ -58,9 +58,9 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
     // Ten lines a second.
     assert!(log.len() as u64 >= periods / 600, "{} lines in {periods} periods", log.len());
-    let latest =
-        heard.lines().filter_map(|line| line.split_once("latest start ")?.1.split_once(' '));
-    let told: f64 = latest.last().context("no status")?.0.parse()?;
+    let mut latest =
+        heard.lines().rev().filter_map(|line| line.split_once("latest start ")?.1.split_once(' '));
+    let told: f64 = latest.next().context("no status")?.0.parse()?;
     let seen = board.latest_start;
     println!("the latest start {seen} cycles after it was asked for; {told} us by the status");
     assert!(seen <= LATEST_START, "{seen} cycles");
