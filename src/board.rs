@@ -232,8 +232,9 @@ pub const WATCHDOG_REACTION_NS: u32 =
 pub const SOFTWARE_REACTION_NS: u32 = (2 * PWM_TOP as u32 + SAMPLES_READY_TICKS) * 1000
     / CYCLES_PER_US
     + (LATEST_START_US + LONGEST_STEP_US) * 1000;
-/// Latest start of the control interrupt after its samples are ready, us: the log's critical sections
-/// and the other interrupt are shorter. `status` shows the latest there was.
+/// Latest start of the control interrupt after its samples are ready, us. Once it runs nothing masks it,
+/// the log neither: what is left is its entry and the instruction it interrupts, below 1 us. `status`
+/// shows the latest there was.
 pub const LATEST_START_US: u32 = 10;
 /// Longest control step that is reckoned with here, us; `status` shows the longest there was, in cycles.
 const LONGEST_STEP_US: u32 = 20;

@@ -2,6 +2,7 @@
 #![cfg(target_os = "none")]
 
 use cortex_m::singleton;
+use drive_core::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Coefficients, Drive, Taken};
 use stm32g4xx_hal::gpio::GpioExt;
@@ -195,11 +196,14 @@ fn start_control(
         singleton!(: Mailbox<Order> = Mailbox::new(Order::Stop)).ok_or(NotStarted::Twice)?;
     let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Taken::AsGiven)))
         .ok_or(NotStarted::Twice)?;
+    let learned =
+        singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(NotStarted::Twice)?;
     // Named, so that `cargo xtask size` can tell it from the rest.
     let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
     let (send_status, status) = status.split();
     let (orders, take_orders) = orders.split();
     let (send_answers, answers) = answers.split();
+    let (send_learned, learned) = learned.split();
     let (recorder, trace) = trace.ok_or(NotStarted::Twice)?.split();
 
     pwm.start().map_err(NotStarted::Timer)?;
@@ -212,8 +216,9 @@ fn start_control(
         status: send_status,
         orders: take_orders,
         answers: send_answers,
+        learned: send_learned,
         trace: recorder,
     }
     .run();
-    Ok(Ends { status, orders, answers, trace })
+    Ok(Ends { status, orders, answers, learned, trace })
 }

@@ -4,14 +4,19 @@
 //! `trace` answer with many lines and end with `ok`; the next line that comes in cuts them short.
 //! Whatever is not understood changes nothing.
 
+#[cfg(not(target_os = "none"))]
+#[doc(hidden)]
+pub mod doubles;
 pub mod grammar;
 pub mod keys;
+mod learned;
 pub mod line;
 
 use core::fmt::{self, Write};
 
 use drive_core::decimal::{Fixed, Shortest};
-use drive_core::settings::{PERIOD_S, SettingsError};
+use drive_core::learning::Learned;
+use drive_core::settings::{PERIOD_S, Scales, SettingsError};
 use drive_core::{Coefficients, Mode, Refused, State, Taken};
 
 use crate::board::CYCLES_PER_US;
@@ -70,6 +75,8 @@ pub trait Machine {
     fn tracing(&self) -> bool;
     /// A record of the last trace.
     fn traced(&self, i: u16) -> Option<trace::Record>;
+    /// Shows what a learning has found since the last call, used or not.
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned));
     /// Sets how much is logged.
     fn set_log_level(&mut self, level: Level);
     /// Most bytes of the stack used so far, and its size.
@@ -96,14 +103,49 @@ enum List {
     Help(u16),
     Get(u16),
     Trace(u16),
+    Learned(u16),
+}
+
+impl List {
+    fn next(self) -> Self {
+        match self {
+            Self::Help(i) => Self::Help(i + 1),
+            Self::Get(i) => Self::Get(i + 1),
+            Self::Trace(i) => Self::Trace(i + 1),
+            Self::Learned(i) => Self::Learned(i + 1),
+        }
+    }
+}
+
+/// A line that waits for room on the wire.
+struct Out(Option<Text>);
+
+impl Out {
+    /// Takes a line; what does not fit is cut off. (The only place that writes text: to write it into
+    /// every answer would take 2 KiB.)
+    #[inline(never)]
+    fn line(&mut self, line: fmt::Arguments<'_>) {
+        let text = self.0.insert(Text::new());
+        // The text itself cannot fail.
+        let _ = text.write_fmt(line);
+        text.end_line();
+    }
+
+    fn ok(&mut self) {
+        self.line(format_args!("ok"));
+    }
+
+    #[inline(never)]
+    fn error(&mut self, why: &dyn fmt::Display) {
+        self.line(format_args!("error: {why}"));
+    }
 }
 
 /// The console.
 pub struct Console {
     settings: Everything,
     lines: Lines,
-    /// A line that waits for room.
-    out: Option<Text>,
+    out: Out,
     list: Option<List>,
     /// When the line that is coming in began.
     began_ms: Option<u32>,
@@ -113,6 +155,8 @@ pub struct Console {
     checking: Option<u32>,
     /// What the last trace recorded.
     traced: Choice,
+    /// What the last learning found, if it is not believable.
+    unbelievable: Option<Learned>,
 }
 
 /// Most bytes that are read at one go: a flood must not keep the main loop.
@@ -124,29 +168,31 @@ impl Console {
         Self {
             settings,
             lines: Lines::new(),
-            out: None,
+            out: Out(None),
             list: None,
             began_ms: None,
             heard_ms: 0,
             checking: None,
             traced: Choice::NONE,
+            unbelievable: None,
         }
     }
 
     /// Says who this is and what ended the last run.
     pub fn greet(&mut self, machine: &impl Machine) {
-        self.reply(|text| {
-            text.write_str("induction-drive ")?;
-            machine.version(text)?;
-            text.write_str("; last run: ")?;
-            machine.last_run(text)
-        });
+        let (version, last_run) =
+            (fmt::from_fn(|f| machine.version(f)), fmt::from_fn(|f| machine.last_run(f)));
+        self.out.line(format_args!("induction-drive {version}; last run: {last_run}"));
     }
 
     /// Reads what came and writes what is due; never waits. `now_ms` wraps.
     pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl Machine, now_ms: u32) {
         self.watch_silence(machine, now_ms);
         self.watch_wiring(machine);
+        machine.learned(&mut |found| {
+            self.settings.learn(found);
+            self.unbelievable = if found.accepted { None } else { Some(*found) };
+        });
         if port.take_damage() {
             self.lines.spoil(Garbled::Lost);
         }
@@ -162,7 +208,7 @@ impl Console {
             Some(began) if now_ms.wrapping_sub(began) > LINE_MS => {
                 self.lines.forget();
                 self.began_ms = None;
-                self.reply(|text| write!(text, "error: {}", Garbled::Unfinished));
+                self.out.error(&Garbled::Unfinished);
             }
             None if self.lines.begun() => self.began_ms = Some(now_ms),
             _ => {}
@@ -176,10 +222,10 @@ impl Console {
 
     /// Sends what waits; whether nothing waits any more.
     fn flushed(&mut self, port: &mut impl Port) -> bool {
-        match &self.out {
+        match &self.out.0 {
             Some(text) if !port.write(text.as_str()) => false,
             _ => {
-                self.out = None;
+                self.out.0 = None;
                 true
             }
         }
@@ -189,14 +235,14 @@ impl Console {
     fn watch_silence(&mut self, machine: &mut impl Machine, now_ms: u32) {
         let limit = self.settings.command.timeout_s;
         let silence = now_ms.wrapping_sub(self.heard_ms) as f32 * 1e-3;
-        if limit > 0.0 && silence > limit && self.out.is_none() && !machine.is_off() {
+        if limit > 0.0 && silence > limit && self.out.0.is_none() && !machine.is_off() {
             let answer = machine.order(Order::Stop);
             self.heard_ms = now_ms;
             match answer {
                 Ok(_) => {
-                    self.reply(|text| write!(text, "stopped: no command for {} s", Shortest(limit)))
+                    self.out.line(format_args!("stopped: no command for {} s", Shortest(limit)));
                 }
-                Err(why) => self.reply(|text| write!(text, "error: not stopped: {why}")),
+                Err(why) => self.out.error(&format_args!("not stopped: {why}")),
             }
         }
     }
@@ -224,9 +270,9 @@ impl Console {
         match machine.order(Order::CheckWiring).and_then(|_| machine.order(Order::Start(mode))) {
             Ok(_) => {
                 self.checking = began;
-                self.reply(|text| text.write_str("ok: the wiring is checked first"));
+                self.out.line(format_args!("ok: the wiring is checked first"));
             }
-            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+            Err(why) => self.out.error(&why),
         }
     }
 
@@ -235,7 +281,7 @@ impl Console {
             None => return,
             Some(Err(why)) => {
                 (self.list, self.began_ms) = (None, None);
-                return self.reply(|text| write!(text, "error: {why}"));
+                return self.out.error(&why);
             }
             Some(Ok(line)) => grammar::parse(line),
         };
@@ -246,16 +292,8 @@ impl Console {
                 self.heard_ms = now_ms;
                 self.answer(request, machine);
             }
-            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+            Err(why) => self.out.error(&why),
         }
-    }
-
-    fn reply(&mut self, write: impl FnOnce(&mut Text) -> fmt::Result) {
-        let mut text = Text::new();
-        // What does not fit is cut off; the text itself cannot fail.
-        let _ = write(&mut text);
-        text.end_line();
-        self.out = Some(text);
     }
 
     fn answer(&mut self, request: Request, machine: &mut impl Machine) {
@@ -263,10 +301,11 @@ impl Console {
             Request::Help => self.list = Some(List::Help(0)),
             Request::Status => match machine.status() {
                 Some(status) => {
-                    let stack = machine.stack();
-                    self.reply(|text| write_status(text, &status, stack));
+                    let (scales, stack) = (&self.settings.drive.scales, machine.stack());
+                    let line = fmt::from_fn(|f| write_status(f, &status, scales, stack));
+                    self.out.line(format_args!("{line}"));
                 }
-                None => self.reply(|text| write!(text, "error: {}", NotDone::NoAnswer)),
+                None => self.out.error(&NotDone::NoAnswer),
             },
             Request::Start(mode) => self.start(mode, machine),
             Request::Stop => self.give(Order::Stop, machine),
@@ -287,72 +326,85 @@ impl Console {
             }
             Request::Defaults => self.configure(Everything::of_the_board(), machine),
             Request::Get(Some(key)) => {
-                let settings = self.settings;
-                self.reply(|text| write_key(text, key, &settings));
+                self.out.line(format_args!("{}", Shown::new(key, &self.settings)));
             }
             Request::Get(None) => self.list = Some(List::Get(0)),
+            Request::Learned => {
+                if self.unbelievable.is_some() || self.settings.learned.is_some() {
+                    self.list = Some(List::Learned(0));
+                } else {
+                    self.out.line(format_args!("ok: nothing learned with these settings"));
+                }
+            }
             Request::Save => {
                 if !machine.is_off() {
-                    return self.reply(|text| write!(text, "error: {}", MUST_BE_OFF));
+                    return self.out.error(&MUST_BE_OFF);
                 }
                 match machine.save(&self.settings) {
-                    Ok(()) => self.reply(|text| text.write_str("ok")),
-                    Err(why) => self.reply(|text| write!(text, "error: {why}")),
+                    Ok(()) => self.out.ok(),
+                    Err(why) => self.out.error(&why),
                 }
             }
             Request::Faults => {
-                let state = machine.status().map(|status| status.state);
-                self.reply(|text| {
-                    match state {
-                        Some(State::Fault(fault)) => {
-                            write!(text, "latched: fault {}, {fault}; ", fault.code())?;
-                        }
-                        _ => text.write_str("none latched; ")?,
-                    }
-                    text.write_str("last run: ")?;
-                    machine.last_run(text)
-                });
+                let last_run = fmt::from_fn(|f| machine.last_run(f));
+                match machine.status().map(|status| status.state) {
+                    Some(State::Fault(fault)) => self.out.line(format_args!(
+                        "latched: fault {}, {fault}; last run: {last_run}",
+                        fault.code()
+                    )),
+                    _ => self.out.line(format_args!("none latched; last run: {last_run}")),
+                }
             }
             Request::Trace { records, divider, choice } => {
                 if machine.begin_trace(records, divider, &choice) {
                     self.traced = choice;
                     self.list = Some(List::Trace(0));
                 } else {
-                    self.reply(|text| text.write_str("error: a trace is being recorded"));
+                    self.out.error(&"a trace is being recorded");
                 }
             }
             Request::Log(level) => {
                 machine.set_log_level(level);
-                self.reply(|text| text.write_str("ok"));
+                self.out.ok();
             }
-            Request::Version => self.reply(|text| machine.version(text)),
+            Request::Version => {
+                let version = fmt::from_fn(|f| machine.version(f));
+                self.out.line(format_args!("{version}"));
+            }
         }
     }
 
     fn give(&mut self, order: Order, machine: &mut impl Machine) {
         match machine.order(order) {
-            Ok(Taken::AsGiven) => self.reply(|text| text.write_str("ok")),
+            Ok(Taken::AsGiven) => self.out.ok(),
             Ok(Taken::Limited(value)) => {
-                self.reply(|text| write!(text, "ok: limited to {}", Shortest(value)))
+                self.out.line(format_args!("ok: limited to {}", Shortest(value)));
             }
-            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+            Err(why) => self.out.error(&why),
         }
     }
 
-    /// Takes other settings, if the drive is off and the design rules take them.
-    fn configure(&mut self, settings: Everything, machine: &mut impl Machine) {
+    /// Takes other settings, if the drive is off and the design rules take them. What was learned with
+    /// others is forgotten.
+    fn configure(&mut self, mut settings: Everything, machine: &mut impl Machine) {
         if !machine.is_off() {
-            return self.reply(|text| write!(text, "error: {}", MUST_BE_OFF));
+            return self.out.error(&MUST_BE_OFF);
         }
+        settings.forget_unless_as(&self.settings);
         match machine.build(&settings) {
-            Err(why) => self.reply(|text| write!(text, "error: {why}")),
+            Err(why) => self.out.error(&why),
             Ok(coefficients) => match machine.order(Order::Configure(coefficients)) {
-                Err(why) => self.reply(|text| write!(text, "error: {why}")),
+                Err(why) => self.out.error(&why),
                 Ok(_) => {
                     let waits = settings.drive.inverter.dead_time_s
                         != self.settings.drive.inverter.dead_time_s;
+                    let forgotten = self.settings.learned.is_some() && settings.learned.is_none();
                     self.settings = settings;
-                    self.reply(|text| text.write_str(if waits { FROM_RESET } else { "ok" }));
+                    self.out.line(format_args!(
+                        "ok{}{}",
+                        if waits { FROM_RESET } else { "" },
+                        if forgotten { FORGOTTEN } else { "" },
+                    ));
                 }
             },
         }
@@ -361,50 +413,45 @@ impl Console {
     /// Puts the next line of the list out; `false` if it has to wait for it.
     fn next_of_list(&mut self, machine: &impl Machine) -> bool {
         let Some(list) = self.list else { return false };
-        let (settings, traced) = (self.settings, self.traced);
-        match list {
-            List::Help(i) => match HELP.get(usize::from(i)) {
-                Some(line) => self.one_of_list(List::Help(i + 1), |text| text.write_str(line)),
-                None => self.end_list(),
-            },
-            List::Get(i) => match KEYS.get(usize::from(i)) {
-                Some(key) => {
-                    self.one_of_list(List::Get(i + 1), |text| write_key(text, key, &settings));
-                }
-                None => self.end_list(),
-            },
+        let written = match list {
+            List::Help(i) => {
+                HELP.get(usize::from(i)).map(|line| self.out.line(format_args!("{line}")))
+            }
+            List::Get(i) => KEYS.get(usize::from(i)).map(|key| {
+                self.out.line(format_args!("{}", Shown::new(key, &self.settings)));
+            }),
             List::Trace(_) if machine.tracing() => return false,
             List::Trace(0) => {
-                self.one_of_list(List::Trace(1), |text| {
-                    text.write_str("record")?;
-                    traced.names().try_for_each(|name| write!(text, ",{name}"))
-                });
+                let names =
+                    fmt::from_fn(|f| self.traced.names().try_for_each(|name| write!(f, ",{name}")));
+                self.out.line(format_args!("record{names}"));
+                Some(())
             }
-            List::Trace(i) => match machine.traced(i - 1) {
-                Some(record) => self.one_of_list(List::Trace(i + 1), |text| {
-                    write!(text, "{}", i - 1)?;
-                    let values = record.iter().take(traced.count());
-                    values.copied().try_for_each(|x| write!(text, ",{}", Fixed::<4>(x)))
-                }),
-                None => self.end_list(),
-            },
+            List::Learned(i) => {
+                // If the last was not believable, it is not what is used.
+                let found = self.unbelievable.as_ref().or(self.settings.learned.as_ref());
+                let line = found.and_then(|f| learned::line(f, self.unbelievable.is_some(), i));
+                line.map(|line| self.out.line(format_args!("{line}")))
+            }
+            List::Trace(i) => machine.traced(i - 1).map(|record| {
+                let values = fmt::from_fn(|f| {
+                    let mut values = record.iter().take(self.traced.count());
+                    values.try_for_each(|x| write!(f, ",{}", Fixed::<4>(*x)))
+                });
+                self.out.line(format_args!("{}{values}", i - 1));
+            }),
+        };
+        self.list = written.map(|()| list.next());
+        if written.is_none() {
+            self.out.ok();
         }
         true
-    }
-
-    fn one_of_list(&mut self, next: List, write: impl FnOnce(&mut Text) -> fmt::Result) {
-        self.reply(write);
-        self.list = Some(next);
-    }
-
-    fn end_list(&mut self) {
-        self.list = None;
-        self.reply(|text| text.write_str("ok"));
     }
 }
 
 /// The timer locks its dead time until a reset.
-const FROM_RESET: &str = "ok: the dead time holds from the next reset on, if saved";
+const FROM_RESET: &str = ": the dead time holds from the next reset on, if saved";
+const FORGOTTEN: &str = ": what was learned belonged to other settings and is forgotten";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
 
 /// Speed in rpm from turns per period.
@@ -412,20 +459,28 @@ fn rpm(step: f32) -> f32 {
     step * (60.0 / PERIOD_S)
 }
 
-fn write_status(text: &mut Text, s: &Status, (used, size): (usize, usize)) -> fmt::Result {
+fn write_status(
+    f: &mut fmt::Formatter<'_>,
+    s: &Status,
+    scales: &Scales,
+    (used, size): (usize, usize),
+) -> fmt::Result {
     let t = &s.telemetry;
+    // Dc link and heat sink as they are now: what the drive makes of them stands still while it is off.
     write!(
-        text,
-        "{}; i_d {} A, i_q {} of {} A, rotor {} rpm electrical, dc link {} V; ",
+        f,
+        "{}; i_d {} A, i_q {} of {} A, rotor {} rpm electrical, dc link {} V, heat sink code {} of {}; ",
         s.state,
         Fixed::<2>(t.current.d),
         Fixed::<2>(t.current.q),
         Fixed::<2>(t.reference.q),
         Fixed::<1>(rpm(t.rotor_step)),
-        Fixed::<0>(t.dc_link),
+        Fixed::<0>(scales.dc_link.at(s.sample.dc_link)),
+        s.sample.heat_sink,
+        scales.heat_sink_trip,
     )?;
     write!(
-        text,
+        f,
         "{} of {} cycles, latest start {} us, stack {used} of {size}",
         s.last_cycles,
         s.worst_cycles,
@@ -433,22 +488,36 @@ fn write_status(text: &mut Text, s: &Status, (used, size): (usize, usize)) -> fm
     )
 }
 
-fn write_key(text: &mut Text, key: &keys::Key, settings: &Everything) -> fmt::Result {
-    let value = key.get(settings);
-    write!(text, "{} = {value}", key.name)?;
-    if !key.unit.is_empty() {
-        write!(text, " {}", key.unit)?;
+/// A setting as it is shown. What has to be computed is before anything is printed: while printing, the
+/// stack is deep.
+struct Shown {
+    key: &'static keys::Key,
+    value: Value,
+    range: Option<(f32, f32)>,
+}
+
+impl Shown {
+    #[inline(never)]
+    fn new(key: &'static keys::Key, settings: &Everything) -> Self {
+        Self { key, value: key.get(settings), range: key.range(settings) }
     }
-    match value {
-        Value::Word { .. } => {
-            text.write_str(" (one of:")?;
-            key.words().iter().try_for_each(|word| write!(text, " {word}"))?;
-            text.write_str(")")
+}
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.key.name, self.value)?;
+        if !self.key.unit.is_empty() {
+            write!(f, " {}", self.key.unit)?;
         }
-        _ => match key.range(settings) {
-            Some((min, max)) => write!(text, " ({} to {})", Shortest(min), Shortest(max)),
-            None => Ok(()),
-        },
+        match (self.value, self.range) {
+            (Value::Word { .. }, _) => {
+                f.write_str(" (one of:")?;
+                self.key.words().iter().try_for_each(|word| write!(f, " {word}"))?;
+                f.write_str(")")
+            }
+            (_, Some((min, max))) => write!(f, " ({} to {})", Shortest(min), Shortest(max)),
+            (_, None) => Ok(()),
+        }
     }
 }
 

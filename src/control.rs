@@ -10,6 +10,7 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
+use drive_core::learning::Learned;
 use drive_core::{Drive, Hardware, Sample, State};
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
@@ -38,6 +39,8 @@ pub struct Control {
     pub orders: Receiver<'static, Order>,
     /// What the drive makes of it.
     pub answers: Sender<'static, Answer>,
+    /// What a learning found.
+    pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
 }
@@ -220,8 +223,14 @@ impl Running {
     // Not inlined: the interrupt would have to save registers for it in every period.
     #[inline(never)]
     fn report(&mut self, sample: Sample, cycles: u32) {
-        let Control { drive, status, .. } = &mut self.control;
+        let Control { drive, status, learned, .. } = &mut self.control;
         let state = drive.state();
+        if self.reported == Some(State::Learning)
+            && let Some(found) = drive.learned()
+        {
+            // There is room: the main loop takes it at once, the next comes a minute later.
+            learned.send(Some(*found));
+        }
         let sent = status.send_with(|report| {
             report.periods = self.periods;
             report.state = state;

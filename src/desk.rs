@@ -6,6 +6,7 @@ use core::sync::atomic::Ordering;
 
 use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
+use drive_core::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Coefficients, Hardware, State, Taken};
 
@@ -34,6 +35,8 @@ pub struct Ends {
     pub orders: Sender<'static, Order>,
     /// From the drive.
     pub answers: Receiver<'static, Answer>,
+    /// What a learning found.
+    pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
 }
@@ -212,6 +215,12 @@ impl Machine for Desk {
 
     fn traced(&self, i: u16) -> Option<trace::Record> {
         self.ends.as_ref()?.trace.get(i)
+    }
+
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
+        if let Some(ends) = &mut self.ends {
+            ends.learned.take_with(|found| found.as_ref().map(show));
+        }
     }
 
     fn set_log_level(&mut self, level: Level) {

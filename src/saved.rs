@@ -10,6 +10,7 @@
 //! the source, and erases the good copy.)
 
 pub mod codec;
+pub mod learned;
 
 use core::fmt;
 
@@ -157,7 +158,7 @@ impl<F: Flash> Saved<F> {
         let record = codec::record(settings, sequence);
         self.flash.erase(slot)?;
         // The one that makes it whole comes last.
-        let others = (0..WORDS).filter(|word| *word != COMMIT);
+        let others = (0..codec::length(&record)).filter(|word| *word != COMMIT);
         for word in others.chain([COMMIT]) {
             let Some(value) = record.get(word) else { continue };
             self.flash.program(slot, word, *value)?;

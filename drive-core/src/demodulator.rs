@@ -93,13 +93,14 @@ pub enum Demodulator {
 }
 
 impl Demodulator {
-    /// At rest; `rms_samples` is the length of the rms filters of [`RmsImpedance`].
-    pub fn new(tracking: Tracking, rms_samples: u8) -> Self {
+    /// Puts one at rest in its place; `rms_samples` is the length of the rms filters of
+    /// [`RmsImpedance`]. (In its place: they are large, and moving one takes longer than making it.)
+    pub fn start(&mut self, tracking: Tracking, rms_samples: u8) {
         match tracking {
-            Tracking::Literal | Tracking::Synchronous => Self::default(),
-            Tracking::Rectified => Self::Rectified(Rectified::default()),
-            Tracking::RmsImpedance => Self::RmsImpedance(RmsImpedance::new(rms_samples)),
-            Tracking::Envelope => Self::Envelope(Envelope::default()),
+            Tracking::Literal | Tracking::Synchronous => *self = Self::Literal(Literal::default()),
+            Tracking::Rectified => *self = Self::Rectified(Rectified::default()),
+            Tracking::RmsImpedance => *self = Self::RmsImpedance(RmsImpedance::new(rms_samples)),
+            Tracking::Envelope => *self = Self::Envelope(Envelope::default()),
         }
     }
 }

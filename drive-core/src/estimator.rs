@@ -143,10 +143,21 @@ impl EstimatorState {
 impl Estimator {
     /// Starts with the flux along phase a.
     pub fn start(&self, state: &mut EstimatorState) {
-        *state = EstimatorState::default();
-        state.demodulator = Demodulator::new(self.demodulator, self.rms_samples);
+        let EstimatorState {
+            tracker,
+            demodulator,
+            mean_step,
+            rotor_step,
+            delta_i,
+            synchronous,
+            push,
+        } = state;
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
-        state.tracker.angle = Angle::QUARTER;
+        *tracker = TrackerState::default();
+        tracker.angle = Angle::QUARTER;
+        demodulator.start(self.demodulator, self.rms_samples);
+        (*mean_step, *rotor_step, *delta_i) = (0.0, 0.0, 0.0);
+        (*synchronous, *push) = (SynchronousState::default(), Push::default());
     }
 
     /// Compares with what was learned from now on.

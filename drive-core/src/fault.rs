@@ -19,7 +19,8 @@ macro_rules! faults {
             /// All faults, by code.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// What it means, in a few words.
+            /// What it means, in a few words. (Not inlined: its texts are many, and needed seldom.)
+            #[inline(never)]
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$name => $text,)+ }
             }

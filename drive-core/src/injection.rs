@@ -71,7 +71,8 @@ impl Injection {
                     index,
                 }
             }),
-            current_amplitude: (libm::sqrt(h_re * h_re + h_im * h_im)) as f32 * amplitude_v,
+            current_amplitude: drive_design::elementary::sqrt(h_re * h_re + h_im * h_im) as f32
+                * amplitude_v,
         }
     }
 }

@@ -43,13 +43,13 @@ const JUDGED_V: f32 = 1.0;
 const TWELFTH: Angle = Angle::from_bits(357_913_941);
 
 /// Largest even part of the reference that is believed. Noise gives 0.001.
-const ASYMMETRY: f32 = 0.005;
+pub(crate) const ASYMMETRY: f32 = 0.005;
 /// Largest difference of the two gains that is believed.
-const LARGEST_MISMATCH: f32 = 0.1;
+pub(crate) const LARGEST_MISMATCH: f32 = 0.1;
 /// Part of the negative sequence that no gain can make: at most this and a quarter of what one can.
 const WRONG_PHASE: (f32, f32) = (0.001, 0.25);
 /// Largest saliency of the current, 1/A, and rms misfit of its law, of the reference's rms.
-const CURRENT_SALIENCY: (f32, f32) = (0.3, 0.35);
+pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.3, 0.35);
 
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]

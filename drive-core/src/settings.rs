@@ -6,6 +6,7 @@
 
 mod check;
 mod coefficients;
+pub mod learned;
 
 use core::fmt;
 

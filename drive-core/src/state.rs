@@ -50,6 +50,7 @@ impl State {
 }
 
 impl fmt::Display for State {
+    #[inline(never)] // not once more for every reference to it
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Off => "off",

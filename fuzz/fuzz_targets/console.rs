@@ -2,105 +2,32 @@
 //! its answer, and an order that reached the drive came from a line that was answered without error.
 #![no_main]
 
-use std::collections::VecDeque;
-use std::fmt;
+use std::sync::OnceLock;
 
-use drive_core::settings::SettingsError;
-use drive_core::{Coefficients, Drive, Hardware, Sample, State, Taken};
+use drive_core::learning::{Fitted, Learned};
+use drive_core::lock_monitor::CarrierTable;
+use drive_core::schedule::ReferenceTable;
+use drive_core::{Drive, Sample, State};
+use induction_drive::console::Console;
+use induction_drive::console::doubles::{Desk, Wire};
 use induction_drive::console::keys::Everything;
-use induction_drive::console::{Console, Machine, NotDone, Port, grammar::Level};
-use induction_drive::link::{Order, Status};
-use induction_drive::{console, saved, trace};
 use libfuzzer_sys::fuzz_target;
-
-struct Desk {
-    drive: Drive,
-    traced: u16,
-}
-
-impl Machine for Desk {
-    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
-        self.drive.command(order.command()).map_err(NotDone::Refused)
-    }
-    fn status(&self) -> Option<Status> {
-        Some(Status {
-            periods: 1,
-            state: self.drive.state(),
-            sample: Sample::default(),
-            telemetry: self.drive.telemetry(),
-            worst_cycles: u32::MAX,
-            last_cycles: 0,
-            worst_latency: u32::MAX,
-            hardware: Hardware::NONE,
-        })
-    }
-    fn is_off(&self) -> bool {
-        matches!(self.drive.state(), State::Off | State::Fault(_))
-    }
-    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
-        settings.build()
-    }
-    fn save(&mut self, _: &Everything) -> Result<(), saved::Failed> {
-        Ok(())
-    }
-    fn begin_trace(&mut self, records: u16, _: u16, _: &trace::Choice) -> bool {
-        assert!(records <= console::grammar::LONGEST_TRACE);
-        self.traced = records;
-        true
-    }
-    fn tracing(&self) -> bool {
-        false
-    }
-    fn traced(&self, i: u16) -> Option<trace::Record> {
-        (i < self.traced).then(|| [0.0; trace::MOST])
-    }
-    fn set_log_level(&mut self, _: Level) {}
-    fn stack(&self) -> (usize, usize) {
-        (1, 8192)
-    }
-    fn version(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        write!(to, "version")
-    }
-    fn last_run(&self, to: &mut dyn fmt::Write) -> fmt::Result {
-        write!(to, "power-on")
-    }
-}
-
-#[derive(Default)]
-struct Wire {
-    sent: VecDeque<u8>,
-    damaged: bool,
-    room: usize,
-    replies: String,
-}
-
-impl Port for Wire {
-    fn read(&mut self) -> Option<u8> {
-        self.sent.pop_front()
-    }
-    fn take_damage(&mut self) -> bool {
-        std::mem::take(&mut self.damaged)
-    }
-    fn write(&mut self, text: &str) -> bool {
-        let fits = text.len() <= self.room;
-        if fits {
-            self.room -= text.len();
-            self.replies.push_str(text);
-        }
-        fits
-    }
-}
 
 fuzz_target!(|bytes: &[u8]| {
     let settings = Everything::of_the_board();
-    let Ok(coefficients) = settings.build() else { panic!("the defaults are refused") };
-    let mut desk = Desk { drive: Drive::new(coefficients), traced: 0 };
+    // (The design rules take longer than all else.)
+    static DRIVE: OnceLock<Drive> = OnceLock::new();
+    let drive = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));
+    let mut desk = Desk::new(drive.clone());
     let mut console = Console::new(settings);
     let mut wire = Wire::default();
     let mut now_ms = 0_u32;
-    // Bytes above 0xf0 are not sent: they are pauses, room, damage, and samples for the drive.
+    // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
+    // drive.
     for &byte in bytes {
         match byte {
+            0xf8 => desk.found = Some(found(false)),
+            0xf9 => desk.found = Some(found(true)),
             0xfa => wire.damaged = true,
             0xfb => now_ms = now_ms.wrapping_add(20_000),
             0xfc => now_ms = now_ms.wrapping_add(u32::MAX / 2),
@@ -119,7 +46,22 @@ fuzz_target!(|bytes: &[u8]| {
         console.poll(&mut wire, &mut desk, now_ms);
     }
     console.poll(&mut wire, &mut desk, now_ms);
-    assert!(wire.replies.ends_with("ok\r\n"), "{:?}", wire.replies);
+    assert!(wire.received.ends_with("ok\r\n"), "{:?}", wire.received);
     let running = !matches!(desk.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", desk.drive.state());
 });
+
+/// What a learning may have found.
+fn found(accepted: bool) -> Learned {
+    let fitted = Fitted { value: 0.05, misfit: 0.001, accepted };
+    Learned {
+        reference: ReferenceTable::default(),
+        carrier: accepted.then(CarrierTable::default),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: fitted,
+        current_saliency: fitted,
+        flux_saliency: -0.035,
+        accepted,
+    }
+}

@@ -2,7 +2,10 @@
 //! save after it is loaded again.
 #![no_main]
 
-use induction_drive::console::keys::{Everything, KEYS};
+use drive_core::learning::{Fitted, Learned};
+use drive_core::lock_monitor::CarrierTable;
+use drive_core::schedule::ReferenceTable;
+use induction_drive::console::keys::Everything;
 use induction_drive::saved::{Failed, Flash, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
 use libfuzzer_sys::fuzz_target;
 
@@ -26,9 +29,9 @@ impl Flash for &mut Fake {
 fuzz_target!(|bytes: &[u8]| {
     let defaults = Everything::of_the_board();
     let mut fake = Fake([[Some(u64::MAX); SLOT_WORDS]; SLOTS]);
-    // A whole record in each slot, and changes of it: slot, place, what to do, eight bytes.
+    // A whole record with everything in each slot, and changes of it: slot, place, what to do, eight bytes.
     for slot in 0..SLOTS {
-        for (word, value) in codec::record(&defaults, slot as u32).into_iter().enumerate() {
+        for (word, value) in codec::record(&full(), slot as u32).into_iter().enumerate() {
             fake.0[slot][word] = Some(value);
         }
     }
@@ -57,9 +60,26 @@ fuzz_target!(|bytes: &[u8]| {
     assert_eq!(Saved::load(&mut fake, &defaults).1, Loaded::Settings(other));
 });
 
+/// Settings, and what may have been learned with them.
+fn full() -> Everything {
+    let mut settings = Everything::of_the_board();
+    let fitted = Fitted { value: 0.01, misfit: 0.001, accepted: true };
+    settings.learn(&Learned {
+        reference: ReferenceTable::default(),
+        carrier: Some(CarrierTable::default()),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: fitted,
+        current_saliency: fitted,
+        flux_saliency: -0.035,
+        accepted: true,
+    });
+    settings
+}
+
 /// Makes the checksum right, with the number of entries that this firmware writes.
 fn reseal(slot: &mut [Option<u64>; SLOT_WORDS]) {
-    let words: Vec<u64> = slot[..2 + KEYS.len()].iter().map(|word| word.unwrap_or(0)).collect();
+    let words: Vec<u64> = slot[..codec::WORDS].iter().map(|word| word.unwrap_or(0)).collect();
     let mut bytes = words[0].to_le_bytes().to_vec();
     bytes.extend((words[1] as u32).to_le_bytes());
     bytes.extend(words[2..].iter().flat_map(|word| word.to_le_bytes()));

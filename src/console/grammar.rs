@@ -1,6 +1,6 @@
 //! What can be asked for: a line in, a [`Request`] or a reason why not out.
 
-use core::fmt;
+use core::{fmt, str};
 
 use drive_core::Mode;
 use drive_core::settings::AngleSource;
@@ -37,7 +37,9 @@ pub enum Request {
     Get(Option<&'static Key>),
     /// Change a setting.
     Set(&'static Key, keys::Value),
-    /// Keep the settings.
+    /// What was learned on the motor.
+    Learned,
+    /// Keep the settings, and what was learned.
     Save,
     /// Back to the settings of the image.
     Defaults,
@@ -125,7 +127,7 @@ impl fmt::Display for Misunderstood {
 }
 
 /// One line per command, for `help`.
-pub const HELP: [&str; 19] = [
+pub const HELP: [&str; 20] = [
     "help                      this list",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position, or learn",
@@ -137,7 +139,8 @@ pub const HELP: [&str; 19] = [
     "angle encoder|injection   where the flux angle comes from",
     "get [KEY]                 one setting with its range, or all",
     "set KEY VALUE             change a setting; the drive must be off",
-    "save                      keep the settings over a reset",
+    "learned                   what was learned on the motor with these settings",
+    "save                      keep the settings, and what was learned, over a reset",
     "defaults                  back to the settings of the image; the drive must be off",
     "faults                    the latched fault and what ended the last run",
     "clear                     forget the latched fault",
@@ -151,8 +154,9 @@ pub const HELP: [&str; 19] = [
 ///
 /// # Errors
 /// Why not. A line is understood as a whole or not at all.
+#[inline(never)]
 pub fn parse(line: &str) -> Result<Request, Misunderstood> {
-    let mut words = line.split_ascii_whitespace();
+    let mut words = Words(line.split_ascii_whitespace());
     let mut word = |what| words.next().ok_or(Misunderstood::Missing(what));
     let request = match word("a command")? {
         "help" => Request::Help,
@@ -183,6 +187,7 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
             let value = key.parse(word("the value")?).map_err(Misunderstood::Value)?;
             Request::Set(key, value)
         }
+        "learned" => Request::Learned,
         "save" => Request::Save,
         "defaults" => Request::Defaults,
         "faults" => Request::Faults,
@@ -215,6 +220,17 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         _ => return Err(Misunderstood::Command),
     };
     if words.next().is_some() { Err(Misunderstood::TooMuch) } else { Ok(request) }
+}
+
+/// The words of a line.
+struct Words<'a>(str::SplitAsciiWhitespace<'a>);
+
+impl<'a> Words<'a> {
+    /// Not inlined: it is asked for at twenty places, never in a hurry.
+    #[inline(never)]
+    fn next(&mut self) -> Option<&'a str> {
+        self.0.next()
+    }
 }
 
 /// A number: digits with or without sign, point and power of ten (`-0.5`, `1e-3`).
@@ -303,6 +319,7 @@ mod tests {
             ("trace 1024 10", Request::Trace { records: 1024, divider: 10, choice: Choice::USUAL }),
             ("trace 5 i_q turns", Request::Trace { records: 5, divider: 1, choice: two }),
             ("trace 5 2 i_q turns", Request::Trace { records: 5, divider: 2, choice: two }),
+            ("learned", Request::Learned),
             ("log warn", Request::Log(Level::Warn)),
             ("version", Request::Version),
         ];

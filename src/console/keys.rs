@@ -6,7 +6,8 @@ use core::fmt;
 
 use drive_core::Settings;
 use drive_core::decimal::Shortest;
-use drive_core::settings::{AngleSource, CurrentPlant, Inverter, SettingsError, Tracking};
+use drive_core::learning::Learned;
+use drive_core::settings::{AngleSource, CurrentPlant, Inverter, SettingsError, Tracking, learned};
 
 use super::grammar::number;
 
@@ -17,6 +18,8 @@ pub struct Everything {
     pub drive: Settings,
     /// Of the firmware around it.
     pub command: Commands,
+    /// What was learned on the motor with these settings, and accepted; it comes on top of them.
+    pub learned: Option<Learned>,
 }
 
 /// What the firmware makes of commands.
@@ -35,7 +38,21 @@ impl Everything {
     /// What is set in the image. Not inlined: every number of it is an instruction or two.
     #[inline(never)]
     pub fn of_the_board() -> Self {
-        Self { drive: crate::board::settings(), command: Commands::default() }
+        Self { drive: crate::board::settings(), command: Commands::default(), learned: None }
+    }
+
+    /// What a learning has found holds from now on, if it was accepted.
+    pub fn learn(&mut self, found: &Learned) {
+        if found.accepted {
+            self.learned = Some(learned::together(self.learned.as_ref(), found));
+        }
+    }
+
+    /// Forgets what was learned, if it was learned with other settings than these.
+    pub fn forget_unless_as(&mut self, before: &Self) {
+        if !self.drive.learns_as(&before.drive) {
+            self.learned = None;
+        }
     }
 
     /// Every value against its range; the coefficients if all are inside.
@@ -43,8 +60,7 @@ impl Everything {
     /// # Errors
     /// The first value outside, or the rule of design that cannot be met.
     pub fn build(&self) -> Result<drive_core::Coefficients, SettingsError> {
-        self.check()?;
-        self.drive_with(crate::board::dead_time(self.drive.inverter.dead_time_s).1).build()
+        self.build_for(crate::board::dead_time(self.drive.inverter.dead_time_s).1)
     }
 
     /// The drive's settings, for a timer that makes this dead time, s.
@@ -60,7 +76,11 @@ impl Everything {
     /// As there.
     pub fn build_for(&self, dead_time_s: f32) -> Result<drive_core::Coefficients, SettingsError> {
         self.check()?;
-        self.drive_with(dead_time_s).build()
+        let mut coefficients = self.drive_with(dead_time_s).build()?;
+        if let Some(learned) = &self.learned {
+            coefficients.take(learned);
+        }
+        Ok(coefficients)
     }
 
     /// What the firmware asks of settings beside the drive.
@@ -189,16 +209,35 @@ macro_rules! whole {
 macro_rules! word {
     ($name:literal, |$s:ident| $place:expr, $($word:literal = $value:pat => $make:expr),+) => {{
         const WORDS: &[&str] = &[$($word),+];
-        let get: fn(&Everything) -> u8 = |$s| match $place { $($value => place($word, WORDS),)+ };
+        let get: fn(&Everything) -> u8 =
+            |$s| match $place { $($value => const { place($word, WORDS) },)+ };
         let set: fn(&mut Everything, u8) =
-            |$s, index| { $(if index == place($word, WORDS) { $place = $make; })+ };
+            |$s, index| { $(if index == const { place($word, WORDS) } { $place = $make; })+ };
         Key { name: $name, unit: "", access: Access::Word { words: WORDS, get, set } }
     }};
 }
 
-/// The place of a word among words.
-fn place(word: &str, words: &[&str]) -> u8 {
-    words.iter().take_while(|other| **other != word).fold(0, |place, _| place + 1)
+macro_rules! yes_or_no {
+    ($name:literal, $($path:ident).+) => {
+        word!($name, |s| s.$($path).+, "no" = false => false, "yes" = true => true)
+    };
+}
+
+/// The place of a word among words, when compiling.
+const fn place(word: &str, words: &[&str]) -> u8 {
+    let (word, mut place) = (word.as_bytes(), 0);
+    while place < words.len() {
+        let other = words[place].as_bytes();
+        let mut same = 0;
+        while same < word.len() && same < other.len() && word[same] == other[same] {
+            same += 1;
+        }
+        if same == word.len() && same == other.len() {
+            break;
+        }
+        place += 1;
+    }
+    place as u8
 }
 
 /// All settings, in the order in which they are shown.
@@ -211,8 +250,7 @@ pub static KEYS: [Key; 53] = [
     whole!("motor.pole_pairs", u8, checked = true, drive.motor.pole_pairs),
     number!("motor.inertia", "kg m2", drive.motor.inertia),
     number!("inverter.dead_time_s", "s", drive.inverter.dead_time_s),
-    word!("inverter.compensate", |s| s.drive.inverter.compensate,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("inverter.compensate", drive.inverter.compensate),
     number!("inverter.full_compensation_a", "A", drive.inverter.full_compensation_a),
     number!("scales.current_a.gain", "A", drive.scales.current_a.gain),
     number!("scales.current_a.offset", "A", drive.scales.current_a.offset),
@@ -229,7 +267,7 @@ pub static KEYS: [Key; 53] = [
     word!("current_plant", |s| s.drive.current_plant,
         "identified" = CurrentPlant::Identified { .. } => CurrentPlant::default(),
         "motor" = CurrentPlant::Motor => CurrentPlant::Motor),
-    word!("ignore_delays", |s| s.drive.ignore_delays, "no" = false => false, "yes" = true => true),
+    yes_or_no!("ignore_delays", drive.ignore_delays),
     number!("injection.amplitude_v", "V", drive.injection.amplitude_v),
     word!("injection.demodulator", |s| s.drive.injection.demodulator,
         "literal" = Tracking::Literal => Tracking::Literal,
@@ -245,15 +283,12 @@ pub static KEYS: [Key; 53] = [
     number!("injection.bandwidth_hz", "Hz", drive.injection.synchronous.bandwidth_hz),
     number!("injection.flux_saliency", "", drive.injection.synchronous.flux_saliency),
     number!("injection.current_saliency", "1/A", drive.injection.synchronous.current_saliency),
-    word!("injection.check", |s| s.drive.injection.synchronous.check,
-        "no" = false => false, "yes" = true => true),
-    word!("injection.monitor", |s| s.drive.injection.synchronous.monitor,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("injection.check", drive.injection.synchronous.check),
+    yes_or_no!("injection.monitor", drive.injection.synchronous.monitor),
     number!("injection.allowed_loss", "", drive.injection.synchronous.allowed_loss),
     number!("injection.loss_s", "s", drive.injection.synchronous.loss_s),
     number!("injection.tracked_rpm", "rpm", drive.injection.synchronous.tracked_rpm),
-    word!("injection.beside_encoder", |s| s.drive.injection.beside_encoder,
-        "no" = false => false, "yes" = true => true),
+    yes_or_no!("injection.beside_encoder", drive.injection.beside_encoder),
     number!("limits.current_a", "A", drive.limits.current_a),
     number!("limits.trip_a", "A", drive.limits.trip_a),
     number!("limits.dc_over_v", "V", drive.limits.dc_over_v),
@@ -268,7 +303,7 @@ pub static KEYS: [Key; 53] = [
     number!("speed.ramp_rpm_per_s", "rpm/s", drive.speed.ramp_rpm_per_s),
     number!("speed.phase_margin_deg", "deg", drive.speed.phase_margin_deg),
     number!("command.timeout_s", "s", command.timeout_s),
-    word!("wiring_checked", |s| s.command.wiring_checked, "no" = false => false, "yes" = true => true),
+    yes_or_no!("wiring_checked", command.wiring_checked),
 ];
 
 /// The setting with this [number](Key::id).
@@ -277,7 +312,7 @@ pub fn find_id(id: u32) -> Option<&'static Key> {
 }
 
 /// FNV-1a: a number for a word.
-fn number_of(word: &str) -> u32 {
+pub(crate) fn number_of(word: &str) -> u32 {
     word.bytes().fold(0x811c_9dc5, |hash, b| (hash ^ u32::from(b)).wrapping_mul(0x0100_0193))
 }
 

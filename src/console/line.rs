@@ -123,12 +123,13 @@ impl<const N: usize> Text<N> {
 
 impl<const N: usize> fmt::Write for Text<N> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        for c in text.chars() {
-            let end = self.length + c.len_utf8();
-            let Some(place) = self.bytes.get_mut(self.length..end) else { break };
-            c.encode_utf8(place);
-            self.length = end;
+        let (bytes, room) = (text.as_bytes(), N.saturating_sub(self.length));
+        // Whole characters only.
+        let fits = text.floor_char_boundary(room);
+        for (place, byte) in self.bytes.iter_mut().skip(self.length).zip(bytes.iter().take(fits)) {
+            *place = *byte;
         }
+        self.length += fits;
         Ok(())
     }
 }

@@ -1,112 +1,10 @@
-use std::collections::VecDeque;
-
+use drive_core::learning::Fitted;
+use drive_core::schedule::ReferenceTable;
 use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
+use super::doubles::{Desk, Wire};
 use super::*;
-
-/// A drive on the desk.
-struct Desk {
-    drive: Drive,
-    running: bool,
-    trace: Vec<trace::Record>,
-    orders: Vec<Order>,
-    saved: Option<Everything>,
-    worn_out: bool,
-}
-
-impl Desk {
-    fn new() -> Self {
-        let drive = Drive::new(Everything::of_the_board().build().unwrap());
-        Self {
-            drive,
-            running: true,
-            trace: Vec::new(),
-            orders: Vec::new(),
-            saved: None,
-            worn_out: false,
-        }
-    }
-}
-
-impl Machine for Desk {
-    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
-        if !self.running {
-            return Err(NotDone::NoAnswer);
-        }
-        self.orders.push(order);
-        self.drive.command(order.command()).map_err(NotDone::Refused)
-    }
-    fn status(&self) -> Option<Status> {
-        self.running.then(|| Status {
-            periods: self.orders.len() as u32,
-            state: self.drive.state(),
-            sample: Sample::default(),
-            telemetry: self.drive.telemetry(),
-            worst_cycles: 900,
-            last_cycles: 800,
-            worst_latency: 50,
-            hardware: Hardware::NONE,
-        })
-    }
-    fn is_off(&self) -> bool {
-        matches!(self.drive.state(), State::Off | State::Fault(_))
-    }
-    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
-        settings.build()
-    }
-    fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
-        if self.worn_out {
-            return Err(Failed::Erase(0x10));
-        }
-        self.saved = Some(*settings);
-        Ok(())
-    }
-    fn begin_trace(&mut self, records: u16, _: u16, _: &Choice) -> bool {
-        self.trace = vec![[0.0; trace::MOST]; usize::from(records)];
-        true
-    }
-    fn tracing(&self) -> bool {
-        false
-    }
-    fn traced(&self, i: u16) -> Option<trace::Record> {
-        self.trace.get(usize::from(i)).copied()
-    }
-    fn set_log_level(&mut self, _: Level) {}
-    fn stack(&self) -> (usize, usize) {
-        (1000, 8192)
-    }
-    fn version(&self, to: &mut dyn Write) -> fmt::Result {
-        write!(to, "version")
-    }
-    fn last_run(&self, to: &mut dyn Write) -> fmt::Result {
-        write!(to, "power-on")
-    }
-}
-
-#[derive(Default)]
-struct Wire {
-    sent: VecDeque<u8>,
-    damaged: bool,
-    room: usize,
-    received: String,
-}
-
-impl Port for Wire {
-    fn read(&mut self) -> Option<u8> {
-        self.sent.pop_front()
-    }
-    fn take_damage(&mut self) -> bool {
-        std::mem::take(&mut self.damaged)
-    }
-    fn write(&mut self, text: &str) -> bool {
-        let fits = text.len() <= self.room;
-        if fits {
-            self.received.push_str(text);
-        }
-        fits
-    }
-}
 
 struct Talk {
     console: Console,
@@ -121,7 +19,7 @@ impl Talk {
         settings.command.wiring_checked = true;
         Self {
             console: Console::new(settings),
-            desk: Desk::new(),
+            desk: Desk::new(Drive::new(settings.build().unwrap())),
             wire: Wire { room: usize::MAX, ..Wire::default() },
             now_ms: 0,
         }
@@ -175,7 +73,10 @@ fn a_session() {
     assert!(talk.ask("torque 100").starts_with("ok: limited to 3.4"));
     assert!(talk.ask("set motor.r_s 5.4").starts_with("error: the drive must be off"));
     assert!(talk.ask("save").starts_with("error: the drive must be off"));
-    assert!(talk.ask("status").starts_with("calibrating; i_d 0.00 A"));
+    talk.desk.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
+    let status = talk.ask("status");
+    assert!(status.starts_with("calibrating; i_d 0.00 A"), "{status}");
+    assert!(status.contains("dc link 311 V, heat sink code 1200 of 4000;"), "{status}");
     assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("save"), "ok");
     assert_eq!(talk.desk.saved.unwrap().drive.motor.r_s, 5.5);
@@ -354,6 +255,68 @@ fn commands_reach_the_drive_as_they_were_given() {
         talk.desk.orders,
         [Order::Start(Mode::Torque), Order::Torque(1.5), Order::Stop, Order::Clear]
     );
+}
+
+/// What a learning finds.
+fn found() -> Learned {
+    Learned {
+        reference: ReferenceTable::default(),
+        carrier: Some(drive_core::lock_monitor::CarrierTable::default()),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: Fitted { value: 0.01, misfit: 0.0002, accepted: true },
+        current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
+        flux_saliency: -0.035,
+        accepted: true,
+    }
+}
+
+#[test]
+fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");
+    talk.desk.found = Some(found());
+    let list = talk.say("learned\n");
+    assert_eq!(
+        list[..4],
+        [
+            "asymmetry 0.00100; gain mismatch 0.01000 (misfit 0.00020); \
+             current saliency 0.03000 (misfit 0.02000); flux saliency -0.03500",
+            "i_q,reference,carrier",
+            "0.00,0.00000,1.00000",
+            "0.25,0.01617,1.00233",
+        ]
+    );
+    assert_eq!((list.len(), list.last().unwrap().as_str()), (2 + 14 + 1, "ok"));
+    assert_eq!(talk.ask("save"), "ok");
+    assert_eq!(talk.desk.saved.unwrap().learned, Some(found()));
+    // What it does not depend on leaves it, and the drive works with it.
+    assert_eq!(talk.ask("set limits.dc_over_v 390"), "ok");
+    let Some(Order::Configure(with)) = talk.desk.orders.last() else { panic!("no order") };
+    let mut settings = Everything::of_the_board();
+    settings.drive.limits.dc_over_v = 390.0;
+    assert_ne!(*with, settings.build().unwrap());
+    settings.learn(&found());
+    assert_eq!(*with, settings.build().unwrap());
+    // What was refused leaves it too.
+    assert!(talk.ask("set motor.r_r 0").starts_with("error"));
+    assert!(talk.say("learned\n").len() > 10);
+    let forgotten = "ok: what was learned belonged to other settings and is forgotten";
+    assert_eq!(talk.ask("set motor.r_r 1.2"), forgotten);
+    assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");
+    talk.desk.found = Some(found());
+    assert_eq!(talk.ask("defaults"), forgotten);
+    assert_eq!(talk.ask("defaults"), "ok");
+}
+
+#[test]
+fn what_is_not_believable_is_shown_and_not_used() {
+    let mut talk = Talk::new();
+    talk.desk.found = Some(Learned { accepted: false, asymmetry: 0.02, ..found() });
+    let list = talk.say("learned\n");
+    assert!(list[0].starts_with("not believable, not used: asymmetry 0.02000; "), "{list:?}");
+    assert_eq!(talk.ask("save"), "ok");
+    assert_eq!(talk.desk.saved.unwrap().learned, None);
 }
 
 proptest! {

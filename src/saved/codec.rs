@@ -7,18 +7,19 @@
 //! | 2 and on | number of the key | its value, 32 bits | |
 //!
 //! A key is known by a number made of its name, so that keys can come and go: what a record does not
-//! hold stays as it is by default, what no key has asked for is passed over. The version changes only
-//! with this layout. The checksum is that of Ethernet over everything but itself.
+//! hold stays as it is by default, what no key has asked for is passed over. What was learned is behind
+//! the keys, if there is something, as entries with numbers of their own ([`learned`]). The version
+//! changes only with this layout. The checksum is that of Ethernet over everything but itself.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use super::{NotUsed, SLOT_WORDS};
+use super::{NotUsed, SLOT_WORDS, learned};
 use crate::console::keys::{Everything, KEYS, find_id};
 
 /// The layout that is written.
 pub const VERSION: u16 = 1;
-/// Double words of a record that is written.
-pub const WORDS: usize = FIRST + KEYS.len();
+/// Double words of the longest record that is written.
+pub const WORDS: usize = FIRST + KEYS.len() + learned::WORDS;
 /// The double word that is written last.
 pub const COMMIT: usize = 1;
 /// The first entry.
@@ -53,16 +54,29 @@ fn halves(word: u64) -> (u32, u32) {
     (word as u32, (word >> 32) as u32)
 }
 
-/// The record of `settings`.
+/// The record of `settings`, erased behind its [`length`].
 pub fn record(settings: &Everything, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
     for (key, word) in KEYS.iter().zip(words.iter_mut().skip(FIRST)) {
         *word = pair(key.id(), key.to_bits(settings));
     }
-    words[0] = pair(MAGIC, u32::from(VERSION) | (KEYS.len() as u32) << 16);
-    let entries = words.iter().skip(FIRST).copied();
-    words[COMMIT] = pair(sequence, checksum(words[0], sequence, entries));
+    let mut entries = KEYS.len();
+    if let Some(found) = &settings.learned {
+        let values = learned::to_words(found).into_iter().enumerate();
+        for ((n, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
+            *word = pair(learned::id(n), value);
+        }
+        entries += learned::WORDS;
+    }
+    words[0] = pair(MAGIC, u32::from(VERSION) | (entries as u32) << 16);
+    let written = words.iter().skip(FIRST).take(entries).copied();
+    words[COMMIT] = pair(sequence, checksum(words[0], sequence, written));
     words
+}
+
+/// Double words of a record that are written.
+pub fn length(record: &[u64; WORDS]) -> usize {
+    FIRST + header(record[0]).map_or(0, |(_, entries)| entries)
 }
 
 #[inline(never)]
@@ -124,11 +138,19 @@ pub fn settings(
         return Err(NotUsed::Newer(version));
     }
     let mut settings = *defaults;
+    let (mut words, mut found) = ([0; learned::WORDS], 0_u64);
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(NotUsed::Broken)?);
         if let Some(key) = find_id(id) {
             key.set_bits(&mut settings, bits).ok_or(NotUsed::Value(key.name))?;
+        } else if let Some(place) = learned::place(id) {
+            words[place] = bits;
+            found |= 1 << place;
         }
+    }
+    if found > 0 {
+        let whole = learned::from_words(&words).filter(|_| found == learned::ALL);
+        settings.learned = Some(whole.ok_or(NotUsed::Value(learned::NAME))?);
     }
     Ok(settings)
 }

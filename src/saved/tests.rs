@@ -1,5 +1,9 @@
+use drive_core::learning::{Fitted, Learned};
+use drive_core::lock_monitor::CarrierTable;
+use drive_core::schedule::{POINTS, ReferenceTable};
 use proptest::prelude::*;
 
+use super::learned as learned_words;
 use super::*;
 use crate::console::keys::{KEYS, Value};
 
@@ -80,6 +84,28 @@ fn with_r_s(r_s: f32) -> Everything {
     settings
 }
 
+/// Something that a learning can have found, of 16 numbers from -1 to 1.
+fn learned(random: [f32; POINTS]) -> Learned {
+    let mut reference = random.map(|x| 0.3 * x);
+    let mut carrier = random.map(|x| 1.25 + 0.75 * x);
+    (reference[0], carrier[0]) = (0.0, 1.0);
+    Learned {
+        reference: ReferenceTable::of_points(reference).unwrap(),
+        carrier: CarrierTable::of_points(carrier).filter(|_| random[1] > -0.5),
+        points: 13,
+        asymmetry: 0.005 * random[2].abs(),
+        gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },
+        current_saliency: Fitted { value: random[5], misfit: 1.0, accepted: random[5].abs() < 0.3 },
+        flux_saliency: 0.05 * random[6],
+        accepted: true,
+    }
+}
+
+fn with_learned() -> Everything {
+    let random = core::array::from_fn(|n| (n as f32 * 0.7).sin());
+    Everything { learned: Some(learned(random)), ..with_r_s(6.0) }
+}
+
 fn load(fake: &mut Fake) -> Loaded {
     Saved::load(fake, &board()).1
 }
@@ -113,6 +139,53 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(9.0)));
 }
 
+/// The record that the firmware wrote before there was anything learned: the same, without it.
+#[test]
+fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by_older_firmware() {
+    let old = codec::record(&with_r_s(7.0), 0);
+    assert_eq!(codec::length(&old), 2 + KEYS.len());
+    // Magic, version 1 and 53 entries: what is in the flash of boards.
+    assert_eq!(old[0], 0x0035_0001_7672_6469);
+    assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(7.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+
+    let new = codec::record(&with_learned(), 0);
+    assert_eq!(codec::length(&new), codec::WORDS);
+    // No key has a number that what was learned has: those who do not know it leave it alone.
+    for word in &new[2 + KEYS.len()..] {
+        assert!(learned_words::place(*word as u32).is_some());
+        assert!(KEYS.iter().all(|key| key.id() != *word as u32));
+    }
+}
+
+#[test]
+fn what_was_learned_is_saved_and_loaded_with_its_settings_and_gone_with_the_defaults() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_learned()).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_learned()));
+    save(&mut fake, &board()).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(board()));
+}
+
+/// Half of it, or what no learning can have found: refused by name, whatever the settings.
+#[test]
+fn what_cannot_have_been_learned_is_refused() {
+    let first = 2 + KEYS.len();
+    let spoil: [fn(&mut u64); 3] =
+        [|word| *word ^= 1, |word| *word |= 0x7f80_0000 << 32, |word| *word = u64::MAX];
+    for (n, spoil) in spoil.into_iter().enumerate() {
+        let mut record = codec::record(&with_learned(), 3);
+        spoil(&mut record[first + 3 * n]);
+        let mut fake = Fake::new();
+        for (word, value) in resealed(record).into_iter().enumerate() {
+            fake.words[0][word] = Some(value);
+        }
+        assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("learned")), "{n}");
+    }
+}
+
 #[test]
 fn sequence_numbers_wrap() {
     let mut fake = Fake::new();
@@ -130,7 +203,8 @@ fn sequence_numbers_wrap() {
 /// Power fails in every operation of a save, and again in every operation of the next one.
 #[test]
 fn whenever_the_power_fails_the_old_or_the_new_set_is_there() {
-    let operations = codec::WORDS + 1;
+    // One erasure, and every double word of the record.
+    let operations = 2 + KEYS.len() + 1;
     for seed in 0..20 {
         for first in 0..=operations {
             let mut fake = Fake::new();
@@ -173,14 +247,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     let mut record = codec::record(&with_r_s(2.0), 1);
     record[0] += 1 << 32;
     // As a later firmware computes it.
-    let bytes: Vec<u8> = [record[0].to_le_bytes().to_vec(), 1_u32.to_le_bytes().to_vec()]
-        .into_iter()
-        .chain(record[2..].iter().map(|word| word.to_le_bytes().to_vec()))
-        .flatten()
-        .collect();
-    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
-    record[1] = 1 | u64::from(checksum) << 32;
-    for (word, value) in record.into_iter().enumerate() {
+    for (word, value) in resealed(record).into_iter().enumerate() {
         fake.words[1][word] = Some(value);
     }
     let kept = fake.words[1];
@@ -218,7 +285,7 @@ fn a_value_that_nobody_knows_is_named() {
 fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
     let mut bytes = record[0].to_le_bytes().to_vec();
     bytes.extend((record[1] as u32).to_le_bytes());
-    bytes.extend(record[2..].iter().flat_map(|word| word.to_le_bytes()));
+    bytes.extend(record[2..codec::length(&record)].iter().flat_map(|word| word.to_le_bytes()));
     let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
     record[1] = record[1] & 0xffff_ffff | u64::from(checksum) << 32;
     record
@@ -231,7 +298,38 @@ fn numbers_of_settings_follow_those_of_the_records() {
     assert!(all.iter().all(|why| why.to_string().starts_with("7")));
 }
 
+/// With what was learned, too: never the settings of one set and what was learned with another.
+#[test]
+fn whenever_the_power_fails_what_was_learned_is_with_its_settings() {
+    let mut before = with_learned();
+    before.drive.motor.r_s = 2.0;
+    let mut after = before;
+    after.drive.motor.r_s = 3.0;
+    after.learned = Some(learned([0.4; POINTS]));
+    for seed in 0..20 {
+        for operation in 0..=codec::WORDS {
+            let mut fake = Fake::new();
+            fake.random = seed * 1000 + operation as u64;
+            save(&mut fake, &before).unwrap();
+            fake.left = Some(operation);
+            assert!(save(&mut fake, &after).is_err());
+            let Loaded::Settings(now) = load(&mut fake) else { panic!("none at {operation}") };
+            assert!(now == before || now == after, "{now:?} at {operation}");
+        }
+    }
+}
+
 proptest! {
+    #[test]
+    fn whatever_was_learned_survives(
+        random in proptest::array::uniform16(-1.0_f32..=1.0), r_s in 0.1_f32..100.0,
+    ) {
+        let settings = Everything { learned: Some(learned(random)), ..with_r_s(r_s) };
+        let mut fake = Fake::new();
+        save(&mut fake, &settings).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+    }
+
     #[test]
     fn every_value_of_every_key_survives(bits: u32, i in 0..KEYS.len()) {
         let mut settings = board();
@@ -251,7 +349,7 @@ proptest! {
 
     #[test]
     fn a_flipped_bit_is_found_and_the_set_before_counts(
-        word in 0..codec::WORDS, bit in 0_u32..64, both: bool,
+        word in 0..2 + KEYS.len(), bit in 0_u32..64, both: bool,
     ) {
         let mut fake = Fake::new();
         save(&mut fake, &with_r_s(1.0)).unwrap();

@@ -1,7 +1,9 @@
 //! Complex numbers.
 
-use core::f64::consts::{FRAC_PI_2, PI};
+use core::f64::consts::PI;
 use core::ops::{Add, Div, Mul, Sub};
+
+use crate::elementary::{atan2, sin_cos, sqrt};
 
 /// A complex number, for frequency responses and poles; not for the control step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,12 +31,12 @@ impl Complex {
 
     /// Magnitude, for parts between 1e-150 and 1e150: the squares are formed.
     pub fn abs(self) -> f64 {
-        libm::sqrt(self.re * self.re + self.im * self.im)
+        sqrt(self.re * self.re + self.im * self.im)
     }
 
     /// Phase in (-π, π].
     pub fn arg(self) -> f64 {
-        libm::atan2(self.im, self.re)
+        atan2(self.im, self.re)
     }
 
     /// Phase in degrees, (-180, 180].
@@ -84,71 +86,5 @@ impl Div for Complex {
             (self.re * o.re + self.im * o.im) / norm,
             (self.im * o.re - self.re * o.im) / norm,
         )
-    }
-}
-
-/// Sine and cosine, to 2e-16 for angles up to a thousand turns.
-///
-/// `libm`'s take 6 KiB of the microcontroller for angles that do not occur here.
-pub(crate) fn sin_cos(angle: f64) -> (f64, f64) {
-    // To within an eighth of a turn. The upper part of a quarter turn has 33 bits: its multiples are
-    // exact.
-    const UPPER: f64 = 1.570_796_326_734_125_6;
-    const LOWER: f64 = 6.077_100_506_506_192e-11;
-    let quarters = angle / FRAC_PI_2;
-    let quarter = if quarters < 0.0 { (quarters - 0.5) as i64 } else { (quarters + 0.5) as i64 };
-    let n = quarter as f64;
-    let x = angle - n * UPPER - n * LOWER;
-
-    // Taylor's series: the first term left out is below 1e-17.
-    let square = x * x;
-    let series = |terms: &[f64]| terms.iter().fold(0.0, |sum, term| 1.0 - sum * square * term);
-    let cos = series(&COSINE);
-    let sin = x * series(&SINE);
-    match quarter & 3 {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
-}
-
-/// 1/((2k)(2k - 1)), from k = 9 down: cos x = 1 - x²/2 (1 - x²/12 (1 - …)).
-const COSINE: [f64; 9] = over_products(-1.0);
-/// 1/((2k)(2k + 1)): sin x = x (1 - x²/6 (1 - x²/20 (1 - …))).
-const SINE: [f64; 9] = over_products(1.0);
-
-const fn over_products(beside: f64) -> [f64; 9] {
-    let mut terms = [0.0; 9];
-    let mut i = 0;
-    while i < terms.len() {
-        let even = 2.0 * (terms.len() - i) as f64;
-        terms[i] = 1.0 / (even * (even + beside));
-        i += 1;
-    }
-    terms
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sine_and_cosine_are_those_of_libm() {
-        for n in -200_000_i32..=200_000 {
-            let angle = f64::from(n) * 3.141_7e-2;
-            let (sin, cos) = sin_cos(angle);
-            // Angles beyond a few turns come with their own rounding, up to 4.5e-13 at 6283 rad.
-            let allowed = 3e-16 + 1e-19 * angle.abs();
-            assert!((sin - libm::sin(angle)).abs() < allowed, "sin {angle}");
-            assert!((cos - libm::cos(angle)).abs() < allowed, "cos {angle}");
-        }
-        for angle in [0.0, -0.0, 1e-300, FRAC_PI_2, PI, -PI, 0.25 * PI] {
-            let (sin, cos) = sin_cos(angle);
-            assert!(
-                (sin - libm::sin(angle)).abs() < 2e-16 && (cos - libm::cos(angle)).abs() < 2e-16
-            );
-        }
-        assert!(sin_cos(f64::NAN).0.is_nan() && sin_cos(f64::INFINITY).1.is_nan());
     }
 }

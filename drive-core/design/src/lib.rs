@@ -8,5 +8,6 @@
 
 pub mod complex;
 pub mod decimal;
+pub mod elementary;
 pub mod section;
 pub mod tuning;

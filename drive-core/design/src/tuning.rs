@@ -33,8 +33,9 @@
 use core::f64::consts::{PI, TAU};
 use core::fmt;
 
-use crate::complex::{Complex, sin_cos};
+use crate::complex::Complex;
 use crate::decimal::{Fixed, Shortest};
+use crate::elementary::{atan2, exp_m1, sin_cos};
 use crate::section::{Section, response};
 
 mod margins;
@@ -226,7 +227,7 @@ pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningErr
     let r = motor.r_s + motor.r_r * (motor.l_m / l_r) * (motor.l_m / l_r);
     let sigma_l_s = motor.l_m + motor.l_ls - motor.l_m * motor.l_m / l_r;
     let exponent = -period_s * r / sigma_l_s;
-    let decay = -libm::expm1(exponent);
+    let decay = -exp_m1(exponent);
     let plant = FirstOrder { k: decay / r, p: 1.0 - decay };
     check_plant(plant.k, plant.p)?;
     Ok(plant)
@@ -239,7 +240,7 @@ pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningErr
 pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<Rule, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
-    let wanted = 100.0 * (PI / 180.0) + libm::atan(4.0);
+    let wanted = 100.0 * (PI / 180.0) + atan2(4.0, 1.0);
     // The lag of G/(z - 1) grows from 90° at dc to 360° at half the sampling rate: one solution.
     let lag = |omega_t: f64| {
         let z = Complex::unit(omega_t);

@@ -7,7 +7,7 @@ use crate::frames::Dq;
 use crate::io::{Command, Mode, Refused, Taken};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::limited;
-use crate::settings::AngleSource;
+use crate::settings::{AngleSource, Coefficients};
 use crate::state::State;
 
 /// Largest test voltage of an axis, V: a step of it moves the current by 0.2 A a period.
@@ -113,12 +113,18 @@ impl Drive {
             }
             Command::Configure(coefficients) => match self.state {
                 State::Off | State::Fault(_) => {
-                    self.c = *coefficients;
+                    self.configure(coefficients);
                     Ok(Taken::AsGiven)
                 }
                 state => Err(Refused::State(state)),
             },
         }
+    }
+
+    // Not inlined: there the compiler knows that the two do not overlap, and copies in one go.
+    #[inline(never)]
+    fn configure(&mut self, coefficients: &Coefficients) {
+        self.c = *coefficients;
     }
 
     fn start(&mut self, mode: Mode) -> Result<Taken, Refused> {
@@ -132,12 +138,11 @@ impl Drive {
             (state, _) => return Err(Refused::State(state)),
         }
         self.mode = mode;
+        if mode == Mode::Learning {
+            self.learned = None;
+        }
         self.control = ControlState::default();
-        self.control.references = References {
-            current: Dq::new(self.c.sequence.i_d, 0.0),
-            injection_axis: self.c.injection_axis,
-            ..References::default()
-        };
+        self.control.references = self.no_torque(self.c.sequence.i_d);
         self.control.axes = self.c.axes(0.0, self.c.injection_axis);
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
@@ -152,15 +157,20 @@ impl Drive {
             state if state == State::of_mode(self.mode) => {}
             state => return Err(Refused::State(state)),
         }
-        self.control.references = References {
-            current: Dq::new(self.control.references.current.d, 0.0),
-            injection_axis: self.c.injection_axis,
-            ..References::default()
-        };
+        self.control.references = self.no_torque(self.control.references.current.d);
         self.c.estimator.start(&mut self.control.estimator);
         self.control.lock = LockMonitorState::default();
         self.enter(State::Magnetising);
         Ok(Taken::AsGiven)
+    }
+
+    /// References of nothing but this direct current, A.
+    fn no_torque(&self, i_d: f32) -> References {
+        References {
+            current: Dq::new(i_d, 0.0),
+            injection_axis: self.c.injection_axis,
+            ..References::default()
+        }
     }
 
     /// Whether a reference for `mode` can be taken now.

@@ -9,7 +9,7 @@ use crate::settings::{Coefficients, Tracking};
 use crate::state::State;
 
 impl Drive {
-    /// What the last learning found, used or not; none before the first.
+    /// What the last learning found, used or not; none before the end of the first.
     pub fn learned(&self) -> Option<&Learned> {
         self.learned.as_ref()
     }

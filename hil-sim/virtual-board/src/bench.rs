@@ -178,6 +178,10 @@ pub struct Board {
     pub worst: Worst,
     /// The longest way to the compare values.
     pub worst_to_compares: Worst,
+    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    pended: Option<u64>,
+    /// Longest from there to its first instruction, ticks.
+    pub latest_start: u64,
     /// The core is stopped before the n-th instruction in the flash from here on, if set, and
     /// [`Board::run_ticks`] returns.
     preempt_at: Option<u64>,
@@ -228,6 +232,8 @@ impl Board {
             resets: Vec::new(),
             worst: Worst::default(),
             worst_to_compares: Worst::default(),
+            pended: None,
+            latest_start: 0,
             preempt_at: None,
         };
         board.see();
@@ -339,6 +345,10 @@ impl Board {
 
     /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
     pub fn pend(&mut self, exception: u16) {
+        // One that runs already is not waited for by anything but itself.
+        if exception == 16 + IRQ_ADC1_2 && self.entered.is_none() {
+            self.pended = Some(self.cpu.chip().now);
+        }
         self.chip().scs.pend(exception);
     }
 
@@ -573,6 +583,9 @@ impl Board {
             hardware,
         };
         let (began, accesses) = (chip.now, chip.accesses);
+        if let Some(at) = self.pended.take() {
+            self.latest_start = self.latest_start.max(began - at);
+        }
         self.entered = Some(Entered { began, sample, ended: ended[0], had_order, accesses });
     }
 

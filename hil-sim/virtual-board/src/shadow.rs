@@ -61,12 +61,11 @@ impl Shadow {
             Ok(Request::Speed(rpm)) => Order::Speed(rpm),
             Ok(Request::Position(turns)) => Order::Position(turns),
             Ok(Request::Angle(source)) => {
-                self.settings.drive.angle_source = source;
-                Order::Configure(self.settings.build_for(self.dead_time_s)?)
+                self.configure(|settings| settings.drive.angle_source = source)?
             }
-            Ok(Request::Set(key, value)) => {
-                key.set(&mut self.settings, value);
-                Order::Configure(self.settings.build_for(self.dead_time_s)?)
+            Ok(Request::Set(key, value)) => self.configure(|settings| key.set(settings, value))?,
+            Ok(Request::Defaults) => {
+                self.configure(|settings| *settings = Everything::of_the_board())?
             }
             Ok(_) => return Ok(()), // no order to the drive
             Err(why) => bail!("{line}: {why}"),
@@ -75,12 +74,43 @@ impl Shadow {
         Ok(())
     }
 
+    /// Changes settings, as the firmware's console does.
+    fn configure(&mut self, change: impl FnOnce(&mut Everything)) -> Result<Order> {
+        let before = self.settings;
+        change(&mut self.settings);
+        self.settings.forget_unless_as(&before);
+        Ok(Order::Configure(self.settings.build_for(self.dead_time_s)?))
+    }
+
+    /// The board was reset: it has these settings, which were saved, and starts anew.
+    ///
+    /// # Errors
+    /// They make no drive.
+    pub fn restart(&mut self, settings: Everything) -> Result<()> {
+        self.settings = settings;
+        self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
+        self.orders.clear();
+        Ok(())
+    }
+
+    /// All that is set, and what was learned.
+    pub fn everything(&self) -> &Everything {
+        &self.settings
+    }
+
     /// Follows a control interrupt of the board.
     ///
     /// # Errors
     /// The compare values differ.
     pub fn follow(&mut self, period: &Period) -> Result<()> {
+        let learning = self.drive.state() == State::Learning;
         let compare = self.drive.step(&period.sample);
+        if learning
+            && self.drive.state() != State::Learning
+            && let Some(found) = self.drive.learned()
+        {
+            self.settings.learn(found);
+        }
         if compare != period.compare {
             bail!(
                 "control interrupt {} while {}: {compare:?} on the host, {:?} on the board",

@@ -3,6 +3,7 @@
 use core::f64::consts::{PI, TAU};
 
 use crate::complex::Complex;
+use crate::elementary::{exp_m1, sqrt};
 
 /// How far a loop is from instability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +36,7 @@ const LN_SPLIT_OVER_START: f64 = 8.517_193_191_416_238;
 fn grid(n: u32) -> f64 {
     if n < LOW {
         // Even in the logarithm: START (SPLIT / START)^(n / LOW).
-        START * (1.0 + libm::expm1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
+        START * (1.0 + exp_m1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
     } else {
         SPLIT + (PI - SPLIT) * (f64::from(n - LOW) / f64::from(HIGH))
     }
@@ -120,10 +121,9 @@ pub(super) fn gain_limit(
         let c = 1.0 - 1.0 / (ms * ms);
         let root = l.re * l.re - a * c;
         // Smaller root of a g² + 2 re g + c = 0, written without cancellation.
-        let by_ms =
-            if l.re < 0.0 && root >= 0.0 { c / (libm::sqrt(root) - l.re) } else { f64::INFINITY };
+        let by_ms = if l.re < 0.0 && root >= 0.0 { c / (sqrt(root) - l.re) } else { f64::INFINITY };
         let by_phase = if 180.0 - l.arg_deg().abs() < phase_margin_deg {
-            1.0 / libm::sqrt(a)
+            1.0 / sqrt(a)
         } else {
             f64::INFINITY
         };

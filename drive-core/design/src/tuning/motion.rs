@@ -4,7 +4,8 @@ use core::f64::consts::{PI, TAU};
 
 use super::margins::{Margins, scan};
 use super::{TuningError, check, check_period, pi_response, zero_at};
-use crate::complex::{Complex, sin_cos};
+use crate::complex::Complex;
+use crate::elementary::{atan2, exp_m1, sin_cos};
 
 /// What [`design_motion_loops`] gives, and for what.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,9 +72,9 @@ pub fn design_motion_loops(
     // 76° is what the zero leaves.
     check("phase margin of the speed loop in degrees", phase_margin_deg, 20.0, 75.0)?;
     let tracking = tracking_hz.map(|hz| TAU * hz);
-    let smoothing = tracking.map_or(1.0, |w_n| -libm::expm1(-CORNER * w_n * period_s));
+    let smoothing = tracking.map_or(1.0, |w_n| -exp_m1(-CORNER * w_n * period_s));
 
-    let spare = libm::atan(SPREAD) - phase_margin_deg * (PI / 180.0);
+    let spare = atan2(SPREAD, 1.0) - phase_margin_deg * (PI / 180.0);
     let lag = |omega_t: f64| {
         let tracked = tracking.map_or(Complex::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
