@@ -6,6 +6,8 @@ mod learn;
 mod tests;
 
 use core::f32::consts::TAU;
+use core::mem::offset_of;
+use core::ops::Range;
 
 use crate::angle::{Angle, UnitVector};
 use crate::estimator::EstimatorState;
@@ -44,6 +46,8 @@ use crate::wiring_check::{Next, WiringCheckState};
 #[derive(Clone, Debug)]
 pub struct Drive {
     c: Coefficients,
+    /// How often `c` was changed, wrapping.
+    changes: u32,
     state: State,
     mode: Mode,
     /// Control periods spent in this state.
@@ -143,10 +147,18 @@ pub struct Telemetry {
 }
 
 impl Drive {
+    /// Where in a drive its coefficients are, bytes: for a check of its memory from outside. They change
+    /// only when the count [`Self::CHANGES`] does.
+    pub const COEFFICIENTS: Range<usize> =
+        offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients>();
+    /// Where in a drive that count is, a `u32`.
+    pub const CHANGES: usize = offset_of!(Self, changes);
+
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
         Self {
             c: coefficients,
+            changes: 0,
             state: State::Off,
             mode: Mode::Torque,
             elapsed: 0,

@@ -109,11 +109,13 @@ impl Drive {
                     .indirect
                     .track(tau_r)
                     .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
+                self.changes = self.changes.wrapping_add(1);
                 Ok(as_taken(tau_r, taken))
             }
             Command::Configure(coefficients) => match self.state {
                 State::Off | State::Fault(_) => {
                     self.c = *coefficients;
+                    self.changes = self.changes.wrapping_add(1);
                     self.sensing = SensingState::default();
                     Ok(Taken::AsGiven)
                 }
