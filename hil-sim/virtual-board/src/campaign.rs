@@ -15,7 +15,6 @@ mod scene;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
@@ -47,30 +46,41 @@ struct Found {
     failures: Vec<(u64, String)>,
 }
 
-/// A campaign of `count` faults, the n-th with seed `seed + n`; `open` opens the image. Gives the table.
+/// Which faults.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// How many.
+    pub count: u64,
+    /// Seed of the first; each has the next one that is chosen.
+    pub seed: u64,
+    /// Only of the classes whose name contains this.
+    pub class: String,
+    /// Whether what fails in a class that is known to be open is not counted.
+    pub forgiven: bool,
+}
+
+/// A campaign of faults; `open` opens the image. Gives the table.
 ///
 /// # Errors
-/// The table with what failed; not what failed in a class that is known to be open, where those are
-/// `forgiven`.
-pub fn run(
-    open: impl Fn() -> Result<Image> + Sync,
-    count: u64,
-    seed: u64,
-    forgiven: bool,
-) -> Result<String> {
-    let next = AtomicU64::new(0);
+/// The table with what failed; no class has that name.
+pub fn run(open: impl Fn() -> Result<Image> + Sync, choice: &Choice) -> Result<String> {
+    let Choice { count, seed, ref class, forgiven } = *choice;
+    let classes = CLASSES.len() as u64;
+    let is_chosen = |seed: &u64| CLASSES[(seed % classes) as usize].name.contains(class);
+    ensure!(
+        CLASSES.iter().any(|c| c.name.contains(class)),
+        "no class of faults has {class:?} in its name: {}",
+        CLASSES.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
+    );
+    let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
     let found: Mutex<BTreeMap<usize, Found>> = Mutex::default();
     let work = || -> Result<()> {
         let mut scene = Scene::new(open()?)?;
         scene.board.forgive();
         loop {
-            let n = next.fetch_add(1, Ordering::Relaxed);
-            if n >= count {
-                return Ok(());
-            }
             // A seed says all: a campaign of one with the seed of a failure repeats it.
-            let seed = seed + n;
-            let classes = CLASSES.len() as u64;
+            let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
+            let Some(seed) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
             let seen = one(&mut scene, &CLASSES[which], seed / classes, seed);
             if let Err(why) = &seen {
@@ -131,13 +141,16 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / (2 * 14_167))?;
-            inject(&mut scene.board, &scene.places, &mut rng);
+            let what = inject(&mut scene.board, &scene.places, &mut rng);
             let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
-            let seen = judge::watch(&mut scene.board, &scene.places, ms, promised)?;
+            let mut seen = judge::watch(&mut scene.board, &scene.places, ms, promised)
+                .with_context(|| what.clone())?;
             if seen.off_ms.is_some() {
-                judge::reported(&mut scene.board, whole_start).context("after the end")?;
+                judge::reported(&mut scene.board, whole_start)
+                    .with_context(|| format!("{what}; after the end"))?;
             }
+            seen.what = what;
             Ok(seen)
         }
         Course::Saving => {

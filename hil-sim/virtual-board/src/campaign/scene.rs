@@ -44,8 +44,10 @@ pub struct Places {
     pub phi: u32,
     /// Data in RAM, without the stack: address, bytes.
     pub data: (u32, u32),
-    /// Code and data in CCM: address, bytes.
-    pub ccm: (u32, u32),
+    /// The control's code, in CCM: address, bytes.
+    pub code: (u32, u32),
+    /// The control's data, in CCM: address, bytes.
+    pub ccm_data: (u32, u32),
     /// Lowest address and size of the stack.
     pub stack: (u32, u32),
 }
@@ -59,13 +61,14 @@ impl Places {
         let end = |name: &str| image.address(name);
         let (data, data_end) = (end("__sdata")?, end("__euninit")?);
         let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
-        let ccm = end("__sccm")?;
+        let (code, code_end) = (end("__sccm")?, end("__eccm")?);
         Ok(Self {
             coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
             control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
             phi: drive + at("Drive", "telemetry")? + at("Telemetry", "phi")?,
             data: (data, data_end - data),
-            ccm: (ccm, running.0 + running.1 - ccm),
+            code: (code, code_end - code),
+            ccm_data: running,
             stack: (stack, stack_end - stack),
         })
     }
