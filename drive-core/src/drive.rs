@@ -21,6 +21,7 @@ use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::learning::{Learned, LearningState};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::{Goal, MotionState, RotorCount};
+use crate::noise_watch::NoiseWatchState;
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, PredictionState};
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
@@ -103,6 +104,7 @@ struct ControlState {
     prediction: PredictionState,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
+    noise: NoiseWatchState,
     inverter_drop: InverterDropState,
     learning: LearningState,
 }
@@ -305,6 +307,11 @@ impl Drive {
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
         let carrier =
             if c.inject { s.carrier.step(&c.injection) } else { CarrierPeriod::default() };
+        if let Some(watch) = &c.noise_watch
+            && let Some(fault) = watch.step(&mut s.noise, carrier.index, sample)
+        {
+            return Err(fault);
+        }
         let phi = flux.phi.unit_vector();
         let theta_axis = phi.turned_by(r.injection_axis);
         let rest = measured.current - AlphaBeta::along(theta_axis, carrier.sampled);
