@@ -156,7 +156,8 @@ impl Indirect {
     /// Integrates the slip over one period with the current in the flux frame, A.
     pub fn update(&self, state: &mut IndirectState, current: Dq) {
         state.magnetising += self.rate * (current.d - state.magnetising);
-        let divisor = if state.magnetising > self.least { state.magnetising } else { self.least };
+        // Not-a-number stays one, and shows in the slip.
+        let divisor = if state.magnetising < self.least { self.least } else { state.magnetising };
         state.slip_step = self.rate * (1.0 / TAU) * current.q / divisor;
         state.slip += Angle::within_turn(state.slip_step);
     }

@@ -156,6 +156,8 @@ impl Prediction {
         state.applied = [computed, state.applied[0]];
         // The two uncertainties are independent: their squares add.
         let allowed = self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * rotor.length_squared();
-        (state.unexplained.length_squared() > allowed).then_some(Fault::CurrentNotAsPredicted)
+        // Not-a-number is not within it.
+        let explained = state.unexplained.length_squared() <= allowed;
+        (!explained).then_some(Fault::CurrentNotAsPredicted)
     }
 }
