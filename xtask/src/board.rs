@@ -43,17 +43,15 @@ pub struct Faults<'a> {
     pub class: &'a str,
 }
 
-/// Injects faults into this image on the virtual board; fails if any is not dealt with in its time, but
-/// where that is known, if that is to be `forgiven`.
-pub fn campaign(elf: &Path, faults: &Faults, forgiven: bool) -> Result<()> {
+/// Injects faults into this image on the virtual board; fails if any is not dealt with in its time.
+pub fn campaign(elf: &Path, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     Step::new("campaign of faults").run(
         on_the_board(["run", "--release", "--package", "virtual-board"])
             .args(["--", "campaign"])
             .arg(elf)
             .args([faults.count.to_string(), faults.seed.to_string()])
-            .args(["--class", faults.class])
-            .args(forgiven.then_some("--forgive-open")),
+            .args(["--class", faults.class]),
     )
 }
 

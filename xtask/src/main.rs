@@ -54,7 +54,7 @@ fn main() -> ExitCode {
             };
             let class = rest.get(2).copied().unwrap_or("");
             let faults = board::Faults { count: number(0, CAMPAIGN), seed: number(1, 1), class };
-            image::build().and_then(|elf| board::campaign(&elf, &faults, false))
+            image::build().and_then(|elf| board::campaign(&elf, &faults))
         }
         ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
         [] | ["help" | "-h" | "--help"] => {
@@ -115,7 +115,7 @@ fn test() -> Result<()> {
     let elf = image::build_with(&target)?;
     image::report_size(&elf)?;
     board::test(&elf)?;
-    board::campaign(&elf, &board::Faults { count: CAMPAIGN / 20, seed: 1, class: "" }, true)?;
+    board::campaign(&elf, &board::Faults { count: CAMPAIGN / 20, seed: 1, class: "" })?;
     board::cycles(&elf)?;
 
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());

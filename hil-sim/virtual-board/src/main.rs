@@ -26,9 +26,6 @@ enum Task {
         /// Seed of the first; each has the next one.
         #[arg(default_value_t = 1)]
         seed: u64,
-        /// Shows what fails in the classes that are known to be open, but does not fail by it.
-        #[arg(long)]
-        forgive_open: bool,
         /// Only the classes whose name contains this.
         #[arg(long, default_value = "")]
         class: String,
@@ -58,8 +55,8 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Campaign { elf, count, seed, forgive_open: forgiven, class } => {
-            let choice = campaign::Choice { count, seed, class, forgiven };
+        Task::Campaign { elf, count, seed, class } => {
+            let choice = campaign::Choice { count, seed, class };
             println!("{}", campaign::bounds());
             println!("{}", campaign::run(|| Image::open(&elf), &choice)?);
         }
