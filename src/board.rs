@@ -315,6 +315,8 @@ pub const WATCHDOG_LONG_PRESCALER: u8 = 6;
 pub const WATCHDOG_LONG_RELOAD: u16 = 1249;
 /// Longest wait for the watchdog to take both over, us: six of its longest clocks, 12 ms.
 pub const WATCHDOG_SET_US: u32 = 15_000;
+/// Longest wait at start for the control interrupt to come as it should, us.
+pub const INTERRUPT_TIMEOUT_US: u32 = 100_000;
 /// Unwished resets in a row after which the drive is not started any more.
 pub const MOST_RESETS: u32 = 4;
 /// Time without a reset after which they are no longer in a row, ms.

@@ -1,6 +1,9 @@
 //! From reset to a running control interrupt.
 #![cfg(target_os = "none")]
 
+use core::sync::atomic::Ordering;
+
+use cortex_m::peripheral::DWT;
 use cortex_m::singleton;
 use drive_core::learning::Learned;
 use drive_core::settings::SettingsError;
@@ -17,7 +20,7 @@ use crate::record::{Reason, Record};
 use crate::saved::{Loaded, NotUsed, Saved};
 use crate::serial::Port;
 use crate::trace::Trace;
-use crate::watchdog::Watchdog;
+use crate::watchdog::{Rule, Verdict, Watchdog};
 use crate::{adc, board, clocks, control, encoder, memory, over_voltage, pwm, stop};
 
 /// What the main loop works with.
@@ -43,6 +46,8 @@ enum NotStarted {
     Resets,
     /// The timer of the power stage.
     Timer(pwm::NotInStep),
+    /// The control interrupt does not come as it should: the timer does not trigger the converters.
+    Interrupt,
 }
 
 /// Sets everything up and starts the control interrupt. If something is wrong with the drive, the
@@ -176,6 +181,25 @@ fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     (cause, record, stop::count_reset(unwished))
 }
 
+/// Waits for the control interrupt to satisfy the rule of the watchdog, which is started then: without
+/// it there would be one reset after the other.
+fn comes_as_it_should() -> bool {
+    let now = || (DWT::cycle_count(), control::PERIODS.load(Ordering::Relaxed));
+    let (began, periods) = now();
+    let mut rule = Rule::new(began, periods);
+    loop {
+        let (cycles, periods) = now();
+        match rule.judge(cycles, periods, false) {
+            Verdict::Feed => return true,
+            Verdict::Wait => {}
+            Verdict::Refuse { .. } => rule = Rule::new(cycles, periods),
+        }
+        if cycles.wrapping_sub(began) > board::INTERRUPT_TIMEOUT_US * board::CYCLES_PER_US {
+            return false;
+        }
+    }
+}
+
 fn start_control(
     coefficients: Result<Coefficients, SettingsError>,
     mut pwm: pwm::Pwm,
@@ -220,5 +244,8 @@ fn start_control(
         trace: recorder,
     }
     .run();
+    if !comes_as_it_should() {
+        return Err(NotStarted::Interrupt);
+    }
     Ok(Ends { status, orders, answers, learned, trace })
 }

@@ -6,7 +6,7 @@
 #![cfg(target_os = "none")]
 
 use core::cell::UnsafeCell;
-use core::mem::MaybeUninit;
+use core::mem::{MaybeUninit, offset_of};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
@@ -20,6 +20,7 @@ use crate::board;
 use crate::encoder::Encoder;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
+use crate::memory_check::Part;
 use crate::pwm::Pwm;
 use crate::trace::Recorder;
 
@@ -78,11 +79,31 @@ impl Control {
     }
 }
 
+/// What the interrupt reads and does not write, unless its drive counts a change: the coefficients, and
+/// where the ends of the ways to the main loop are.
+pub fn constants() -> ([Part; 5], u32) {
+    let control = RUNNING.0.get() as usize + offset_of!(Running, control);
+    let part = |at: usize, bytes: usize| Part {
+        address: (control + at) as u32,
+        words: (bytes / size_of::<u32>()) as u32,
+    };
+    let drive = offset_of!(Control, drive);
+    let constants = [
+        part(drive + Drive::COEFFICIENTS.start, Drive::COEFFICIENTS.len()),
+        part(offset_of!(Control, status), size_of::<Sender<'static, Status>>()),
+        part(offset_of!(Control, orders), size_of::<Receiver<'static, Order>>()),
+        part(offset_of!(Control, answers), size_of::<Sender<'static, Answer>>()),
+        part(offset_of!(Control, trace), size_of::<Recorder<'static, { board::TRACE_RECORDS }>>()),
+    ];
+    (constants, (control + drive + Drive::CHANGES) as u32)
+}
+
 /// The interrupt's own memory.
 struct Owned(UnsafeCell<MaybeUninit<Running>>);
 
 // SAFETY: shared between contexts, but not at one time: `Control::run` writes it before it unmasks
-// the interrupt, and after that only the interrupt touches it, which cannot interrupt itself.
+// the interrupt, and after that only the interrupt touches it, which cannot interrupt itself. (The check of
+// the memory looks at words of it, without a reference; see `memory::word`.)
 unsafe impl Sync for Owned {}
 
 // SAFETY: a section of memory.x for data that nobody initialises, which `MaybeUninit` allows for.

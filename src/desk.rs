@@ -19,6 +19,7 @@ use crate::flash::Pages;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::memory;
+use crate::memory_check::{Flipped, MemoryCheck, Places};
 use crate::record::{Reason, Record};
 use crate::saved::{Failed, NotUsed, Saved};
 use crate::watchdog::{Rule, Verdict, Watchdog};
@@ -49,6 +50,8 @@ pub struct Desk {
     level: Level,
     clock: Clock,
     guard: Option<(Watchdog, Rule)>,
+    /// Over a control that runs.
+    check: Option<MemoryCheck<5>>,
     /// Whether it has run for a while.
     well: bool,
     chip: Chip,
@@ -96,7 +99,26 @@ impl Desk {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
-        Self { ends, status: None, level: Level::Info, clock, guard, well: false, chip }
+        let check = ends.is_some().then(|| {
+            let ((code, source), (constants, changes)) =
+                (memory::control_code(), control::constants());
+            MemoryCheck::new(Places { code, source, constants, changes }, memory::word)
+        });
+        Self { ends, status: None, level: Level::Info, clock, guard, check, well: false, chip }
+    }
+
+    /// Looks at a slice of the control's memory. What has flipped ends it: start-up copies and computes it
+    /// afresh.
+    pub fn check_memory(&mut self) {
+        match self.check.as_mut().map(|check| check.slice(memory::word)) {
+            Some(Err(Flipped::Code { address, found, copied })) => {
+                stop::end(Reason::Code, [address, found, copied, 0]);
+            }
+            Some(Err(Flipped::Constants { found, before })) => {
+                stop::end(Reason::Coefficients, [found, before, 0, 0]);
+            }
+            Some(Ok(())) | None => {}
+        }
     }
 
     /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.

@@ -9,6 +9,7 @@ pub mod board;
 pub mod console;
 pub mod link;
 pub mod mailbox;
+pub mod memory_check;
 pub mod record;
 pub mod ring;
 pub mod saved;

@@ -5,6 +5,8 @@ use core::ptr;
 
 use cortex_m::register::msp;
 
+use crate::memory_check::Part;
+
 unsafe extern "C" {
     static mut _stack_start: u32;
     static mut _stack_end: u32;
@@ -33,6 +35,35 @@ unsafe extern "C" fn copy_control_code() {
         "isb",
         "bx lr",
     )
+}
+
+/// Where the code in CCM is, and where it was copied from.
+pub fn control_code() -> (Part, u32) {
+    unsafe extern "C" {
+        static __sccm: u32;
+        static __eccm: u32;
+        static __siccm: u32;
+    }
+    let [begin, end, source] =
+        [&raw const __sccm, &raw const __eccm, &raw const __siccm].map(|at| at as u32);
+    (Part { address: begin, words: (end - begin) / size_of::<u32>() as u32 }, source)
+}
+
+/// The word at an address that is a multiple of 4, in the flash or in RAM.
+pub fn word(address: u32) -> u32 {
+    let word;
+    // SAFETY: all callers' addresses are those of statics, and reading memory changes nothing. By an
+    // instruction that the compiler does not look into: the word may be padding or the interrupt's own,
+    // which no read of Rust's may touch. A word is read whole, before the interrupt wrote it or after.
+    unsafe {
+        core::arch::asm!(
+            "ldr {word}, [{address}]",
+            address = in(reg) address,
+            word = lateout(reg) word,
+            options(readonly, nostack, preserves_flags),
+        );
+    }
+    word
 }
 
 /// The build id: a hash that the linker makes of the image, so that what runs can be told from what was

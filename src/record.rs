@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-/// Reasons to stop, with the numbers that follow those of the drive's faults.
+/// Reasons to stop, with the numbers that follow those of the drive's faults (70 to 73 are those of settings
+/// that are not used, see `saved.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Reason {
@@ -18,16 +19,22 @@ pub enum Reason {
     NotFed = 68,
     /// The drive's own fault; details: its number.
     Drive = 69,
+    /// A bit of the control's code has flipped; details: address, what it holds, what the flash holds.
+    Code = 74,
+    /// A bit of the coefficients has flipped; details: their hash now, and before.
+    Coefficients = 75,
 }
 
 impl Reason {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 8] = [
         Self::Panic,
         Self::HardFault,
         Self::NonMaskable,
         Self::Unexpected,
         Self::NotFed,
         Self::Drive,
+        Self::Code,
+        Self::Coefficients,
     ];
 
     /// In a few words.
@@ -39,6 +46,8 @@ impl Reason {
             Self::Unexpected => "unexpected interrupt",
             Self::NotFed => "watchdog not fed",
             Self::Drive => "fault of the drive",
+            Self::Code => "code of the control changed",
+            Self::Coefficients => "coefficients of the control changed",
         }
     }
 }
@@ -100,7 +109,7 @@ mod tests {
     #[test]
     fn numbers_follow_those_of_the_drive_and_never_change() {
         let codes: Vec<u8> = Reason::ALL.iter().map(|reason| *reason as u8).collect();
-        assert_eq!(codes, [64, 65, 66, 67, 68, 69]);
+        assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75]);
         assert!(drive_core::Fault::ALL.iter().all(|fault| fault.code() < 64));
     }
 

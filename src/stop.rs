@@ -76,7 +76,8 @@ pub fn forget_resets() {
     RESETS.write([0, !0]);
 }
 
-fn end(reason: Reason, details: [u32; 4]) -> ! {
+/// Outputs off, the reason kept, and a reset.
+pub fn end(reason: Reason, details: [u32; 4]) -> ! {
     pwm::outputs_off();
     keep(reason, details);
     SCB::sys_reset()

@@ -6,6 +6,8 @@ mod learn;
 mod tests;
 
 use core::f32::consts::TAU;
+use core::mem::offset_of;
+use core::ops::Range;
 
 use crate::angle::{Angle, UnitVector};
 use crate::demodulator::CarrierSample;
@@ -20,6 +22,7 @@ use crate::io::{Compare, Hardware, Mode, Sample};
 use crate::learning::{Learned, LearningState};
 use crate::lock_monitor::LockMonitorState;
 use crate::motion::{Goal, MotionState, RotorCount};
+use crate::noise_watch::NoiseWatchState;
 use crate::pi::{DqPiState, ReferenceState};
 use crate::plausibility::{CarrierWatch, JUDGED_EVERY, Prediction, PredictionState, is_judged};
 use crate::saliency_check::{Phase, SaliencyCheck, SaliencyCheckState};
@@ -45,6 +48,8 @@ use crate::wiring_check::{Next, WiringCheckState};
 #[derive(Clone, Debug)]
 pub struct Drive {
     c: Coefficients,
+    /// How often `c` was changed, wrapping.
+    changes: u32,
     control: ControlState,
     state: State,
     mode: Mode,
@@ -103,6 +108,7 @@ struct ControlState {
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
+    noise: NoiseWatchState,
     inverter_drop: InverterDropState,
     /// Those demodulations that are not the usual one are large: at its end.
     estimator: EstimatorState,
@@ -186,10 +192,18 @@ pub struct Telemetry {
 }
 
 impl Drive {
+    /// Where in a drive its coefficients are, bytes: for a check of its memory from outside. They change
+    /// only when the count [`Self::CHANGES`] does.
+    pub const COEFFICIENTS: Range<usize> =
+        offset_of!(Self, c)..offset_of!(Self, c) + size_of::<Coefficients>();
+    /// Where in a drive that count is, a `u32`.
+    pub const CHANGES: usize = offset_of!(Self, changes);
+
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
         Self {
             c: coefficients,
+            changes: 0,
             state: State::Off,
             mode: Mode::Torque,
             elapsed: 0,
@@ -391,6 +405,11 @@ impl Drive {
 
         // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
         // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
+        if let Some(watch) = &c.noise_watch
+            && let Some(fault) = watch.step(&mut s.noise, index, sample)
+        {
+            return Err(fault);
+        }
         let phi = flux.phi.unit_vector();
         let carrier_axis = phi.turned_by(axes.carrier);
         let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);

@@ -64,6 +64,8 @@ faults! {
     WiringExchanged = 33, "wiring check: current sensors or gates are on the wrong phases";
     WiringCurrent = 34, "wiring check: more current than the motor's settings explain";
     CarrierNoRoom = 35, "the voltage left by the fundamental is too small for the carrier";
+    SensorNoisyA = 36, "current sensor a is too noisy for the injection";
+    SensorNoisyB = 37, "current sensor b is too noisy for the injection";
 }
 
 impl Fault {
@@ -127,6 +129,8 @@ mod tests {
             (33, Fault::WiringExchanged),
             (34, Fault::WiringCurrent),
             (35, Fault::CarrierNoRoom),
+            (36, Fault::SensorNoisyA),
+            (37, Fault::SensorNoisyB),
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);

@@ -164,7 +164,8 @@ impl Indirect {
             let i_m = state.magnetising
                 + CARRIER_SAMPLES as f32 * self.rate * (current.d - state.magnetising);
             state.magnetising = i_m;
-            let divisor = if i_m > self.least { i_m } else { self.least };
+            // Not-a-number stays one, and shows in the slip.
+            let divisor = if i_m < self.least { self.least } else { i_m };
             state.slip_per_ampere = self.rate * (1.0 / TAU) / divisor;
         }
         state.slip_step = state.slip_per_ampere * current.q;

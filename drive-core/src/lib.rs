@@ -44,6 +44,7 @@ pub mod lock_monitor;
 pub mod modulation;
 pub mod motion;
 pub mod moving_sum;
+pub mod noise_watch;
 pub mod online;
 pub mod pi;
 pub mod plausibility;

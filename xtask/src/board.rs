@@ -33,16 +33,25 @@ pub fn cycles(elf: &Path) -> Result<()> {
     )
 }
 
-/// Injects `count` faults into this image on the virtual board, the first with this seed; fails if any is
-/// not dealt with in its time, but where that is known, if that is to be `forgiven`.
-pub fn campaign(elf: &Path, count: u32, seed: u32, forgiven: bool) -> Result<()> {
+/// Which faults.
+pub struct Faults<'a> {
+    /// How many.
+    pub count: u32,
+    /// Seed of the first.
+    pub seed: u32,
+    /// Only of the classes whose name contains this.
+    pub class: &'a str,
+}
+
+/// Injects faults into this image on the virtual board; fails if any is not dealt with in its time.
+pub fn campaign(elf: &Path, faults: &Faults) -> Result<()> {
     toolchain::ensure_c_compiler()?;
     Step::new("campaign of faults").run(
         on_the_board(["run", "--release", "--package", "virtual-board"])
             .args(["--", "campaign"])
             .arg(elf)
-            .args([count.to_string(), seed.to_string()])
-            .args(forgiven.then_some("--forgive-open")),
+            .args([faults.count.to_string(), faults.seed.to_string()])
+            .args(["--class", faults.class]),
     )
 }
 

@@ -24,8 +24,9 @@ Usage: cargo xtask <task>
   flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
   board     builds the image and tests it on the virtual board
   cycles    counts what the control interrupt costs on the virtual board, and fails when it rises
-  campaign [N] [SEED]
-            injects N faults (2000) into the image on the virtual board, the first with SEED (1)
+  campaign [N] [SEED] [CLASS]
+            injects N faults (2000) into the image on the virtual board, the first with SEED (1), only
+            of the classes whose name contains CLASS
   fuzz [S]  fuzzes console and saved settings, S seconds each (300)
   size      shows what the image takes of each memory, and fails above the limits";
 
@@ -46,13 +47,14 @@ fn main() -> ExitCode {
         ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
         ["board"] => image::build().and_then(|elf| board::test(&elf)),
         ["campaign", ref rest @ ..]
-            if rest.len() <= 2 && rest.iter().all(|n| n.parse::<u32>().is_ok()) =>
+            if rest.len() <= 3 && rest.iter().take(2).all(|n| n.parse::<u32>().is_ok()) =>
         {
             let number = |n: usize, default| {
                 rest.get(n).and_then(|text| text.parse().ok()).unwrap_or(default)
             };
-            image::build()
-                .and_then(|elf| board::campaign(&elf, number(0, CAMPAIGN), number(1, 1), false))
+            let class = rest.get(2).copied().unwrap_or("");
+            let faults = board::Faults { count: number(0, CAMPAIGN), seed: number(1, 1), class };
+            image::build().and_then(|elf| board::campaign(&elf, &faults))
         }
         ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
         [] | ["help" | "-h" | "--help"] => {
@@ -113,7 +115,7 @@ fn test() -> Result<()> {
     let elf = image::build_with(&target)?;
     image::report_size(&elf)?;
     board::test(&elf)?;
-    board::campaign(&elf, CAMPAIGN / 20, 1, true)?;
+    board::campaign(&elf, &board::Faults { count: CAMPAIGN / 20, seed: 1, class: "" })?;
     board::cycles(&elf)?;
 
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());

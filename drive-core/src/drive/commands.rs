@@ -109,6 +109,7 @@ impl Drive {
                     .indirect
                     .track(tau_r)
                     .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
+                self.changes = self.changes.wrapping_add(1);
                 Ok(as_taken(tau_r, taken))
             }
             Command::Configure(coefficients) => match self.state {
@@ -125,6 +126,7 @@ impl Drive {
     #[inline(never)]
     fn configure(&mut self, coefficients: &Coefficients) {
         self.c = *coefficients;
+        self.changes = self.changes.wrapping_add(1);
     }
 
     fn start(&mut self, mode: Mode) -> Result<Taken, Refused> {

@@ -46,6 +46,7 @@ impl Drive {
                     return Err(Fault::NothingLearned);
                 }
                 self.c.take(&learned);
+                self.changes = self.changes.wrapping_add(1);
                 self.enter(State::Stopping);
             }
         }

@@ -13,6 +13,7 @@ use crate::learning::Learning;
 use crate::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::modulation::Modulator;
 use crate::motion::{self, Motion};
+use crate::noise_watch::NoiseWatch;
 use crate::pi::{DqPi, Pi, ReferenceFilter};
 use crate::plausibility::{Prediction, RotorFlux};
 use crate::saliency_check::SaliencyCheck;
@@ -59,6 +60,8 @@ pub struct Coefficients {
     pub(crate) lag_share: f32,
     pub(crate) sequence: SequenceSteps,
     pub(crate) estimator: Estimator,
+    /// The watch on the sensors' noise, where the angle is the injection's.
+    pub(crate) noise_watch: Option<NoiseWatch>,
     pub(crate) injection: Injection,
     /// The watch on the lock, if it is wanted.
     pub(crate) lock_monitor: Option<LockMonitor>,
@@ -242,6 +245,10 @@ impl Settings {
             injection_axis,
             lock_monitor,
             saliency_check: self.saliency_check(),
+            noise_watch: (self.angle_source == AngleSource::Injection).then(|| {
+                let gains = [self.scales.current_a.gain, self.scales.current_b.gain];
+                NoiseWatch::new(t.flux_saliency, injection.current_amplitude, gains)
+            }),
             wiring: WiringCheck::new(m.sigma_l_s(), PERIOD_S),
             estimator: self.estimator(
                 lag_share,

@@ -26,9 +26,9 @@ enum Task {
         /// Seed of the first; each has the next one.
         #[arg(default_value_t = 1)]
         seed: u64,
-        /// Shows what fails in the classes that are known to be open, but does not fail by it.
-        #[arg(long)]
-        forgive_open: bool,
+        /// Only the classes whose name contains this.
+        #[arg(long, default_value = "")]
+        class: String,
     },
     /// Counts what the control interrupt costs.
     Cycles {
@@ -55,9 +55,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Campaign { elf, count, seed, forgive_open } => {
+        Task::Campaign { elf, count, seed, class } => {
+            let choice = campaign::Choice { count, seed, class };
             println!("{}", campaign::bounds());
-            println!("{}", campaign::run(|| Image::open(&elf), count, seed, forgive_open)?);
+            println!("{}", campaign::run(|| Image::open(&elf), &choice)?);
         }
         Task::Cycles { elf, against, functions } => {
             let lines = cycles::measure(|| Image::open(&elf))?;

@@ -6,6 +6,7 @@ use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
 use virtual_board::chip::Reset;
+use virtual_board::cpu::Cpu;
 use virtual_board::{Board, Image, Options};
 
 /// Periods that the firmware needs from reset to its greeting, at most.
@@ -93,5 +94,67 @@ fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     assert!(heard.contains("clock or flash failure"), "{heard}");
     let log = pair.board.logged()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
+    Ok(())
+}
+
+/// A timer that never triggers the converters: one look at start, no reset after the other, and the console
+/// says that the drive does not run.
+#[test]
+fn without_the_control_interrupt_it_stays_off() -> Result<()> {
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 5))?;
+    board.chip().adc.lose_triggers = [u32::MAX; 2];
+    board.run_periods(START)?;
+    let heard = board.heard();
+    assert!(heard.contains("last run: reset by power-on"), "{heard}");
+    let log = board.logged()?;
+    assert!(
+        log.iter().any(|line| line.contains("not started") && line.contains("Interrupt")),
+        "{log:#?}"
+    );
+    board.type_line("start");
+    board.run_periods(2 * START)?;
+    let heard = board.heard();
+    assert!(heard.contains("error: the control does not run"), "{heard}");
+    assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty(), "{:?}", board.resets);
+    Ok(())
+}
+
+/// A bit that flips in the control's code, and one that flips in its coefficients: outputs off within
+/// 20 ms, and the next run knows why.
+#[test]
+fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
+    for (code, reason) in
+        [(true, "74 code of the control"), (false, "75 coefficients of the control")]
+    {
+        let mut pair = common::pair(&Config::default(), 6)?;
+        pair.order("start torque")?;
+        pair.until_state(State::Torque)?;
+        let image = pair.board.image();
+        let (running, _) = image.symbol("control7RUNNING")?;
+        // The last word of the code, which is padding or never executed here; the direct current.
+        let address = if code {
+            image.address("__eccm")? - 4
+        } else {
+            let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
+            running
+                + at("Running", "control")?
+                + at("Control", "drive")?
+                + at("Drive", "c")?
+                + at("Coefficients", "sequence")?
+                + at("SequenceSteps", "i_d")?
+        };
+        let word = pair.board.word(address).unwrap_or(0) ^ 1 << 20;
+        pair.board.cpu().write(address, &word.to_le_bytes());
+        let began = pair.board.time();
+        while pair.board.chip().tim1.outputs_on() {
+            pair.board.run_ticks(2000)?;
+            assert!(pair.board.time() - began < 20e-3, "still on");
+        }
+        println!("{reason}: off after {:.1} ms", (pair.board.time() - began) * 1e3);
+        pair.board.heard();
+        pair.board.run_periods(START)?;
+        let heard = pair.board.heard();
+        assert!(heard.contains("reset by software") && heard.contains(reason), "{heard}");
+    }
     Ok(())
 }

@@ -21,8 +21,10 @@ const START: u64 = 30_000;
 const PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
 
 /// What was seen of a run.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Seen {
+    /// What was done.
+    pub what: String,
     /// From the fault to the outputs off, ms.
     pub off_ms: Option<f64>,
     /// From the fault to the last instant with outputs on and wrong control, ms.

@@ -16,11 +16,13 @@ use crate::pair::Pair;
 
 /// Current on the quadrature axis before the injection, A.
 const TORQUE: &str = "torque 1.5";
-/// Held speed of the shaft with the encoder, rad/s mechanical: 300 rpm. Without it the shaft is locked,
-/// where the injection alone knows the angle.
-const SPEED: f64 = 31.4;
+/// Held speeds of the shaft with the encoder, rad/s mechanical: 300 and 900 rpm. Without it the shaft is
+/// locked, where the injection alone knows the angle.
+const SPEEDS: [f64; 2] = [31.4, 94.2];
 /// Periods until the torque stands.
 const SETTLING: u64 = 1200;
+/// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
+const DECAYED: u64 = 9000;
 /// What is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
@@ -31,6 +33,8 @@ pub enum Source {
     Injection,
     /// The encoder, at 300 rpm.
     Encoder,
+    /// The encoder, at 900 rpm.
+    FastEncoder,
 }
 
 /// Places in memory.
@@ -44,8 +48,10 @@ pub struct Places {
     pub phi: u32,
     /// Data in RAM, without the stack: address, bytes.
     pub data: (u32, u32),
-    /// Code and data in CCM: address, bytes.
-    pub ccm: (u32, u32),
+    /// The control's code, in CCM: address, bytes.
+    pub code: (u32, u32),
+    /// The control's data, in CCM: address, bytes.
+    pub ccm_data: (u32, u32),
     /// Lowest address and size of the stack.
     pub stack: (u32, u32),
 }
@@ -59,13 +65,14 @@ impl Places {
         let end = |name: &str| image.address(name);
         let (data, data_end) = (end("__sdata")?, end("__euninit")?);
         let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
-        let ccm = end("__sccm")?;
+        let (code, code_end) = (end("__sccm")?, end("__eccm")?);
         Ok(Self {
             coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
             control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
             phi: drive + at("Drive", "control")? + at("ControlState", "seen")? + at("Seen", "phi")?,
             data: (data, data_end - data),
-            ccm: (ccm, running.0 + running.1 - ccm),
+            code: (code, code_end - code),
+            ccm_data: running,
             stack: (stack, stack_end - stack),
         })
     }
@@ -77,11 +84,13 @@ pub struct Scene {
     pub board: Board,
     /// Places in its memory.
     pub places: Places,
-    /// The settings that both pages hold or held, and those that are not saved yet.
+    /// Two sets of settings.
     pub settings: [Everything; 2],
-    off: Snapshot,
+    /// With the first set saved twice and the second one not yet; with the second one saved over the older
+    /// of these, and the first one to be saved again.
+    off: [Snapshot; 2],
     injection: Snapshot,
-    encoder: Snapshot,
+    encoder: [Snapshot; 2],
 }
 
 impl Scene {
@@ -101,13 +110,24 @@ impl Scene {
         pair.order(&format!("set {} {}", CHANGE.0, CHANGE.1))?;
         let mut new = old;
         new.command.timeout_s = CHANGE.1;
-        let off = pair.board.keep()?;
+        let first = pair.board.keep()?;
+        pair.order("save")?;
+        pair.order(&format!("set {} {}", CHANGE.0, old.command.timeout_s))?;
+        let off = [first, pair.board.keep()?];
         let injection = started(&mut pair)?;
         pair.order("stop")?;
         pair.until_state(State::Off)?;
-        pair.board.plant.set_load(Load::Speed { speed: SPEED })?;
         pair.order("angle encoder")?;
-        let encoder = started(&mut pair)?;
+        let mut with_encoder = |speed| {
+            pair.board.plant.set_load(Load::Speed { speed })?;
+            let started = started(&mut pair)?;
+            pair.order("stop")?;
+            pair.until_state(State::Off)?;
+            // A start takes a flux that has not decayed for a current that follows no voltage.
+            pair.run(DECAYED, |_, _| {})?;
+            anyhow::Ok(started)
+        };
+        let encoder = [with_encoder(SPEEDS[0])?, with_encoder(SPEEDS[1])?];
         let board = pair.board;
         Ok(Self { board, places, settings: [old, new], off, injection, encoder })
     }
@@ -119,16 +139,18 @@ impl Scene {
     pub fn regulating(&mut self, source: Source) -> Result<()> {
         match source {
             Source::Injection => self.board.go_back(&self.injection),
-            Source::Encoder => self.board.go_back(&self.encoder),
+            Source::Encoder => self.board.go_back(&self.encoder[0]),
+            Source::FastEncoder => self.board.go_back(&self.encoder[1]),
         }
     }
 
-    /// Off, with settings that are not saved.
+    /// Off, with settings that are not saved: the second set, to go to one slot, or the first, to go to the
+    /// other.
     ///
     /// # Errors
     /// The emulator's.
-    pub fn off(&mut self) -> Result<()> {
-        self.board.go_back(&self.off)
+    pub fn off(&mut self, slot: usize) -> Result<()> {
+        self.board.go_back(&self.off[slot % 2])
     }
 }
 
