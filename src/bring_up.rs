@@ -13,9 +13,11 @@ use crate::flash::Pages;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::Mailbox;
 use crate::record::{Reason, Record};
+use crate::ring::Ring;
 use crate::saved::{Loaded, NotUsed, Saved};
 use crate::serial::Port;
 use crate::trace::Trace;
+use crate::tracking::{Seen, Tracking};
 use crate::watchdog::Watchdog;
 use crate::{adc, board, clocks, control, encoder, memory, over_voltage, pwm, stop};
 
@@ -106,8 +108,12 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     // Only over a control that runs: without it the outputs stay off.
     let watchdog = ends.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
     let Start { saved, settings, not_used } = start;
+    let Some(tracking) = singleton!(: Option<Tracking> = None) else {
+        unreachable!("main runs once")
+    };
+    *tracking = Tracking::new(&settings.drive);
     let chip = Chip { cause, record, options, dual_bank, saved, not_used, dead_time_s };
-    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip) }
+    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip, tracking) }
 }
 
 /// What the drive starts with.
@@ -198,6 +204,8 @@ fn start_control(
     let (orders, take_orders) = orders.split();
     let (send_answers, answers) = answers.split();
     let (recorder, trace) = trace.ok_or(NotStarted::Twice)?.split();
+    let seen = singleton!(: Ring<Seen, { board::SEEN_PERIODS }> = Ring::new());
+    let (write_seen, seen) = seen.ok_or(NotStarted::Twice)?.split();
 
     pwm.start().map_err(NotStarted::Timer)?;
     let drive = Drive::new(coefficients);
@@ -210,7 +218,8 @@ fn start_control(
         orders: take_orders,
         answers: send_answers,
         trace: recorder,
+        seen: write_seen,
     }
     .run();
-    Ok(Ends { status, orders, answers, trace })
+    Ok(Ends { status, orders, answers, trace, seen })
 }

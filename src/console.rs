@@ -18,6 +18,7 @@ use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
 use crate::saved::Failed;
 use crate::trace::{self, Choice};
+use crate::tracking::Report;
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
 use line::{Garbled, Lines, Text};
@@ -59,6 +60,10 @@ pub trait Machine {
     /// # Errors
     /// Why the settings are none.
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError>;
+    /// The drive has taken these settings.
+    fn configured(&mut self, settings: &Everything);
+    /// What is known of the rotor time constant, where it is tracked.
+    fn tracking(&self) -> Option<Report>;
     /// Keeps the settings over a reset, which takes long: only while the outputs are off.
     ///
     /// # Errors
@@ -264,7 +269,11 @@ impl Console {
             Request::Status => match machine.status() {
                 Some(status) => {
                     let stack = machine.stack();
-                    self.reply(|text| write_status(text, &status, stack));
+                    let tracking = machine.tracking().filter(|_| status.state.regulates());
+                    self.reply(|text| {
+                        write_status(text, &status, stack)?;
+                        tracking.map_or(Ok(()), |report| write!(text, "; {report}"))
+                    });
                 }
                 None => self.reply(|text| write!(text, "error: {}", NotDone::NoAnswer)),
             },
@@ -352,6 +361,7 @@ impl Console {
                     let waits = settings.drive.inverter.dead_time_s
                         != self.settings.drive.inverter.dead_time_s;
                     self.settings = settings;
+                    machine.configured(&settings);
                     self.reply(|text| text.write_str(if waits { FROM_RESET } else { "ok" }));
                 }
             },

@@ -20,7 +20,9 @@ use crate::encoder::Encoder;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::pwm::Pwm;
+use crate::ring::Writer;
 use crate::trace::Recorder;
+use crate::tracking::Seen;
 
 /// Everything the interrupt works with.
 pub struct Control {
@@ -40,6 +42,8 @@ pub struct Control {
     pub answers: Sender<'static, Answer>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
+    /// What the identification sees.
+    pub seen: Writer<'static, Seen, { board::SEEN_PERIODS }>,
 }
 
 /// Control periods since the start, wrapping.
@@ -117,7 +121,7 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, status, orders, answers, trace } =
+        let Control { drive, pwm, adc, encoder, status, orders, answers, trace, seen } =
             &mut self.control;
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
@@ -188,6 +192,10 @@ impl Running {
             answers.send(answer);
         }
         trace.step(drive.telemetry());
+        if drive.tracks_rotor() {
+            // Without room it is missing, which the main loop sees.
+            seen.push(Seen::new(self.periods, drive.telemetry()));
+        }
 
         self.seen = self.seen.and(hardware);
         self.periods = self.periods.wrapping_add(1);

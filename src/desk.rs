@@ -19,7 +19,9 @@ use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::memory;
 use crate::record::{Reason, Record};
+use crate::ring;
 use crate::saved::{Failed, NotUsed, Saved};
+use crate::tracking::{Report, Seen, Tracking};
 use crate::watchdog::{Rule, Verdict, Watchdog};
 use crate::{pwm, stop, trace};
 
@@ -36,6 +38,8 @@ pub struct Ends {
     pub answers: Receiver<'static, Answer>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
+    /// What the identification sees.
+    pub seen: ring::Reader<'static, Seen, { board::SEEN_PERIODS }>,
 }
 
 /// The main loop's side of the drive.
@@ -49,6 +53,8 @@ pub struct Desk {
     /// Whether it has run for a while.
     well: bool,
     chip: Chip,
+    /// The rotor time constant, where the settings want it tracked. (Not on the stack: it is large.)
+    tracking: &'static mut Option<Tracking>,
 }
 
 /// What the desk knows of the chip and of its own start.
@@ -89,16 +95,23 @@ impl Clock {
 
 impl Desk {
     /// A desk; without `ends`, one whose control does not run.
-    pub fn new(ends: Option<Ends>, watchdog: Option<Watchdog>, chip: Chip) -> Self {
+    pub fn new(
+        ends: Option<Ends>,
+        watchdog: Option<Watchdog>,
+        chip: Chip,
+        tracking: &'static mut Option<Tracking>,
+    ) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
-        Self { ends, status: None, level: Level::Info, clock, guard, well: false, chip }
+        Self { ends, status: None, level: Level::Info, clock, guard, well: false, chip, tracking }
     }
 
-    /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.
+    /// Takes what the control reports, logs it, and tracks the rotor time constant by it. Gives the time
+    /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
         self.clock.update();
+        self.track();
         if let Some(status) = self.ends.as_mut().and_then(|ends| ends.status.take()) {
             self.log(status);
         }
@@ -123,6 +136,18 @@ impl Desk {
         if self.clock.ms > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();
+        }
+    }
+
+    /// Comes to an end: a period takes less time here than it lasts.
+    fn track(&mut self) {
+        while let Some(seen) = self.ends.as_mut().and_then(|ends| ends.seen.pop()) {
+            let Some(tau_r) = self.tracking.as_mut().and_then(|t| t.take(&seen)) else { continue };
+            // Refused when the drive has just stopped.
+            let answer = self.order(Order::RotorTimeConstant(tau_r));
+            if let (Ok(taken), Some(tracking)) = (answer, self.tracking.as_mut()) {
+                tracking.taken(tau_r, taken);
+            }
         }
     }
 
@@ -194,6 +219,14 @@ impl Machine for Desk {
 
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         stretched(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
+    }
+
+    fn configured(&mut self, settings: &Everything) {
+        *self.tracking = Tracking::new(&settings.drive);
+    }
+
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
 
     fn save(&mut self, settings: &Everything) -> Result<(), Failed> {

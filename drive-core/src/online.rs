@@ -28,6 +28,7 @@
 mod fit;
 
 use core::f32::consts::TAU;
+use core::fmt;
 
 use crate::frames::{AlphaBeta, Dq};
 use crate::rls::filter::Filter;
@@ -101,6 +102,17 @@ pub enum Doubt {
     Unbelievable,
 }
 
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Settling => "settling",
+            Self::Transient => "the speed changes",
+            Self::PoorExcitation => "the excitation is too poor",
+            Self::Unbelievable => "out of range",
+        })
+    }
+}
+
 /// The estimator. It lives in the idle loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Online {
@@ -121,6 +133,19 @@ pub struct Online {
     calls: u32,
 }
 
+/// `base`, but with `limit` no more than 50 times as large, and no less: what the least squares ask for, for
+/// any motor that the drive takes.
+#[inline]
+fn between(base: f32, limit: f32) -> f32 {
+    if base > limit {
+        limit
+    } else if base < 0.02 * limit {
+        0.02 * limit
+    } else {
+        base
+    }
+}
+
 /// What is taken from the settings.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
@@ -135,6 +160,7 @@ struct Motor {
 impl Motor {
     /// The machine's inductances with `current`, A: L x = sigma L_s (x - s x*), and x turns with the
     /// current in the steady state.
+    #[inline]
     fn machine(&self, current: Dq) -> Machine {
         let square = current.length_squared();
         let along = current.d * current.d - current.q * current.q;
@@ -156,7 +182,9 @@ impl Online {
     /// For the motor and the sensors of these settings.
     ///
     /// # Errors
-    /// What the recursive least squares refuse.
+    /// What the recursive least squares refuse: nothing of settings that
+    /// [`build`](Settings::build) takes.
+    #[inline]
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let (m, limits) = (&settings.motor, &settings.limits);
         let synchronous = &settings.injection.synchronous;
@@ -173,8 +201,8 @@ impl Online {
             lambda: LAMBDA,
             p0: P0,
             corner: TAU * CORNER_HZ * SAMPLE_S,
-            voltage_base: limits.current_a * m.r_s,
-            current_base: settings.sequence.i_d,
+            voltage_base: between(limits.current_a * m.r_s, limits.dc_over_v),
+            current_base: between(settings.sequence.i_d, limits.trip_a),
             voltage_limit: limits.dc_over_v,
             current_limit: limits.trip_a,
         })?;
@@ -199,6 +227,7 @@ impl Online {
 
     /// One control period, in order and without gaps: the current that was measured, A, and the voltage
     /// that the same step put out, V ([`Telemetry`](crate::Telemetry) has both).
+    #[inline]
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta) {
         // What a step puts out acts from the next sample on; the current is seen later still.
         let voltage = self.present + (self.before - self.present) * self.delay;
@@ -206,11 +235,18 @@ impl Online {
         if !(voltage.is_finite() && measured.is_finite()) {
             // Inside the filters they would never leave.
             self.restart();
-            return;
+        } else {
+            self.sample(voltage.into(), measured.into());
         }
+    }
+
+    /// What every control period costs. Not inlined: it would be compiled for size, as the firmware around
+    /// it.
+    #[inline(never)]
+    fn sample(&mut self, voltage: Complex32, current: Complex32) {
         let [on_voltage, on_current] = &mut self.filters;
-        let v = on_voltage.step(voltage.into()).value;
-        let i = on_current.step(measured.into()).value;
+        let v = on_voltage.step(voltage).value;
+        let i = on_current.step(current).value;
         if self.pushed == DECIMATION {
             let mean = self.sum * (1.0 / f32::from(DECIMATION));
             self.rls.step(mean.into(), self.sampled.into());
@@ -224,6 +260,7 @@ impl Online {
     }
 
     /// Samples were lost, or the outputs were off: begins anew, but with what it believes.
+    #[inline]
     pub fn restart(&mut self) {
         self.rls.reset();
         let nominal =
@@ -243,6 +280,7 @@ impl Online {
     ///
     /// # Errors
     /// Why the estimate must not be used now.
+    #[inline]
     pub fn refine(&mut self, current: Dq, speed: Speed) -> Result<Tracked, Doubt> {
         let (Speed::Known(seen) | Speed::Guess(seen)) = speed;
         let free_speed = matches!(speed, Speed::Guess(_));

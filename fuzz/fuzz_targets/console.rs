@@ -10,6 +10,7 @@ use drive_core::{Coefficients, Drive, Hardware, Sample, State, Taken};
 use induction_drive::console::keys::Everything;
 use induction_drive::console::{Console, Machine, NotDone, Port, grammar::Level};
 use induction_drive::link::{Order, Status};
+use induction_drive::tracking::Report;
 use induction_drive::{console, saved, trace};
 use libfuzzer_sys::fuzz_target;
 
@@ -39,6 +40,10 @@ impl Machine for Desk {
     }
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         settings.build()
+    }
+    fn configured(&mut self, _: &Everything) {}
+    fn tracking(&self) -> Option<Report> {
+        None
     }
     fn save(&mut self, _: &Everything) -> Result<(), saved::Failed> {
         Ok(())

@@ -202,7 +202,7 @@ fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 53] = [
+pub static KEYS: [Key; 54] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -230,6 +230,7 @@ pub static KEYS: [Key; 53] = [
         "identified" = CurrentPlant::Identified { .. } => CurrentPlant::default(),
         "motor" = CurrentPlant::Motor => CurrentPlant::Motor),
     word!("ignore_delays", |s| s.drive.ignore_delays, "no" = false => false, "yes" = true => true),
+    word!("track_rotor", |s| s.drive.track_rotor, "no" = false => false, "yes" = true => true),
     number!("injection.amplitude_v", "V", drive.injection.amplitude_v),
     word!("injection.demodulator", |s| s.drive.injection.demodulator,
         "literal" = Tracking::Literal => Tracking::Literal,

@@ -4,6 +4,7 @@ use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
 use super::*;
+use crate::tracking::Tracking;
 
 /// A drive on the desk.
 struct Desk {
@@ -13,6 +14,7 @@ struct Desk {
     orders: Vec<Order>,
     saved: Option<Everything>,
     worn_out: bool,
+    tracking: Option<Tracking>,
 }
 
 impl Desk {
@@ -25,6 +27,7 @@ impl Desk {
             orders: Vec::new(),
             saved: None,
             worn_out: false,
+            tracking: None,
         }
     }
 }
@@ -54,6 +57,12 @@ impl Machine for Desk {
     }
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         settings.build()
+    }
+    fn configured(&mut self, settings: &Everything) {
+        self.tracking = Tracking::new(&settings.drive);
+    }
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
     fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
         if self.worn_out {

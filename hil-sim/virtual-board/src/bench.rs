@@ -576,11 +576,7 @@ impl Board {
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
         let accesses = (chip.accesses - entered.accesses) as u32;
-        let spent: u32 = chip
-            .blocks
-            .iter()
-            .map(|block| block.cycles + if block.taken { crate::cost::TAKEN } else { 0 })
-            .sum();
+        let spent = crate::chip::cycles_of(&chip.blocks);
         let cycles = spent + crate::cost::EXCEPTION + accesses * crate::cost::BUS;
         if spent > 0 && cycles > self.worst.cycles {
             self.worst = Worst { cycles, accesses, blocks: std::mem::take(&mut chip.blocks) };

@@ -1,4 +1,4 @@
-//! What the control interrupt costs: its longest path over whole runs, block by block.
+//! What the control interrupt costs, and a sample of the identification: its longest path over whole runs, block by block.
 //!
 //! A block is what [`drive_core::Drive::step`] is made of; an instruction belongs to the outermost of the
 //! functions it was inlined into that is one of them.
@@ -12,12 +12,13 @@ use hil_sim::Config;
 use hil_sim::config::LoadMode;
 
 use crate::bench::{Options, Worst};
+use crate::chip::Watched;
 use crate::cost::{BUS, EXCEPTION, TAKEN, instructions};
 use crate::image::Image;
 use crate::pair::Pair;
 
 /// Blocks, and the paths of functions that belong to them; the first that fits counts.
-const BLOCKS: [(&str, &[&str]); 9] = [
+const BLOCKS: [(&str, &[&str]); 10] = [
     ("sensing", &["drive_core::sensing", "induction_drive::adc", "induction_drive::encoder"]),
     ("protection", &["Drive>::protect", "drive_core::plausibility"]),
     ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
@@ -45,6 +46,7 @@ const BLOCKS: [(&str, &[&str]); 9] = [
             "idsp::",
         ],
     ),
+    ("identification", &["drive_core::online", "drive_core::rls"]),
     ("sequence", &["drive_core::drive"]),
 ];
 /// What belongs to none: timer, mailboxes, report.
@@ -54,16 +56,23 @@ const ENTRY: [&str; 2] = ["exception", "bus"];
 /// How much a line of the table may rise before it is refused.
 const TOLERANCE: f64 = 1.05;
 
+/// The function of the main loop that takes a control period into the identification.
+const IDENTIFICATION: &str = "6Online6sample";
+
+/// Periods that are watched, three seconds: the filters settle within one.
+const IDENTIFIED: u64 = 18_000;
+
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// `sensored` or `sensorless`.
+    /// `sensored` or `sensorless`: the control interrupt; `identification`: a control period in the main
+    /// loop, the longest with a sample of the recursive least squares in it, the median without.
     pub name: &'static str,
     /// Instructions on the longest path.
     pub instructions: u32,
     /// Estimated cycles of it.
     pub cycles: u32,
-    /// Estimated cycles of the interrupt in the middle of all while the drive regulates.
+    /// Estimated cycles of the one in the middle of all while the drive regulates.
     pub median: u32,
     /// Cycles by block.
     pub blocks: BTreeMap<&'static str, u32>,
@@ -76,8 +85,35 @@ pub struct Line {
 ///
 /// # Errors
 /// The board cannot go on, or does not compute what the host computes.
-pub fn measure(image: impl Fn() -> Result<Image>) -> Result<[Line; 2]> {
-    Ok([sensored(image()?)?, sensorless(image()?)?])
+pub fn measure(image: impl Fn() -> Result<Image>) -> Result<[Line; 3]> {
+    Ok([sensored(image()?)?, sensorless(image()?)?, identification(image()?)?])
+}
+
+/// Runs the drive with the rotor time constant tracked.
+fn identification(image: Image) -> Result<Line> {
+    let watched = Watched::new(image.symbol(IDENTIFICATION)?);
+    let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
+    for line in ["angle encoder", "set track_rotor yes", "start torque"] {
+        pair.order(line)?;
+    }
+    pair.until_state(State::Torque)?;
+    pair.order("torque 1.5")?;
+    pair.board.chip().watched = Some(watched);
+    pair.run(IDENTIFIED, |_, _| {})?;
+    let watched = pair.board.chip().watched.take().context("not watched")?;
+    let mut cycles = watched.calls;
+    let worst = cycles.iter().max().copied().unwrap_or(0);
+    let worst = Worst { cycles: worst, accesses: 0, blocks: watched.longest };
+    let median = middle(&mut cycles)?;
+    attribute("identification", pair.board.image(), (&worst, 0), median, |address, bytes| {
+        pair_read(&pair, address, bytes)
+    })
+}
+
+/// The one in the middle.
+fn middle(cycles: &mut [u32]) -> Result<u32> {
+    cycles.sort_unstable();
+    cycles.get(cycles.len() / 2).copied().context("nothing was counted")
 }
 
 fn sensorless(image: Image) -> Result<Line> {
@@ -116,10 +152,9 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     pair.run(60, |_, _| {})?;
     pair.say("stop")?;
     pair.until_state(State::Off)?;
-    cycles.sort_unstable();
-    let median = *cycles.get(cycles.len() / 2).context("no control interrupts")?;
+    let median = middle(&mut cycles)?;
     let worst = std::mem::take(&mut pair.board.worst);
-    attribute(name, pair.board.image(), &worst, median, |address, bytes| {
+    attribute(name, pair.board.image(), (&worst, EXCEPTION), median, |address, bytes| {
         pair_read(pair, address, bytes)
     })
 }
@@ -135,11 +170,11 @@ fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
 fn attribute(
     name: &'static str,
     image: &Image,
-    worst: &Worst,
+    (worst, entry): (&Worst, u32),
     median: u32,
     read: impl Fn(u32, &mut [u8]),
 ) -> Result<Line> {
-    let mut blocks = BTreeMap::from([(ENTRY[0], EXCEPTION), (ENTRY[1], worst.accesses * BUS)]);
+    let mut blocks = BTreeMap::from([(ENTRY[0], entry), (ENTRY[1], worst.accesses * BUS)]);
     let mut functions = BTreeMap::new();
     let mut belongs: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
     let mut count = 0;
@@ -183,14 +218,14 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
 /// The lines as a table.
 pub fn table(lines: &[Line]) -> String {
     let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(ENTRY);
-    let mut text = format!("{:<12}{:>14}{:>8}{:>8}", "line", "instructions", "cycles", "median");
+    let mut text = format!("{:<16}{:>14}{:>8}{:>8}", "line", "instructions", "cycles", "median");
     blocks().for_each(|block| {
         let _ = write!(text, "{block:>17}");
     });
     text.push('\n');
     for line in lines {
         let (i, c, m) = (line.instructions, line.cycles, line.median);
-        let _ = write!(text, "{:<12}{i:>14}{c:>8}{m:>8}", line.name);
+        let _ = write!(text, "{:<16}{i:>14}{c:>8}{m:>8}", line.name);
         for block in blocks() {
             let _ = write!(text, "{:>17}", line.blocks.get(block).copied().unwrap_or(0));
         }
@@ -204,7 +239,7 @@ pub fn functions(line: &Line) -> String {
     let mut list: Vec<_> = line.functions.iter().collect();
     list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));
     list.iter().fold(String::new(), |mut text, ((block, function), cycles)| {
-        let _ = writeln!(text, "{:<12}{cycles:>6} {block:<16} {function}", line.name);
+        let _ = writeln!(text, "{:<16}{cycles:>6} {block:<16} {function}", line.name);
         text
     })
 }
