@@ -121,3 +121,91 @@ impl fmt::Display for Report {
         write!(f, "; used {} ms", ms(self.used))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{Command, Mode};
+    use hil_sim::Config;
+    use hil_sim::config::AngleSource as Source;
+    use hil_sim::rig::{Rig, drive_settings, plant_settings};
+
+    use super::*;
+    use crate::ring::Ring;
+
+    /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than it believes, and its
+    /// tracking.
+    fn tracked() -> (Rig, Tracking) {
+        let mut config = Config::default();
+        config.angle.source = Source::Encoder;
+        let settings = Settings { track_rotor: true, ..drive_settings(&config) };
+        config.motor.rr *= 1.3;
+        let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
+        rig.start(Mode::Torque).unwrap();
+        rig.command(Command::Torque(2.0)).unwrap();
+        rig.run(0.5, |_| {});
+        assert!(rig.drive.tracks_rotor());
+        (rig, Tracking::new(&settings).unwrap())
+    }
+
+    fn seen(rig: &mut Rig, number: u32) -> Seen {
+        rig.step();
+        Seen::new(number, rig.drive.telemetry())
+    }
+
+    #[test]
+    fn only_settings_that_want_it_are_tracked() {
+        assert!(Tracking::new(&board::settings()).is_none());
+        let settings = Settings { track_rotor: true, ..board::settings() };
+        assert!(Tracking::new(&settings).is_some());
+    }
+
+    #[test]
+    fn the_drive_gets_the_time_constant_of_its_motor() {
+        let (mut rig, mut tracking) = tracked();
+        let truth = rig.plant.motor().machine.tau_r();
+        let mut ordered = Vec::new();
+        // The numbers wrap on the way.
+        for n in 0..60_000_u32 {
+            let number = (u32::MAX - 9).wrapping_add(n);
+            if let Some(tau_r) = tracking.take(&seen(&mut rig, number)) {
+                assert_eq!((n + 1) % PERIODS_PER_FIT, 0);
+                let taken = rig.drive.command(Command::RotorTimeConstant(tau_r)).unwrap();
+                tracking.taken(tau_r, taken);
+                ordered.push(tau_r);
+            }
+        }
+        // Ten a second after three seconds of settling.
+        assert!((65..=71).contains(&ordered.len()), "{}", ordered.len());
+        // Within 6 %, as measured by `cargo sim run online-tracking`, and what the drive uses is that.
+        for tau_r in [ordered[ordered.len() - 1], tracking.report().used] {
+            assert!((f64::from(tau_r) / truth - 1.0).abs() < 0.06, "{tau_r} for {truth}");
+        }
+    }
+
+    #[test]
+    fn a_main_loop_that_comes_too_late_begins_anew() {
+        let (mut rig, mut tracking) = tracked();
+        let mut ring = Ring::<Seen, { board::SEEN_PERIODS }>::new();
+        let (mut write, mut read) = ring.split();
+        let (mut orders, mut lost) = (Vec::new(), 0);
+        for n in 0..60_000_u32 {
+            if !write.push(seen(&mut rig, n)) {
+                lost += 1;
+            }
+            // It hangs for 100 periods once, and else comes every 20.
+            if n % 20 == 19 && !(30_000..30_100).contains(&n) {
+                while let Some(seen) = read.pop() {
+                    orders.extend(tracking.take(&seen).map(|_| n));
+                }
+            }
+            if n == 30_200 {
+                assert_eq!(tracking.report().found, Err(Doubt::Settling));
+            }
+        }
+        assert!((30..60).contains(&lost), "{lost}");
+        let (before, after): (Vec<u32>, Vec<u32>) = orders.iter().partition(|n| **n < 30_000);
+        assert!(before.len() > 15 && after.len() > 15, "{orders:?}");
+        // The memory of the least squares is filled again first.
+        assert!(after.iter().all(|n| *n > 30_100 + 29 * PERIODS_PER_FIT), "{after:?}");
+    }
+}
