@@ -35,6 +35,8 @@ pub struct Fit {
     pub unknowns: Unknowns,
     /// Relative uncertainty of the rate, by the noise of the prediction and by what is excited.
     pub uncertainty: f32,
+    /// How far the rate still was from there, relatively.
+    pub moved: f32,
 }
 
 type Column = [Complex32; N];
@@ -118,7 +120,8 @@ impl Machine {
         // The prediction errors behind the filters are alike for about 1/corner samples.
         let noise = rls.error_square() / rls.settings().corner;
         let uncertainty = libm::sqrtf(noise / information);
-        Some(Fit { unknowns, uncertainty })
+        let moved = (unknowns.rate / from.rate - 1.0).abs();
+        Some(Fit { unknowns, uncertainty, moved })
     }
 }
 
