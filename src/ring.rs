@@ -61,14 +61,15 @@ impl<T: Copy, const N: usize> Writer<'_, T, N> {
     /// Writes an item, if there is room; says whether there was.
     #[inline]
     pub fn push(&mut self, item: T) -> bool {
-        if self.room() == 0 {
+        let ring = self.0;
+        let written = ring.written.load(Ordering::Relaxed);
+        if written.wrapping_sub(ring.read.load(Ordering::Acquire)) >= N {
             return false;
         }
-        let written = self.0.written.load(Ordering::Relaxed);
         // SAFETY: inside the array; with room left, the reader does not touch this item before
         // `written` says so.
-        unsafe { self.0.place(written).write(item) };
-        self.0.written.store(written.wrapping_add(1), Ordering::Release);
+        unsafe { ring.place(written).write(item) };
+        ring.written.store(written.wrapping_add(1), Ordering::Release);
         true
     }
 }

@@ -176,6 +176,7 @@ struct Motor {
 
 impl Motor {
     /// What the settings say, with this speed, electrical rad/s.
+    #[inline]
     fn nominal(&self, omega_m: f32) -> Unknowns {
         Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
     }
@@ -293,6 +294,7 @@ impl Online {
     }
 
     /// The least squares begin anew with what is believed.
+    #[inline]
     fn begin(&mut self) {
         let nominal = self.motor.nominal(self.speed);
         self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));

@@ -143,7 +143,6 @@ pub struct Rls {
 
 impl Rls {
     /// At rest.
-    #[inline]
     pub fn new(settings: RlsSettings) -> Result<Self, RlsError> {
         let RlsSettings { lambda, p0, corner, voltage_base, current_base, .. } = settings;
         let base = |x: f32| x.is_finite() && x > 1e-9 && x < 1e9;
