@@ -22,6 +22,14 @@
 //!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the injection's tracking
 //!   loop is no substitute: the believed slip is in it.
 //!
+//! Where speed or torque change there is no one machine, and what was learnt is forgotten: three seconds
+//! of steady running give the next estimate. Measured on the simulated motor with the encoder, over
+//! steps of the torque between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time left and a
+//! rotor of 0.8 to 1.3 times the resistance in the settings: every estimate that is given is within 6 %.
+//!
+//! It costs an estimated 200 cycles of a Cortex-M4 per control period and 1000 more in every eighth, 2 MHz in
+//! all, and the fit ten times a second.
+//!
 //! The saliency makes the transient inductance look larger along the current; with the sensorless
 //! settings' two numbers that is taken into account (left out, tau_r is 11 % low at 2 A).
 

@@ -18,7 +18,7 @@
 //! the factored covariance, the equation in differences, increments that the filters compute
 //! themselves, and the rounding of the estimate carried along (without it: 0.024 rad/s).
 //!
-//! A sample costs the same whatever it is: two filters, one update of [`ud::Ud`], no loop that
+//! A sample costs the same whatever it is, an estimated 1000 cycles of a Cortex-M4: two filters, one update of [`ud::Ud`], no loop that
 //! depends on data, no function of a maths library, no panic.
 
 mod complex;
