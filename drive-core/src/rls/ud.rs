@@ -98,6 +98,7 @@ impl Ud {
 
     /// Column `J` of U: of one function, so that its loops are known to the compiler and unrolled.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
     fn column<const J: usize>(&mut self, x: &[Complex32; N], forget: f32, pass: &mut Pass) {
         let mut w = x[J];
         for i in 0..J {
