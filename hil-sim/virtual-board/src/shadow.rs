@@ -100,12 +100,10 @@ impl Shadow {
             self.settings.command.wiring_checked = true;
         }
         if period.took_order {
-            let order = match (self.tau_r.take(), self.orders.pop_front()) {
-                (None, Some(order)) => order,
-                (Some(tau_r), None) => Order::RotorTimeConstant(tau_r),
-                (None, None) => bail!("an order nobody gave"),
-                (Some(_), Some(_)) => bail!("it cannot be told whose order was taken"),
-            };
+            // The main loop looks after the tracking first; of a line, it may not have heard yet.
+            let tracked = self.tau_r.take().map(Order::RotorTimeConstant);
+            let order = tracked.or_else(|| self.orders.pop_front());
+            let Some(order) = order else { bail!("an order nobody gave") };
             let command: Command<'_> = order.command();
             let answer = self.drive.command(command);
             if let (Ok(_), Command::Configure(_)) = (answer, command) {
