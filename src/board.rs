@@ -290,6 +290,10 @@ pub const SERIAL_RECEIVE: usize = 256;
 pub const SERIAL_TRANSMIT: usize = 512;
 /// Records of a trace, 32 bytes each: all that the console can ask for.
 pub const TRACE_RECORDS: usize = crate::console::grammar::LONGEST_TRACE as usize;
+/// Control periods that the identification in the main loop may be behind, 10.7 ms: longer than the
+/// watchdog lets it be.
+pub const SEEN_PERIODS: usize = 64;
+const _: () = assert!(SEEN_PERIODS as u32 * 1_000_000 / PWM_HZ > 2 * WATCHDOG_US);
 /// Longest wait for the answer to an order, us: it is taken in the next period, which lasts 167 us.
 pub const ANSWER_TIMEOUT_US: u32 = 500;
 const _: () = assert!(ANSWER_TIMEOUT_US > 2 * 1_000_000 / PWM_HZ);

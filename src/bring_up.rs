@@ -17,9 +17,11 @@ use crate::flash::Pages;
 use crate::link::{Answer, Order, Status};
 use crate::mailbox::Mailbox;
 use crate::record::{Reason, Record};
+use crate::ring::Ring;
 use crate::saved::{Loaded, NotUsed, Saved};
 use crate::serial::Port;
 use crate::trace::Trace;
+use crate::tracking::{Seen, Tracking};
 use crate::watchdog::{Rule, Verdict, Watchdog};
 use crate::{adc, board, clocks, control, encoder, memory, over_voltage, pwm, stop};
 
@@ -112,8 +114,12 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     // Only over a control that runs: without it the outputs stay off.
     let watchdog = ends.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
     let Start { saved, settings, not_used } = start;
+    let Some(tracking) = singleton!(: Option<Tracking> = None) else {
+        unreachable!("main runs once")
+    };
+    *tracking = Tracking::new(&settings.drive);
     let chip = Chip { cause, record, options, dual_bank, saved, not_used, dead_time_s };
-    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip) }
+    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip, tracking) }
 }
 
 /// What the drive starts with.
@@ -229,6 +235,8 @@ fn start_control(
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
     let (recorder, trace) = trace.ok_or(NotStarted::Twice)?.split();
+    let seen = singleton!(: Ring<Seen, { board::SEEN_PERIODS }> = Ring::new());
+    let (write_seen, seen) = seen.ok_or(NotStarted::Twice)?.split();
 
     pwm.start().map_err(NotStarted::Timer)?;
     let drive = Drive::new(coefficients);
@@ -242,10 +250,11 @@ fn start_control(
         answers: send_answers,
         learned: send_learned,
         trace: recorder,
+        seen: write_seen,
     }
     .run();
     if !comes_as_it_should() {
         return Err(NotStarted::Interrupt);
     }
-    Ok(Ends { status, orders, answers, learned, trace })
+    Ok(Ends { status, orders, answers, learned, trace, seen })
 }

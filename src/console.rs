@@ -23,6 +23,7 @@ use crate::board::CYCLES_PER_US;
 use crate::link::{Order, Status};
 use crate::saved::Failed;
 use crate::trace::{self, Choice};
+use crate::tracking::Report;
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
 use line::{Garbled, Lines, Text};
@@ -64,6 +65,10 @@ pub trait Machine {
     /// # Errors
     /// Why the settings are none.
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError>;
+    /// The drive has taken these settings.
+    fn configured(&mut self, settings: &Everything);
+    /// What is known of the rotor time constant, where it is tracked.
+    fn tracking(&self) -> Option<Report>;
     /// Keeps the settings over a reset, which takes long: only while the outputs are off.
     ///
     /// # Errors
@@ -302,7 +307,11 @@ impl Console {
             Request::Status => match machine.status() {
                 Some(status) => {
                     let (scales, stack) = (&self.settings.drive.scales, machine.stack());
-                    let line = fmt::from_fn(|f| write_status(f, &status, scales, stack));
+                    let tracking = machine.tracking().filter(|_| status.state.regulates());
+                    let line = fmt::from_fn(|f| {
+                        write_status(f, &status, scales, stack)?;
+                        tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
+                    });
                     self.out.line(format_args!("{line}"));
                 }
                 None => self.out.error(&NotDone::NoAnswer),
@@ -400,6 +409,7 @@ impl Console {
                         != self.settings.drive.inverter.dead_time_s;
                     let forgotten = self.settings.learned.is_some() && settings.learned.is_none();
                     self.settings = settings;
+                    machine.configured(&settings);
                     self.out.line(format_args!(
                         "ok{}{}",
                         if waits { FROM_RESET } else { "" },

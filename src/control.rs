@@ -22,7 +22,9 @@ use crate::link::{Answer, Order, Status};
 use crate::mailbox::{Receiver, Sender};
 use crate::memory_check::Part;
 use crate::pwm::Pwm;
+use crate::ring::Writer;
 use crate::trace::Recorder;
+use crate::tracking::Seen;
 
 /// Everything the interrupt works with.
 pub struct Control {
@@ -44,6 +46,8 @@ pub struct Control {
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
+    /// What the identification sees.
+    pub seen: Writer<'static, Seen, { board::SEEN_PERIODS }>,
 }
 
 /// Control periods since the start, wrapping.
@@ -154,7 +158,8 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, orders, answers, trace, .. } = &mut self.control;
+        let Control { drive, pwm, adc, encoder, orders, answers, trace, seen, .. } =
+            &mut self.control;
 
         // Over-current first: the outputs are off before anything is computed. The analog watchdogs ask
         // when the current is converted, before the sequence has ended.
@@ -224,6 +229,10 @@ impl Running {
         }
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         trace.step(|| drive.telemetry());
+        if drive.tracks_rotor() {
+            // Without room it is missing, which the main loop sees.
+            seen.push(Seen::new(self.periods, &drive.telemetry()));
+        }
 
         self.seen = self.seen.and(hardware);
         self.periods = self.periods.wrapping_add(1);

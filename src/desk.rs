@@ -21,7 +21,9 @@ use crate::mailbox::{Receiver, Sender};
 use crate::memory;
 use crate::memory_check::{Flipped, MemoryCheck, Places};
 use crate::record::{Reason, Record};
+use crate::ring;
 use crate::saved::{Failed, NotUsed, Saved};
+use crate::tracking::{Report, Seen, Tracking};
 use crate::watchdog::{Rule, Verdict, Watchdog};
 use crate::{pwm, stop, trace};
 
@@ -40,6 +42,8 @@ pub struct Ends {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
+    /// What the identification sees.
+    pub seen: ring::Reader<'static, Seen, { board::SEEN_PERIODS }>,
 }
 
 /// The main loop's side of the drive.
@@ -55,6 +59,8 @@ pub struct Desk {
     /// Whether it has run for a while.
     well: bool,
     chip: Chip,
+    /// The rotor time constant, where the settings want it tracked. (Not on the stack: it is large.)
+    tracking: &'static mut Option<Tracking>,
 }
 
 /// What the desk knows of the chip and of its own start.
@@ -95,7 +101,12 @@ impl Clock {
 
 impl Desk {
     /// A desk; without `ends`, one whose control does not run.
-    pub fn new(ends: Option<Ends>, watchdog: Option<Watchdog>, chip: Chip) -> Self {
+    pub fn new(
+        ends: Option<Ends>,
+        watchdog: Option<Watchdog>,
+        chip: Chip,
+        tracking: &'static mut Option<Tracking>,
+    ) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
@@ -104,7 +115,17 @@ impl Desk {
                 (memory::control_code(), control::constants());
             MemoryCheck::new(Places { code, source, constants, changes }, memory::word)
         });
-        Self { ends, status: None, level: Level::Info, clock, guard, check, well: false, chip }
+        Self {
+            ends,
+            status: None,
+            level: Level::Info,
+            clock,
+            guard,
+            check,
+            well: false,
+            chip,
+            tracking,
+        }
     }
 
     /// Looks at a slice of the control's memory. What has flipped ends it: start-up copies and computes it
@@ -121,9 +142,11 @@ impl Desk {
         }
     }
 
-    /// Takes what the control reports and logs it. Gives the time since the start, ms, wrapping.
+    /// Takes what the control reports, logs it, and tracks the rotor time constant by it. Gives the time
+    /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
         self.clock.update();
+        self.track();
         if let Some(status) = self.ends.as_mut().and_then(|ends| ends.status.take()) {
             self.log(status);
         }
@@ -148,6 +171,18 @@ impl Desk {
         if self.clock.ms > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();
+        }
+    }
+
+    /// Comes to an end: a period takes less time here than it lasts.
+    fn track(&mut self) {
+        while let Some(seen) = self.ends.as_mut().and_then(|ends| ends.seen.pop()) {
+            let Some(tau_r) = self.tracking.as_mut().and_then(|t| t.take(&seen)) else { continue };
+            // Refused when the drive has just stopped.
+            let answer = self.order(Order::RotorTimeConstant(tau_r));
+            if let (Ok(taken), Some(tracking)) = (answer, self.tracking.as_mut()) {
+                tracking.taken(tau_r, taken);
+            }
         }
     }
 
@@ -219,6 +254,14 @@ impl Machine for Desk {
 
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         stretched(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
+    }
+
+    fn configured(&mut self, settings: &Everything) {
+        *self.tracking = Tracking::new(&settings.drive);
+    }
+
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
 
     fn save(&mut self, settings: &Everything) -> Result<(), Failed> {

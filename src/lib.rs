@@ -14,4 +14,5 @@ pub mod record;
 pub mod ring;
 pub mod saved;
 pub mod trace;
+pub mod tracking;
 pub mod watchdog;

@@ -23,6 +23,8 @@ pub enum Order {
     Speed(f32),
     /// See [`Command::Position`].
     Position(f32),
+    /// See [`Command::RotorTimeConstant`].
+    RotorTimeConstant(f32),
     /// See [`Command::Configure`].
     Configure(Coefficients),
 }
@@ -39,6 +41,7 @@ impl Order {
             Self::Torque(i_q) => Command::Torque(*i_q),
             Self::Speed(rpm) => Command::Speed(*rpm),
             Self::Position(turns) => Command::Position(*turns),
+            Self::RotorTimeConstant(tau_r) => Command::RotorTimeConstant(*tau_r),
             Self::Configure(coefficients) => Command::Configure(coefficients),
         }
     }

@@ -7,8 +7,9 @@
 //! * the control interrupt (`control.rs`), 6000 times a second, before all others: samples in,
 //!   `Drive::step`, compare values out, then one order from the console if there is one.
 //! * the interrupt of the serial port (`serial.rs`): a byte in, a byte out.
-//! * the loop at the end of `main`, between interrupts: console, the log ten times a second
-//!   (`desk.rs`), and the check of the control's memory (`memory_check.rs`).
+//! * the loop at the end of `main`, between interrupts: console, the log ten times a second, the
+//!   rotor time constant where it is tracked (`desk.rs`), and the check of the control's memory
+//!   (`memory_check.rs`).
 //! * `stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
 //! * the watchdog (`watchdog.rs`), when the loop or the control interrupt does not come round.
 //!
@@ -33,7 +34,7 @@ mod stop;
 // What touches no register is a library, which a host tests.
 #[cfg(target_os = "none")]
 use induction_drive::{
-    board, console, link, mailbox, memory_check, record, ring, saved, trace, watchdog,
+    board, console, link, mailbox, memory_check, record, ring, saved, trace, tracking, watchdog,
 };
 
 /// See the top of this file.

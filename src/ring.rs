@@ -1,51 +1,54 @@
-//! Bytes between an interrupt and the main loop: one writes, one reads, nobody waits.
+//! Items between an interrupt and the main loop: one writes, one reads, nobody waits.
+//!
+//! (No queue of `heapless`, for the reason that `mailbox.rs` gives.)
 
 use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// Holds up to `N` bytes; `N` is a power of two.
-pub struct Ring<const N: usize> {
-    /// Bytes written so far, wrapping; only the writer changes it.
+/// Holds up to `N` items; `N` is a power of two.
+pub struct Ring<T, const N: usize> {
+    /// Items written so far, wrapping; only the writer changes it.
     written: AtomicUsize,
-    /// Bytes read so far, wrapping; only the reader changes it.
+    /// Items read so far, wrapping; only the reader changes it.
     read: AtomicUsize,
-    bytes: UnsafeCell<[u8; N]>,
+    items: UnsafeCell<[MaybeUninit<T>; N]>,
 }
 
-// SAFETY: a byte belongs to the writer or to the reader, as the two counts say; there is one of
+// SAFETY: an item belongs to the writer or to the reader, as the two counts say; there is one of
 // each, because `split` borrows the ring mutably.
-unsafe impl<const N: usize> Sync for Ring<N> {}
+unsafe impl<T: Copy + Send, const N: usize> Sync for Ring<T, N> {}
 
 /// The end that fills the ring.
-pub struct Writer<'a, const N: usize>(&'a Ring<N>);
+pub struct Writer<'a, T, const N: usize>(&'a Ring<T, N>);
 
 /// The end that empties the ring.
-pub struct Reader<'a, const N: usize>(&'a Ring<N>);
+pub struct Reader<'a, T, const N: usize>(&'a Ring<T, N>);
 
-impl<const N: usize> Ring<N> {
+impl<T: Copy, const N: usize> Ring<T, N> {
     /// An empty ring.
     pub const fn new() -> Self {
         assert!(N.is_power_of_two());
         Self {
             written: AtomicUsize::new(0),
             read: AtomicUsize::new(0),
-            bytes: UnsafeCell::new([0; N]),
+            items: UnsafeCell::new([MaybeUninit::uninit(); N]),
         }
     }
 
     /// Its two ends.
-    pub fn split(&mut self) -> (Writer<'_, N>, Reader<'_, N>) {
+    pub fn split(&mut self) -> (Writer<'_, T, N>, Reader<'_, T, N>) {
         (Writer(self), Reader(self))
     }
 
-    fn place(&self, count: usize) -> *mut u8 {
+    fn place(&self, count: usize) -> *mut T {
         // Inside for every count, because `N` is a power of two.
-        self.bytes.get().cast::<u8>().wrapping_add(count & (N - 1))
+        self.items.get().cast::<T>().wrapping_add(count & (N - 1))
     }
 }
 
-impl<const N: usize> Writer<'_, N> {
-    /// Bytes that still fit.
+impl<T: Copy, const N: usize> Writer<'_, T, N> {
+    /// Items that still fit.
     pub fn room(&self) -> usize {
         let used = self
             .0
@@ -55,31 +58,33 @@ impl<const N: usize> Writer<'_, N> {
         N.saturating_sub(used)
     }
 
-    /// Writes a byte, if there is room; says whether there was.
-    pub fn push(&mut self, byte: u8) -> bool {
-        if self.room() == 0 {
+    /// Writes an item, if there is room; says whether there was.
+    #[inline]
+    pub fn push(&mut self, item: T) -> bool {
+        let ring = self.0;
+        let written = ring.written.load(Ordering::Relaxed);
+        if written.wrapping_sub(ring.read.load(Ordering::Acquire)) >= N {
             return false;
         }
-        let written = self.0.written.load(Ordering::Relaxed);
-        // SAFETY: inside the array; with room left, the reader does not touch this byte before
+        // SAFETY: inside the array; with room left, the reader does not touch this item before
         // `written` says so.
-        unsafe { *self.0.place(written) = byte };
-        self.0.written.store(written.wrapping_add(1), Ordering::Release);
+        unsafe { ring.place(written).write(item) };
+        ring.written.store(written.wrapping_add(1), Ordering::Release);
         true
     }
 }
 
-impl<const N: usize> Reader<'_, N> {
-    /// The oldest byte, if there is one.
-    pub fn pop(&mut self) -> Option<u8> {
+impl<T: Copy, const N: usize> Reader<'_, T, N> {
+    /// The oldest item, if there is one.
+    pub fn pop(&mut self) -> Option<T> {
         let read = self.0.read.load(Ordering::Relaxed);
         if self.0.written.load(Ordering::Acquire) == read {
             return None;
         }
         // SAFETY: inside the array; written, and the writer leaves it alone until `read` says so.
-        let byte = unsafe { *self.0.place(read) };
+        let item = unsafe { self.0.place(read).read() };
         self.0.read.store(read.wrapping_add(1), Ordering::Release);
-        Some(byte)
+        Some(item)
     }
 }
 
@@ -89,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_full_ring_takes_no_more_and_keeps_the_order() {
-        let mut ring = Ring::<4>::new();
+        let mut ring = Ring::<u8, 4>::new();
         let (mut writer, mut reader) = ring.split();
         for round in 0..10_u8 {
             for byte in 0..4 {
@@ -105,26 +110,26 @@ mod tests {
     }
 
     #[test]
-    fn bytes_arrive_in_order_across_threads() {
-        let mut ring = Ring::<8>::new();
+    fn items_arrive_whole_and_in_order_across_threads() {
+        let mut ring = Ring::<[u32; 8], 8>::new();
         let (mut writer, mut reader) = ring.split();
-        let bytes = || (0..100_000_u32).map(|i| (i % 251) as u8);
+        let items = || (0..100_000_u32).map(|i| [i; 8]);
         std::thread::scope(|scope| {
             scope.spawn(move || {
-                for byte in bytes() {
-                    while !writer.push(byte) {
+                for item in items() {
+                    while !writer.push(item) {
                         std::thread::yield_now();
                     }
                 }
             });
-            for byte in bytes() {
+            for item in items() {
                 let got = loop {
                     match reader.pop() {
                         Some(got) => break got,
                         None => std::thread::yield_now(),
                     }
                 };
-                assert_eq!(got, byte);
+                assert_eq!(got, item);
             }
         });
     }

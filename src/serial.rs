@@ -17,23 +17,23 @@ use crate::board;
 use crate::console;
 use crate::ring::{Reader, Ring, Writer};
 
-type Received = Ring<{ board::SERIAL_RECEIVE }>;
-type ToSend = Ring<{ board::SERIAL_TRANSMIT }>;
+type Received = Ring<u8, { board::SERIAL_RECEIVE }>;
+type ToSend = Ring<u8, { board::SERIAL_TRANSMIT }>;
 
 /// Priority of the interrupt: the last. The four upper bits count (datasheet).
 const PRIORITY: u8 = 0xf0;
 
 /// The main loop's end of the port.
 pub struct Port {
-    received: Reader<'static, { board::SERIAL_RECEIVE }>,
-    to_send: Writer<'static, { board::SERIAL_TRANSMIT }>,
+    received: Reader<'static, u8, { board::SERIAL_RECEIVE }>,
+    to_send: Writer<'static, u8, { board::SERIAL_TRANSMIT }>,
 }
 
 /// The interrupt's end.
 struct Ends {
     port: pac::LPUART1,
-    received: Writer<'static, { board::SERIAL_RECEIVE }>,
-    to_send: Reader<'static, { board::SERIAL_TRANSMIT }>,
+    received: Writer<'static, u8, { board::SERIAL_RECEIVE }>,
+    to_send: Reader<'static, u8, { board::SERIAL_TRANSMIT }>,
     /// A byte that waits for the transmitter.
     next: Option<u8>,
 }

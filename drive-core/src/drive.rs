@@ -243,6 +243,12 @@ impl Drive {
         }
     }
 
+    /// Whether [`online`](crate::online) is to be given what the last step saw.
+    #[inline]
+    pub fn tracks_rotor(&self) -> bool {
+        self.c.track_rotor && self.state.regulates()
+    }
+
     /// One PWM period: from the sample of instant `k T` to the compare values of the period that
     /// begins at `(k + 1) T`.
     ///

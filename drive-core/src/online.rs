@@ -22,12 +22,21 @@
 //!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the injection's tracking
 //!   loop is no substitute: the believed slip is in it.
 //!
+//! Where speed or torque change there is no one machine, and what was learnt is forgotten: three seconds
+//! of steady running give the next estimate. Measured on the simulated motor with the encoder, over
+//! steps of the torque between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time left and a
+//! rotor of 0.8 to 1.3 times the resistance in the settings: every estimate that is given is within 6 %.
+//!
+//! It costs an estimated 200 cycles of a Cortex-M4 per control period and 1000 more in every eighth, 2 MHz in
+//! all, and the fit ten times a second.
+//!
 //! The saliency makes the transient inductance look larger along the current; with the sensorless
 //! settings' two numbers that is taken into account (left out, tau_r is 11 % low at 2 A).
 
 mod fit;
 
 use core::f32::consts::TAU;
+use core::fmt;
 
 use crate::frames::{AlphaBeta, Dq};
 use crate::rls::filter::Filter;
@@ -57,13 +66,23 @@ const SETTLE: u32 = 30;
 const STEADY: f32 = 3.0;
 /// The same where the speed is a guess: the tracking loop moves with the flux.
 const STEADY_GUESS: f32 = 12.0;
+/// The same of the reference of the current, as a share of the magnetising current. The saliency moves
+/// with the current, and what is left of the dead time does not grow with it: a step of 2 A put 24 %
+/// on tau_r.
+const STEADY_CURRENT: f32 = 0.25;
 /// Samples that may be missing in a row.
 const MISSING: u32 = 75;
 /// tau_r, as a factor of the one in the settings, beyond which it is not believed: the rotor at
 /// 150 degrees has 0.65.
 pub const LIMITS: [f32; 2] = [0.5, 2.0];
-/// Largest relative uncertainty of tau_r that is published.
-const UNCERTAIN: f32 = 0.04;
+/// Largest last step of the fit, as a share of the rate, with which tau_r is published.
+const AT_REST: f32 = 0.04;
+/// Largest relative uncertainty of tau_r that is published. It is that of the noise alone: where it is
+/// larger, what is systematic is larger still. At standstill with a slip below 0.3 Hz tau_r was 80 %
+/// off where 4 % were said; where 1 % was said, 6 % at most.
+const UNCERTAIN: f32 = 0.01;
+/// The same where the speed is estimated, with a magnetising current that moves.
+const UNCERTAIN_GUESS: f32 = 0.04;
 
 /// What else is known of the speed, electrical rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,13 +111,24 @@ pub struct Tracked {
 pub enum Doubt {
     /// The memory is not full yet since the start, or since samples were missing.
     Settling,
-    /// The speed changed while the memory was filled.
+    /// Speed or current changed: what was learnt before is forgotten.
     Transient,
     /// The signals do not tell tau_r (and the speed) apart from the rest.
     PoorExcitation,
     /// tau_r outside [`LIMITS`] times that of the settings, or a resistance below zero or above
     /// three times that of the settings.
     Unbelievable,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Settling => "settling",
+            Self::Transient => "speed or torque change",
+            Self::PoorExcitation => "the excitation is too poor",
+            Self::Unbelievable => "out of range",
+        })
+    }
 }
 
 /// The estimator. It lives in the idle loop.
@@ -121,6 +151,24 @@ pub struct Online {
     calls: u32,
 }
 
+/// `base`, but with `limit` no more than 50 times as large, and no less: what the least squares ask for, for
+/// any motor that the drive takes.
+#[inline]
+fn between(base: f32, limit: f32) -> f32 {
+    if base > limit {
+        limit
+    } else if base < 0.02 * limit {
+        0.02 * limit
+    } else {
+        base
+    }
+}
+
+#[inline]
+const fn squared(x: f32) -> f32 {
+    x * x
+}
+
 /// What is taken from the settings.
 #[derive(Clone, Copy, Debug)]
 struct Motor {
@@ -130,11 +178,20 @@ struct Motor {
     l_s: f32,
     flux_saliency: f32,
     current_saliency: f32,
+    /// Square of [`STEADY_CURRENT`], A².
+    steady_squared: f32,
 }
 
 impl Motor {
+    /// What the settings say, with this speed, electrical rad/s.
+    #[inline]
+    fn nominal(&self, omega_m: f32) -> Unknowns {
+        Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
+    }
+
     /// The machine's inductances with `current`, A: L x = sigma L_s (x - s x*), and x turns with the
     /// current in the steady state.
+    #[inline]
     fn machine(&self, current: Dq) -> Machine {
         let square = current.length_squared();
         let along = current.d * current.d - current.q * current.q;
@@ -156,7 +213,9 @@ impl Online {
     /// For the motor and the sensors of these settings.
     ///
     /// # Errors
-    /// What the recursive least squares refuse.
+    /// What the recursive least squares refuse: nothing of settings that
+    /// [`build`](Settings::build) takes.
+    #[inline]
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let (m, limits) = (&settings.motor, &settings.limits);
         let synchronous = &settings.injection.synchronous;
@@ -168,13 +227,14 @@ impl Online {
             l_s,
             flux_saliency: synchronous.flux_saliency,
             current_saliency: synchronous.current_saliency,
+            steady_squared: squared(STEADY_CURRENT * settings.sequence.i_d),
         };
         let rls = Rls::new(RlsSettings {
             lambda: LAMBDA,
             p0: P0,
             corner: TAU * CORNER_HZ * SAMPLE_S,
-            voltage_base: limits.current_a * m.r_s,
-            current_base: settings.sequence.i_d,
+            voltage_base: between(limits.current_a * m.r_s, limits.dc_over_v),
+            current_base: between(settings.sequence.i_d, limits.trip_a),
             voltage_limit: limits.dc_over_v,
             current_limit: limits.trip_a,
         })?;
@@ -188,7 +248,7 @@ impl Online {
             sum: Complex32::ZERO,
             sampled: Complex32::ZERO,
             pushed: 0,
-            unknowns: Unknowns { r_s: motor.r_s, rate: 1.0 / motor.tau_r, omega_m: 0.0 },
+            unknowns: motor.nominal(0.0),
             current: Dq::ZERO,
             speed: 0.0,
             calls: 0,
@@ -199,6 +259,7 @@ impl Online {
 
     /// One control period, in order and without gaps: the current that was measured, A, and the voltage
     /// that the same step put out, V ([`Telemetry`](crate::Telemetry) has both).
+    #[inline]
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta) {
         // What a step puts out acts from the next sample on; the current is seen later still.
         let voltage = self.present + (self.before - self.present) * self.delay;
@@ -206,11 +267,18 @@ impl Online {
         if !(voltage.is_finite() && measured.is_finite()) {
             // Inside the filters they would never leave.
             self.restart();
-            return;
+        } else {
+            self.sample(voltage.into(), measured.into());
         }
+    }
+
+    /// What every control period costs. Not inlined: it would be compiled for size, as the firmware around
+    /// it.
+    #[inline(never)]
+    fn sample(&mut self, voltage: Complex32, current: Complex32) {
         let [on_voltage, on_current] = &mut self.filters;
-        let v = on_voltage.step(voltage.into()).value;
-        let i = on_current.step(measured.into()).value;
+        let v = on_voltage.step(voltage).value;
+        let i = on_current.step(current).value;
         if self.pushed == DECIMATION {
             let mean = self.sum * (1.0 / f32::from(DECIMATION));
             self.rls.step(mean.into(), self.sampled.into());
@@ -224,14 +292,21 @@ impl Online {
     }
 
     /// Samples were lost, or the outputs were off: begins anew, but with what it believes.
+    #[inline]
     pub fn restart(&mut self) {
         self.rls.reset();
-        let nominal =
-            Unknowns { r_s: self.motor.r_s, rate: 1.0 / self.motor.tau_r, omega_m: self.speed };
-        self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
+        self.begin();
         (self.before, self.present) = (AlphaBeta::ZERO, AlphaBeta::ZERO);
         self.filters = [Filter::new(TAU * BEFORE_HZ * PERIOD_S); 2];
         (self.sum, self.pushed) = (Complex32::ZERO, 0);
+    }
+
+    /// The least squares begin anew with what is believed.
+    #[inline]
+    fn begin(&mut self) {
+        let nominal = self.motor.nominal(self.speed);
+        self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
+        self.unknowns = nominal;
         self.calls = 0;
     }
 
@@ -243,25 +318,30 @@ impl Online {
     ///
     /// # Errors
     /// Why the estimate must not be used now.
+    #[inline]
     pub fn refine(&mut self, current: Dq, speed: Speed) -> Result<Tracked, Doubt> {
         let (Speed::Known(seen) | Speed::Guess(seen)) = speed;
         let free_speed = matches!(speed, Speed::Guess(_));
+        if !(current.is_finite() && seen.is_finite()) {
+            self.calls = 0;
+            return Err(Doubt::Transient);
+        }
         let weight = if self.calls == 0 { 1.0 } else { SMOOTHING };
         self.current += (current - self.current) * weight;
         self.speed += (seen - self.speed) * weight;
         if self.calls == 0 || !free_speed {
             self.unknowns.omega_m = self.speed;
         }
-        // Not-a-number is not steady.
-        let most = if free_speed { STEADY_GUESS } else { STEADY };
-        let steady = (seen - self.speed).abs() < most && self.current.is_finite();
+        let (most, uncertain) =
+            if free_speed { (STEADY_GUESS, UNCERTAIN_GUESS) } else { (STEADY, UNCERTAIN) };
+        let moved = (current - self.current).length_squared();
+        let steady = (seen - self.speed).abs() < most && moved < self.motor.steady_squared;
         if !steady {
-            self.calls = 0;
+            self.begin();
             return Err(Doubt::Transient);
         }
         self.calls = self.calls.saturating_add(1);
-        let nominal =
-            Unknowns { r_s: self.motor.r_s, rate: 1.0 / self.motor.tau_r, omega_m: self.speed };
+        let nominal = self.motor.nominal(self.speed);
         let machine = self.motor.machine(self.current);
         let Some(fit) = machine.step(&self.rls, &self.unknowns, &nominal, free_speed) else {
             self.unknowns = nominal;
@@ -271,8 +351,9 @@ impl Online {
         let Unknowns { r_s, rate, omega_m } = fit.unknowns;
         let (tau_r, uncertainty) = (1.0 / rate, fit.uncertainty);
         let ratio = tau_r / self.motor.tau_r;
-        let certain = uncertainty < UNCERTAIN && self.rls.missing() < MISSING;
-        if self.calls < SETTLE {
+        let certain = uncertainty < uncertain && self.rls.missing() < MISSING;
+        let at_rest = fit.moved < AT_REST;
+        if self.calls < SETTLE || !at_rest {
             Err(Doubt::Settling)
         } else if !certain {
             Err(Doubt::PoorExcitation)

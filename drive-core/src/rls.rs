@@ -18,7 +18,7 @@
 //! the factored covariance, the equation in differences, increments that the filters compute
 //! themselves, and the rounding of the estimate carried along (without it: 0.024 rad/s).
 //!
-//! A sample costs the same whatever it is: two filters, one update of [`ud::Ud`], no loop that
+//! A sample costs the same whatever it is, an estimated 1000 cycles of a Cortex-M4: two filters, one update of [`ud::Ud`], no loop that
 //! depends on data, no function of a maths library, no panic.
 
 mod complex;
@@ -132,6 +132,7 @@ pub struct Rls {
     /// Means of alpha², beta² and alpha beta of the current.
     axes: [f32; 3],
     forget: f32,
+    lambda_inverse: f32,
     unknown: f32,
     /// Samples to go until the filters have settled.
     settling: u32,
@@ -170,6 +171,7 @@ impl Rls {
             settle,
             memory,
             forget: 1.0 / memory as f32,
+            lambda_inverse: 1.0 / lambda,
             unknown: UNKNOWN / (corner * corner * corner),
             validity: Validity::NONE,
         })
@@ -178,9 +180,7 @@ impl Rls {
     /// One sample: `current` (A) as sampled, `voltage` (V) as applied from this sample to the next.
     pub fn step(&mut self, voltage: AlphaBeta, current: AlphaBeta) {
         // Before the filters: a NaN inside them would never leave. False for a NaN, too.
-        let inside = |x: AlphaBeta, limit: f32| {
-            -limit < x.alpha && x.alpha < limit && -limit < x.beta && x.beta < limit
-        };
+        let inside = |x: AlphaBeta, limit: f32| x.alpha.abs() < limit && x.beta.abs() < limit;
         let RlsSettings { voltage_limit, current_limit, .. } = self.settings;
         if !(inside(voltage, voltage_limit) && inside(current, current_limit)) {
             self.settling = self.settle;
@@ -209,9 +209,13 @@ impl Rls {
             self.unused();
             return;
         }
-        let lambda = if self.ud.largest() > WIND_UP { 1.0 } else { self.settings.lambda };
-        let error = self.ud.update([di, i2, dv, v2], i.change, lambda);
-        self.judge(error, i.change);
+        let wound_up = self.ud.largest() > WIND_UP;
+        let lambda =
+            if wound_up { (1.0, 1.0) } else { (self.settings.lambda, self.lambda_inverse) };
+        match self.ud.update([di, i2, dv, v2], i.change, lambda) {
+            Some(error) => self.judge(error, i.change),
+            None => self.reset(),
+        }
     }
 
     #[inline]
@@ -233,10 +237,6 @@ impl Rls {
     /// A sample was used.
     #[inline]
     fn judge(&mut self, error: Complex32, signal: Complex32) {
-        if !self.ud.is_sound() {
-            self.reset();
-            return;
-        }
         let (forget, validity) = (self.forget, &mut self.validity);
         validity.missing = 0;
         validity.error += forget * (error.square() - validity.error);
@@ -263,6 +263,7 @@ impl Rls {
     }
 
     /// The same, valid or not; finite in any case.
+    #[inline]
     pub fn latest(&self) -> [Complex32; N] {
         let admittance = self.scale[0] * self.settings.current_base;
         let [g1, g0, h1, u0] = self.ud.theta;
@@ -271,6 +272,7 @@ impl Rls {
 
     /// A difference of coefficients, like those of [`latest`](Self::latest), as numbers of size one that know
     /// nothing of each other; see [`Ud::whitened`].
+    #[inline]
     pub fn whitened(&self, [g1, g0, h1, u0]: [Complex32; N]) -> [Complex32; N] {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud.whitened([g1, g0, h1 * impedance, u0 * impedance])
@@ -302,12 +304,14 @@ impl Rls {
     }
 
     /// Forgets how sure the estimate is, and keeps it: after a fault.
+    #[inline]
     pub fn reset_covariance(&mut self) {
         self.ud = Ud::new(self.ud.theta, self.settings.p0);
         self.validity = Validity::NONE;
     }
 
     /// Begins from these coefficients, as [`latest`](Self::latest) gives them, instead of from zero.
+    #[inline]
     pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
@@ -315,6 +319,8 @@ impl Rls {
     }
 
     /// Forgets everything but the settings.
+    #[cold]
+    #[inline(never)]
     pub fn reset(&mut self) {
         self.ud = Ud::new(START, self.settings.p0);
         self.voltage = Filter::new(self.settings.corner);

@@ -47,6 +47,12 @@ impl State {
             Mode::Learning => Self::Learning,
         }
     }
+
+    /// Whether torque, speed or position is regulated as asked for.
+    #[inline]
+    pub const fn regulates(self) -> bool {
+        matches!(self, Self::Torque | Self::Speed | Self::Position)
+    }
 }
 
 impl fmt::Display for State {

@@ -16,6 +16,7 @@ use super::{Machine, NotDone, Port};
 use crate::link::{Order, Status};
 use crate::saved::Failed;
 use crate::trace::{self, Choice};
+use crate::tracking::{Report, Tracking};
 
 /// A drive on the desk.
 pub struct Desk {
@@ -35,6 +36,8 @@ pub struct Desk {
     pub worn_out: bool,
     /// What a learning has found.
     pub found: Option<Learned>,
+    /// What tracks the rotor time constant.
+    pub tracking: Option<Tracking>,
 }
 
 impl Desk {
@@ -49,6 +52,7 @@ impl Desk {
             saved: None,
             worn_out: false,
             found: None,
+            tracking: None,
         }
     }
 }
@@ -78,6 +82,12 @@ impl Machine for Desk {
     }
     fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
         settings.build()
+    }
+    fn configured(&mut self, settings: &Everything) {
+        self.tracking = Tracking::new(&settings.drive);
+    }
+    fn tracking(&self) -> Option<Report> {
+        self.tracking.as_ref().map(Tracking::report)
     }
     fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
         if self.worn_out {

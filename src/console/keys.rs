@@ -241,7 +241,7 @@ const fn place(word: &str, words: &[&str]) -> u8 {
 }
 
 /// All settings, in the order in which they are shown.
-pub static KEYS: [Key; 53] = [
+pub static KEYS: [Key; 54] = [
     number!("motor.r_s", "ohm", drive.motor.r_s),
     number!("motor.r_r", "ohm", drive.motor.r_r),
     number!("motor.l_ls", "H", drive.motor.l_ls),
@@ -268,6 +268,7 @@ pub static KEYS: [Key; 53] = [
         "identified" = CurrentPlant::Identified { .. } => CurrentPlant::default(),
         "motor" = CurrentPlant::Motor => CurrentPlant::Motor),
     yes_or_no!("ignore_delays", drive.ignore_delays),
+    yes_or_no!("track_rotor", drive.track_rotor),
     number!("injection.amplitude_v", "V", drive.injection.amplitude_v),
     word!("injection.demodulator", |s| s.drive.injection.demodulator,
         "literal" = Tracking::Literal => Tracking::Literal,

@@ -1,10 +1,12 @@
 use drive_core::learning::Fitted;
+use drive_core::online::Doubt;
 use drive_core::schedule::ReferenceTable;
 use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
 use super::doubles::{Desk, Wire};
 use super::*;
+use crate::tracking::Tracking;
 
 struct Talk {
     console: Console,
@@ -245,6 +247,31 @@ fn without_a_control_interrupt_nothing_is_promised() {
         assert_eq!(talk.ask(line), "error: the control does not run");
     }
     assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
+}
+
+#[test]
+fn status_tells_what_is_known_of_the_rotor_time_constant() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set track_rotor yes"), "ok");
+    let of_the_rotor = |talk: &mut Talk| {
+        let status = talk.ask("status");
+        status.split_once("; tau_r ").map(|(_, rest)| rest.to_owned())
+    };
+    assert_eq!(of_the_rotor(&mut talk), None, "not while it is off");
+    // One that regulates.
+    let mut config = hil_sim::Config::default();
+    config.angle.source = hil_sim::config::AngleSource::Encoder;
+    let mut rig = hil_sim::rig::Rig::from_config(&config, 1).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    talk.desk.drive = rig.drive;
+    assert_eq!(of_the_rotor(&mut talk).unwrap(), "not found: settling; used 186.1 ms");
+    // The longest is not cut off.
+    let tracking = talk.desk.tracking.as_ref().unwrap().report();
+    for doubt in [Doubt::Transient, Doubt::PoorExcitation, Doubt::Unbelievable] {
+        let report = Report { found: Err(doubt), ..tracking };
+        assert!(report.to_string().len() < 75, "{report}");
+    }
+    assert_eq!(talk.ask("stop"), "ok");
 }
 
 #[test]

@@ -18,79 +18,116 @@ pub struct Ud {
     /// What the last addition to the estimate rounded off. Without it corrections below half a unit
     /// in the last place are lost and the estimate stands still 1e-6 off.
     lost: [Complex32; N],
-    /// Above the diagonal of U.
-    u: [[Complex32; N]; N],
-    /// D.
+    /// Above the diagonal of U, column by column.
+    u: [Complex32; N * (N - 1) / 2],
+    /// D, and its largest element.
     d: [f32; N],
+    largest: f32,
 }
 
 impl Ud {
     /// This estimate, with P = `p0` times the unit matrix.
     pub const fn new(theta: [Complex32; N], p0: f32) -> Self {
-        Self { theta, lost: [Complex32::ZERO; N], u: [[Complex32::ZERO; N]; N], d: [p0; N] }
+        Self {
+            theta,
+            lost: [Complex32::ZERO; N],
+            u: [Complex32::ZERO; N * (N - 1) / 2],
+            d: [p0; N],
+            largest: p0,
+        }
     }
 
     /// Largest element of D: how uncertain the least certain direction is.
     #[inline]
     pub fn largest(&self) -> f32 {
-        self.d.iter().fold(0.0, |largest, &d| if d > largest { d } else { largest })
-    }
-
-    /// Whether the estimate is finite and P is positive and finite.
-    #[inline]
-    pub fn is_sound(&self) -> bool {
-        self.theta.iter().all(|x| x.is_finite()) && self.d.iter().all(|&d| d > 0.0 && d.is_finite())
+        self.largest
     }
 
     /// D^-1/2 U^-1 x: where P is the covariance of x, numbers of size one that know nothing of each
     /// other. Where P is large, x counts for little. Not for the control step: it takes roots.
+    #[inline]
     pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
         for j in (1..N).rev() {
             for i in 0..j {
-                x[i] = x[i] - self.u[i][j] * x[j];
+                x[i] = x[i] - self.u[above(i, j)] * x[j];
             }
         }
         core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
     }
 
-    /// Takes y = sum x theta in, forgetting by `lambda`. The error of the prediction.
+    /// Takes y = sum x theta in, forgetting by `lambda`, whose inverse is `forget`. The error of the
+    /// prediction; nothing if estimate or P are no longer finite and positive.
     ///
-    /// About 290 multiplications and additions and 5 divisions.
+    /// About 290 multiplications and additions and 4 divisions.
     #[inline]
-    #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
-    pub fn update(&mut self, x: [Complex32; N], y: Complex32, lambda: f32) -> Complex32 {
+    pub fn update(
+        &mut self,
+        x: [Complex32; N],
+        y: Complex32,
+        (lambda, forget): (f32, f32),
+    ) -> Option<Complex32> {
+        let mut pass = Pass { alpha: lambda, inverse: forget, gain: [Complex32::ZERO; N] };
+        self.column::<0>(&x, forget, &mut pass);
+        self.column::<1>(&x, forget, &mut pass);
+        self.column::<2>(&x, forget, &mut pass);
+        self.column::<3>(&x, forget, &mut pass);
+        // (Before the columns, it would hold registers that they need.)
         let mut error = y;
         for (x, theta) in x.iter().zip(&self.theta) {
             error = error - *x * *theta;
         }
-        let forget = 1.0 / lambda;
-        let (mut alpha, mut inverse) = (lambda, forget);
-        // P conj(x), a column of U at a time.
-        let mut gain = [Complex32::ZERO; N];
-        for j in 0..N {
-            let mut w = x[j];
-            for i in 0..j {
-                w += self.u[i][j] * x[i];
+        let step = error * pass.inverse;
+        // Of one that is infinite or not a number, the sum is neither finite.
+        let (mut sum, mut positive) = (0.0, true);
+        self.largest = 0.0;
+        for d in self.d {
+            sum += d;
+            positive &= d > 0.0;
+            if d > self.largest {
+                self.largest = d;
             }
-            let g = w.conj() * self.d[j];
-            let next = alpha + self.d[j] * w.square();
-            let next_inverse = 1.0 / next;
-            self.d[j] *= alpha * next_inverse * forget;
-            let mu = w * -inverse;
-            for i in 0..j {
-                let u = self.u[i][j];
-                self.u[i][j] = u + gain[i] * mu;
-                gain[i] += u * g;
-            }
-            gain[j] = g;
-            (alpha, inverse) = (next, next_inverse);
         }
-        let step = error * inverse;
-        for ((theta, lost), gain) in self.theta.iter_mut().zip(&mut self.lost).zip(&gain) {
+        for ((theta, lost), gain) in self.theta.iter_mut().zip(&mut self.lost).zip(&pass.gain) {
             let (old, change) = (*theta, *gain * step + *lost);
             *theta = old + change;
             *lost = change - (*theta - old);
+            sum += theta.re + theta.im;
         }
-        error
+        (positive && sum.is_finite()).then_some(error)
     }
+
+    /// Column `J` of U: of one function, so that its loops are known to the compiler and unrolled.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
+    fn column<const J: usize>(&mut self, x: &[Complex32; N], forget: f32, pass: &mut Pass) {
+        let mut w = x[J];
+        for i in 0..J {
+            w += self.u[above(i, J)] * x[i];
+        }
+        let g = w.conj() * self.d[J];
+        let next = pass.alpha + (w.re * g.re - w.im * g.im);
+        let next_inverse = 1.0 / next;
+        self.d[J] *= pass.alpha * next_inverse * forget;
+        let mu = w * -pass.inverse;
+        for i in 0..J {
+            let u = self.u[above(i, J)];
+            self.u[above(i, J)] = u + pass.gain[i] * mu;
+            pass.gain[i] += u * g;
+        }
+        pass.gain[J] = g;
+        (pass.alpha, pass.inverse) = (next, next_inverse);
+    }
+}
+
+/// From column to column.
+struct Pass {
+    alpha: f32,
+    inverse: f32,
+    /// P conj(x), as far as it is known.
+    gain: [Complex32; N],
+}
+
+/// Where U's element of row i, column j is kept, i < j.
+const fn above(i: usize, j: usize) -> usize {
+    j * (j - 1) / 2 + i
 }

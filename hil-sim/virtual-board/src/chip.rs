@@ -67,6 +67,55 @@ pub struct Block {
     pub taken: bool,
 }
 
+/// A function of the main loop whose calls are counted as if its memory had no wait states.
+#[derive(Clone, Debug)]
+pub struct Watched {
+    /// Where it begins and ends.
+    pub range: (u32, u32),
+    /// Estimated cycles of each call, interrupts not counted.
+    pub calls: Vec<u32>,
+    /// The blocks of the longest.
+    pub longest: Vec<Block>,
+    /// Those of the present one.
+    present: Vec<Block>,
+}
+
+impl Watched {
+    /// A function in the flash, at an address, with its size in bytes.
+    pub fn new((address, size): (u32, u32)) -> Self {
+        let range = (address, address + size);
+        Self { range, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
+    }
+
+    /// Whether a block is its own.
+    #[inline]
+    pub fn has(&self, address: u32) -> bool {
+        (self.range.0..self.range.1).contains(&address)
+    }
+
+    /// A block of the flash is about to be executed; `cycles` of one of its own.
+    fn block(&mut self, address: u32, size: u32, cycles: u32) {
+        if let Some(last) = self.present.last_mut() {
+            last.taken = last.address + last.size != address;
+        }
+        if address == self.range.0 {
+            self.present.clear();
+        } else if self.present.is_empty() {
+            return;
+        }
+        if self.has(address) {
+            self.present.push(Block { address, size, cycles, taken: false });
+            return;
+        }
+        let spent = crate::cost::of(&self.present);
+        if self.calls.iter().all(|call| *call < spent) {
+            self.longest.clone_from(&self.present);
+        }
+        self.calls.push(spent);
+        self.present.clear();
+    }
+}
+
 /// The chip but for its core and memories.
 #[derive(Clone, Debug)]
 pub struct Chip {
@@ -94,6 +143,8 @@ pub struct Chip {
     pub keep_blocks: bool,
     /// Blocks and accesses up to the compare value of a leg that was written last.
     pub compared: (usize, u64),
+    /// A function of the main loop whose calls are counted, if there is one.
+    pub watched: Option<Watched>,
     /// Whether registers that are not known read as 0.
     pub forgiving: bool,
     last_block: Option<(u32, u32)>,
@@ -145,6 +196,7 @@ impl Chip {
             blocks: Vec::new(),
             keep_blocks: false,
             compared: (0, 0),
+            watched: None,
             forgiving: false,
             last_block: None,
             scs: Scs::default(),
@@ -173,6 +225,7 @@ impl Chip {
         self.accesses = old.accesses;
         self.instructions = old.instructions;
         self.keep_blocks = old.keep_blocks;
+        self.watched = old.watched;
         self.forgiving = old.forgiving;
         let mut flags = old.rcc.reset_flags();
         if cause == Reset::Power {
@@ -209,6 +262,15 @@ impl Chip {
         self.now += self.rcc.ticks_per_cycle() * count;
         self.instructions += count;
         self.last_block = None;
+    }
+
+    /// A block in the flash is about to be executed, of this size and cost if it is watched.
+    #[inline]
+    pub fn watch(&mut self, address: u32, size: u32, cycles: u32) {
+        let in_main = self.scs.running() == scs::THREAD;
+        if let (Some(watched), true) = (&mut self.watched, in_main) {
+            watched.block(address, size, cycles);
+        }
     }
 
     /// A block in CCM is about to be executed.

@@ -1,5 +1,5 @@
-//! What the control interrupt costs: its longest way over whole runs, from its entry to the compare values,
-//! block by block, and the whole of it.
+//! What the control interrupt costs, block by block: its longest way over whole runs, from its entry to the
+//! compare values, and the whole of it; and what a sample of the identification costs.
 //!
 //! A block is what [`drive_core::Drive::step`] is made of; an instruction belongs to the outermost of the
 //! functions it was inlined into that is one of them.
@@ -13,12 +13,13 @@ use hil_sim::Config;
 use hil_sim::config::LoadMode;
 
 use crate::bench::{Options, Worst};
+use crate::chip::Watched;
 use crate::cost::{BUS, EXCEPTION, TAKEN, instructions};
 use crate::image::Image;
 use crate::pair::Pair;
 
 /// Blocks, and the paths of functions that belong to them; the first that fits counts.
-const BLOCKS: [(&str, &[&str]); 9] = [
+const BLOCKS: [(&str, &[&str]); 10] = [
     ("sensing", &["drive_core::sensing", "induction_drive::adc", "induction_drive::encoder"]),
     ("protection", &["Drive>::protect", "drive_core::plausibility", "drive_core::lock_monitor"]),
     ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
@@ -46,6 +47,7 @@ const BLOCKS: [(&str, &[&str]); 9] = [
             "idsp::",
         ],
     ),
+    ("identification", &["drive_core::online", "drive_core::rls"]),
     ("sequence", &["drive_core::drive", "drive_core::motion"]),
 ];
 /// What belongs to none: the timer.
@@ -55,16 +57,23 @@ const ENTRY: [&str; 2] = ["exception", "bus"];
 /// How much a line of the table may rise before it is refused.
 const TOLERANCE: f64 = 1.05;
 
+/// The function of the main loop that takes a control period into the identification.
+const IDENTIFICATION: &str = "6Online6sample";
+
+/// Periods that are watched, three seconds: the filters settle within one.
+const IDENTIFIED: u64 = 18_000;
+
 /// A line of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// `sensored` or `sensorless`.
+    /// `sensored` or `sensorless`: the control interrupt; `identification`: a control period in the main
+    /// loop, the longest with a sample of the recursive least squares in it, the median without.
     pub name: &'static str,
     /// Instructions on the longest way to the compare values.
     pub instructions: u32,
     /// Estimated cycles of it.
     pub cycles: u32,
-    /// Estimated cycles of the way in the middle of all while the drive regulates.
+    /// Estimated cycles of the one in the middle of all while the drive regulates.
     pub median: u32,
     /// Estimated cycles of the longest interrupt, with what comes after the compare values: report, trace,
     /// orders.
@@ -80,8 +89,33 @@ pub struct Line {
 ///
 /// # Errors
 /// The board cannot go on, or does not compute what the host computes.
-pub fn measure(image: impl Fn() -> Result<Image>) -> Result<[Line; 2]> {
-    Ok([sensored(image()?)?, sensorless(image()?)?])
+pub fn measure(image: impl Fn() -> Result<Image>) -> Result<[Line; 3]> {
+    Ok([sensored(image()?)?, sensorless(image()?)?, identification(image()?)?])
+}
+
+/// Runs the drive with the rotor time constant tracked.
+fn identification(image: Image) -> Result<Line> {
+    let watched = Watched::new(image.symbol(IDENTIFICATION)?);
+    let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
+    for line in ["angle encoder", "set track_rotor yes", "start torque"] {
+        pair.order(line)?;
+    }
+    pair.until_state(State::Torque)?;
+    pair.order("torque 1.5")?;
+    pair.board.chip().watched = Some(watched);
+    pair.run(IDENTIFIED, |_, _| {})?;
+    let watched = pair.board.chip().watched.take().context("not watched")?;
+    let mut cycles = watched.calls;
+    let worst = cycles.iter().max().copied().unwrap_or(0);
+    let worst = Worst { cycles: worst, accesses: 0, blocks: watched.longest };
+    let median = middle(&mut cycles)?;
+    line("identification", &pair, (&worst, 0), median, worst.cycles)
+}
+
+/// The one in the middle.
+fn middle(cycles: &mut [u32]) -> Result<u32> {
+    cycles.sort_unstable();
+    cycles.get(cycles.len() / 2).copied().context("nothing was counted")
 }
 
 fn sensorless(image: Image) -> Result<Line> {
@@ -121,13 +155,10 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     pair.run(60, |_, _| {})?;
     pair.say("stop")?;
     pair.until_state(State::Off)?;
-    cycles.sort_unstable();
-    let median = *cycles.get(cycles.len() / 2).context("no control interrupts")?;
+    let median = middle(&mut cycles)?;
     let whole = pair.board.worst.cycles;
     let worst = std::mem::take(&mut pair.board.worst_to_compares);
-    let (instructions, (blocks, functions)) =
-        attribute(pair.board.image(), &worst, |address, bytes| pair_read(pair, address, bytes))?;
-    Ok(Line { name, instructions, cycles: worst.cycles, median, whole, blocks, functions })
+    line(name, pair, (&worst, EXCEPTION), median, whole)
 }
 
 fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
@@ -138,12 +169,29 @@ fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {
     }
 }
 
+/// The line of a longest way that was entered by so many cycles.
+fn line(
+    name: &'static str,
+    pair: &Pair,
+    way: (&Worst, u32),
+    median: u32,
+    whole: u32,
+) -> Result<Line> {
+    let (instructions, (blocks, functions)) =
+        attribute(pair.board.image(), way, |address, bytes| pair_read(pair, address, bytes))?;
+    Ok(Line { name, instructions, cycles: way.0.cycles, median, whole, blocks, functions })
+}
+
 /// Cycles by block, and by block and innermost function.
 type Shares = (BTreeMap<&'static str, u32>, BTreeMap<(&'static str, String), u32>);
 
 /// Instructions of a way, and what belongs to what.
-fn attribute(image: &Image, worst: &Worst, read: impl Fn(u32, &mut [u8])) -> Result<(u32, Shares)> {
-    let mut blocks = BTreeMap::from([(ENTRY[0], EXCEPTION), (ENTRY[1], worst.accesses * BUS)]);
+fn attribute(
+    image: &Image,
+    (worst, entry): (&Worst, u32),
+    read: impl Fn(u32, &mut [u8]),
+) -> Result<(u32, Shares)> {
+    let mut blocks = BTreeMap::from([(ENTRY[0], entry), (ENTRY[1], worst.accesses * BUS)]);
     let mut functions = BTreeMap::new();
     let mut belongs: BTreeMap<u32, (&'static str, String)> = BTreeMap::new();
     let mut count = 0;
@@ -159,18 +207,6 @@ fn attribute(image: &Image, worst: &Worst, read: impl Fn(u32, &mut [u8])) -> Res
             let place = belongs.entry(at).or_insert_with(|| block_of(image, at));
             *blocks.entry(place.0).or_default() += instruction.cycles;
             *functions.entry(place.clone()).or_default() += instruction.cycles;
-            if std::env::var_os("LISTING").is_some() {
-                let fr = image.frames(at);
-                println!(
-                    "L {at:#x} {} {} | {}",
-                    instruction.cycles,
-                    place.0,
-                    fr.iter()
-                        .map(|f| format!("{} {}", f.function, f.place))
-                        .collect::<Vec<_>>()
-                        .join(" < ")
-                );
-            }
             count += 1;
         }
     }
@@ -200,14 +236,14 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
 pub fn table(lines: &[Line]) -> String {
     let blocks = || BLOCKS.iter().map(|block| block.0).chain([REST]).chain(ENTRY);
     let mut text =
-        format!("{:<12}{:>14}{:>8}{:>8}{:>8}", "line", "instructions", "cycles", "median", "whole");
+        format!("{:<16}{:>14}{:>8}{:>8}{:>8}", "line", "instructions", "cycles", "median", "whole");
     blocks().for_each(|block| {
         let _ = write!(text, "{block:>17}");
     });
     text.push('\n');
     for line in lines {
         let (i, c, m, w) = (line.instructions, line.cycles, line.median, line.whole);
-        let _ = write!(text, "{:<12}{i:>14}{c:>8}{m:>8}{w:>8}", line.name);
+        let _ = write!(text, "{:<16}{i:>14}{c:>8}{m:>8}{w:>8}", line.name);
         for block in blocks() {
             let _ = write!(text, "{:>17}", line.blocks.get(block).copied().unwrap_or(0));
         }
@@ -221,7 +257,7 @@ pub fn functions(line: &Line) -> String {
     let mut list: Vec<_> = line.functions.iter().collect();
     list.sort_by_key(|(_, cycles)| std::cmp::Reverse(**cycles));
     list.iter().fold(String::new(), |mut text, ((block, function), cycles)| {
-        let _ = writeln!(text, "{:<12}{cycles:>6} {block:<16} {function}", line.name);
+        let _ = writeln!(text, "{:<16}{cycles:>6} {block:<16} {function}", line.name);
         text
     })
 }

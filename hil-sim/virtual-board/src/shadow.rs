@@ -10,6 +10,7 @@ use crate::bench::Period;
 use crate::console::grammar::{self, Request};
 use crate::console::keys::Everything;
 use crate::link::Order;
+use crate::tracking::{Seen, Tracking};
 
 /// A drive with the settings of the board.
 pub struct Shadow {
@@ -19,6 +20,9 @@ pub struct Shadow {
     /// Dead time that the timer makes since its start, s.
     dead_time_s: f32,
     orders: VecDeque<Order>,
+    tracking: Option<Tracking>,
+    /// Rotor time constant that the main loop is about to order, s.
+    tau_r: Option<f32>,
     /// Control interrupts compared so far.
     pub compared: u64,
 }
@@ -32,7 +36,8 @@ impl Shadow {
         let settings = Everything::of_the_board();
         let dead_time_s = crate::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
-        Ok(Self { drive, settings, dead_time_s, orders: VecDeque::new(), compared: 0 })
+        let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
+        Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
     }
 
     /// Its settings, with the dead time that the timer makes.
@@ -125,9 +130,22 @@ impl Shadow {
             self.settings.command.wiring_checked = true;
         }
         if period.took_order {
-            let Some(order) = self.orders.pop_front() else { bail!("an order nobody gave") };
+            // The main loop looks after the tracking first; of a line, it may not have heard yet.
+            let tracked = self.tau_r.take().map(Order::RotorTimeConstant);
+            let order = tracked.or_else(|| self.orders.pop_front());
+            let Some(order) = order else { bail!("an order nobody gave") };
             let command: Command<'_> = order.command();
-            let _ = self.drive.command(command);
+            let answer = self.drive.command(command);
+            if let (Ok(_), Command::Configure(_)) = (answer, command) {
+                self.tracking = Tracking::new(&self.settings.drive);
+            }
+        }
+        // As the firmware's main loop.
+        if self.drive.tracks_rotor()
+            && let Some(tracking) = &mut self.tracking
+        {
+            let seen = Seen::new(self.compared as u32, &self.drive.telemetry());
+            self.tau_r = tracking.take(&seen).or(self.tau_r);
         }
         Ok(())
     }

@@ -112,11 +112,20 @@ impl UnicornCpu {
             })?;
         } else {
             let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
+            let mut costs = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |i| i.cycles);
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
-                if !stopped(uc, address) {
-                    let instructions = cost_of(&mut lengths, uc, address as u32, size);
-                    uc.get_data_mut().instructions(u64::from(instructions));
+                if stopped(uc, address) {
+                    return;
                 }
+                let instructions = cost_of(&mut lengths, uc, address as u32, size);
+                let watched = uc.get_data().watched.as_ref();
+                if let Some(watched) = watched {
+                    let own = watched.has(address as u32);
+                    let cycles =
+                        if own { cost_of(&mut costs, uc, address as u32, size) } else { 0 };
+                    uc.get_data_mut().watch(address as u32, size, cycles);
+                }
+                uc.get_data_mut().instructions(u64::from(instructions));
             })?;
         }
         if counting.cycles {
