@@ -122,7 +122,8 @@ impl Channel {
         let square = if square < most { square } else { most };
         self.level += SMOOTHING * (square - self.level);
         // Not-a-number is not within the limit.
-        !(self.level <= allowed)
+        let within = self.level <= allowed;
+        !within
     }
 }
 
