@@ -2,6 +2,7 @@
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 
 use crate::frames::Dq;
+use crate::sos::Complex;
 use crate::tuning::FirstOrder;
 
 /// Samples per period of the carrier.
@@ -45,34 +46,34 @@ impl Injection {
         // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
         // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of
         // the samples at both ends, to 0.1 %.
-        let (c, s) = (0.809_016_994_374_947_5_f64, 0.587_785_252_292_473_1_f64);
-        let (re, im) = (c - plant.p, s);
-        let square = re * re + im * im;
-        let (h_re, h_im) = (plant.k * re / square, -plant.k * im / square);
-        // times (1 + e^(j w)) / 2
-        let (a, b) = (0.5 * (1.0 + c), 0.5 * s);
+        let one = Complex { re: 1.0, im: 0.0 };
+        let turn = Complex { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
+        let response = Complex { re: plant.k, im: 0.0 } / (turn - one * plant.p);
+        let mean = response * (one + turn) * 0.5;
         // What is computed in step k acts from the sample k + 1 on: at sample k the response is that
         // of period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
-        let lag = core::f64::consts::TAU / CARRIER_SAMPLES as f64 * f64::from(analog);
-        let (f_re, f_im) = (1.0 / (1.0 + lag * lag), -lag / (1.0 + lag * lag));
-        let (d_re, d_im) = (c * f_re + s * f_im, c * f_im - s * f_re);
-        let (s_re, s_im) = ((h_re * d_re - h_im * d_im) as f32, (h_re * d_im + h_im * d_re) as f32);
-        let (m_re, m_im) = ((h_re * a - h_im * b) as f32, (h_re * b + h_im * a) as f32);
+        let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
+        let sampled = response / (turn * Complex { re: 1.0, im: w * f64::from(analog) });
+        let single = |z: Complex| (z.re as f32, z.im as f32);
+        let ((s_re, s_im), (m_re, m_im)) = (single(sampled), single(mean));
+        let mut periods = [CarrierPeriod::default(); CARRIER_SAMPLES];
+        // (By a length that the compiler does not know: else it writes this out ten times.)
+        for (index, period) in core::hint::black_box(periods.as_mut_slice()).iter_mut().enumerate()
+        {
+            let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
+            *period = CarrierPeriod {
+                voltage: amplitude_v * cos,
+                mean_current: amplitude_v * (m_re * cos - m_im * sin),
+                sampled: amplitude_v * (s_re * cos - s_im * sin),
+                cos,
+                sin,
+                index,
+            };
+        }
         Self {
             amplitude: amplitude_v,
-            periods: core::array::from_fn(|index| {
-                let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
-                CarrierPeriod {
-                    voltage: amplitude_v * cos,
-                    mean_current: amplitude_v * (m_re * cos - m_im * sin),
-                    sampled: amplitude_v * (s_re * cos - s_im * sin),
-                    cos,
-                    sin,
-                    index,
-                }
-            }),
-            current_amplitude: drive_design::elementary::sqrt(h_re * h_re + h_im * h_im) as f32
-                * amplitude_v,
+            periods,
+            current_amplitude: response.abs() as f32 * amplitude_v,
         }
     }
 }

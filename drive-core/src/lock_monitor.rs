@@ -34,7 +34,7 @@
 use core::fmt;
 
 use crate::fault::Fault;
-use crate::schedule::{POINTS, between, place, sampled};
+use crate::schedule::{POINTS, all_within, between, each, place, sampled};
 use crate::synchronous::Saliency;
 
 /// Range of a believable ratio.
@@ -105,7 +105,7 @@ impl CarrierTable {
 impl CarrierTable {
     /// From its values at multiples of [`STEP_A`](crate::schedule::STEP_A); none when the first is not 1 or any is out of range.
     pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
-        let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
+        let believable = all_within(&ratio, RATIO.0, RATIO.1);
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
 
@@ -193,13 +193,19 @@ const LEAST_CARRIER: f32 = 0.5;
 /// Carrier periods in a row until that is a fault. The averages of the demodulation take four to fill.
 const WEAK_PERIODS: u8 = 8;
 
+fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
+    let mut squares = table.ratio;
+    each(&mut squares, |_, r| 1.0 / (r * r));
+    squares
+}
+
 impl LockMonitor {
     /// See [`LockMonitorSettings`].
     #[inline]
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {
-            inverse_square: table.ratio.map(|r| 1.0 / (r * r)),
+            inverse_square: inverse_square(table),
             per_saliency: 1.0 / s.flux_saliency.abs(),
             smoothing: s.period_s / (s.smoothing_s + s.period_s),
             baseline_smoothing: s.period_s / BASELINE_S,
@@ -211,7 +217,7 @@ impl LockMonitor {
 
     /// Compares with what was learned from now on.
     pub fn take(&mut self, table: &CarrierTable) {
-        self.inverse_square = table.ratio.map(|r| 1.0 / (r * r));
+        self.inverse_square = inverse_square(table);
     }
 
     /// One carrier period: what is demodulated, and `per_share_squared`, one over the square of the share of

@@ -89,7 +89,7 @@ impl ReferenceTable {
 
     /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
     pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
-        let believable = q.iter().all(|q| q.abs() <= LARGEST);
+        let believable = all_within(&q, -LARGEST, LARGEST);
         (q[0] == 0.0 && believable).then_some(Self { q })
     }
 
@@ -129,6 +129,19 @@ pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
     })
 }
 
+/// Goes through a table, not in the control step. (By a length that the compiler does not know: else it
+/// writes `f` out sixteen times.)
+pub(crate) fn each(table: &mut [f32; POINTS], mut f: impl FnMut(usize, f32) -> f32) {
+    for (n, x) in core::hint::black_box(table.as_mut_slice()).iter_mut().enumerate() {
+        *x = f(n, *x);
+    }
+}
+
+/// Whether all values of a table lie from `low` to `high`; not in the control step. (See [`each`].)
+pub(crate) fn all_within(table: &[f32; POINTS], low: f32, high: f32) -> bool {
+    core::hint::black_box(table.as_slice()).iter().all(|x| (low..=high).contains(x))
+}
+
 /// The interval of the tables in which a current lies, A, and the share of it that is past. The last
 /// value is held beyond the end.
 pub(crate) fn place(i_q: f32) -> (usize, f32) {
@@ -166,7 +179,7 @@ impl Schedule {
     /// current, 1/A, and the direct-axis current, A.
     #[inline]
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
-        let share = |n: usize| {
+        let by_current = |n: usize, _: f32| {
             let i_q = n as f32 * STEP_A;
             let length = libm::sqrtf(i_d * i_d + i_q * i_q);
             // b |i| cos 2 gamma, where it adds to the slope
@@ -175,9 +188,11 @@ impl Schedule {
                 a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 });
             LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope
         };
+        let mut share = [0.0; POINTS];
+        each(&mut share, by_current);
         Self {
             table: *table,
-            share: core::array::from_fn(share),
+            share,
             flux_saliency: a,
             current_saliency: b,
             i_d,
