@@ -91,6 +91,7 @@ impl Adc {
     }
 
     /// What both converters have to tell; takes back what is only told once.
+    #[inline(always)]
     pub fn look(&mut self) -> Events {
         let (one, two) = (self.one.isr().read(), self.two.isr().read());
         let over_current = one.awd1().bit() || two.awd1().bit();
@@ -103,6 +104,7 @@ impl Adc {
     }
 
     /// The codes of the sequence that has just ended; takes the interrupt request back.
+    #[inline(always)]
     pub fn read(&mut self) -> Codes {
         // Before the data are read: a sequence that ends from here on asks again.
         self.one.isr().write(|w| w.jeoc().clear().jeos().clear());

@@ -229,12 +229,12 @@ fn start_control(
     let learned =
         singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(NotStarted::Twice)?;
     // Named, so that `cargo xtask size` can tell it from the rest.
-    let trace = singleton!(TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new());
+    static TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new();
     let (send_status, status) = status.split();
     let (orders, take_orders) = orders.split();
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
-    let (recorder, trace) = trace.ok_or(NotStarted::Twice)?.split();
+    let (recorder, trace) = TRACE_MEMORY.take().ok_or(NotStarted::Twice)?;
     let seen = singleton!(: Ring<Seen, { board::SEEN_PERIODS }> = Ring::new());
     let (write_seen, seen) = seen.ok_or(NotStarted::Twice)?.split();
 

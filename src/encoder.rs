@@ -38,6 +38,7 @@ impl Encoder {
     }
 
     /// Counts, four a line.
+    #[inline(always)]
     pub fn count(&self) -> u32 {
         self.timer.cnt().read().bits()
     }

@@ -27,11 +27,13 @@ pub struct Receiver<'a, T>(&'a Mailbox<T>);
 
 impl<T> Mailbox<T> {
     /// An empty mailbox; in the place of the message lies what nobody reads.
+    #[inline(always)]
     pub const fn new(unread: T) -> Self {
         Self { full: AtomicBool::new(false), message: UnsafeCell::new(unread) }
     }
 
     /// Its two ends.
+    #[inline(always)]
     pub fn split(&mut self) -> (Sender<'_, T>, Receiver<'_, T>) {
         (Sender(self), Receiver(self))
     }

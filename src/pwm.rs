@@ -157,6 +157,7 @@ impl Pwm {
     /// now.
     ///
     /// Until the first compare values are taken over, the zeros from before hold: low sides on.
+    #[inline(always)]
     pub fn apply(&mut self, compare: Compare) {
         if !compare.enabled {
             // First of all.
@@ -174,12 +175,14 @@ impl Pwm {
     }
 
     /// All six switches off, now.
+    #[inline(always)]
     pub fn trip(&mut self) {
         self.timer.bdtr().modify(|_, w| w.moe().disabled_idle());
         self.on = false;
     }
 
     /// What the timer has to tell; takes back what is only told once.
+    #[inline(always)]
     pub fn look(&mut self) -> Events {
         let status = self.timer.sr().read();
         let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
@@ -190,6 +193,7 @@ impl Pwm {
 
     /// Ticks since the counter was at its top, if it is on its way down; else as much as half a
     /// period, or more.
+    #[inline(always)]
     pub fn since_top(&self) -> u32 {
         let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {
@@ -200,6 +204,7 @@ impl Pwm {
     }
 
     /// Whether the timer has taken over compare values since the last look.
+    #[inline(always)]
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()
     }

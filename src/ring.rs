@@ -27,6 +27,7 @@ pub struct Reader<'a, T, const N: usize>(&'a Ring<T, N>);
 
 impl<T: Copy, const N: usize> Ring<T, N> {
     /// An empty ring.
+    #[inline(always)]
     pub const fn new() -> Self {
         assert!(N.is_power_of_two());
         Self {
@@ -37,6 +38,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     }
 
     /// Its two ends.
+    #[inline(always)]
     pub fn split(&mut self) -> (Writer<'_, T, N>, Reader<'_, T, N>) {
         (Writer(self), Reader(self))
     }

@@ -4,7 +4,7 @@
 //! changes hands with `stage`.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
 
@@ -113,12 +113,13 @@ struct Inner<const N: usize> {
 
 /// Memory for `N` records.
 pub struct Trace<const N: usize> {
+    taken: AtomicBool,
     stage: AtomicU8,
     inner: UnsafeCell<Inner<N>>,
 }
 
-// SAFETY: `stage` says whose the memory is, and there is one writer and one reader, because `split`
-// borrows the trace mutably.
+// SAFETY: `stage` says whose the memory is, and there is one writer and one reader, because `take`
+// gives them once.
 unsafe impl<const N: usize> Sync for Trace<N> {}
 
 /// The end of the control interrupt.
@@ -138,12 +139,17 @@ impl<const N: usize> Trace<N> {
             next: 0,
             wait: 0,
         };
-        Self { stage: AtomicU8::new(IDLE), inner: UnsafeCell::new(inner) }
+        Self {
+            taken: AtomicBool::new(false),
+            stage: AtomicU8::new(IDLE),
+            inner: UnsafeCell::new(inner),
+        }
     }
 
-    /// Its two ends.
-    pub fn split(&mut self) -> (Recorder<'_, N>, Reader<'_, N>) {
-        (Recorder(self), Reader(self))
+    /// Its two ends; only the first time.
+    pub fn take(&self) -> Option<(Recorder<'_, N>, Reader<'_, N>)> {
+        let first = !self.taken.swap(true, Ordering::AcqRel);
+        first.then_some((Recorder(self), Reader(self)))
     }
 }
 
@@ -216,8 +222,8 @@ mod tests {
 
     #[test]
     fn records_every_nth_period_and_gives_them_back_when_done() {
-        let mut trace = Trace::<4>::new();
-        let (mut recorder, mut reader) = trace.split();
+        let trace = Trace::<4>::new();
+        let (mut recorder, mut reader) = trace.take().unwrap();
         assert_eq!(reader.get(0), None);
         assert!(reader.begin(3, 2, &Choice::USUAL));
         assert!(!reader.begin(1, 1, &Choice::USUAL));
@@ -236,8 +242,8 @@ mod tests {
 
     #[test]
     fn asks_for_no_more_than_there_is_room() {
-        let mut trace = Trace::<4>::new();
-        let (mut recorder, mut reader) = trace.split();
+        let trace = Trace::<4>::new();
+        let (mut recorder, mut reader) = trace.take().unwrap();
         assert!(reader.begin(100, 1, &Choice::USUAL));
         for _ in 0..4 {
             recorder.step(Telemetry::default);

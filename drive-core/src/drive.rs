@@ -348,8 +348,9 @@ impl Drive {
             Next::Apply(voltage, flowing) => {
                 let signs = self.c.dead_time.signs(flowing.to_abc());
                 let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
-                let [a, b, c] =
-                    self.c.modulator.step(voltage, compensation, measured.dc_link).compare;
+                // (Which is there already; `step` would be written out again.)
+                let modulated = self.c.modulator.limited(voltage, compensation, measured.dc_link);
+                let [a, b, c] = modulated.compare;
                 Compare { a, b, c, enabled: true }
             }
             Next::Passed => {

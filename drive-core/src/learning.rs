@@ -287,7 +287,9 @@ impl Learning {
         let mut q = [0.0; POINTS];
         let (mut asymmetry, mut held) = (0.0_f32, 0.0);
         let (mut xx, mut xq, mut qq) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for (n, (place, (p, m))) in q.iter_mut().zip(plus.iter().zip(minus)).enumerate() {
+        // (By a length that the compiler does not know: else it writes this out sixteen times.)
+        let places = core::hint::black_box(q.as_mut_slice()).iter_mut();
+        for (n, (place, (p, m))) in places.zip(plus.iter().zip(minus)).enumerate() {
             if n <= self.points {
                 held = 0.5 * (p - m);
                 let even = 0.5 * (p + m) - offset;
@@ -315,7 +317,8 @@ impl Learning {
         };
         let mut ratio = [1.0; POINTS];
         let mut held = 1.0;
-        for (n, (place, square)) in ratio.iter_mut().zip(state.carrier).enumerate().skip(1) {
+        let places = core::hint::black_box(ratio.as_mut_slice()).iter_mut();
+        for (n, (place, square)) in places.zip(state.carrier).enumerate().skip(1) {
             if n <= self.points {
                 held = libm::sqrtf(square / baseline);
             }

@@ -72,8 +72,9 @@ impl Modulator {
         self.limited(wanted, compensation, v_dc)
     }
 
+    /// The same without the short cut for what needs no limiting.
     #[inline(never)]
-    fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
+    pub(crate) fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
