@@ -149,7 +149,7 @@ mod tests {
 
     fn seen(rig: &mut Rig, number: u32) -> Seen {
         rig.step();
-        Seen::new(number, rig.drive.telemetry())
+        Seen::new(number, &rig.drive.telemetry())
     }
 
     #[test]

@@ -6,7 +6,6 @@ use proptest::prelude::*;
 
 use super::doubles::{Desk, Wire};
 use super::*;
-use crate::tracking::Tracking;
 
 struct Talk {
     console: Console,
