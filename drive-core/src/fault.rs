@@ -138,4 +138,14 @@ mod tests {
         }
         assert_eq!(table.len(), Fault::ALL.len());
     }
+
+    /// The README's table is these.
+    #[test]
+    fn the_manual_lists_them() {
+        let manual = include_str!("../../README.md");
+        for fault in Fault::ALL {
+            let line = format!("| {} | {fault} |", fault.code());
+            assert!(manual.contains(&line), "{line}");
+        }
+    }
 }
