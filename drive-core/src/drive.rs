@@ -95,7 +95,7 @@ impl Default for References {
 struct ControlState {
     references: References,
     sensing: SensingState,
-    seen: Seen,
+    seen: Observed,
     low_pass: LpfState,
     indirect: IndirectState,
     carrier: Carrier,
@@ -139,7 +139,7 @@ impl Default for Axes {
 
 /// What of a step stands nowhere else in the state; see [`Telemetry`].
 #[derive(Clone, Copy, Debug, Default)]
-struct Seen {
+struct Observed {
     phi: Angle,
     flux_step: f32,
     rotor_step: f32,

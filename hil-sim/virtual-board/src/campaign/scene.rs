@@ -69,7 +69,10 @@ impl Places {
         Ok(Self {
             coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
             control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
-            phi: drive + at("Drive", "control")? + at("ControlState", "seen")? + at("Seen", "phi")?,
+            phi: drive
+                + at("Drive", "control")?
+                + at("ControlState", "seen")?
+                + at("Observed", "phi")?,
             data: (data, data_end - data),
             code: (code, code_end - code),
             ccm_data: running,

@@ -40,7 +40,7 @@ impl Probe {
         let running = image.symbol("control7RUNNING").context("the drive in RAM")?.0;
         let drive = running + place("Running", "control")? + place("Control", "drive")?;
         let seen = drive + place("Drive", "control")? + place("ControlState", "seen")?;
-        let at = |member: &str| Ok::<u32, anyhow::Error>(seen + place("Seen", member)?);
+        let at = |member: &str| Ok::<u32, anyhow::Error>(seen + place("Observed", member)?);
         let q = place("Dq", "q")?;
         Ok(Self {
             phi: at("phi")?,
