@@ -42,10 +42,13 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: Case) -> Result<Rig, Error> {
-    at_speed_of(&drive_settings(config), config, case)
+    let mut rig = without_torque(&drive_settings(config), config, case)?;
+    rig.command(Command::Torque(case.iq as f32))?;
+    Ok(rig)
 }
 
-fn at_speed_of(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Error> {
+/// The same before it is given its torque; it may have stopped itself on the way.
+fn without_torque(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
@@ -61,7 +64,6 @@ fn at_speed_of(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Err
         rig.run(0.01, |_| {});
     }
     rig.run(0.3, |_| {});
-    rig.command(Command::Torque(case.iq as f32))?;
     Ok(rig)
 }
 
@@ -83,9 +85,13 @@ pub fn steady_run_of(
     case: Case,
     seconds: f64,
 ) -> Result<SteadyRun, Error> {
-    let mut rig = at_speed_of(drive, config, case)?;
-    rig.run(1.0, |_| {});
+    let mut rig = without_torque(drive, config, case)?;
     let (mut error, mut torque) = (Stats::default(), Stats::default());
+    if matches!(rig.drive.state(), State::Fault(_)) {
+        return Ok(SteadyRun { error, torque: 0.0, lost: true });
+    }
+    rig.command(Command::Torque(case.iq as f32))?;
+    rig.run(1.0, |_| {});
     rig.run(seconds, |p| {
         error.push(p.angle_error_deg);
         torque.push(p.torque);
