@@ -10,6 +10,7 @@ use object::elf::{FileHeader32, SHF_ALLOC, SHT_PROGBITS, SHT_SYMTAB};
 use object::read::elf::{FileHeader, SectionHeader, Sym};
 
 use crate::control;
+use crate::paths;
 use crate::run::{self, Step};
 use crate::stack;
 use crate::toolchain::{self, PROFILE, TARGET, Target};
@@ -24,10 +25,11 @@ pub fn build() -> Result<PathBuf> {
 
 /// The same, when it is known how to build for the target.
 pub fn build_with(target: &Target) -> Result<PathBuf> {
-    Step::new("firmware").run(target.cargo("build").args(["--package", "induction-drive"]))?;
+    Step::new("firmware").run(target.cargo("build")?.args(["--package", "induction-drive"]))?;
     let elf = target.target_dir()?.join(TARGET).join(PROFILE).join("induction-drive");
     let bytes = fs::read(&elf).with_context(|| elf.display().to_string())?;
     control::check(&bytes).context("the control interrupt")?;
+    paths::check(&bytes)?;
     Ok(elf)
 }
 

@@ -4,6 +4,7 @@ mod board;
 mod control;
 mod fuzz;
 mod image;
+mod paths;
 mod run;
 mod stack;
 mod toolchain;
@@ -103,8 +104,8 @@ fn test() -> Result<()> {
 
     let target = toolchain::for_target()?;
     Step::new("drive-core for the controller")
-        .run(target.cargo("build").args(["--package", "drive-core"]))?;
-    Step::new("lints of the firmware").run(target.cargo("clippy").args([
+        .run(target.cargo("build")?.args(["--package", "drive-core"]))?;
+    Step::new("lints of the firmware").run(target.cargo("clippy")?.args([
         "--package",
         "induction-drive",
         "--no-deps",

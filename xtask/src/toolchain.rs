@@ -14,6 +14,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
+use crate::paths;
 use crate::run::{self, Step};
 
 /// The microcontroller: Cortex-M4 with a single-precision floating-point unit.
@@ -43,7 +44,7 @@ pub enum Target {
 
 impl Target {
     /// A cargo command for the target, in the profile of the image.
-    pub fn cargo(&self, subcommand: &str) -> Command {
+    pub fn cargo(&self, subcommand: &str) -> Result<Command> {
         let mut command = match self {
             Self::InUse => run::cargo()(),
             Self::Debian => {
@@ -65,10 +66,11 @@ impl Target {
         // They would replace the flags of the target in .cargo/config.toml.
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
         command.arg(subcommand).args(["--profile", PROFILE, "--target", TARGET]);
-        if let (Self::Debian, Ok(dir)) = (self, self.target_dir()) {
-            command.arg("-Zbuild-std=core").arg("--target-dir").arg(dir);
+        command.arg(paths::option()?);
+        if let Self::Debian = self {
+            command.arg("-Zbuild-std=core").arg("--target-dir").arg(self.target_dir()?);
         }
-        command
+        Ok(command)
     }
 
     /// Where this way of building puts its results.
