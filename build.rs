@@ -24,12 +24,17 @@ fn commit() -> String {
         let output = Command::new("git").args(arguments).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    // Looked at again when the sources or the commit change.
+    // Looked at again when the sources or the commit change. A commit on a branch leaves HEAD as it is,
+    // but adds a line to its log.
     for path in ["src", "drive-core/src"] {
         println!("cargo::rerun-if-changed={path}");
     }
-    if let Some(head) = git(&["rev-parse", "--git-path", "HEAD"]) {
-        println!("cargo::rerun-if-changed={head}");
+    for name in ["HEAD", "logs/HEAD"] {
+        if let Some(path) =
+            git(&["rev-parse", "--git-path", name]).filter(|path| fs::exists(path).unwrap_or(false))
+        {
+            println!("cargo::rerun-if-changed={path}");
+        }
     }
     let Some(hash) = git(&["rev-parse", "--short=10", "HEAD"]) else { return "unknown".into() };
     let changed = git(&["status", "--porcelain", "--untracked-files=no"]);
