@@ -131,10 +131,11 @@ pub struct Reader<'a, const N: usize>(&'a Trace<N>);
 impl<const N: usize> Trace<N> {
     /// Nothing recorded.
     pub const fn new() -> Self {
+        // Zeros only: else 32 KiB of the flash would hold the first contents of the memory.
         let inner = Inner {
             records: [[0.0; MOST]; N],
             wanted: 0,
-            divider: 1,
+            divider: 0,
             choice: Choice::NONE,
             next: 0,
             wait: 0,
