@@ -2,7 +2,7 @@
 //! its answer, and an order that reached the drive came from a line that was answered without error.
 #![no_main]
 
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 
 use drive_core::learning::{Fitted, Learned};
 use drive_core::lock_monitor::CarrierTable;
@@ -10,7 +10,9 @@ use drive_core::schedule::ReferenceTable;
 use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
 use induction_drive::console::doubles::{Desk, Wire};
-use induction_drive::console::keys::Everything;
+use induction_drive::console::grammar::{HELP, LEVELS};
+use induction_drive::console::keys::{Everything, KEYS};
+use induction_drive::trace::SIGNALS;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -23,8 +25,13 @@ fuzz_target!(|bytes: &[u8]| {
     let mut wire = Wire::default();
     let mut now_ms = 0_u32;
     // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
-    // drive.
+    // drive. Those from 0x80 on stand for words, which the fuzzer does not find letter by letter.
+    static WORDS: LazyLock<Vec<&str>> = LazyLock::new(words);
     for &byte in bytes {
+        if let Some(word) = byte.checked_sub(0x80).and_then(|n| WORDS.get(usize::from(n))) {
+            wire.sent.extend(word.bytes().chain([b' ']));
+            continue;
+        }
         match byte {
             0xf8 => desk.found = Some(found(false)),
             0xf9 => desk.found = Some(found(true)),
@@ -50,6 +57,20 @@ fuzz_target!(|bytes: &[u8]| {
     let running = !matches!(desk.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", desk.drive.state());
 });
+
+/// What the console knows: commands, settings, and the words that follow them.
+fn words() -> Vec<&'static str> {
+    let commands = HELP.iter().filter_map(|line| line.split_whitespace().next());
+    let settings = KEYS.iter().map(|key| key.name);
+    let levels = LEVELS.iter().map(|(name, _)| *name);
+    let others =
+        ["encoder", "injection", "learning", "yes", "no", "synchronous", "rectified", "motor"];
+    let words: Vec<_> =
+        commands.chain(settings).chain(levels).chain(others).chain(SIGNALS).collect();
+    // Or they would hide the bytes that are not sent.
+    assert!(words.len() <= 0xf0 - 0x80, "{} words", words.len());
+    words
+}
 
 /// What a learning may have found.
 fn found(accepted: bool) -> Learned {
