@@ -1,8 +1,8 @@
 //! D1: the numbers of Barroso (2017), recomputed. What is printed and wrong is asserted as wrong.
 //!
 //! Elsewhere: plant, rule of section 3.8, controllers, 3.41 and 3.42 and the unstable 4.1 under 4.2 in
-//! `drive-core/tests/tuning.rs`; filters of appendix C, step 3.39 and figure 40 in
-//! `drive-core/tests/filters.rs`; Table 5 in `bench_tests.rs`; appendix A in `identification_arx.rs`.
+//! `drive-core/tests/tuning.rs`; step 3.39 and figure 40 in `drive-core/tests/pi.rs`; filters of appendix C
+//! in `drive-core/tests/filters/`; Table 5 in `bench_tests.rs`; appendix A in `identification_arx.rs`.
 
 use std::f64::consts::{PI, TAU};
 
