@@ -2,20 +2,7 @@
 
 mod common;
 
-use common::{IDEAL, all, config};
-use hil_sim::Outcome;
-use hil_sim::experiments::{self, Context};
-use hil_sim::progress::Progress;
-
-fn run(name: &str, changes: &[&str], seed: u64) -> Outcome {
-    (experiments::find(name).unwrap().run)(&Context {
-        config: &config(changes),
-        seed,
-        seconds: None,
-        progress: Progress::hidden(),
-    })
-    .unwrap()
-}
+use common::{IDEAL, all, config, run};
 
 /// The chain of the source with a rectifier.
 const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];

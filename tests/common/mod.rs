@@ -2,9 +2,9 @@
 #![allow(dead_code)] // every procedure uses its own part of it
 
 use drive_core::{Command, Mode, Settings};
-use hil_sim::Config;
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
+use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {
@@ -28,6 +28,11 @@ pub const ISOTROPIC: [&str; 2] = ["saliency.a_psi=0", "saliency.b1=0"];
 /// All of these changes.
 pub fn all(parts: &[&[&'static str]]) -> Vec<&'static str> {
     parts.concat()
+}
+
+/// What an experiment finds with these changes.
+pub fn run(experiment: &str, changes: &[&str], seed: u64) -> Outcome {
+    experiments::run(experiment, &config(changes), seed).unwrap()
 }
 
 /// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
