@@ -1,6 +1,7 @@
 //! The bench that the procedures share.
 #![allow(dead_code)] // every procedure uses its own part of it
 
+use drive_core::settings::AngleSource;
 use drive_core::{Command, Mode, Settings};
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
@@ -38,6 +39,14 @@ pub fn run(experiment: &str, changes: &[&str], seed: u64) -> Outcome {
 /// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
 pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     regulating_with(&plant_settings(config), &drive_settings(config), seed, i_q, settle)
+}
+
+/// The same by the encoder, with the injection beside it.
+pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
+    let mut drive = drive_settings(config);
+    drive.angle_source = AngleSource::Encoder;
+    drive.injection.beside_encoder = true;
+    regulating_with(&plant_settings(config), &drive, seed, i_q, settle)
 }
 
 /// The same from settings.
