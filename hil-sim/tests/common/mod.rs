@@ -6,7 +6,7 @@ use hil_sim::plant::{
 };
 
 pub const PERIOD: f64 = 1.0 / 6000.0;
-pub const TOP: u16 = 14_167;
+pub const TOP: u16 = InverterSettings::IDEAL.timer_top;
 
 /// With a locked shaft and an ideal measurement.
 pub fn settings(inverter: InverterSettings) -> PlantSettings {

@@ -32,9 +32,11 @@ pub const NEVER: u64 = u64::MAX;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
-/// Position of the converters' interrupt in the vector table, from the first peripheral.
-pub const IRQ_ADC1_2: u16 = 18;
+/// Positions in the vector table, from the first peripheral.
+const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
+/// Exception number of the control interrupt, which is the converters'.
+pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 
 /// Why the chip was reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

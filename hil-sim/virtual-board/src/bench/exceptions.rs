@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::{Board, Failure};
-use crate::chip::IRQ_ADC1_2;
+use crate::chip::CONTROL_INTERRUPT;
 use crate::cpu::{Cpu, Fault, Register, Stop};
 use crate::memory;
 use crate::scs;
@@ -22,17 +22,17 @@ impl Board {
 
     fn enter(&mut self, exception: u16) -> Result<()> {
         self.sleeping = false;
-        if exception == 16 + IRQ_ADC1_2 {
+        if exception == CONTROL_INTERRUPT {
             self.begin_control();
         }
         let vector = self.cpu.chip().scs.vector(exception);
         let handler = self.cpu.word(vector).ok_or_else(|| Failure::Core("no vector".into()))?;
         self.cpu.chip_mut().scs.begin(exception);
-        if exception == 16 + IRQ_ADC1_2 {
+        if exception == CONTROL_INTERRUPT {
             self.remember();
         }
         let stacked = self.cpu.enter(exception, handler & !1);
-        if exception == 16 + IRQ_ADC1_2 {
+        if exception == CONTROL_INTERRUPT {
             self.spoil();
         }
         if !stacked && exception != scs::HARD_FAULT {
@@ -113,12 +113,12 @@ impl Board {
 
     fn leave(&mut self, exc_return: u32) -> Result<()> {
         let ended = self.cpu.chip_mut().scs.end();
-        if ended == Some(16 + IRQ_ADC1_2) {
+        if ended == Some(CONTROL_INTERRUPT) {
             self.end_control();
         }
         if ended.is_none() || !self.cpu.leave(exc_return) {
             self.hard_fault(1 << 11, None)?;
-        } else if ended == Some(16 + IRQ_ADC1_2) {
+        } else if ended == Some(CONTROL_INTERRUPT) {
             self.compare_with_before()?;
         }
         Ok(())

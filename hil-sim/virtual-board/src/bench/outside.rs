@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::Board;
-use crate::chip::IRQ_ADC1_2;
+use crate::chip::CONTROL_INTERRUPT;
 use crate::cpu::Cpu;
 
 impl Board {
@@ -76,7 +76,7 @@ impl Board {
     /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
     pub fn pend(&mut self, exception: u16) {
         // One that runs already is not waited for by anything but itself.
-        if exception == 16 + IRQ_ADC1_2 && self.entered.is_none() {
+        if exception == CONTROL_INTERRUPT && self.entered.is_none() {
             self.pended = Some(self.cpu.chip().now);
         }
         self.chip().scs.pend(exception);
