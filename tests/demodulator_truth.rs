@@ -50,7 +50,7 @@ fn encoder_rig(iq: f64, amplitude_v: f64, parts: &[&[&'static str]]) -> Rig {
     beside_encoder(&config(&changes), 1, (iq / LPF_DC) as f32, 0.4)
 }
 
-/// G2: the printed chain on a motor without saliency.
+/// The printed chain on a motor without saliency.
 #[test]
 fn the_printed_chain_shows_the_fundamental_leaking() {
     for iq in [0.5, 1.0, 2.0, 3.0] {
@@ -81,7 +81,7 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
     }
 }
 
-/// G2: and the injection makes no difference to it. In the motor, to within what the converter leaves
+/// The injection makes no difference to the printed chain. In the motor, to within what the converter leaves
 /// uncertain of the mean current (0.1 %); with given currents, to within 1 µA.
 #[test]
 fn the_printed_chain_does_not_see_the_injection() {
@@ -110,7 +110,7 @@ fn the_printed_chain_does_not_see_the_injection() {
     assert!(difference.abs() < 1e-6, "{difference} A");
 }
 
-/// G3: the angle is moved by 50°; 50 ms later the printed chain gives what it gave before.
+/// The angle is moved by 50°; 50 ms later the printed chain gives what it gave before.
 #[test]
 fn the_printed_chain_is_blind_and_the_rectified_is_not() {
     let moved_by = |demodulator: &'static str| {

@@ -108,7 +108,7 @@ fn learning_takes_stop_and_no_other_reference() {
     }
 }
 
-/// G6: the rectified chain of the source with a learned reference, shaft locked.
+/// The rectified chain of the source with a learned reference, shaft locked.
 #[test]
 fn the_rectified_chain_tracks_with_a_learned_reference() {
     let changes = ["injection.demodulator=rectified"];
