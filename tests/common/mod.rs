@@ -1,7 +1,6 @@
 //! The bench that the procedures share.
 #![allow(dead_code)] // every procedure uses its own part of it
 
-use drive_core::settings::AngleSource;
 use drive_core::{Command, Mode, Settings};
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
@@ -41,12 +40,9 @@ pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     regulating_with(&plant_settings(config), &drive_settings(config), seed, i_q, settle)
 }
 
-/// The same by the encoder, with the injection beside it.
+/// The same by the encoder, with the shaft locked and the injection beside it.
 pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
-    let mut drive = drive_settings(config);
-    drive.angle_source = AngleSource::Encoder;
-    drive.injection.beside_encoder = true;
-    regulating_with(&plant_settings(config), &drive, seed, i_q, settle)
+    settled(Rig::oriented(config, seed).unwrap(), i_q, settle)
 }
 
 /// The same from settings.
@@ -59,6 +55,10 @@ pub fn regulating_with(
 ) -> Rig {
     let mut rig = Rig::new(plant, drive, seed).unwrap();
     rig.start(Mode::Torque).unwrap();
+    settled(rig, i_q, settle)
+}
+
+fn settled(mut rig: Rig, i_q: f32, settle: f64) -> Rig {
     rig.command(Command::Torque(i_q)).unwrap();
     rig.run(settle, |_| {});
     rig
