@@ -1,11 +1,12 @@
-//! Wall time of one control step, one plant period and both together: `cargo bench`.
+//! Wall time of the control step, alone and with the motor: `cargo bench`. The motor alone is in
+//! `hil-sim/benches/plant.rs`.
 //!
 //! The machines it runs on are noisy: compare figures of one run only. Real time is 6000 periods a
 //! second, so `real time / (time of "drive and motor")` is how many times faster than real time a
 //! simulation runs.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use drive_core::{Command, Compare, Mode, Sample};
+use drive_core::{Command, Mode, Sample};
 use hil_sim::Config;
 use hil_sim::rig::Rig;
 use std::hint::black_box;
@@ -51,17 +52,6 @@ fn speed(c: &mut Criterion) {
             b.iter(|| (0..6000).for_each(|_| rig.step()));
         });
     }
-
-    let mut plant = rig(&[]).plant;
-    let compare = Compare { a: 7300, b: 7000, c: 6950, enabled: true };
-    c.bench_function("plant, averaged inverter, 6000 periods", |b| {
-        b.iter(|| {
-            for _ in 0..6000 {
-                plant.advance(black_box(&compare), 1.0 / 6000.0);
-                black_box(plant.sample());
-            }
-        });
-    });
 }
 
 criterion_group! {

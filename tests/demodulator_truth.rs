@@ -5,11 +5,11 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
-use common::{IDEAL, ISOTROPIC, all, config, regulating, regulating_with};
+use common::{IDEAL, ISOTROPIC, all, beside_encoder, config, regulating};
 use drive_core::demodulator::{CarrierSample, Demodulate, Literal, Rectified};
 use drive_core::injection::CarrierPeriod;
 use drive_core::{AlphaBeta, Angle};
-use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings, wrapped_degrees};
+use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 
 /// One step of a chain, dm along `axis`.
 fn step(chain: &mut impl Demodulate<Seen = f32>, current: AlphaBeta, axis: Angle) -> f32 {
@@ -46,14 +46,11 @@ fn encoder_rig(iq: f64, amplitude_v: f64, parts: &[&[&'static str]]) -> Rig {
     let mut changes = all(parts);
     let amplitude = format!("injection.amplitude_v={amplitude_v}");
     let id = format!("reference.id_a={}", 0.7 / LPF_DC);
-    changes.extend(["angle.source=encoder", amplitude.as_str(), id.as_str()]);
-    let config = config(&changes);
-    let mut drive = drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    regulating_with(&plant_settings(&config), &drive, 1, (iq / LPF_DC) as f32, 0.4)
+    changes.extend([amplitude.as_str(), id.as_str()]);
+    beside_encoder(&config(&changes), 1, (iq / LPF_DC) as f32, 0.4)
 }
 
-/// G2: the printed chain on a motor without saliency.
+/// The printed chain on a motor without saliency.
 #[test]
 fn the_printed_chain_shows_the_fundamental_leaking() {
     for iq in [0.5, 1.0, 2.0, 3.0] {
@@ -84,7 +81,7 @@ fn the_printed_chain_shows_the_fundamental_leaking() {
     }
 }
 
-/// G2: and the injection makes no difference to it. In the motor, to within what the converter leaves
+/// The injection makes no difference to the printed chain. In the motor, to within what the converter leaves
 /// uncertain of the mean current (0.1 %); with given currents, to within 1 µA.
 #[test]
 fn the_printed_chain_does_not_see_the_injection() {
@@ -113,21 +110,19 @@ fn the_printed_chain_does_not_see_the_injection() {
     assert!(difference.abs() < 1e-6, "{difference} A");
 }
 
-/// G3: the angle is moved by 50°; 50 ms later the printed chain gives what it gave before.
+/// The angle is moved by 50°; 50 ms later the printed chain gives what it gave before.
 #[test]
 fn the_printed_chain_is_blind_and_the_rectified_is_not() {
     let moved_by = |demodulator: &'static str| {
         let config = config(&all(&[
             &IDEAL,
-            &["angle.source=encoder", "angle.compensate_delays=false"],
+            &["angle.compensate_delays=false"],
             match demodulator {
                 "literal" => &["injection.demodulator=literal"],
                 _ => &["injection.demodulator=rectified"],
             },
         ]));
-        let mut drive = drive_settings(&config);
-        drive.injection.beside_encoder = true;
-        let mut rig = regulating_with(&plant_settings(&config), &drive, 1, 2.0, 0.4);
+        let mut rig = beside_encoder(&config, 1, 2.0, 0.4);
         // Mean delta_i (mA) and angle error (degrees) while the encoder is moved on by `counts` a
         // period.
         let mut offset = 0_u32;

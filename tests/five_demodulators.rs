@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{ISOTROPIC, all, config, regulating_with};
+use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::settings::{SettingsError, Tracking};
 use drive_core::{Command, Settings};
 use hil_sim::config::{Config, Demodulator, LoadMode};
@@ -21,15 +21,12 @@ const ALL: [(&str, f64); 5] = [
     ("synchronous", 1.0),
 ];
 
-/// With one of the demodulations, the encoder as angle source and the injection beside it.
-fn beside_encoder(name: &str, parts: &[&[&'static str]], iq: f64) -> Rig {
+/// With one of the demodulations beside the encoder.
+fn demodulating(name: &str, parts: &[&[&'static str]], iq: f32) -> Rig {
     let demodulator = format!("injection.demodulator={name}");
     let mut changes = all(parts);
-    changes.extend(["angle.source=encoder", demodulator.as_str()]);
-    let config = config(&changes);
-    let mut drive = drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    regulating_with(&plant_settings(&config), &drive, 3, iq as f32, 0.5)
+    changes.push(demodulator.as_str());
+    beside_encoder(&config(&changes), 3, iq, 0.5)
 }
 
 /// Mean signal over half a second.
@@ -44,12 +41,12 @@ fn signal(rig: &mut Rig) -> f64 {
 #[test]
 fn all_but_the_literal_chain_see_the_saliency() {
     for (name, _) in ALL {
-        let mut rig = beside_encoder(name, &[], 1.5);
+        let mut rig = demodulating(name, &[], 1.5);
         let here = signal(&mut rig);
         rig.command(Command::TurnInjection(5.0)).unwrap();
         rig.run(0.1, |_| {});
         let slope = (signal(&mut rig) - here) / 5f64.to_radians();
-        let without = signal(&mut beside_encoder(name, &[&ISOTROPIC], 1.5));
+        let without = signal(&mut demodulating(name, &[&ISOTROPIC], 1.5));
         println!("{name}: {here:.5}, slope {slope:.4}, without saliency {without:.5}");
         assert!(here > 0.0 && slope > 0.0, "{name}: {here} {slope}");
         let share = (without / here).abs();
@@ -66,7 +63,7 @@ fn all_but_the_literal_chain_see_the_saliency() {
 #[test]
 fn the_carrier_lies_where_the_method_wants_it() {
     for (name, _) in ALL {
-        let mut rig = beside_encoder(name, &[&ISOTROPIC], 0.5);
+        let mut rig = demodulating(name, &[&ISOTROPIC], 0.5);
         // Component of the current at the carrier, along the flux and across it.
         let mut parts = [[0.0_f64; 2]; 2];
         for k in 0..600 {

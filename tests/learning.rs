@@ -2,25 +2,13 @@
 
 mod common;
 
-use common::{all, config};
+use common::{all, config, run};
 use drive_core::learning::Learned;
 use drive_core::schedule::ReferenceTable;
 use drive_core::{Command, Fault, Mode, State};
-use hil_sim::experiments::{self, Context};
+use hil_sim::learn;
 use hil_sim::plant::Load;
-use hil_sim::progress::Progress;
 use hil_sim::rig::Rig;
-use hil_sim::{Outcome, learn};
-
-fn run(name: &str, changes: &[&str], seed: u64) -> Outcome {
-    (experiments::find(name).unwrap().run)(&Context {
-        config: &config(changes),
-        seed,
-        seconds: None,
-        progress: Progress::hidden(),
-    })
-    .unwrap()
-}
 
 fn learned(changes: &[&str], seed: u64) -> Learned {
     let learned = learn::on(&config(changes), seed).unwrap();
@@ -120,7 +108,7 @@ fn learning_takes_stop_and_no_other_reference() {
     }
 }
 
-/// G6: the rectified chain of the source with a learned reference, shaft locked.
+/// The rectified chain of the source with a learned reference, shaft locked.
 #[test]
 fn the_rectified_chain_tracks_with_a_learned_reference() {
     let changes = ["injection.demodulator=rectified"];

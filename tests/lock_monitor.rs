@@ -3,29 +3,15 @@
 
 mod common;
 
-use common::{config, regulating};
+use common::{config, regulating, run};
 use drive_core::{Command, Fault, Mode, State};
-use hil_sim::Outcome;
-use hil_sim::experiments::{self, Context};
-use hil_sim::progress::Progress;
 use hil_sim::rig::Rig;
-
-fn run(changes: &[&str], seed: u64) -> Outcome {
-    let outcome = (experiments::find("lock-monitor").unwrap().run)(&Context {
-        config: &config(changes),
-        seed,
-        seconds: None,
-        progress: Progress::hidden(),
-    })
-    .unwrap();
-    println!("{changes:?}: {:?}", outcome.metrics);
-    outcome
-}
 
 /// A share of what `cargo sim run lock-monitor --set runs=1000` shows.
 #[test]
 fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
-    let outcome = run(&["runs=12"], 31);
+    let outcome = run("lock-monitor", &["runs=12"], 31);
+    println!("{:?}", outcome.metrics);
     for metric in [
         "not_in_time_p90",
         "not_in_time_m90",
@@ -46,7 +32,8 @@ fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
 /// Without the monitor the same trials end in false locks.
 #[test]
 fn without_the_monitor_a_false_lock_stays() {
-    let outcome = run(&["runs=6", "injection.monitor=false"], 32);
+    let outcome = run("lock-monitor", &["runs=6", "injection.monitor=false"], 32);
+    println!("{:?}", outcome.metrics);
     let missed = ["p120", "m120", "180"].map(|n| outcome.metrics.get(&format!("not_in_time_{n}")));
     assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");
 }

@@ -2,20 +2,12 @@
 
 mod common;
 
-use common::config;
-use hil_sim::experiments::{self, Context};
-use hil_sim::progress::Progress;
+use common::run;
 
 #[test]
 fn five_turns_arrive_without_overshoot() {
     for seed in [1, 2] {
-        let outcome = (experiments::find("position-step").unwrap().run)(&Context {
-            config: &config(&[]),
-            seed,
-            seconds: None,
-            progress: Progress::hidden(),
-        })
-        .unwrap();
+        let outcome = run("position-step", &[], seed);
         let metric = |name| outcome.metrics.get(name).unwrap();
         println!("{:?}", outcome.metrics);
         assert!(metric("overshoot_pct") < 2.0);

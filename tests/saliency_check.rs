@@ -2,20 +2,12 @@
 
 mod common;
 
-use common::config;
-use hil_sim::experiments::{self, Context};
-use hil_sim::progress::Progress;
+use common::run;
 
 /// A share of what `cargo sim run saliency-check --set runs=1000` shows.
 #[test]
 fn a_motor_without_saliency_is_refused_and_one_with_half_of_it_is_not() {
-    let outcome = (experiments::find("saliency-check").unwrap().run)(&Context {
-        config: &config(&["runs=60"]),
-        seed: 5,
-        seconds: None,
-        progress: Progress::hidden(),
-    })
-    .unwrap();
+    let outcome = run("saliency-check", &["runs=60"], 5);
     let accepted = |name| outcome.metrics.get(&format!("accepted_{name}")).unwrap();
     println!("{:?}", outcome.metrics);
     // 3.8 standard deviations lie between the limit and either a tenth or half.

@@ -2,27 +2,14 @@
 
 mod common;
 
-use common::{IDEAL, all, config};
-use hil_sim::Outcome;
-use hil_sim::experiments::{self, Context};
-use hil_sim::progress::Progress;
-
-fn run(name: &str, changes: &[&str], seed: u64) -> Outcome {
-    (experiments::find(name).unwrap().run)(&Context {
-        config: &config(changes),
-        seed,
-        seconds: None,
-        progress: Progress::hidden(),
-    })
-    .unwrap()
-}
+use common::{IDEAL, all, config, run};
 
 /// The chain of the source with a rectifier.
 const RECTIFIED: [&str; 1] = ["injection.demodulator=rectified"];
 /// The source compensates no delay.
 const AS_PRINTED: [&str; 1] = ["angle.compensate_delays=false"];
 
-/// G5: rectified, 10 mA, k_s 0.132546, z_s 0.9 on plant A without noise: with the delays left as in
+/// Rectified, 10 mA, k_s 0.132546, z_s 0.9, without noise: with the delays left as in
 /// the source, and compensated.
 #[test]
 fn the_rectified_chain_tracks_within_13_degrees() {
@@ -67,7 +54,7 @@ fn the_synchronous_chain_is_exact_to_a_degree() {
     }
 }
 
-/// G8: steps up to full reversal, and with a rotor 30 % warmer than the drive believes.
+/// Steps up to full reversal, and with a rotor 30 % warmer than the drive believes.
 #[test]
 fn reversals_keep_the_angle() {
     for (changes, limit) in [(vec![], 9.0), (vec!["drive.motor.rr=0.846"], 18.0)] {

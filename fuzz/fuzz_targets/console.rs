@@ -4,12 +4,10 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use drive_core::learning::{Fitted, Learned};
-use drive_core::lock_monitor::CarrierTable;
-use drive_core::schedule::ReferenceTable;
+use drive_core::learning::Learned;
 use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
-use induction_drive::console::doubles::{Desk, Wire};
+use induction_drive::console::doubles::{Desk, Wire, found};
 use induction_drive::console::grammar::{HELP, LEVELS};
 use induction_drive::console::keys::{Everything, KEYS};
 use induction_drive::trace::SIGNALS;
@@ -33,8 +31,8 @@ fuzz_target!(|bytes: &[u8]| {
             continue;
         }
         match byte {
-            0xf8 => desk.found = Some(found(false)),
-            0xf9 => desk.found = Some(found(true)),
+            0xf8 => desk.found = Some(doubtful()),
+            0xf9 => desk.found = Some(found()),
             0xfa => wire.damaged = true,
             0xfb => now_ms = now_ms.wrapping_add(20_000),
             0xfc => now_ms = now_ms.wrapping_add(u32::MAX / 2),
@@ -72,17 +70,11 @@ fn words() -> Vec<&'static str> {
     words
 }
 
-/// What a learning may have found.
-fn found(accepted: bool) -> Learned {
-    let fitted = Fitted { value: 0.05, misfit: 0.001, accepted };
-    Learned {
-        reference: ReferenceTable::default(),
-        carrier: accepted.then(CarrierTable::default),
-        points: 13,
-        asymmetry: 0.001,
-        gain_mismatch: fitted,
-        current_saliency: fitted,
-        flux_saliency: -0.035,
-        accepted,
-    }
+/// What a learning finds that is not believable.
+fn doubtful() -> Learned {
+    let mut found = found();
+    found.carrier = None;
+    found.gain_mismatch.accepted = false;
+    found.current_saliency.accepted = false;
+    Learned { accepted: false, ..found }
 }

@@ -2,9 +2,7 @@
 //! save after it is loaded again.
 #![no_main]
 
-use drive_core::learning::{Fitted, Learned};
-use drive_core::lock_monitor::CarrierTable;
-use drive_core::schedule::ReferenceTable;
+use induction_drive::console::doubles::found;
 use induction_drive::console::keys::Everything;
 use induction_drive::saved::{Failed, Flash, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
 use libfuzzer_sys::fuzz_target;
@@ -63,17 +61,7 @@ fuzz_target!(|bytes: &[u8]| {
 /// Settings, and what may have been learned with them.
 fn full() -> Everything {
     let mut settings = Everything::of_the_board();
-    let fitted = Fitted { value: 0.01, misfit: 0.001, accepted: true };
-    settings.learn(&Learned {
-        reference: ReferenceTable::default(),
-        carrier: Some(CarrierTable::default()),
-        points: 13,
-        asymmetry: 0.001,
-        gain_mismatch: fitted,
-        current_saliency: fitted,
-        flux_saliency: -0.035,
-        accepted: true,
-    });
+    settings.learn(&found());
     settings
 }
 

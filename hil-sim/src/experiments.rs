@@ -126,6 +126,15 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     })
 }
 
+/// Runs the experiment with this name for its own time, and shows no progress.
+///
+/// # Errors
+/// No experiment has this name; what the experiment refuses.
+pub fn run(name: &str, config: &Config, seed: u64) -> Result<Outcome, Error> {
+    let context = Context { config, seed, seconds: None, progress: Progress::hidden() };
+    (find(name)?.run)(&context)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use drive_core::learning::Learned;
 use drive_core::schedule::ReferenceTable;
 use drive_core::{Command, Mode, State};
 
-use crate::config::{AngleSource, Config, Demodulator, LoadMode};
+use crate::config::{Config, Demodulator, LoadMode};
 use crate::error::Error;
 use crate::rig::Rig;
 use crate::stats::Stats;
@@ -85,13 +85,8 @@ pub fn reference_of(
     seed: u64,
 ) -> Result<Vec<Point>, Error> {
     let mut config = config.clone();
-    config.angle.source = AngleSource::Encoder;
-    config.load.mode = LoadMode::Locked;
     config.injection.demodulator = demodulator;
-    let mut drive = crate::rig::drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    let mut rig = Rig::new(&crate::rig::plant_settings(&config), &drive, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::oriented(&config, seed)?;
     let points = (LAST_A / STEP_A).round() as usize;
     let mut table = Vec::with_capacity(points + 1);
     for n in 0..=points {

@@ -97,6 +97,21 @@ impl Rig {
         Self::new(&plant_settings(config), &drive_settings(config), seed)
     }
 
+    /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
+    ///
+    /// # Errors
+    /// As [`Rig::new`] and [`Rig::start`].
+    pub fn oriented(config: &Config, seed: u64) -> Result<Self, Error> {
+        let mut config = config.clone();
+        config.angle.source = config::AngleSource::Encoder;
+        config.load.mode = config::LoadMode::Locked;
+        let mut drive = drive_settings(&config);
+        drive.injection.beside_encoder = true;
+        let mut rig = Self::new(&plant_settings(&config), &drive, seed)?;
+        rig.start(Mode::Torque)?;
+        Ok(rig)
+    }
+
     /// Seconds since the beginning.
     pub fn time(&self) -> f64 {
         self.periods as f64 / RATE_HZ

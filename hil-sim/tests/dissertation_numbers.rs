@@ -1,15 +1,13 @@
 //! D1: the numbers of Barroso (2017), recomputed. What is printed and wrong is asserted as wrong.
 //!
 //! Elsewhere: plant, rule of section 3.8, controllers, 3.41 and 3.42 and the unstable 4.1 under 4.2 in
-//! `drive-core/tests/tuning.rs`; filters of appendix C, step 3.39 and figure 40 in
-//! `drive-core/tests/filters.rs`; Table 5 in `bench_tests.rs`; appendix A in `identification_arx.rs`.
+//! `drive-core/tests/tuning.rs`; step 3.39 and figure 40 in `drive-core/tests/pi.rs`; filters of appendix C
+//! in `drive-core/tests/filters/`; Table 5 in `bench_tests.rs`; appendix A in `identification_arx.rs`.
 
 use std::f64::consts::{PI, TAU};
 
 use drive_core::tuning::{FirstOrder, Motor, motor_plant, rule_3_8};
-use hil_sim::experiments::{Context, find};
-use hil_sim::progress::Progress;
-use hil_sim::{Config, Outcome};
+use hil_sim::{Config, Outcome, experiments};
 
 const T: f64 = 1.0 / 6000.0;
 const TABLE_5: Motor = Motor { r_s: 5.4, r_r: 1.1, l_m: 0.1771, l_ls: 0.0276, l_lr: 0.0276 };
@@ -24,9 +22,7 @@ fn same(name: &str, value: f64, expected: &str) {
 }
 
 fn outcome(name: &str) -> Outcome {
-    let config = Config::default();
-    let context = Context { config: &config, seed: 1, seconds: None, progress: Progress::hidden() };
-    (find(name).unwrap().run)(&context).unwrap()
+    experiments::run(name, &Config::default(), 1).unwrap()
 }
 
 /// Fictitious frequency of the w plane (Eq. 2.18), rad/s, of a pole and of a real one in Hz.

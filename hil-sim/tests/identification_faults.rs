@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use drive_core::AlphaBeta;
 use drive_core::rls::{Rls, RlsError, RlsSettings};
 use hil_sim::identification::signals::noise;
-use hil_sim::identification::trial::{Noise, VOLTAGE};
+use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Parameters, Signal, Trial};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -56,11 +56,7 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
     let machine = Parameters::PX.at(speed);
     let trial = Trial::printed(machine, signal, H, Noise::NONE);
     let truth = machine.delta(H).g1.im / H;
-    let steady: Vec<_> = trial.raw().skip(RATE).take(RATE / 5).collect();
-    let peak = |x: &dyn Fn(&(Complex, Complex)) -> Complex| {
-        steady.iter().map(x).fold(0.0f64, |peak, x| peak.max(x.re.abs()).max(x.im.abs()))
-    };
-    let (peak_v, peak_i) = (peak(&|s| s.0), peak(&|s| s.1));
+    let [peak_v, peak_i] = peaks(trial.raw().skip(RATE).take(RATE / 5));
     // The converter ends at one and a half times the largest current.
     let full_scale = 1.5 * peak_i;
     let settings = RlsSettings {

@@ -7,7 +7,7 @@ use drive_core::rls::{Complex32, Rls, RlsSettings};
 use hil_sim::identification::models::model_c;
 use hil_sim::identification::recursive::{Plain, Reference};
 use hil_sim::identification::signals::{Filter, noise};
-use hil_sim::identification::trial::{Noise, VOLTAGE};
+use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Delta, Parameters, Signal, Trial};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -42,11 +42,8 @@ fn cases() -> Vec<(Signal, f64)> {
 
 /// Measurements with this noise, without end.
 fn samples(trial: Trial, level: Noise, seed: u64) -> impl Iterator<Item = (Complex, Complex)> {
-    let steady: Vec<_> = trial.raw().skip(RATE).take(RATE / 5).collect();
-    let peak = |x: fn(&(Complex, Complex)) -> Complex| {
-        steady.iter().map(x).fold(0.0f64, |peak, x| peak.max(x.re.abs()).max(x.im.abs()))
-    };
-    let (largest_v, largest_i) = (level.voltage * peak(|s| s.0), level.current * peak(|s| s.1));
+    let [peak_v, peak_i] = peaks(trial.raw().skip(RATE).take(RATE / 5));
+    let (largest_v, largest_i) = (level.voltage * peak_v, level.current * peak_i);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let noisy = move |(v, i)| (v + noise(&mut rng, largest_v), i + noise(&mut rng, largest_i));
     trial.raw().skip(RATE).map(noisy)

@@ -1,11 +1,9 @@
 //! The tables of the paper: what can be reproduced (T1), and which machine they were made with (T2).
 
-use hil_sim::experiments::{Context, find};
 use hil_sim::identification::Parameters;
 use hil_sim::identification::study::{Entry, Errors, all};
 use hil_sim::identification::trial::Noise;
-use hil_sim::progress::Progress;
-use hil_sim::{Config, Outcome};
+use hil_sim::{Config, Outcome, experiments};
 
 const TRIALS: u64 = 60;
 
@@ -124,9 +122,7 @@ fn t2_the_machine_by_ratios_that_do_not_depend_on_the_noise() {
 }
 
 fn outcome(name: &str, seed: u64) -> Outcome {
-    let config = Config::default();
-    let context = Context { config: &config, seed, seconds: None, progress: Progress::hidden() };
-    (find(name).expect("known").run)(&context).expect("runs")
+    experiments::run(name, &Config::default(), seed).expect("runs")
 }
 
 #[test]

@@ -1,16 +1,11 @@
 //! The plant of the current loop, identified through the drive, is the motor's.
 
-use hil_sim::Config;
-use hil_sim::experiments::{Context, find};
-use hil_sim::progress::Progress;
+use hil_sim::{Config, experiments};
 
 #[test]
 fn through_the_drive_the_plant_is_that_of_the_motor() {
     for seed in [1, 2] {
-        let config = Config::default();
-        let context =
-            Context { config: &config, seed, seconds: None, progress: Progress::hidden() };
-        let outcome = (find("plant-identification").unwrap().run)(&context).unwrap();
+        let outcome = experiments::run("plant-identification", &Config::default(), seed).unwrap();
         let metric = |name: &str| outcome.metrics.get(name).unwrap();
         // Independent: exact hold of 1/(R' + s sigma L_s) of Table 5, k = 0.0032052, p = 0.980053. On d
         // the saliency of 3.5 % along the flux remains; on q that of the current, 7 % at 2 A.

@@ -1,38 +1,14 @@
 //! The inverter: averaged against switched, dead time, delay, and the integration steps.
 
+mod common;
+
 use std::f64::consts::TAU;
 
+use common::{PERIOD, TOP, duties, plant, settings, voltage};
 use drive_core::Compare;
-use hil_sim::plant::{
-    Complex, InverterSettings, Load, MeasurementSettings, Plant, PlantSettings, clarke, phases,
-};
+use hil_sim::plant::{Complex, InverterSettings, Load, PlantSettings, clarke, phases};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-
-const PERIOD: f64 = 1.0 / 6000.0;
-const TOP: u16 = 14_167;
-
-fn settings(inverter: InverterSettings) -> PlantSettings {
-    let mut settings = PlantSettings { inverter, ..Default::default() };
-    settings.mechanics.load = Load::Locked;
-    settings.measurement = MeasurementSettings::IDEAL;
-    settings
-}
-
-fn plant(settings: &PlantSettings) -> Plant {
-    Plant::new(settings, 1).expect("settings of the test")
-}
-
-/// Duty cycles as compare values.
-fn duties([a, b, c]: [f64; 3]) -> Compare {
-    let compare = |duty: f64| (duty * f64::from(TOP)).round().clamp(0.0, f64::from(TOP)) as u16;
-    Compare { a: compare(a), b: compare(b), c: compare(c), enabled: true }
-}
-
-/// Compare values for a line-to-neutral voltage, all legs about half the dc link.
-fn voltage(v: Complex) -> Compare {
-    duties(phases(v).map(|v| 0.5 + v / 311.0))
-}
 
 /// After 0.2 s of these duty cycles: the current, and the voltage of the last period.
 fn settled(inverter: InverterSettings, d: [f64; 3]) -> (Complex, Complex) {

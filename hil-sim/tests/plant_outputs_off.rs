@@ -1,45 +1,34 @@
 //! All outputs off: the currents end in the diodes.
 
+mod common;
+
 use std::f64::consts::TAU;
 
+use common::{PERIOD, plant, settings, voltage};
 use drive_core::Compare;
-use hil_sim::plant::{
-    Complex, InverterSettings, Load, MeasurementSettings, Plant, PlantSettings, clarke, phases,
-};
+use hil_sim::plant::{Complex, InverterSettings, Load, Plant, clarke, phases};
 
-const PERIOD: f64 = 1.0 / 6000.0;
-const TOP: u16 = 14_167;
-
-fn settings(inverter: InverterSettings) -> PlantSettings {
-    let mut settings = PlantSettings { inverter, ..Default::default() };
-    settings.mechanics.load = Load::Locked;
-    settings.measurement = MeasurementSettings::IDEAL;
-    settings
-}
-
-fn plant(settings: &PlantSettings) -> Plant {
-    Plant::new(settings, 1).expect("settings of the test")
-}
-
-/// Compare values for a line-to-neutral voltage, all legs about half the dc link.
-fn voltage(v: Complex) -> Compare {
-    let [a, b, c] = phases(v).map(|v| ((0.5 + v / 311.0) * f64::from(TOP)).round() as u16);
-    Compare { a, b, c, enabled: true }
+/// A motor at a held speed after 0.3 s of a voltage of this many volts that turns with it, from `start`;
+/// and how far they turn in a period, rad.
+fn magnetised(rpm: f64, volts: f64, start: f64) -> (Plant, f64) {
+    let speed = rpm * TAU / 60.0;
+    let mut settings = settings(InverterSettings::default());
+    settings.mechanics.load = Load::Speed { speed };
+    let mut plant = plant(&settings);
+    let turning = 2.0 * speed * PERIOD;
+    for k in 0..1800 {
+        let angle = start + turning * f64::from(k);
+        plant.advance(&voltage(Complex::from_polar(volts, angle)), PERIOD);
+    }
+    (plant, turning)
 }
 
 #[test]
 fn outputs_off_ends_the_current_and_keeps_it_at_zero() {
     for rpm in [0.0, 30.0, 1440.0] {
         for direction in 0..24 {
-            let mut s = settings(InverterSettings::default());
-            s.mechanics.load = Load::Speed { speed: rpm * TAU / 60.0 };
-            let mut plant = plant(&s);
-            let turning = 2.0 * rpm * TAU / 60.0 * PERIOD;
             let start = TAU * f64::from(direction) / 24.0 + 0.01;
-            for k in 0..1800 {
-                let angle = start + turning * f64::from(k);
-                plant.advance(&voltage(Complex::from_polar(22.0, angle)), PERIOD);
-            }
+            let (mut plant, turning) = magnetised(rpm, 22.0, start);
             assert!(plant.current().norm() > 0.15, "{rpm} rpm: {}", plant.current());
             let mut periods = 0;
             while plant.current() != Complex::ZERO {
@@ -133,15 +122,8 @@ fn outputs_off_is_a_bridge_of_diodes() {
     let mut worst = 0f64;
     for rpm in [0.0, 1440.0] {
         for direction in 0..12 {
-            let mut s = settings(InverterSettings::default());
-            s.mechanics.load = Load::Speed { speed: rpm * TAU / 60.0 };
-            let mut plant = plant(&s);
-            let turning = 2.0 * rpm * TAU / 60.0 * PERIOD;
             let start = TAU * f64::from(direction) / 12.0 + 0.1;
-            for k in 0..1800 {
-                let angle = start + turning * f64::from(k);
-                plant.advance(&voltage(Complex::from_polar(40.0, angle)), PERIOD);
-            }
+            let (mut plant, _) = magnetised(rpm, 40.0, start);
             assert!(plant.current().norm() > 0.4, "{}", plant.current());
             // Decay against a high link; then, against one below the back-emf if there is one,
             // diodes that come and go through several turns of the rotor.

@@ -1,10 +1,8 @@
-use drive_core::learning::Fitted;
 use drive_core::online::Doubt;
-use drive_core::schedule::ReferenceTable;
 use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
-use super::doubles::{Desk, Wire};
+use super::doubles::{Desk, Wire, found};
 use super::*;
 
 struct Talk {
@@ -281,20 +279,6 @@ fn commands_reach_the_drive_as_they_were_given() {
         talk.desk.orders,
         [Order::Start(Mode::Torque), Order::Torque(1.5), Order::Stop, Order::Clear]
     );
-}
-
-/// What a learning finds.
-fn found() -> Learned {
-    Learned {
-        reference: ReferenceTable::default(),
-        carrier: Some(drive_core::lock_monitor::CarrierTable::default()),
-        points: 13,
-        asymmetry: 0.001,
-        gain_mismatch: Fitted { value: 0.01, misfit: 0.0002, accepted: true },
-        current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
-        flux_saliency: -0.035,
-        accepted: true,
-    }
 }
 
 #[test]

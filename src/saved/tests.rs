@@ -22,6 +22,13 @@ impl Fake {
         Self { words: [[Some(u64::MAX); SLOT_WORDS]; SLOTS], left: None, random: 1 }
     }
 
+    /// A record is in this slot.
+    fn hold(&mut self, slot: usize, record: [u64; codec::WORDS]) {
+        for (word, value) in record.into_iter().enumerate() {
+            self.words[slot][word] = Some(value);
+        }
+    }
+
     /// Splitmix64.
     fn next(&mut self) -> u64 {
         self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -179,9 +186,7 @@ fn what_cannot_have_been_learned_is_refused() {
         let mut record = codec::record(&with_learned(), 3);
         spoil(&mut record[first + 3 * n]);
         let mut fake = Fake::new();
-        for (word, value) in resealed(record).into_iter().enumerate() {
-            fake.words[0][word] = Some(value);
-        }
+        fake.hold(0, resealed(record));
         assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("learned")), "{n}");
     }
 }
@@ -191,9 +196,7 @@ fn sequence_numbers_wrap() {
     let mut fake = Fake::new();
     for (slot, sequence) in [(0, u32::MAX), (1, 0)] {
         let record = codec::record(&with_r_s(slot as f32 + 1.0), sequence);
-        for (word, value) in record.into_iter().enumerate() {
-            fake.words[slot][word] = Some(value);
-        }
+        fake.hold(slot, record);
     }
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(2.0)));
     save(&mut fake, &with_r_s(3.0)).unwrap();
@@ -247,9 +250,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     let mut record = codec::record(&with_r_s(2.0), 1);
     record[0] += 1 << 32;
     // As a later firmware computes it.
-    for (word, value) in resealed(record).into_iter().enumerate() {
-        fake.words[1][word] = Some(value);
-    }
+    fake.hold(1, resealed(record));
     let kept = fake.words[1];
     assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Newer(2)));
     save(&mut fake, &with_r_s(3.0)).unwrap();
@@ -263,9 +264,7 @@ fn keys_may_come_and_go() {
     // The second key is one that this firmware does not know.
     record[3] ^= 1;
     let mut fake = Fake::new();
-    for (word, value) in resealed(record).into_iter().enumerate() {
-        fake.words[0][word] = Some(value);
-    }
+    fake.hold(0, resealed(record));
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
 }
 
@@ -275,9 +274,7 @@ fn a_value_that_nobody_knows_is_named() {
     let mut record = codec::record(&board(), 3);
     record[2 + place] ^= 1 << 40;
     let mut fake = Fake::new();
-    for (word, value) in resealed(record).into_iter().enumerate() {
-        fake.words[0][word] = Some(value);
-    }
+    fake.hold(0, resealed(record));
     assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("angle_source")));
 }
 

@@ -2,9 +2,9 @@
 #![allow(dead_code)] // every procedure uses its own part of it
 
 use drive_core::{Command, Mode, Settings};
-use hil_sim::Config;
 use hil_sim::plant::PlantSettings;
 pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
+use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {
@@ -30,9 +30,19 @@ pub fn all(parts: &[&[&'static str]]) -> Vec<&'static str> {
     parts.concat()
 }
 
+/// What an experiment finds with these changes.
+pub fn run(experiment: &str, changes: &[&str], seed: u64) -> Outcome {
+    experiments::run(experiment, &config(changes), seed).unwrap()
+}
+
 /// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
 pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
     regulating_with(&plant_settings(config), &drive_settings(config), seed, i_q, settle)
+}
+
+/// The same by the encoder, with the shaft locked and the injection beside it.
+pub fn beside_encoder(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
+    settled(Rig::oriented(config, seed).unwrap(), i_q, settle)
 }
 
 /// The same from settings.
@@ -45,6 +55,10 @@ pub fn regulating_with(
 ) -> Rig {
     let mut rig = Rig::new(plant, drive, seed).unwrap();
     rig.start(Mode::Torque).unwrap();
+    settled(rig, i_q, settle)
+}
+
+fn settled(mut rig: Rig, i_q: f32, settle: f64) -> Rig {
     rig.command(Command::Torque(i_q)).unwrap();
     rig.run(settle, |_| {});
     rig

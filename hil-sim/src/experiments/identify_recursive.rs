@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::identification::models::{Value, model_c};
 use crate::identification::recursive::Reference;
 use crate::identification::signals::{Filter, noise};
-use crate::identification::trial::{Noise, VOLTAGE};
+use crate::identification::trial::{Noise, VOLTAGE, peaks};
 use crate::identification::{Complex, Delta, Parameters, Signal, Trial};
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -55,9 +55,7 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
     let mut double = Reference::new(f64::from(settings.lambda), f64::from(settings.p0));
     let filter = Filter::new(corner, H);
     let (mut on_v, mut on_i) = (filter, filter);
-    let peak = trial.raw().skip(RATE).take(RATE / 5).fold([0.0f64; 2], |[v, i], s| {
-        [v.max(s.0.re.abs()).max(s.0.im.abs()), i.max(s.1.re.abs()).max(s.1.im.abs())]
-    });
+    let peak = peaks(trial.raw().skip(RATE).take(RATE / 5));
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
     let (mut estimates, mut square, mut count) = (Vec::new(), 0.0, 0u32);
     let samples = (seconds * RATE as f64) as usize;

@@ -1,13 +1,13 @@
 //! The current difference over the injection angle, Figure 19.
 
-use drive_core::{Command, Mode};
+use drive_core::Command;
 use rayon::prelude::*;
 
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config, Demodulator, LoadMode};
+use crate::config::{Config, Demodulator};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::{Rig, drive_settings, plant_settings};
+use crate::rig::Rig;
 use crate::stats::Stats;
 
 /// Figure 19.
@@ -147,8 +147,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 /// belongs along the flux, theta is counted from 90° ahead of it.
 pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
     let mut config = config.clone();
-    config.angle.source = AngleSource::Encoder;
-    config.load.mode = LoadMode::Locked;
     config.injection.demodulator = variant.demodulator;
     config.angle.compensate_delays = variant.compensate;
     if !variant.saliency {
@@ -157,10 +155,7 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
     if !variant.inject {
         config.injection.amplitude_v = 0.0;
     }
-    let mut drive = drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::oriented(&config, seed)?;
     rig.command(Command::Torque(iq as f32))?;
     rig.run(0.3, |_| {});
     let mut curve = Curve::new();

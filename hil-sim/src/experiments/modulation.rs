@@ -238,14 +238,11 @@ fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
 mod tests {
     use super::*;
     use crate::config::Config;
-    use crate::progress::Progress;
+    use crate::experiments;
 
     #[test]
     fn table_2_and_the_sequence_agree_with_the_modulator() {
-        let config = Config::default();
-        let context =
-            Context { config: &config, seed: 1, seconds: None, progress: Progress::hidden() };
-        let outcome = run(&context).unwrap();
+        let outcome = experiments::run(EXPERIMENT.name, &Config::default(), 1).unwrap();
         let metric = |name: &str| outcome.metrics.get(name).unwrap();
         assert_eq!(metric("table_2_differences"), 0.0);
         assert!(metric("voltage_error_max_v") < 0.05);

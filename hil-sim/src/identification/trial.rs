@@ -68,6 +68,12 @@ impl Noise {
     pub const HALF: Self = Self { voltage: 0.025, current: 0.1 };
 }
 
+/// Largest voltage and largest current of either axis, V and A.
+pub fn peaks(samples: impl Iterator<Item = (Complex, Complex)>) -> [f64; 2] {
+    let larger = |peak: f64, x: Complex| peak.max(x.re.abs()).max(x.im.abs());
+    samples.fold([0.0; 2], |[peak_v, peak_i], (v, i)| [larger(peak_v, v), larger(peak_i, i)])
+}
+
 /// What is simulated.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
@@ -113,11 +119,8 @@ impl Trial {
         let warm_up = (WARM_UP / self.h).round() as usize;
         let length = self.samples + DISCARDED;
         let clean: Vec<_> = self.raw().skip(warm_up).take(length).collect();
-        let peak = |x: fn(&(Complex, Complex)) -> Complex| {
-            clean.iter().map(x).fold(0.0f64, |peak, x| peak.max(x.re.abs()).max(x.im.abs()))
-        };
-        let (largest_v, largest_i) =
-            (self.noise.voltage * peak(|s| s.0), self.noise.current * peak(|s| s.1));
+        let [peak_v, peak_i] = peaks(clean.iter().copied());
+        let (largest_v, largest_i) = (self.noise.voltage * peak_v, self.noise.current * peak_i);
         let mut rng =
             Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(0x9E37_79B9).wrapping_add(m));
         let filter = Filter::new(5.0 * TAU * self.hz, self.h);

@@ -1,146 +1,39 @@
 //! The board: the core, its chip, and the motor, from one period to the next.
 
+mod control;
+mod exceptions;
+mod failure;
+mod motor;
+mod options;
+mod outside;
 pub mod poison;
 pub mod snapshot;
 
 use std::collections::VecDeque;
-use std::fmt;
 
 use anyhow::{Context, Result, anyhow};
-use drive_core::{Compare, Hardware, Sample};
-use hil_sim::config::Config;
-use hil_sim::plant::{MeasurementSettings, Plant, PlantSettings};
+use drive_core::{Compare, Sample};
+use hil_sim::plant::Plant;
 
-use crate::board as numbers;
-use crate::chip::{Block, Chip, IRQ_ADC1_2, Reset, TICKS_PER_S, Unknown};
-use crate::cpu::{Cpu, Fault, Register, Stop};
+pub use control::{Period, Worst};
+pub use failure::Failure;
+pub use motor::Disturbance;
+pub use options::Options;
+
+use crate::chip::{Chip, Reset, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::cpu::Cpu;
 use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
-use crate::periph::tim1::{BadGates, GateLimits};
-use crate::scs;
-use crate::unicorn::{Counting, UnicornCpu};
-
-/// What a board is made with.
-pub struct Options {
-    /// The motor and everything around it; see [`Options::plant`].
-    pub plant: PlantSettings,
-    /// Seed of the sensors' noise.
-    pub seed: u64,
-    /// What is counted.
-    pub counting: Counting,
-    /// What the gates must respect.
-    pub gates: GateLimits,
-}
-
-impl Options {
-    /// The plant that a configuration describes, with the sensors and the dead time of this board.
-    pub fn plant(config: &Config) -> PlantSettings {
-        let mut plant = hil_sim::rig::plant_settings(config);
-        // The converters have another reference than the source's.
-        let gain = f64::from(numbers::CURRENT_A.gain / drive_core::sensing::Line::CHANNEL_A.gain);
-        plant.measurement.lsb_a = MeasurementSettings::default().lsb_a * gain;
-        plant.inverter.dead_time_us = f64::from(numbers::dead_time(numbers::DEAD_TIME_S).1) * 1e6;
-        plant.inverter.timer_top = numbers::PWM_TOP;
-        plant
-    }
-
-    /// A board with the motor of a configuration.
-    pub fn new(config: &Config, seed: u64) -> Self {
-        let us = numbers::CYCLES_PER_US;
-        let gates = GateLimits {
-            // What the firmware asks for; the timer makes it a little longer.
-            dead_time: (f64::from(numbers::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
-            // A microsecond, less what rounding to counts takes.
-            pulse: us - 2,
-        };
-        Self {
-            plant: Self::plant(config),
-            seed,
-            counting: Counting { cycles: true, every_instruction: false },
-            gates,
-        }
-    }
-}
-
-/// Why the board cannot go on.
-#[derive(Clone, Debug)]
-pub enum Failure {
-    /// A register that the model does not know.
-    Unknown(Unknown, String),
-    /// Bad gate signals.
-    Gates(BadGates),
-    /// The core does something that no exception of the model covers.
-    Core(String),
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown(access, place) => match access.written {
-                Some(value) => {
-                    write!(
-                        f,
-                        "unknown register {:#010x} written with {value:#x} at {place}",
-                        access.address
-                    )
-                }
-                None => write!(f, "unknown register {:#010x} read at {place}", access.address),
-            },
-            Self::Gates(bad) => write!(f, "bad gate signals: {bad:?}"),
-            Self::Core(what) => f.write_str(what),
-        }
-    }
-}
-
-impl std::error::Error for Failure {}
-
-/// One control interrupt, as seen from outside.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Period {
-    /// When it began, ticks.
-    pub began: u64,
-    /// What the converters and the encoder gave it.
-    pub sample: Sample,
-    /// Compare values it wrote, and whether the outputs were on after it.
-    pub compare: Compare,
-    /// Whether it took an order from the console.
-    pub took_order: bool,
-    /// Estimated cycles, with entry, exit and bus, when they are counted.
-    pub cycles: u32,
-    /// How many of them go by before the last compare value is written; the exit is among them.
-    pub to_compares: u32,
-}
-
-/// What is known of a control interrupt while it runs.
-#[derive(Clone, Copy, Debug)]
-struct Entered {
-    began: u64,
-    sample: Sample,
-    ended: bool,
-    had_order: bool,
-    accesses: u64,
-}
-
-/// The longest way through the control interrupt.
-#[derive(Clone, Debug, Default)]
-pub struct Worst {
-    /// Estimated cycles.
-    pub cycles: u32,
-    /// Accesses to registers.
-    pub accesses: u32,
-    /// What was executed.
-    pub blocks: Vec<Block>,
-}
+use crate::periph::tim1::GateLimits;
+use crate::unicorn::UnicornCpu;
+use control::Entered;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
 
 /// Turns of the loop without time passing: exceptions nest a few deep.
 const IDLE_LIMIT: u32 = 100_000;
-
-/// A change of what the converters see.
-pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
 /// The board.
 pub struct Board {
@@ -272,84 +165,9 @@ impl Board {
         self.cpu.chip().now as f64 / TICKS_PER_S as f64
     }
 
-    /// Puts a line, without its end, on the wire to the console.
-    pub fn type_line(&mut self, line: &str) {
-        self.send(line.as_bytes());
-        self.send(b"\n");
-    }
-
-    /// Puts bytes on the wire to the console.
-    pub fn send(&mut self, bytes: &[u8]) {
-        let chip = self.chip();
-        chip.lpuart.wire.to_chip.extend(bytes.iter().map(|byte| Some(*byte)));
-        chip.lpuart.wake(chip.now);
-    }
-
-    /// What the console has said since the last call.
-    pub fn heard(&mut self) -> String {
-        let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
-        String::from_utf8_lossy(&bytes).into_owned()
-    }
-
-    /// What was logged since the last call.
-    ///
-    /// # Errors
-    /// The log cannot be decoded.
-    pub fn logged(&mut self) -> Result<Vec<String>> {
-        self.drain_log()?;
-        Ok(std::mem::take(&mut self.lines))
-    }
-
-    fn drain_log(&mut self) -> Result<()> {
-        let lines = self.log.take(&mut self.cpu)?;
-        self.lines.extend(lines);
-        Ok(())
-    }
-
     /// The oldest control interrupt that has ended and was not asked for yet.
     pub fn next_period(&mut self) -> Option<Period> {
         self.periods.pop_front()
-    }
-
-    /// Level of the break pin: low trips.
-    pub fn set_fault_pin(&mut self, high: bool) {
-        self.chip().tim1.set_fault_pin(high);
-    }
-
-    /// The crystal stops, or lives again.
-    pub fn set_crystal(&mut self, lives: bool) {
-        self.chip().rcc.crystal_lives = lives;
-    }
-
-    /// The core executes nothing any more, until a reset.
-    pub fn hang(&mut self) {
-        self.hung = true;
-    }
-
-    /// The core executes nothing for some ticks, as if the bus were taken.
-    pub fn stall(&mut self, ticks: u64) {
-        self.stalled_until = self.cpu.chip().now + ticks;
-    }
-
-    /// From now on what the model does not know is what the chip makes of it: reserved registers read as 0,
-    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in
-    /// which the firmware is damaged on purpose.
-    pub fn forgive(&mut self) {
-        self.cpu.chip_mut().forgiving = true;
-    }
-
-    /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
-    pub fn stop_after(&mut self, instructions: u64) {
-        self.preempt_at = Some(self.cpu.chip().instructions + instructions);
-    }
-
-    /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
-    pub fn pend(&mut self, exception: u16) {
-        // One that runs already is not waited for by anything but itself.
-        if exception == 16 + IRQ_ADC1_2 && self.entered.is_none() {
-            self.pended = Some(self.cpu.chip().now);
-        }
-        self.chip().scs.pend(exception);
     }
 
     /// Resets the chip; RAM, flash and the motor stay, unless power was lost.
@@ -378,7 +196,7 @@ impl Board {
     /// What the board cannot go on with.
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
-            self.run_ticks(2 * u64::from(numbers::PWM_TOP))?;
+            self.run_ticks(TICKS_PER_PERIOD)?;
             self.since_log += 1;
             if self.since_log >= PERIODS_PER_LOG {
                 self.since_log = 0;
@@ -436,257 +254,5 @@ impl Board {
             self.reset(cause);
         }
         Ok(())
-    }
-
-    /// Takes the exception that is due.
-    fn exceptions(&mut self) -> Result<()> {
-        let (primask, basepri) = self.masks();
-        let Some(exception) = self.cpu.chip().scs.due(primask, basepri) else { return Ok(()) };
-        self.enter(exception)
-    }
-
-    fn masks(&self) -> (u32, u32) {
-        (self.cpu.get(Register::Primask), self.cpu.get(Register::Basepri))
-    }
-
-    fn enter(&mut self, exception: u16) -> Result<()> {
-        self.sleeping = false;
-        if exception == 16 + IRQ_ADC1_2 {
-            self.begin_control();
-        }
-        let vector = self.cpu.chip().scs.vector(exception);
-        let handler = self.cpu.word(vector).ok_or_else(|| Failure::Core("no vector".into()))?;
-        self.cpu.chip_mut().scs.begin(exception);
-        if exception == 16 + IRQ_ADC1_2 {
-            self.remember();
-        }
-        let stacked = self.cpu.enter(exception, handler & !1);
-        if exception == 16 + IRQ_ADC1_2 {
-            self.spoil();
-        }
-        if !stacked && exception != scs::HARD_FAULT {
-            // The stack is at its end: the frame is lost, and the fault is taken instead.
-            self.hard_fault(1 << 12, None)?;
-        }
-        Ok(())
-    }
-
-    fn hard_fault(&mut self, cfsr: u32, address: Option<u32>) -> Result<()> {
-        let pc = self.cpu.get(Register::Pc);
-        let chip = self.cpu.chip_mut();
-        if chip.scs.running() < 0 && chip.forgiving {
-            // Locked up, until a reset.
-            chip.lock_up();
-            self.hung = true;
-            return Ok(());
-        }
-        if chip.scs.running() < 0 {
-            let place = self.image.location(pc);
-            return Err(
-                Failure::Core(format!("lock-up: a fault in a fault handler at {place}")).into()
-            );
-        }
-        chip.scs.cfsr |= cfsr;
-        chip.scs.hfsr |= 1 << 30;
-        if let Some(address) = address {
-            chip.scs.bfar = address;
-            chip.scs.cfsr |= 1 << 15;
-        }
-        self.enter(scs::HARD_FAULT)
-    }
-
-    /// Lets the core run, or time pass if it sleeps.
-    fn go(&mut self, end: u64) -> Result<()> {
-        let chip = self.cpu.chip_mut();
-        chip.deadline = chip.next_event().min(end);
-        if self.stalled_until > chip.now {
-            chip.now = chip.now.max(chip.deadline.min(self.stalled_until));
-            return Ok(());
-        }
-        if self.hung || self.sleeping {
-            if self.sleeping && chip.scs.wakes() {
-                self.sleeping = false;
-                return Ok(());
-            }
-            chip.now = chip.now.max(chip.deadline);
-            return Ok(());
-        }
-        if chip.attention || chip.reset.is_some() {
-            return Ok(());
-        }
-        // A mask that is going to be taken away lets in what waits: look at every instruction.
-        if chip.scs.waits() {
-            chip.deadline = chip.now + 1;
-        }
-        if let Some(at) = self.preempt_at {
-            chip.deadline =
-                chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
-        }
-        match self.cpu.run() {
-            Stop::Asked => {}
-            Stop::Wait => self.sleeping = true,
-            Stop::Return(exc_return) => self.leave(exc_return)?,
-            Stop::Fault(Fault::Access(address))
-                if memory::is_reserved(address) || self.cpu.chip().forgiving =>
-            {
-                self.hard_fault(1 << 9, Some(address))?;
-            }
-            Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
-            Stop::Fault(Fault::Access(address)) => {
-                let place = self.image.location(self.cpu.chip().at);
-                return Err(Failure::Core(format!("access to {address:#010x} at {place}")).into());
-            }
-        }
-        Ok(())
-    }
-
-    fn leave(&mut self, exc_return: u32) -> Result<()> {
-        let ended = self.cpu.chip_mut().scs.end();
-        if ended == Some(16 + IRQ_ADC1_2) {
-            self.end_control();
-        }
-        if ended.is_none() || !self.cpu.leave(exc_return) {
-            self.hard_fault(1 << 11, None)?;
-        } else if ended == Some(16 + IRQ_ADC1_2) {
-            self.compare_with_before()?;
-        }
-        Ok(())
-    }
-
-    fn has_order(&self) -> bool {
-        let mut flag = [0];
-        self.cpu.read(self.order_flag, &mut flag) && flag[0] == 1
-    }
-
-    fn begin_control(&mut self) {
-        let had_order = self.has_order();
-        let chip = self.cpu.chip_mut();
-        chip.begin_interrupt();
-        let mut hardware = Hardware::NONE;
-        if chip.adc.over_current() {
-            hardware = hardware.and(Hardware::ANALOG_WATCHDOG);
-        }
-        if chip.tim1.broken() {
-            hardware = hardware.and(Hardware::BREAK);
-        }
-        let ended = chip.adc.ended();
-        if ended[0] && !ended[1] {
-            hardware = hardware.and(Hardware::CONVERTER_OVERRUN);
-        }
-        let [one, two] = chip.adc.data();
-        let sample = Sample {
-            current_a: one[0],
-            current_b: two[0],
-            dc_link: one[1],
-            heat_sink: two[1],
-            encoder: chip.tim2.count(),
-            hardware,
-        };
-        let (began, accesses) = (chip.now, chip.accesses);
-        if let Some(at) = self.pended.take() {
-            self.latest_start = self.latest_start.max(began - at);
-        }
-        self.entered = Some(Entered { began, sample, ended: ended[0], had_order, accesses });
-    }
-
-    fn end_control(&mut self) {
-        let Some(entered) = self.entered.take() else { return };
-        let took_order = entered.had_order && !self.has_order();
-        let chip = self.cpu.chip_mut();
-        let (compared, up_to) = chip.compared;
-        let way = |blocks: &[Block], accesses: u64| {
-            let accesses = (accesses - entered.accesses) as u32;
-            (
-                crate::cost::of(blocks) + crate::cost::EXCEPTION + accesses * crate::cost::BUS,
-                accesses,
-            )
-        };
-        let (cycles, accesses) = way(&chip.blocks, chip.accesses);
-        let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
-        let note = |worst: &mut Worst, cycles, accesses, blocks: &[Block]| {
-            if cycles > worst.cycles && !blocks.is_empty() {
-                *worst = Worst { cycles, accesses, blocks: blocks.to_vec() };
-            }
-        };
-        note(&mut self.worst, cycles, accesses, &chip.blocks);
-        note(&mut self.worst_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
-        if entered.ended {
-            let [a, b, c] = chip.tim1.written().map(|value| value as u16);
-            let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
-            let period = Period {
-                began: entered.began,
-                sample: entered.sample,
-                compare,
-                took_order,
-                cycles,
-                to_compares,
-            };
-            self.periods.push_back(period);
-        }
-    }
-
-    /// The outputs as they are now hold from now on.
-    fn see_outputs(&mut self) {
-        let chip = self.cpu.chip();
-        let (on, now) = (chip.tim1.outputs_on(), chip.now);
-        if on != self.outputs {
-            if on && !chip.gates_connected() {
-                return; // the pins are not the timer's
-            }
-            self.advance_plant(now);
-            self.outputs = on;
-            if !on {
-                self.went_off = Some(now);
-            }
-        }
-    }
-
-    fn advance_plant(&mut self, to: u64) {
-        let compare =
-            if self.outputs { Compare { enabled: true, ..self.applied } } else { Compare::OFF };
-        while self.plant_at < to {
-            // The plant's steps are fractions of what it is given: a period at most.
-            let ticks = (to - self.plant_at).min(2 * u64::from(numbers::PWM_TOP));
-            self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
-            self.plant_at += ticks;
-        }
-    }
-
-    /// The counter is at its top: a period of the motor ends, the converters hold their samples, and the
-    /// compare values taken over are in force.
-    fn crest(&mut self, at: u64) -> Result<()> {
-        self.advance_plant(at);
-        self.sample = self.plant.sample();
-        if let Some(disturb) = &mut self.disturb {
-            disturb(&mut self.sample);
-        }
-        self.see();
-        let chip = self.cpu.chip_mut();
-        let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
-        self.applied = Compare { a, b, c, enabled: true };
-        if self.outputs {
-            match chip.tim1.check_gates(self.gates) {
-                Err(BadGates::Pulse { .. }) if chip.forgiving => self.short_pulses += 1,
-                checked => checked.map_err(Failure::Gates)?,
-            }
-        }
-        Ok(())
-    }
-
-    /// Shows the sample to converters, comparators and encoder.
-    fn see(&mut self) {
-        let s = self.sample;
-        let chip = self.cpu.chip_mut();
-        let pins = [
-            (0, numbers::ADC1_CHANNELS.0, s.current_a),
-            (0, numbers::ADC1_CHANNELS.1, s.dc_link),
-            (1, numbers::ADC2_CHANNELS.0, s.current_b),
-            (1, numbers::ADC2_CHANNELS.1, s.heat_sink),
-        ];
-        for (converter, channel, code) in pins {
-            chip.adc.inputs[converter][usize::from(channel)] = code;
-        }
-        chip.tim2.set_position(s.encoder);
-        chip.compare(s.current_a, s.current_b, s.dc_link);
     }
 }

@@ -20,7 +20,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::chip::Reset;
+use crate::chip::{Reset, TICKS_PER_PERIOD};
 use crate::image::Image;
 use class::{CLASSES, Class, Course};
 use judge::Seen;
@@ -131,7 +131,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
         Course::Regulating(inject) => {
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
-            scene.board.run_periods(rng.random_range(0..LATEST) / (2 * 14_167))?;
+            scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
             let what = inject(&mut scene.board, &scene.places, &mut rng);
             let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
             let ms = AFTER_MS + if promised { bound } else { 0.0 };

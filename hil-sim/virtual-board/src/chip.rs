@@ -3,8 +3,12 @@
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
 //! its PLL.
 
-use crate::memory;
-use crate::periph::Effect;
+mod bus;
+mod execution;
+
+pub use bus::Unknown;
+pub use execution::{Block, Watched};
+
 use crate::periph::adc::Adc;
 use crate::periph::analog::{Comparators, Dacs};
 use crate::periph::debug::Debug;
@@ -21,14 +25,18 @@ use crate::scs::{self, Scs};
 
 /// Ticks per second.
 pub const TICKS_PER_S: u64 = 170_000_000;
+/// Ticks of a PWM period, from one top of the counter to the next.
+pub const TICKS_PER_PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
 /// No event.
 pub const NEVER: u64 = u64::MAX;
 /// Longest time that the core runs on without being looked at, ticks.
-const PATIENCE: u64 = 2 * 28_334;
+const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
-/// Position of the converters' interrupt in the vector table, from the first peripheral.
-pub const IRQ_ADC1_2: u16 = 18;
+/// Positions in the vector table, from the first peripheral.
+const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
+/// Exception number of the control interrupt, which is the converters'.
+pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 
 /// Why the chip was reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,79 +49,6 @@ pub enum Reset {
     Software,
     /// The independent watchdog.
     Watchdog,
-}
-
-/// An access that the model does not know.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unknown {
-    /// Where.
-    pub address: u32,
-    /// What was to be written, if it was a write.
-    pub written: Option<u32>,
-    /// Last known place of the core: the instruction, in CCM the block.
-    pub at: u32,
-}
-
-/// Where a block of the control interrupt began, and its cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// Address of its first instruction.
-    pub address: u32,
-    /// Bytes.
-    pub size: u32,
-    /// Cycles with its last branch not taken.
-    pub cycles: u32,
-    /// Whether that branch was taken.
-    pub taken: bool,
-}
-
-/// A function of the main loop whose calls are counted as if its memory had no wait states.
-#[derive(Clone, Debug)]
-pub struct Watched {
-    /// Where it begins and ends.
-    pub range: (u32, u32),
-    /// Estimated cycles of each call, interrupts not counted.
-    pub calls: Vec<u32>,
-    /// The blocks of the longest.
-    pub longest: Vec<Block>,
-    /// Those of the present one.
-    present: Vec<Block>,
-}
-
-impl Watched {
-    /// A function in the flash, at an address, with its size in bytes.
-    pub fn new((address, size): (u32, u32)) -> Self {
-        let range = (address, address + size);
-        Self { range, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
-    }
-
-    /// Whether a block is its own.
-    #[inline]
-    pub fn has(&self, address: u32) -> bool {
-        (self.range.0..self.range.1).contains(&address)
-    }
-
-    /// A block of the flash is about to be executed; `cycles` of one of its own.
-    fn block(&mut self, address: u32, size: u32, cycles: u32) {
-        if let Some(last) = self.present.last_mut() {
-            last.taken = last.address + last.size != address;
-        }
-        if address == self.range.0 {
-            self.present.clear();
-        } else if self.present.is_empty() {
-            return;
-        }
-        if self.has(address) {
-            self.present.push(Block { address, size, cycles, taken: false });
-            return;
-        }
-        let spent = crate::cost::of(&self.present);
-        if self.calls.iter().all(|call| *call < spent) {
-            self.longest.clone_from(&self.present);
-        }
-        self.calls.push(spent);
-        self.present.clear();
-    }
 }
 
 /// The chip but for its core and memories.
@@ -243,219 +178,6 @@ impl Chip {
         self.lpuart.wire = old.lpuart.wire;
     }
 
-    /// Whether the core is to stop before the block that begins here; never before the first of a run, so
-    /// that each run gets on.
-    #[inline]
-    pub fn stops_here(&mut self) -> bool {
-        !std::mem::take(&mut self.first) && self.wants_attention()
-    }
-
-    /// Whether the core is to stop.
-    #[inline]
-    pub fn wants_attention(&self) -> bool {
-        self.attention || self.now >= self.deadline
-    }
-
-    /// Instructions from the flash are about to be executed.
-    #[inline]
-    pub fn instructions(&mut self, count: u64) {
-        self.now += self.rcc.ticks_per_cycle() * count;
-        self.instructions += count;
-        self.last_block = None;
-    }
-
-    /// A block in the flash is about to be executed, of this size and cost if it is watched.
-    #[inline]
-    pub fn watch(&mut self, address: u32, size: u32, cycles: u32) {
-        let in_main = self.scs.running() == scs::THREAD;
-        if let (Some(watched), true) = (&mut self.watched, in_main) {
-            watched.block(address, size, cycles);
-        }
-    }
-
-    /// A block in CCM is about to be executed.
-    #[inline]
-    pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
-        let taken = self.last_block.is_some_and(|(_, end)| end != address);
-        if taken {
-            self.now += u64::from(crate::cost::TAKEN);
-        }
-        self.now += u64::from(cycles);
-        self.last_block = Some((address, address + size));
-        if self.keep_blocks {
-            if taken && let Some(block) = self.blocks.last_mut() {
-                block.taken = true;
-            }
-            self.blocks.push(Block { address, size, cycles, taken: false });
-        }
-    }
-
-    /// Blocks since the last call.
-    pub fn begin_interrupt(&mut self) {
-        self.blocks.clear();
-        self.compared = (0, self.accesses);
-        self.last_block = None;
-    }
-
-    /// Reads a register, `size` bytes.
-    pub fn read(&mut self, address: u32, size: u8) -> u32 {
-        self.accesses += 1;
-        let value = if let Some(word) = bit_band(address) {
-            self.peek(word.0).map(|value| value >> word.1 & 1)
-        } else {
-            let value = self.read_word(address & !3);
-            value.map(|value| value >> (8 * (address & 3)))
-        };
-        match value {
-            Some(value) if size >= 4 => value,
-            Some(value) => value & ((1 << (8 * size)) - 1),
-            None => self.is_unknown(address, None),
-        }
-    }
-
-    /// Writes a register, `size` bytes.
-    pub fn write(&mut self, address: u32, size: u8, value: u32) {
-        self.accesses += 1;
-        let done = if let Some((word, bit)) = bit_band(address) {
-            self.peek(word).and_then(|old| {
-                let new = old & !(1 << bit) | (value & 1) << bit;
-                self.write_word(word, new)
-            })
-        } else if size < 4 {
-            let shift = 8 * (address & 3);
-            let mask = ((1_u32 << (8 * size)) - 1) << shift;
-            let word = address & !3;
-            self.peek(word)
-                .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
-        } else {
-            self.write_word(address, value)
-        };
-        if COMPARES.contains(&address) {
-            self.compared = (self.blocks.len(), self.accesses);
-        }
-        if done.is_none() {
-            self.is_unknown(address, Some(value));
-        }
-    }
-
-    fn is_unknown(&mut self, address: u32, written: Option<u32>) -> u32 {
-        if self.forgiving {
-            return 0;
-        }
-        self.unknown.get_or_insert(Unknown { address, written, at: self.at });
-        self.attention = true;
-        0
-    }
-
-    /// What a read gives, without what a read does.
-    fn peek(&mut self, address: u32) -> Option<u32> {
-        match address & !0x3ff {
-            IWDG | LPUART1 => Some(0),
-            _ if (0xe000_e400..0xe000_e4f0).contains(&address) => self.scs.read(address, self.now),
-            _ => self.read_word(address),
-        }
-    }
-
-    fn read_word(&mut self, address: u32) -> Option<u32> {
-        let offset = address & 0x3ff;
-        let now = self.now;
-        if address >= 0xe000_0000 {
-            return match address & !0xfff {
-                0xe004_2000 => self.debug.read(offset),
-                _ => self.scs.read(address, now),
-            };
-        }
-        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
-            let (value, torn) = self.flash.load(address);
-            if torn {
-                if self.syscfg.flash_error_breaks() {
-                    self.tim1.system_break();
-                }
-                self.scs.pend(scs::NMI);
-                self.attention = true;
-            }
-            return Some(value);
-        }
-        match address & !0x3ff {
-            TIM1 => self.tim1.read(offset, now),
-            ADC1 => self.adc.read(offset),
-            TIM2 => self.tim2.read(offset),
-            RCC => self.rcc.read(offset),
-            PWR => self.pwr.read(offset),
-            FLASH_REGISTERS => self.flash.read(offset, now),
-            LPUART1 => {
-                let value = self.lpuart.read(offset);
-                self.update_lines();
-                value
-            }
-            IWDG => self.iwdg.read(offset, now),
-            SYSCFG => match offset {
-                0x200..0x220 => self.comp.read(offset - 0x200),
-                _ => self.syscfg.read(offset),
-            },
-            EXTI => self.exti.read(offset),
-            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].read(offset),
-            DAC1 => self.dac.read(0, offset),
-            DAC3 => self.dac.read(1, offset),
-            _ => None,
-        }
-    }
-
-    fn write_word(&mut self, address: u32, value: u32) -> Option<()> {
-        let offset = address & 0x3ff;
-        let now = self.now;
-        if address >= 0xe000_0000 {
-            let effect = match address & !0xfff {
-                0xe004_2000 => return self.debug.write(offset, value),
-                _ => self.scs.write(address, value, now)?,
-            };
-            return self.follow(effect);
-        }
-        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
-            let effect = self.flash.store(address, value, now)?;
-            return self.follow(effect);
-        }
-        let effect = match address & !0x3ff {
-            TIM1 => self.tim1.write(offset, value, now)?,
-            ADC1 => self.adc.write(offset, value)?,
-            TIM2 => self.tim2.write(offset, value)?,
-            RCC => self.rcc.write(offset, value, now)?,
-            PWR => self.pwr.write(offset, value)?,
-            FLASH_REGISTERS => self.flash.write(offset, value, now)?,
-            LPUART1 => self.lpuart.write(offset, value, now)?,
-            IWDG => self.iwdg.write(offset, value, now)?,
-            SYSCFG => match offset {
-                0x200..0x220 => self.comp.write(offset - 0x200, value)?,
-                _ => self.syscfg.write(offset, value)?,
-            },
-            EXTI => self.exti.write(offset, value)?,
-            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].write(offset, value)?,
-            DAC1 => self.dac.write(0, offset, value)?,
-            DAC3 => self.dac.write(1, offset, value)?,
-            _ => return None,
-        };
-        self.follow(effect)
-    }
-
-    fn follow(&mut self, effect: Effect) -> Option<()> {
-        match effect {
-            Effect::None => {}
-            Effect::Look => {
-                self.update_lines();
-                self.attention = true;
-            }
-            Effect::Reset => {
-                self.reset = Some(Reset::Software);
-                self.attention = true;
-            }
-            Effect::Nmi => {
-                self.scs.pend(scs::NMI);
-                self.attention = true;
-            }
-        }
-        Some(())
-    }
-
     /// The core locks up: to the break of TIM1, if the firmware wants that.
     pub fn lock_up(&mut self) {
         if self.syscfg.lock_up_breaks() {
@@ -554,31 +276,4 @@ impl Default for Chip {
 pub struct Happened {
     /// The counter of TIM1 was at its top then; nothing that comes later has happened yet.
     pub crest: Option<u64>,
-}
-
-const TIM2: u32 = 0x4000_0000;
-const IWDG: u32 = 0x4000_3000;
-const PWR: u32 = 0x4000_7000;
-const LPUART1: u32 = 0x4000_8000;
-const SYSCFG: u32 = 0x4001_0000;
-const EXTI: u32 = 0x4001_0400;
-const TIM1: u32 = 0x4001_2c00;
-/// Compare values of the three legs.
-const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
-const RCC: u32 = 0x4002_1000;
-const FLASH_REGISTERS: u32 = 0x4002_2000;
-const GPIO_FIRST: u32 = 0x4800_0000;
-const GPIO_LAST: u32 = 0x4800_1bff;
-const ADC1: u32 = 0x5000_0000;
-const DAC1: u32 = 0x5000_0800;
-const DAC3: u32 = 0x5000_1000;
-
-fn port(address: u32) -> usize {
-    ((address - GPIO_FIRST) >> 10) as usize
-}
-
-/// The word and bit behind an address of the alias.
-fn bit_band(address: u32) -> Option<(u32, u32)> {
-    let offset = address.checked_sub(memory::BIT_BAND).filter(|offset| *offset < 0x60_0000)?;
-    Some((memory::PERIPHERALS + (offset >> 7 << 2), offset >> 2 & 31))
 }

@@ -7,8 +7,6 @@ pub const NMI: u16 = 2;
 /// See [`NMI`].
 pub const HARD_FAULT: u16 = 3;
 /// See [`NMI`].
-pub const SV_CALL: u16 = 11;
-/// See [`NMI`].
 pub const PEND_SV: u16 = 14;
 /// See [`NMI`].
 pub const SYSTICK: u16 = 15;

@@ -10,9 +10,7 @@ use hil_sim::Config;
 /// control interrupt is compared where it is written (see `Shadow::follow`).
 #[test]
 fn sixty_thousand_interrupts_of_a_sensorless_run_are_the_same() -> Result<()> {
-    let mut pair = common::pair(&Config::default(), 11)?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    let mut pair = common::regulating(11)?;
     for i_q in ["1", "1.25", "1.5", "1.75", "2", "-1", "-2", "0.5"] {
         pair.order(&format!("torque {i_q}"))?;
         pair.run(6600, |_, _| {})?;

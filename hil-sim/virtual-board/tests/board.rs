@@ -38,9 +38,7 @@ fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
 /// next run says why it is there.
 #[test]
 fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
-    let mut pair = common::pair(&Config::default(), 2)?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    let mut pair = common::regulating(2)?;
     pair.order("torque 2")?;
     pair.run(1200, |_, _| {})?;
     let began = pair.board.time();
@@ -64,9 +62,7 @@ fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
 /// A pull at the break pin takes the outputs off in hardware, before the firmware knows.
 #[test]
 fn a_break_switches_off_and_is_reported() -> Result<()> {
-    let mut pair = common::pair(&Config::default(), 3)?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    let mut pair = common::regulating(3)?;
     pair.board.set_fault_pin(false);
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.run(2, |_, _| {})?;
@@ -82,9 +78,7 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
 /// oscillator and says so.
 #[test]
 fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
-    let mut pair = common::pair(&Config::default(), 4)?;
-    pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
+    let mut pair = common::regulating(4)?;
     pair.board.heard();
     pair.board.set_crystal(false);
     pair.board.run_ticks(2000)?;
@@ -126,9 +120,7 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
     for (code, reason) in
         [(true, "74 code of the control"), (false, "75 coefficients of the control")]
     {
-        let mut pair = common::pair(&Config::default(), 6)?;
-        pair.order("start torque")?;
-        pair.until_state(State::Torque)?;
+        let mut pair = common::regulating(6)?;
         let image = pair.board.image();
         let (running, _) = image.symbol("control7RUNNING")?;
         // The last word of the code, which is padding or never executed here; the direct current.

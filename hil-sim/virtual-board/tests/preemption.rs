@@ -7,7 +7,7 @@ use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use virtual_board::bench::poison::Poison;
-use virtual_board::chip::IRQ_ADC1_2;
+use virtual_board::chip::CONTROL_INTERRUPT;
 use virtual_board::{Counting, Image, Options, Pair};
 
 /// Control interrupts that are looked at.
@@ -40,7 +40,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     while board.poison.as_ref().is_some_and(|poison| poison.intact < INTERRUPTS) {
         board.stop_after(rng.random_range(1..APART));
         board.run_ticks(2000)?;
-        board.pend(16 + IRQ_ADC1_2);
+        board.pend(CONTROL_INTERRUPT);
         while board.next_period().is_some() {
             periods += 1;
             if periods % 60 == 0 {

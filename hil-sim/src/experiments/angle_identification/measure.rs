@@ -1,11 +1,11 @@
 //! Turning the injection axis, alone or with the current, while the encoder holds the orientation.
 
-use drive_core::{Command, Mode};
+use drive_core::Command;
 
-use crate::config::{AngleSource, Config, Demodulator, LoadMode};
+use crate::config::{Config, Demodulator};
 use crate::error::Error;
 use crate::identification::signals::Prbs;
-use crate::rig::{RATE_HZ, Rig, drive_settings, plant_settings, wrapped_degrees};
+use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 
 /// The sequence: 8 bits as in section 3.10, each value held for 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no
@@ -37,13 +37,8 @@ pub struct Record {
 /// Orientation by the encoder, shaft locked, injection beside it, current settled.
 fn oriented(config: &Config, demodulator: Demodulator, iq: f64, seed: u64) -> Result<Rig, Error> {
     let mut config = config.clone();
-    config.angle.source = AngleSource::Encoder;
-    config.load.mode = LoadMode::Locked;
     config.injection.demodulator = demodulator;
-    let mut drive = drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::oriented(&config, seed)?;
     rig.command(Command::Torque(iq as f32))?;
     rig.run(0.8, |_| {});
     Ok(rig)

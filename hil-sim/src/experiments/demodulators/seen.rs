@@ -1,11 +1,11 @@
 //! What a demodulation sees while the encoder holds the angle: signal, slope, noise, delay.
 
-use drive_core::{Command, Mode};
+use drive_core::Command;
 
 use super::subject::Subject;
-use crate::config::{AngleSource, Config, LoadMode};
+use crate::config::Config;
 use crate::error::Error;
-use crate::rig::{Rig, drive_settings, plant_settings};
+use crate::rig::{Rig, plant_settings};
 use crate::stats::Stats;
 
 /// Half of the turn over which the slope is taken, degrees.
@@ -27,13 +27,7 @@ pub struct Seen {
 
 /// A drive that the encoder orients, with the shaft locked and the injection beside it.
 fn oriented(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Rig, Error> {
-    let mut config = subject.config(config);
-    config.angle.source = AngleSource::Encoder;
-    config.load.mode = LoadMode::Locked;
-    let mut drive = drive_settings(&config);
-    drive.injection.beside_encoder = true;
-    let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
-    rig.start(Mode::Torque)?;
+    let mut rig = Rig::oriented(&subject.config(config), seed)?;
     rig.command(Command::Torque(iq as f32))?;
     rig.run(0.5, |_| {});
     Ok(rig)

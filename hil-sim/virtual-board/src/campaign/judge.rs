@@ -6,7 +6,7 @@ use anyhow::{Result, bail, ensure};
 
 use super::scene::{Places, cause};
 use crate::bench::Board;
-use crate::chip::{Reset, TICKS_PER_S};
+use crate::chip::{Reset, TICKS_PER_PERIOD, TICKS_PER_S};
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
@@ -18,7 +18,6 @@ const REPORTED: u64 = 400;
 const FAULT_REPORTED: u64 = 60;
 /// Periods from a reset to the greeting, at most.
 const START: u64 = 30_000;
-const PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
 
 /// What was seen of a run.
 #[derive(Clone, Debug, Default)]
@@ -48,7 +47,7 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) ->
     let mut next = began;
     while since(next) < ms {
         // The motor's truth and the drive's angle belong to the same sample.
-        next += PERIOD;
+        next += TICKS_PER_PERIOD;
         let now = board.chip().now;
         board.run_ticks(next.saturating_sub(now))?;
         while board.next_period().is_some() {}

@@ -13,11 +13,8 @@ use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
 use crate::bench::{Board, Period};
-use crate::board as numbers;
-use crate::chip::TICKS_PER_S;
+use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 
-/// Ticks in a control period.
-const PERIOD: u64 = 2 * numbers::PWM_TOP as u64;
 /// Control periods between two looks at the world outside: 5 ms, less than anyone notices.
 const SLICE: u32 = 30;
 /// The board is looked at this long before a control interrupt, ticks: the one before has ended, and the

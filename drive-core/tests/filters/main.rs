@@ -1,0 +1,23 @@
+//! The filters of Appendix C against the printed tables.
+
+mod precision;
+mod printed;
+mod responses;
+mod states;
+
+use core::f64::consts::{PI, TAU};
+
+use drive_core::sos::Complex;
+
+const RATE: f64 = 6000.0;
+
+fn rad(hz: f64) -> f64 {
+    TAU * hz / RATE
+}
+
+/// Largest distance between two responses from dc to half the sampling rate.
+fn largest_distance(one: impl Fn(f64) -> Complex, other: impl Fn(f64) -> Complex) -> f64 {
+    (0..=6000)
+        .map(|n| PI * f64::from(n) / 6000.0)
+        .fold(0.0, |m, w| m.max((one(w) - other(w)).abs()))
+}

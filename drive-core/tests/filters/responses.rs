@@ -1,0 +1,117 @@
+//! Responses: transfer functions as printed, gains, delays.
+
+use core::f64::consts::PI;
+
+use drive_core::filters::{BPF, LPF, LPF_AS_PRINTED, PP, lpf_lag_samples};
+use drive_core::sos::{Complex, Section, Sos, SosState, response};
+
+use super::printed::{TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
+use super::{largest_distance, rad};
+
+#[test]
+fn sections_have_the_printed_transfer_functions() {
+    let lpf = largest_distance(|w| LPF_AS_PRINTED.response(w), |w| TABLE_7_LPF.response(w));
+    let bpf = largest_distance(|w| BPF.response(w), |w| TABLE_8_BPF.response(w));
+    let pp = largest_distance(|w| PP.response(w), |w| TABLE_8_PP.response(w));
+    println!("largest |dH|: LPF {lpf:.2e}, BPF {bpf:.2e}, PP {pp:.2e}");
+    assert!(lpf < 3.5e-6 && bpf < 1.5e-6 && pp < 6e-6);
+    assert!(LPF_AS_PRINTED.is_stable() && LPF.is_stable() && BPF.is_stable() && PP.is_stable());
+}
+
+#[test]
+fn gains() {
+    for (name, gain, printed) in [
+        ("LPF", LPF_AS_PRINTED.dc_gain(), 0.94406),
+        ("BPF", BPF.dc_gain(), 0.01000),
+        ("PP", PP.dc_gain(), 0.94406),
+    ] {
+        println!("{name} at dc: {gain:.6}");
+        assert!((gain - printed).abs() < 1e-4, "{name}");
+    }
+    let at_600 = |h: Complex| h.db();
+    let w = rad(600.0);
+    let (lpf, unit) = (at_600(LPF_AS_PRINTED.response(w)), at_600(LPF.response(w)));
+    println!("LPF at 600 Hz: {lpf:.3} dB as printed, {unit:.3} dB with unit gain at dc");
+    assert!(lpf <= -48.0 && (lpf + 48.29).abs() < 0.01);
+    assert!((unit + 47.79).abs() < 0.01);
+    let bpf = BPF.response(w);
+    assert!((bpf.db() + 0.490).abs() < 0.001 && (bpf.arg_deg() + 3.86).abs() < 0.01);
+    assert!((PP.response(w).db() + 75.83).abs() < 0.01);
+    assert!((PP.response(rad(1200.0)).db() + 62.73).abs() < 0.01);
+    // The band stop lets everything above 650 Hz through: no anti-alias filter.
+    assert!((LPF_AS_PRINTED.response(PI).db() + 0.5).abs() < 0.001);
+}
+
+#[test]
+fn lpf_has_unit_gain_at_dc() {
+    let error = LPF.dc_gain() - 1.0;
+    println!("LPF at dc: 1 + {error:.2e}; at 60 Hz {:.5}", LPF.response(rad(60.0)).abs());
+    // Rounding of the last section, whose zeros nearly cancel at dc.
+    assert!(error.abs() < 3e-7);
+    assert!((LPF.response(rad(60.0)).abs() - 1.00125).abs() < 1e-5);
+    // Nothing else changes: same poles, same zeros.
+    let scaled = |w| LPF_AS_PRINTED.response(w) * (1.0 / LPF_AS_PRINTED.dc_gain());
+    assert!(largest_distance(|w| LPF.response(w), scaled) < 3e-6);
+
+    // And so it settles on what it is fed: the noise of f32 is all that is left.
+    let mut state = SosState::ZERO;
+    let mut y = 0.0;
+    for _ in 0..20_000 {
+        y = LPF.step(&mut state, 3.0);
+    }
+    println!("3 A through LPF: {y} A");
+    assert!((y - 3.0).abs() < 1e-5);
+}
+
+#[test]
+fn group_delays() {
+    for (name, delay, printed) in [
+        ("LPF at dc", LPF.group_delay(0.0), 1.53),
+        ("LPF at 200 Hz", LPF.group_delay(rad(200.0)), 2.46),
+        ("BPF at dc", BPF.group_delay(0.0), 0.80),
+        ("BPF at 600 Hz", BPF.group_delay(rad(600.0)), 8.83),
+        ("PP at dc", PP.group_delay(0.0), 24.46),
+        ("PP at 200 Hz", PP.group_delay(rad(200.0)), 4.0),
+    ] {
+        println!("{name}: {delay:.4} samples");
+        assert!((delay - printed).abs() < 0.006, "{name}: {delay}");
+    }
+    // The formula against the difference quotient of the phase.
+    for hz in [10.0, 100.0, 300.0, 700.0, 1500.0] {
+        let (w, h) = (rad(hz), 1e-5);
+        let turned = (BPF.response(w + h) / BPF.response(w - h)).arg();
+        assert!((BPF.group_delay(w) + turned / (2.0 * h)).abs() < 1e-6, "{hz} Hz");
+    }
+}
+
+#[test]
+fn lag_of_lpf_up_to_60_hz() {
+    let error_deg = |hz: f64| {
+        let w = rad(hz);
+        let lag = f64::from(lpf_lag_samples(w as f32)) * w;
+        (lag + LPF.response(w).arg()) * (180.0 / PI)
+    };
+    let worst = (1..=600).map(|n| error_deg(f64::from(n) / 10.0).abs()).fold(0.0, f64::max);
+    println!(
+        "phase error: {worst:.5} deg up to 60 Hz, {:.4} at 100 Hz, {:.3} at 200 Hz",
+        error_deg(100.0),
+        error_deg(200.0)
+    );
+    assert!(worst < 2e-4);
+    assert!(error_deg(100.0).abs() < 0.01 && error_deg(200.0).abs() < 0.5);
+    assert_eq!(lpf_lag_samples(-0.05), lpf_lag_samples(0.05));
+}
+
+#[test]
+fn responses_of_trivial_cascades() {
+    assert_eq!(response(&[], 1.0), Complex::ONE);
+    let delay = Sos { sections: [Section { b0: 0.0, b1: 1.0, ..Section::IDENTITY }] };
+    assert!((delay.response(0.3) - Complex::unit(-0.3)).abs() < 1e-15);
+    assert!((delay.group_delay(0.3) - 1.0).abs() < 1e-15);
+    let mut state = SosState::ZERO;
+    assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
+    // Unstable ones are seen as such.
+    for (a1, a2) in [(0.0, 1.0), (-2.0, 1.0), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)] {
+        assert!(!Section { a1, a2, ..Section::IDENTITY }.is_stable(), "{a1} {a2}");
+    }
+}

@@ -1,0 +1,80 @@
+//! The motor beside the chip: it moves with the time, gets the voltages, and is sampled.
+
+use anyhow::Result;
+use drive_core::{Compare, Sample};
+
+use super::{Board, Failure};
+use crate::board as numbers;
+use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::cpu::Cpu;
+use crate::periph::tim1::BadGates;
+
+/// A change of what the converters see.
+pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
+
+impl Board {
+    /// The outputs as they are now hold from now on.
+    pub(super) fn see_outputs(&mut self) {
+        let chip = self.cpu.chip();
+        let (on, now) = (chip.tim1.outputs_on(), chip.now);
+        if on != self.outputs {
+            if on && !chip.gates_connected() {
+                return; // the pins are not the timer's
+            }
+            self.advance_plant(now);
+            self.outputs = on;
+            if !on {
+                self.went_off = Some(now);
+            }
+        }
+    }
+
+    pub(super) fn advance_plant(&mut self, to: u64) {
+        let compare =
+            if self.outputs { Compare { enabled: true, ..self.applied } } else { Compare::OFF };
+        while self.plant_at < to {
+            // The plant's steps are fractions of what it is given: a period at most.
+            let ticks = (to - self.plant_at).min(TICKS_PER_PERIOD);
+            self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
+            self.plant_at += ticks;
+        }
+    }
+
+    /// The counter is at its top: a period of the motor ends, the converters hold their samples, and the
+    /// compare values taken over are in force.
+    pub(super) fn crest(&mut self, at: u64) -> Result<()> {
+        self.advance_plant(at);
+        self.sample = self.plant.sample();
+        if let Some(disturb) = &mut self.disturb {
+            disturb(&mut self.sample);
+        }
+        self.see();
+        let chip = self.cpu.chip_mut();
+        let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
+        self.applied = Compare { a, b, c, enabled: true };
+        if self.outputs {
+            match chip.tim1.check_gates(self.gates) {
+                Err(BadGates::Pulse { .. }) if chip.forgiving => self.short_pulses += 1,
+                checked => checked.map_err(Failure::Gates)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Shows the sample to converters, comparators and encoder.
+    pub(super) fn see(&mut self) {
+        let s = self.sample;
+        let chip = self.cpu.chip_mut();
+        let pins = [
+            (0, numbers::ADC1_CHANNELS.0, s.current_a),
+            (0, numbers::ADC1_CHANNELS.1, s.dc_link),
+            (1, numbers::ADC2_CHANNELS.0, s.current_b),
+            (1, numbers::ADC2_CHANNELS.1, s.heat_sink),
+        ];
+        for (converter, channel, code) in pins {
+            chip.adc.inputs[converter][usize::from(channel)] = code;
+        }
+        chip.tim2.set_position(s.encoder);
+        chip.compare(s.current_a, s.current_b, s.dc_link);
+    }
+}

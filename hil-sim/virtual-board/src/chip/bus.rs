@@ -1,0 +1,205 @@
+//! The bus: reads and writes of registers, each to the model that has it.
+
+use super::{Chip, Reset};
+use crate::memory;
+use crate::periph::Effect;
+use crate::scs;
+
+const TIM2: u32 = 0x4000_0000;
+const IWDG: u32 = 0x4000_3000;
+const PWR: u32 = 0x4000_7000;
+const LPUART1: u32 = 0x4000_8000;
+const SYSCFG: u32 = 0x4001_0000;
+const EXTI: u32 = 0x4001_0400;
+const TIM1: u32 = 0x4001_2c00;
+/// Compare values of the three legs.
+const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
+const RCC: u32 = 0x4002_1000;
+const FLASH_REGISTERS: u32 = 0x4002_2000;
+const GPIO_FIRST: u32 = 0x4800_0000;
+const GPIO_LAST: u32 = 0x4800_1bff;
+const ADC1: u32 = 0x5000_0000;
+const DAC1: u32 = 0x5000_0800;
+const DAC3: u32 = 0x5000_1000;
+
+/// An access that the model does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unknown {
+    /// Where.
+    pub address: u32,
+    /// What was to be written, if it was a write.
+    pub written: Option<u32>,
+    /// Last known place of the core: the instruction, in CCM the block.
+    pub at: u32,
+}
+
+impl Chip {
+    /// Reads a register, `size` bytes.
+    pub fn read(&mut self, address: u32, size: u8) -> u32 {
+        self.accesses += 1;
+        let value = if let Some(word) = bit_band(address) {
+            self.peek(word.0).map(|value| value >> word.1 & 1)
+        } else {
+            let value = self.read_word(address & !3);
+            value.map(|value| value >> (8 * (address & 3)))
+        };
+        match value {
+            Some(value) if size >= 4 => value,
+            Some(value) => value & ((1 << (8 * size)) - 1),
+            None => self.is_unknown(address, None),
+        }
+    }
+
+    /// Writes a register, `size` bytes.
+    pub fn write(&mut self, address: u32, size: u8, value: u32) {
+        self.accesses += 1;
+        let done = if let Some((word, bit)) = bit_band(address) {
+            self.peek(word).and_then(|old| {
+                let new = old & !(1 << bit) | (value & 1) << bit;
+                self.write_word(word, new)
+            })
+        } else if size < 4 {
+            let shift = 8 * (address & 3);
+            let mask = ((1_u32 << (8 * size)) - 1) << shift;
+            let word = address & !3;
+            self.peek(word)
+                .and_then(|old| self.write_word(word, old & !mask | value << shift & mask))
+        } else {
+            self.write_word(address, value)
+        };
+        if COMPARES.contains(&address) {
+            self.compared = (self.blocks.len(), self.accesses);
+        }
+        if done.is_none() {
+            self.is_unknown(address, Some(value));
+        }
+    }
+
+    fn is_unknown(&mut self, address: u32, written: Option<u32>) -> u32 {
+        if self.forgiving {
+            return 0;
+        }
+        self.unknown.get_or_insert(Unknown { address, written, at: self.at });
+        self.attention = true;
+        0
+    }
+
+    /// What a read gives, without what a read does.
+    fn peek(&mut self, address: u32) -> Option<u32> {
+        match address & !0x3ff {
+            IWDG | LPUART1 => Some(0),
+            _ if (0xe000_e400..0xe000_e4f0).contains(&address) => self.scs.read(address, self.now),
+            _ => self.read_word(address),
+        }
+    }
+
+    fn read_word(&mut self, address: u32) -> Option<u32> {
+        let offset = address & 0x3ff;
+        let now = self.now;
+        if address >= 0xe000_0000 {
+            return match address & !0xfff {
+                0xe004_2000 => self.debug.read(offset),
+                _ => self.scs.read(address, now),
+            };
+        }
+        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
+            let (value, torn) = self.flash.load(address);
+            if torn {
+                if self.syscfg.flash_error_breaks() {
+                    self.tim1.system_break();
+                }
+                self.scs.pend(scs::NMI);
+                self.attention = true;
+            }
+            return Some(value);
+        }
+        match address & !0x3ff {
+            TIM1 => self.tim1.read(offset, now),
+            ADC1 => self.adc.read(offset),
+            TIM2 => self.tim2.read(offset),
+            RCC => self.rcc.read(offset),
+            PWR => self.pwr.read(offset),
+            FLASH_REGISTERS => self.flash.read(offset, now),
+            LPUART1 => {
+                let value = self.lpuart.read(offset);
+                self.update_lines();
+                value
+            }
+            IWDG => self.iwdg.read(offset, now),
+            SYSCFG => match offset {
+                0x200..0x220 => self.comp.read(offset - 0x200),
+                _ => self.syscfg.read(offset),
+            },
+            EXTI => self.exti.read(offset),
+            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].read(offset),
+            DAC1 => self.dac.read(0, offset),
+            DAC3 => self.dac.read(1, offset),
+            _ => None,
+        }
+    }
+
+    fn write_word(&mut self, address: u32, value: u32) -> Option<()> {
+        let offset = address & 0x3ff;
+        let now = self.now;
+        if address >= 0xe000_0000 {
+            let effect = match address & !0xfff {
+                0xe004_2000 => return self.debug.write(offset, value),
+                _ => self.scs.write(address, value, now)?,
+            };
+            return self.follow(effect);
+        }
+        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
+            let effect = self.flash.store(address, value, now)?;
+            return self.follow(effect);
+        }
+        let effect = match address & !0x3ff {
+            TIM1 => self.tim1.write(offset, value, now)?,
+            ADC1 => self.adc.write(offset, value)?,
+            TIM2 => self.tim2.write(offset, value)?,
+            RCC => self.rcc.write(offset, value, now)?,
+            PWR => self.pwr.write(offset, value)?,
+            FLASH_REGISTERS => self.flash.write(offset, value, now)?,
+            LPUART1 => self.lpuart.write(offset, value, now)?,
+            IWDG => self.iwdg.write(offset, value, now)?,
+            SYSCFG => match offset {
+                0x200..0x220 => self.comp.write(offset - 0x200, value)?,
+                _ => self.syscfg.write(offset, value)?,
+            },
+            EXTI => self.exti.write(offset, value)?,
+            GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].write(offset, value)?,
+            DAC1 => self.dac.write(0, offset, value)?,
+            DAC3 => self.dac.write(1, offset, value)?,
+            _ => return None,
+        };
+        self.follow(effect)
+    }
+
+    fn follow(&mut self, effect: Effect) -> Option<()> {
+        match effect {
+            Effect::None => {}
+            Effect::Look => {
+                self.update_lines();
+                self.attention = true;
+            }
+            Effect::Reset => {
+                self.reset = Some(Reset::Software);
+                self.attention = true;
+            }
+            Effect::Nmi => {
+                self.scs.pend(scs::NMI);
+                self.attention = true;
+            }
+        }
+        Some(())
+    }
+}
+
+fn port(address: u32) -> usize {
+    ((address - GPIO_FIRST) >> 10) as usize
+}
+
+/// The word and bit behind an address of the alias.
+fn bit_band(address: u32) -> Option<(u32, u32)> {
+    let offset = address.checked_sub(memory::BIT_BAND).filter(|offset| *offset < 0x60_0000)?;
+    Some((memory::PERIPHERALS + (offset >> 7 << 2), offset >> 2 & 31))
+}

@@ -1,0 +1,122 @@
+//! What the core executes: the time it takes, and the blocks that are kept of it.
+
+use super::Chip;
+use crate::scs;
+
+/// Where a block of the control interrupt began, and its cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Address of its first instruction.
+    pub address: u32,
+    /// Bytes.
+    pub size: u32,
+    /// Cycles with its last branch not taken.
+    pub cycles: u32,
+    /// Whether that branch was taken.
+    pub taken: bool,
+}
+
+/// A function of the main loop whose calls are counted as if its memory had no wait states.
+#[derive(Clone, Debug)]
+pub struct Watched {
+    /// Where it begins and ends.
+    pub range: (u32, u32),
+    /// Estimated cycles of each call, interrupts not counted.
+    pub calls: Vec<u32>,
+    /// The blocks of the longest.
+    pub longest: Vec<Block>,
+    /// Those of the present one.
+    present: Vec<Block>,
+}
+
+impl Watched {
+    /// A function in the flash, at an address, with its size in bytes.
+    pub fn new((address, size): (u32, u32)) -> Self {
+        let range = (address, address + size);
+        Self { range, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
+    }
+
+    /// Whether a block is its own.
+    #[inline]
+    pub fn has(&self, address: u32) -> bool {
+        (self.range.0..self.range.1).contains(&address)
+    }
+
+    /// A block of the flash is about to be executed; `cycles` of one of its own.
+    fn block(&mut self, address: u32, size: u32, cycles: u32) {
+        if let Some(last) = self.present.last_mut() {
+            last.taken = last.address + last.size != address;
+        }
+        if address == self.range.0 {
+            self.present.clear();
+        } else if self.present.is_empty() {
+            return;
+        }
+        if self.has(address) {
+            self.present.push(Block { address, size, cycles, taken: false });
+            return;
+        }
+        let spent = crate::cost::of(&self.present);
+        if self.calls.iter().all(|call| *call < spent) {
+            self.longest.clone_from(&self.present);
+        }
+        self.calls.push(spent);
+        self.present.clear();
+    }
+}
+
+impl Chip {
+    /// Whether the core is to stop before the block that begins here; never before the first of a run, so
+    /// that each run gets on.
+    #[inline]
+    pub fn stops_here(&mut self) -> bool {
+        !std::mem::take(&mut self.first) && self.wants_attention()
+    }
+
+    /// Whether the core is to stop.
+    #[inline]
+    pub fn wants_attention(&self) -> bool {
+        self.attention || self.now >= self.deadline
+    }
+
+    /// Instructions from the flash are about to be executed.
+    #[inline]
+    pub fn instructions(&mut self, count: u64) {
+        self.now += self.rcc.ticks_per_cycle() * count;
+        self.instructions += count;
+        self.last_block = None;
+    }
+
+    /// A block in the flash is about to be executed, of this size and cost if it is watched.
+    #[inline]
+    pub fn watch(&mut self, address: u32, size: u32, cycles: u32) {
+        let in_main = self.scs.running() == scs::THREAD;
+        if let (Some(watched), true) = (&mut self.watched, in_main) {
+            watched.block(address, size, cycles);
+        }
+    }
+
+    /// A block in CCM is about to be executed.
+    #[inline]
+    pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
+        let taken = self.last_block.is_some_and(|(_, end)| end != address);
+        if taken {
+            self.now += u64::from(crate::cost::TAKEN);
+        }
+        self.now += u64::from(cycles);
+        self.last_block = Some((address, address + size));
+        if self.keep_blocks {
+            if taken && let Some(block) = self.blocks.last_mut() {
+                block.taken = true;
+            }
+            self.blocks.push(Block { address, size, cycles, taken: false });
+        }
+    }
+
+    /// Blocks since the last call.
+    pub fn begin_interrupt(&mut self) {
+        self.blocks.clear();
+        self.compared = (0, self.accesses);
+        self.last_block = None;
+    }
+}
