@@ -9,8 +9,10 @@ use crate::chip::Block;
 
 /// More cycles for a branch that is taken: the pipeline fills again.
 pub const TAKEN: u32 = 2;
-/// Exception entry and exit with the saving and restoring of the floating-point registers.
-pub const EXCEPTION: u32 = 12 + 12 + 18 + 17;
+/// Exception entry and exit, with the saving and the restoring of the floating-point registers.
+pub const ENTRY: u32 = 12 + 18;
+/// See [`ENTRY`].
+pub const EXIT: u32 = 12 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
 

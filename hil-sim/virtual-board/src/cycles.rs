@@ -14,7 +14,7 @@ use hil_sim::config::LoadMode;
 
 use crate::bench::{Options, Worst};
 use crate::chip::Watched;
-use crate::cost::{BUS, EXCEPTION, TAKEN, instructions};
+use crate::cost::{self, BUS, TAKEN, instructions};
 use crate::image::Image;
 use crate::pair::Pair;
 
@@ -52,7 +52,7 @@ const BLOCKS: [(&str, &[&str]); 10] = [
 ];
 /// What belongs to none: the timer.
 const REST: &str = "firmware";
-/// Entry, exit, registers; and waiting for the bus of the peripherals.
+/// Entry and registers; and waiting for the bus of the peripherals.
 const ENTRY: [&str; 2] = ["exception", "bus"];
 /// How much a line of the table may rise before it is refused.
 const TOLERANCE: f64 = 1.05;
@@ -158,7 +158,7 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     let median = middle(&mut cycles)?;
     let whole = pair.board.worst.cycles;
     let worst = std::mem::take(&mut pair.board.worst_to_compares);
-    line(name, pair, (&worst, EXCEPTION), median, whole)
+    line(name, pair, (&worst, cost::ENTRY), median, whole)
 }
 
 fn pair_read(pair: &Pair, address: u32, bytes: &mut [u8]) {

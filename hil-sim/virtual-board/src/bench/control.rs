@@ -4,6 +4,7 @@ use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
 use crate::chip::Block;
+use crate::cost;
 use crate::cpu::Cpu;
 
 /// One control interrupt, as seen from outside.
@@ -19,7 +20,7 @@ pub struct Period {
     pub took_order: bool,
     /// Estimated cycles, with entry, exit and bus, when they are counted.
     pub cycles: u32,
-    /// How many of them go by before the last compare value is written; the exit is among them.
+    /// How many of them go by before the last compare value is written.
     pub to_compares: u32,
 }
 
@@ -88,12 +89,10 @@ impl Board {
         let (compared, up_to) = chip.compared;
         let way = |blocks: &[Block], accesses: u64| {
             let accesses = (accesses - entered.accesses) as u32;
-            (
-                crate::cost::of(blocks) + crate::cost::EXCEPTION + accesses * crate::cost::BUS,
-                accesses,
-            )
+            (cost::of(blocks) + cost::ENTRY + accesses * cost::BUS, accesses)
         };
         let (cycles, accesses) = way(&chip.blocks, chip.accesses);
+        let cycles = cycles + cost::EXIT;
         let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
         let note = |worst: &mut Worst, cycles, accesses, blocks: &[Block]| {
             if cycles > worst.cycles && !blocks.is_empty() {
