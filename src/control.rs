@@ -185,10 +185,6 @@ impl Running {
             {
                 self.late = Hardware::DEADLINE_MISS;
             }
-            let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
-            if latency > self.worst_latency {
-                self.worst_latency = latency;
-            }
         }
         let mut hardware = self.late.and(self.over);
         self.over = Hardware::NONE;
@@ -215,6 +211,10 @@ impl Running {
         self.late = Hardware::NONE;
         if pwm.updated() {
             self.late = Hardware::DEADLINE_MISS;
+        }
+        let latency = since_top.saturating_sub(board::SAMPLES_READY_TICKS);
+        if self.periods > 0 && latency > self.worst_latency {
+            self.worst_latency = latency;
         }
         // With the outputs off a miss harms nobody, and is only told.
         let missed = hardware.and(self.late).has(Hardware::DEADLINE_MISS);

@@ -14,7 +14,7 @@ use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 /// One step of a chain, dm along `axis`.
 fn step(chain: &mut impl Demodulate<Seen = f32>, current: AlphaBeta, axis: Angle) -> f32 {
     let axis = (axis + Angle::EIGHTH).unit_vector();
-    chain.step(&CarrierSample { current, axis, carrier: CarrierPeriod::default(), i_q: 0.0 })
+    chain.step(&CarrierSample { current, axis, carrier: CarrierPeriod::default() })
 }
 
 /// Mean output, A, of a chain fed with the true current, its injection axis at phi2 - theta = `x`

@@ -57,8 +57,6 @@ pub struct CarrierSample {
     pub axis: UnitVector,
     /// The injection in this period.
     pub carrier: CarrierPeriod,
-    /// Reference of the quadrature current, A.
-    pub i_q: f32,
 }
 
 impl CarrierSample {

@@ -10,7 +10,7 @@ use crate::indirect::FluxAngle;
 use crate::learning::Learned;
 use crate::schedule::{ReferenceTable, Schedule};
 use crate::settings::Tracking;
-use crate::synchronous::{SEEN_AT, Saliency, SynchronousState};
+use crate::synchronous::{Saliency, SynchronousState};
 use crate::tracker::{Pll, Push, Tracker, TrackerState};
 
 /// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
@@ -107,7 +107,7 @@ pub struct EstimatorState {
     pub rotor_step: f32,
     /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
-    /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.4 ms older,
+    /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.1 ms older,
     /// on average, than what the averages themselves delay by 3.2 ms: little for a loop of 4 Hz.
     push: Push,
     demodulator: Demodulator,
@@ -177,14 +177,26 @@ impl Estimator {
     #[inline]
     pub fn observe(&self, state: &mut EstimatorState, sample: &CarrierSample, step: f32) {
         state.synchronous.mix(sample);
-        if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
-            state.synchronous.conclude(sample.carrier.index, sample.i_q);
-            if sample.carrier.index == SEEN_AT {
-                let (error, share) = schedule.correction(state.saliency());
-                state.push = pll.push(error, share);
-            }
-        } else {
+        if let AngleLoop::Pii { .. } = self.angle_loop {
             self.observe_printed(state, *sample, step);
+        }
+    }
+
+    /// Once a carrier period, where the synchronous demodulation tracks: the saliency that the one before shows.
+    #[inline]
+    pub fn see(&self, state: &mut EstimatorState) {
+        if let AngleLoop::Pll { .. } = self.angle_loop {
+            state.synchronous.see();
+        }
+    }
+
+    /// Once a carrier period, with the saliency of the one before: which way the axis is pushed by it. An
+    /// acceleration of the rotor that is asked for is known, turns per period in each.
+    #[inline]
+    pub fn push(&self, state: &mut EstimatorState, acceleration: f32) {
+        if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
+            let (error, share) = schedule.correction(state.saliency());
+            state.push = pll.push(error, share, acceleration);
         }
     }
 

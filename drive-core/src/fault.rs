@@ -73,11 +73,6 @@ impl Fault {
     pub const fn code(self) -> u8 {
         self as u8
     }
-
-    /// The fault with this number.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.iter().copied().find(|f| f.code() == code)
-    }
 }
 
 impl fmt::Display for Fault {
@@ -134,7 +129,6 @@ mod tests {
         ];
         for (code, fault) in table {
             assert_eq!(fault.code(), code);
-            assert_eq!(Fault::from_code(code), Some(fault));
         }
         assert_eq!(table.len(), Fault::ALL.len());
     }

@@ -8,7 +8,6 @@
 use core::f32::consts::TAU;
 
 use crate::angle::Angle;
-use crate::frames::Dq;
 use crate::injection::CARRIER_SAMPLES;
 use crate::online::LIMITS;
 
@@ -156,25 +155,24 @@ impl Indirect {
         Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_step + state.slip_step })
     }
 
-    /// Integrates the slip over one period with the current in the flux frame, A. The magnetising current
-    /// follows once a carrier period, in its sample `index`.
+    /// Integrates the slip over one period with the quadrature current, A.
     #[inline]
-    pub fn update(&self, state: &mut IndirectState, current: Dq, index: usize) {
-        if index == MAGNETISED_AT {
-            let i_m = state.magnetising
-                + CARRIER_SAMPLES as f32 * self.rate * (current.d - state.magnetising);
-            state.magnetising = i_m;
-            // Not-a-number stays one, and shows in the slip.
-            let divisor = if i_m < self.least { self.least } else { i_m };
-            state.slip_per_ampere = self.rate * (1.0 / TAU) / divisor;
-        }
-        state.slip_step = state.slip_per_ampere * current.q;
+    pub fn slip(&self, state: &mut IndirectState, i_q: f32) {
+        state.slip_step = state.slip_per_ampere * i_q;
         state.slip += Angle::within_turn(state.slip_step);
     }
-}
 
-/// Sample of the carrier period in which the magnetising current follows; see [`crate::drive`].
-const MAGNETISED_AT: usize = 8;
+    /// Once a carrier period: the magnetising current follows the direct current, A.
+    #[inline]
+    pub fn magnetise(&self, state: &mut IndirectState, i_d: f32) {
+        let i_m =
+            state.magnetising + CARRIER_SAMPLES as f32 * self.rate * (i_d - state.magnetising);
+        state.magnetising = i_m;
+        // Not-a-number stays one, and shows in the slip.
+        let divisor = if i_m < self.least { self.least } else { i_m };
+        state.slip_per_ampere = self.rate * (1.0 / TAU) / divisor;
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -217,11 +215,11 @@ mod tests {
         let ind = indirect();
         let mut state = IndirectState::default();
         // flux built up for 10 time constants, then i_q = 2 i_d for 0.1 s
-        for n in 0..12_000 {
-            ind.update(&mut state, Dq::new(0.7, 0.0), n % CARRIER_SAMPLES);
+        for _ in 0..1200 {
+            ind.magnetise(&mut state, 0.7);
         }
-        for n in 0..600 {
-            ind.update(&mut state, Dq::new(0.7, 1.4), n % CARRIER_SAMPLES);
+        for _ in 0..600 {
+            ind.slip(&mut state, 1.4);
         }
         let phi = ind.angle(&mut state, 0).unwrap().phi.to_radians();
         assert!((phi - 0.1 * 2.0 / 0.186).abs() < 1e-3, "{phi}");

@@ -67,7 +67,6 @@ impl Injection {
                 sampled: amplitude_v * (s_re * cos - s_im * sin),
                 cos,
                 sin,
-                index,
             };
         }
         Self {
@@ -125,8 +124,6 @@ pub struct CarrierPeriod {
     pub cos: f32,
     /// Sine of its phase.
     pub sin: f32,
-    /// Its number in the carrier period, 0 to 9.
-    pub index: usize,
 }
 
 impl Carrier {
@@ -220,7 +217,7 @@ mod tests {
             let next = plant.p * i + plant.k * f64::from(now.voltage);
             if n > 5000 {
                 assert!((0.5 * (i + next) - f64::from(now.mean_current)).abs() < 1e-5);
-                let one_later = injection.periods[(now.index + 1) % CARRIER_SAMPLES].sampled;
+                let one_later = injection.periods[(index + 1) % CARRIER_SAMPLES].sampled;
                 assert!((i - f64::from(one_later)).abs() < 1e-5);
                 peak = peak.max(next.abs());
             }

@@ -84,6 +84,12 @@ impl Compare {
     pub const OFF: Self = Self { a: 0, b: 0, c: 0, enabled: false };
     /// All low sides on: zero voltage, and the bootstrap capacitors charge.
     pub const LOW_SIDES_ON: Self = Self { a: 0, b: 0, c: 0, enabled: true };
+
+    /// Outputs on, with the compare values of a, b, c.
+    #[inline]
+    pub const fn on([a, b, c]: [u16; 3]) -> Self {
+        Self { a, b, c, enabled: true }
+    }
 }
 
 /// What the drive is to regulate once it runs.

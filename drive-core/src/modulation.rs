@@ -66,15 +66,25 @@ impl Modulator {
         let (low, high) = extremes(leg);
         // Shortest pulses fit in above and below: nothing to limit. Not-a-number fails the test.
         if (high - low) * per_volt <= self.top - 2.0 * self.shortest {
-            let counts = self.centred(leg, low + high, per_volt);
-            return Modulated { compare: counts.map(rounded), realised: wanted, limited: false };
+            let [a, b, c] = self.centred(leg, low + high, per_volt);
+            let compare = [rounded(a), rounded(b), rounded(c)];
+            return Modulated { compare, realised: wanted, limited: false };
         }
-        self.limited(wanted, compensation, v_dc)
+        let Modulated { compare, realised, limited } = self.limited(wanted, compensation, v_dc);
+        Modulated { compare, realised, limited }
     }
 
     /// The same without the short cut for what needs no limiting.
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
+        let Abc { a, b, c } = compensation;
+        self.limited_by_parts(wanted, a, b, c, v_dc)
+    }
+
+    // By parts: they come in registers, and need not be stored where nothing is limited.
+    #[inline(never)]
+    fn limited_by_parts(&self, wanted: AlphaBeta, a: f32, b: f32, c: f32, v_dc: f32) -> Modulated {
+        let compensation = Abc { a, b, c };
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
@@ -99,6 +109,7 @@ impl Modulator {
     }
 
     /// Moves a pulse of either switch that is too short to the nearer of none and the shortest.
+    #[inline(never)]
     fn drop_or_extend(&self, count: f32) -> f32 {
         let from_top = self.top - count;
         if count < self.shortest {

@@ -32,7 +32,6 @@
 //! in 2400 s with reversals of 3 A and up to 600 rpm.
 
 use crate::fault::Fault;
-use crate::injection::CARRIER_SAMPLES;
 use crate::io::Sample;
 
 /// Noise allowed, as a share of the carrier current that the saliency makes.
@@ -43,8 +42,8 @@ const WEIGHTS: f32 = 36.0;
 const SMOOTHING: f32 = 1.0 / 40.0;
 /// What one square counts at most, in units of what is allowed: a step of the current is no noise.
 const MOST: f32 = 4.0;
-/// Samples of half a carrier period: one for each channel.
-const HALF: usize = CARRIER_SAMPLES / 2;
+/// Samples that are looked at for a channel.
+const LOOKS: usize = 3;
 
 /// Coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,32 +80,37 @@ impl NoiseWatch {
         Self { allowed: gains.map(square) }
     }
 
-    /// One sample, the `index`-th of the carrier period.
-    // Always: in four of ten samples there is nothing to do, and a call costs more than that.
+    /// Looks at a sample, the `look`-th of six in a carrier period: 0 to 2 in three samples in a row for
+    /// channel a, 3 to 5 as well for channel b.
+    ///
+    /// # Errors
+    /// The channel is noisy, which comes out with its third.
+    // Always: it is called with a number, and of all this little is left then.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut NoiseWatchState,
-        index: usize,
+        look: usize,
         sample: &Sample,
-    ) -> Option<Fault> {
+    ) -> Result<(), Fault> {
         let [a, b] = &mut state.channels;
-        let (channel, code, allowed, fault, at) = if index < HALF {
-            (a, sample.current_a, self.allowed[0], Fault::SensorNoisyA, index)
+        let (channel, code, allowed, fault, look) = if look < LOOKS {
+            (a, sample.current_a, self.allowed[0], Fault::SensorNoisyA, look)
         } else {
-            (b, sample.current_b, self.allowed[1], Fault::SensorNoisyB, index - HALF)
+            (b, sample.current_b, self.allowed[1], Fault::SensorNoisyB, look - LOOKS)
         };
         let code = i32::from(code);
-        match at {
-            1 => channel.difference = code,
-            2 => channel.difference = channel.difference.wrapping_sub(2 * code),
-            3 => {
+        match look {
+            0 => channel.difference = code,
+            1 => channel.difference = channel.difference.wrapping_sub(2 * code),
+            _ => {
                 channel.difference = channel.difference.wrapping_add(code);
-                return channel.is_noisy(allowed).then_some(fault);
+                if channel.is_noisy(allowed) {
+                    return Err(fault);
+                }
             }
-            _ => {}
         }
-        None
+        Ok(())
     }
 }
 
@@ -148,6 +152,20 @@ mod tests {
         Sample { current_a, current_b, ..Sample::default() }
     }
 
+    /// Sample `n` of ten in a carrier period, three of each half looked at.
+    fn look(
+        watch: &NoiseWatch,
+        state: &mut NoiseWatchState,
+        n: usize,
+        sample: &Sample,
+    ) -> Result<(), Fault> {
+        match n % 10 {
+            at @ 0..3 => watch.step(state, at, sample),
+            at @ 7..10 => watch.step(state, at - 4, sample),
+            _ => Ok(()),
+        }
+    }
+
     /// Normal noise of variance 1 by the sum of twelve.
     fn normal(x: &mut u64) -> f64 {
         let mut uniform = || {
@@ -168,7 +186,7 @@ mod tests {
                 3.0 * angle.cos() + 0.26 * angle.sin() * (TAU * 600.0 * t + 0.4).cos()
             });
             let sample = sample([a + noise[0] * normal(&mut x), b + noise[1] * normal(&mut x)]);
-            watch.step(&mut state, n % 10, &sample).map(|fault| (t, fault))
+            look(&watch, &mut state, n, &sample).err().map(|fault| (t, fault))
         })
     }
 
@@ -195,7 +213,7 @@ mod tests {
         let (watch, mut state) = (watch(), NoiseWatchState::default());
         for n in 0..60_000_usize {
             let i = if n / 1000 % 2 == 0 { 3.0 } else { -3.0 };
-            assert_eq!(watch.step(&mut state, n % 10, &sample([i, -i])), None, "{n}");
+            assert_eq!(look(&watch, &mut state, n, &sample([i, -i])), Ok(()), "{n}");
         }
     }
 
@@ -203,7 +221,7 @@ mod tests {
     fn a_state_that_is_no_number_is_a_fault() {
         let (watch, mut state) = (watch(), NoiseWatchState::default());
         state.channels[1].level = f32::NAN;
-        let found = (0..10_usize).find_map(|n| watch.step(&mut state, n, &sample([0.0; 2])));
+        let found = (0..10).find_map(|n| look(&watch, &mut state, n, &sample([0.0; 2])).err());
         assert_eq!(found, Some(Fault::SensorNoisyB));
     }
 }

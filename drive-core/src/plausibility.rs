@@ -33,8 +33,16 @@ pub struct CarrierWatch {
 impl CarrierWatch {
     /// Once a carrier period: the carrier current in it, the injection axis, and the amplitude of the
     /// carrier current expected along it, A.
+    ///
+    /// # Errors
+    /// A channel does not see it.
     #[inline(never)]
-    pub fn step(&mut self, seen: CarrierCurrent, axis: UnitVector, expected: f32) -> Option<Fault> {
+    pub fn step(
+        &mut self,
+        seen: CarrierCurrent,
+        axis: UnitVector,
+        expected: f32,
+    ) -> Result<(), Fault> {
         // Of the axes: what of the injection lies along phases a and b, cos(theta) and cos(theta - 120°);
         // and of what lies 90° ahead of it.
         let phases = |x: f32, y: f32| [x, 0.5 * (SQRT_3 * y - x)];
@@ -43,7 +51,7 @@ impl CarrierWatch {
         // The first two carrier periods are not settled.
         if self.settled < 2 {
             self.settled += 1;
-            return None;
+            return Ok(());
         }
         for ((along, across), silent) in along.into_iter().zip(across).zip(&mut self.silent) {
             let re = along * seen.along.0 + across * seen.across.0;
@@ -54,11 +62,11 @@ impl CarrierWatch {
             *silent = if quiet { silent.saturating_add(1) } else { 0 };
         }
         if self.silent[0] >= SILENT_PERIODS {
-            Some(Fault::CarrierMissingA)
+            Err(Fault::CarrierMissingA)
         } else if self.silent[1] >= SILENT_PERIODS {
-            Some(Fault::CarrierMissingB)
+            Err(Fault::CarrierMissingB)
         } else {
-            None
+            Ok(())
         }
     }
 }
@@ -98,25 +106,14 @@ pub struct PredictionState {
     /// Sum of the computed voltages since they were last taken, and what was taken, V.
     voltages: AlphaBeta,
     taken: AlphaBeta,
+    /// Voltage of the rotor that is expected in the mean of the samples between, V.
+    rotor: AlphaBeta,
     unexplained: AlphaBeta,
 }
 
 /// Samples from one comparison to the next: half a carrier period. Over a whole one the carrier would be zero
 /// in the mean, but a sensor that lies would drive the current for twice as long.
-pub const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
-
-/// Whether the comparison is made in this sample of the carrier period.
-#[inline]
-pub fn is_judged(index: usize) -> bool {
-    matches!(index, 0 | JUDGED_EVERY)
-}
-
-/// Whether the sum of the voltages begins anew in this sample: what is computed in a sample acts between the
-/// next one and the one after that, and so explains the current two samples later.
-#[inline]
-fn begins(index: usize) -> bool {
-    matches!(index, 4 | 9)
-}
+const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
 
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
 const SMOOTHING: f32 = 0.276;
@@ -137,51 +134,58 @@ impl Prediction {
         }
     }
 
-    /// The voltage that the rotor flux adds to the applied one, V in the flux frame,
-    /// (L_m/L_r)(1/T_sec - j w_r) psi, with the magnetising current in A and the electrical speed of
-    /// the rotor in turns per period.
-    pub fn rotor_voltage(&self, magnetising: f32, rotor_step: f32) -> Dq {
-        Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_step }
-    }
-
-    /// One sample: its number in the carrier period; the current, A; the voltage just computed, which
-    /// acts in the next period, V.
+    /// The sample before it is judged: the voltage that the rotor flux adds to the applied one, V,
+    /// (L_m/L_r)(1/T_sec - j w_r) psi, with the magnetising current in A, the electrical speed of the rotor
+    /// in turns per period, and the flux as it is `seen` in this sample, turning by `flux_step` turns per
+    /// period.
     #[inline]
-    pub fn collect(
-        state: &mut PredictionState,
-        index: usize,
-        current: AlphaBeta,
-        computed: AlphaBeta,
-    ) {
-        state.currents += current;
-        if begins(index) {
-            state.taken = state.voltages;
-            state.voltages = computed;
-        } else {
-            state.voltages += computed;
-        }
-    }
-
-    /// In the sample in which it [is](is_judged): the current, A, and the expected voltage of the rotor, V,
-    /// in the middle of the samples since the last time.
-    ///
-    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over [`JUDGED_EVERY`] of them.
-    #[inline(never)]
-    pub fn judge(
+    pub fn expect(
         &self,
         state: &mut PredictionState,
-        current: AlphaBeta,
-        rotor: AlphaBeta,
-    ) -> Option<Fault> {
+        (magnetising, rotor_step): (f32, f32),
+        (seen, flux_step): (UnitVector, f32),
+    ) {
+        let rotor = Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_step };
+        // The middle of the samples lies so far back from here.
+        const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
+        state.rotor = rotor.to_alpha_beta(seen.turned_slightly(-MIDDLE * flux_step));
+    }
+
+    /// Every fifth sample: the current, A, which is [collected](PredictionState::collect)
+    /// already.
+    ///
+    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over the five.
+    ///
+    /// # Errors
+    /// The current is not as predicted.
+    #[inline(never)]
+    pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
-        let unexplained = (changed * self.per_ampere - state.taken) * MEAN - rotor;
+        let unexplained = (changed * self.per_ampere - state.taken) * MEAN - state.rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         (state.last, state.currents) = (current, AlphaBeta::ZERO);
         // The two uncertainties are independent: their squares add.
-        let allowed = self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * rotor.length_squared();
+        let allowed =
+            self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * state.rotor.length_squared();
+        // (Not-a-number is not within the limit.)
         let explained = state.unexplained.length_squared() <= allowed;
-        // (Not-a-number is not.)
-        (!explained).then_some(Fault::CurrentNotAsPredicted)
+        if explained { Ok(()) } else { Err(Fault::CurrentNotAsPredicted) }
+    }
+}
+
+impl PredictionState {
+    /// One sample: the current, A, and the voltage just computed, V.
+    #[inline]
+    pub fn collect(&mut self, current: AlphaBeta, computed: AlphaBeta) {
+        self.currents += current;
+        self.voltages += computed;
+    }
+
+    /// Two samples before it is judged: what is computed in a sample acts between the next one and the one
+    /// after that, and so explains the current two samples later.
+    #[inline]
+    pub fn take(&mut self) {
+        self.taken = core::mem::replace(&mut self.voltages, AlphaBeta::ZERO);
     }
 }

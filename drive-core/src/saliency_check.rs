@@ -8,7 +8,7 @@
 //! the power stage drops has the direction of the carrier. At 45° a drop of 1.6 V a phase looks like a
 //! saliency of 0.0135.) Then the flux is built up again.
 
-use crate::angle::{Angle, UnitVector};
+use crate::angle::UnitVector;
 use crate::frames::SQRT_3;
 
 /// Coefficients of the check.
@@ -66,13 +66,14 @@ impl SaliencyCheck {
     #[inline]
     pub fn new(flux_saliency: f32, t_sec: f32, period_s: f32) -> Self {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
+        let average = periods(AVERAGE_S);
         Self {
             settle: periods(SETTLE_S),
-            average: periods(AVERAGE_S),
+            average,
             restore: periods(RESTORE_T * t_sec),
             least: LEAST_SHARE * flux_saliency,
             per_expected: 1.0 / (SEEN_SHARE * flux_saliency),
-            per_average: 1.0 / periods(AVERAGE_S) as f32,
+            per_average: 1.0 / average as f32,
         }
     }
 
@@ -81,9 +82,7 @@ impl SaliencyCheck {
         state.sum / (SEEN_SHARE * self.average as f32)
     }
 
-    /// Angle of the injection axis from the flux while looking.
-    pub const LOOK: Angle = Angle::from_bits(715_827_883); // a sixth of a turn
-    /// The same as a unit vector.
+    /// The injection axis seen from the flux while looking: a sixth of a turn ahead.
     pub const LOOK_AXIS: UnitVector = UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 };
 
     /// Period `elapsed` of the check, with the saliency seen in it.

@@ -48,10 +48,33 @@ impl State {
         }
     }
 
+    /// Whether the current is regulated, for whatever purpose.
+    #[inline]
+    pub(crate) const fn has_current(self) -> bool {
+        matches!(
+            self,
+            Self::Magnetising
+                | Self::Verifying
+                | Self::Torque
+                | Self::Speed
+                | Self::Position
+                | Self::Commissioning
+                | Self::Learning
+                | Self::Stopping
+        )
+    }
+
     /// Whether torque, speed or position is regulated as asked for.
     #[inline]
     pub const fn regulates(self) -> bool {
         matches!(self, Self::Torque | Self::Speed | Self::Position)
+    }
+}
+
+impl From<Fault> for State {
+    #[inline]
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
     }
 }
 

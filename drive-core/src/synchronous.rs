@@ -22,20 +22,15 @@
 //! 400 X = D[0] + (10 S + D)[1] + (20 S - D)[2] + (10 S - D)[3]        [n]: n carrier periods ago
 //! ```
 //!
-//! All sums begin anew with every carrier period, so that no rounding adds up. The work of a carrier
-//! period is spread over the first samples of the next; the saliency is there in the fourth.
+//! All sums begin anew with every carrier period, so that no rounding adds up. What is done with those of
+//! a whole one is the drive's to [call in turn](crate::Drive).
 
-use crate::demodulator::{CarrierSample, Demodulate};
+use crate::demodulator::CarrierSample;
 use crate::injection::CARRIER_SAMPLES;
 
-/// Samples of the carrier period in which X, Y and then the saliency of the one before are computed.
-const X_AT: usize = 1;
-const Y_AT: usize = 2;
-const Q_AT: usize = 3;
-/// From this sample on all that can be seen is there.
-pub const SEEN_AT: usize = 4;
-/// Sample in which the reference current is looked at: it is then as old as the other signals are.
-const REFERENCE_AT: usize = 5;
+/// Sample of the carrier period in which the reference current is to be [seen](SynchronousState::see_reference):
+/// it is then as old as the other signals are.
+pub const REFERENCE_AT: usize = 5;
 
 /// Of the mixed current along and across the axis: real and imaginary parts.
 type Mixed = [f32; 4];
@@ -71,14 +66,15 @@ const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    /// The carrier period that goes on, and the one before.
+    /// The carrier period that goes on.
     period: Period,
-    last: Period,
+    /// Sum over the one before, A.
+    last: Mixed,
     averages: [Average; 4],
     /// X and Y, times [`WEIGHTS`], A.
     mean: Mixed,
     i_q_earlier: [f32; 3],
-    /// What was seen last; whole and new from sample [`SEEN_AT`] of the carrier on.
+    /// What was seen last.
     pub seen: Saliency,
 }
 
@@ -102,63 +98,44 @@ pub struct CarrierCurrent {
     pub across: (f32, f32),
 }
 
-impl Demodulate for SynchronousState {
-    type Seen = Saliency;
-
-    #[inline]
-    fn step(&mut self, sample: &CarrierSample) -> Saliency {
-        self.mix(sample);
-        self.conclude(sample.carrier.index, sample.i_q);
-        self.seen
-    }
-}
-
 impl SynchronousState {
-    /// Mixes one sample.
+    /// Mixes a sample.
     #[inline]
     pub fn mix(&mut self, sample: &CarrierSample) {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
         let mixed = [along * c, along * s, across * c, across * s];
-        let period = &mut self.period;
-        if sample.carrier.index == 0 {
-            self.last = *period;
-            *period = Period { sum: mixed, ramp: mixed };
-        } else {
-            for ((sum, ramp), x) in period.sum.iter_mut().zip(&mut period.ramp).zip(mixed) {
-                *sum += x;
-                *ramp += *sum;
-            }
+        let Period { sum, ramp } = &mut self.period;
+        for ((sum, ramp), x) in sum.iter_mut().zip(ramp).zip(mixed) {
+            *sum += x;
+            *ramp += *sum;
         }
     }
 
-    /// What is due in this sample of the carrier period, with the reference of the quadrature current, A.
+    /// Once a carrier period, behind its last sample: averages, and begins the next.
+    // Always: left to itself the compiler makes a call of it, which costs a tenth of it.
+    #[inline(always)]
+    pub fn average(&mut self) {
+        let Period { sum, ramp } = &mut self.period;
+        for n in 0..sum.len() {
+            self.mean[n] = self.averages[n].step(sum[n], ramp[n]);
+            self.last[n] = sum[n];
+            (sum[n], ramp[n]) = (0.0, 0.0);
+        }
+    }
+
+    /// The same average of the reference of the quadrature current, A, of one sample in each of the carrier
+    /// periods, that of [`REFERENCE_AT`]: 1, 3, 3, 1 eighths.
     #[inline]
-    pub fn conclude(&mut self, index: usize, i_q: f32) {
-        match index {
-            X_AT => self.average(0),
-            Y_AT => self.average(2),
-            Q_AT => self.see(),
-            REFERENCE_AT => self.see_reference(i_q),
-            _ => {}
-        }
-    }
-
-    /// Averages the signals `first` and `first + 1`.
-    fn average(&mut self, first: usize) {
-        for n in [first, first + 1] {
-            self.mean[n] = self.averages[n].step(self.last.sum[n], self.last.ramp[n]);
-        }
-    }
-
-    /// The same average of the reference, of one sample in each of the carrier periods: 1, 3, 3, 1 eighths.
-    fn see_reference(&mut self, now: f32) {
+    pub fn see_reference(&mut self, now: f32) {
         let (i_q, [one, two, three]) = (0.125 * now, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
         self.seen.i_q = i_q + one;
     }
 
-    fn see(&mut self) {
+    /// Once a carrier period, after [`average`](Self::average): the saliency.
+    #[inline]
+    pub fn see(&mut self) {
         // The mean of the mixed current is half the amplitude.
         const MEAN: f32 = 2.0 / WEIGHTS;
         let [x_re, x_im, y_re, y_im] = self.mean.map(|x| x * MEAN);
@@ -172,7 +149,7 @@ impl SynchronousState {
     /// The carrier current in the carrier period before this one.
     #[inline]
     pub fn carrier_current(&self) -> CarrierCurrent {
-        let [x_re, x_im, y_re, y_im] = self.last.sum.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
+        let [x_re, x_im, y_re, y_im] = self.last.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
         CarrierCurrent { along: (x_re, x_im), across: (y_re, y_im) }
     }
 }
@@ -181,24 +158,45 @@ impl SynchronousState {
 const LEAST: f32 = 5e-7;
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
     use crate::angle::Angle;
+    use crate::demodulator::Demodulate;
     use crate::frames::AlphaBeta;
     use crate::injection::{CARRIER_COS, CARRIER_SIN, CarrierPeriod};
     use core::f64::consts::TAU;
 
     /// Sample `k` of a current, injected along `axis`.
-    fn sample(current: AlphaBeta, axis: Angle, k: usize, i_q: f32) -> CarrierSample {
+    fn sample(current: AlphaBeta, axis: Angle, k: usize) -> CarrierSample {
         let k = k % CARRIER_SAMPLES;
-        let carrier = CarrierPeriod {
-            cos: CARRIER_COS[k],
-            sin: CARRIER_SIN[k],
-            index: k,
-            ..CarrierPeriod::default()
-        };
-        CarrierSample { current, axis: axis.unit_vector(), carrier, i_q }
+        let (cos, sin) = (CARRIER_COS[k], CARRIER_SIN[k]);
+        let carrier = CarrierPeriod { cos, sin, ..CarrierPeriod::default() };
+        CarrierSample { current, axis: axis.unit_vector(), carrier }
+    }
+
+    /// The demodulation with what is done once a carrier period, when the drive does it.
+    #[derive(Default)]
+    pub(crate) struct InTurn {
+        state: SynchronousState,
+        k: usize,
+        i_q: f32,
+    }
+
+    impl Demodulate for InTurn {
+        type Seen = Saliency;
+
+        fn step(&mut self, sample: &CarrierSample) -> Saliency {
+            self.state.mix(sample);
+            match self.k % CARRIER_SAMPLES {
+                0 => self.state.see(),
+                REFERENCE_AT => self.state.see_reference(self.i_q),
+                9 => self.state.average(),
+                _ => {}
+            }
+            self.k += 1;
+            self.state.seen
+        }
     }
 
     /// Steady q for a carrier current of `amplitude` A in direction `turn` from the injection axis,
@@ -206,16 +204,16 @@ mod tests {
     fn steady(amplitude: f64, turn: f64, phase: f64) -> SynchronousState {
         let theta = 0.7;
         let axis = Angle::from_radians(theta as f32);
-        let mut state = SynchronousState::default();
+        let mut demodulation = InTurn { i_q: 1.5, ..InTurn::default() };
         for k in 0..505 {
-            let carrier = amplitude * (TAU * f64::from(k) / 10.0 + phase).cos();
+            let carrier = amplitude * (TAU * k as f64 / 10.0 + phase).cos();
             let i = AlphaBeta::new(
                 (carrier * (theta + turn).cos() + 2.0) as f32,
                 (carrier * (theta + turn).sin() - 2.2) as f32,
             );
-            state.step(&sample(i, axis, k as usize, 1.5));
+            demodulation.step(&sample(i, axis, k));
         }
-        state
+        demodulation.state
     }
 
     #[test]
@@ -247,7 +245,7 @@ mod tests {
     /// Against the moving averages of the definition, in f64, on noise.
     #[test]
     fn the_averages_are_two_moving_averages_of_twenty_samples() {
-        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
+        let (mut demodulation, axis) = (InTurn::default(), Angle::ZERO);
         let moving = |x: &[f64]| -> Vec<f64> {
             (0..x.len()).map(|n| x[n.saturating_sub(19)..=n].iter().sum::<f64>() / 20.0).collect()
         };
@@ -255,17 +253,16 @@ mod tests {
         for k in 0..1000_usize {
             x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let noise = (x >> 8) as f32 / 4e6 - 2.0;
-            let given = sample(AlphaBeta::new(noise, 0.0), axis, k, 0.0);
-            state.step(&given);
+            let given = sample(AlphaBeta::new(noise, 0.0), axis, k);
+            let seen = demodulation.step(&given);
             let (c, s) = (f64::from(given.carrier.cos), f64::from(given.carrier.sin));
             let along = f64::from(noise) * f64::from(given.axis.cos);
             mixed[0].push(2.0 * along * c);
             mixed[1].push(2.0 * along * s);
-            if k % 10 == Q_AT && k > 50 {
+            if k % 10 == 0 && k > 50 {
                 // As of the last sample of the carrier period before.
-                let at = k - Q_AT - 1;
-                let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[at]);
-                let found = f64::from(state.seen.carrier_squared);
+                let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[k - 1]);
+                let found = f64::from(seen.carrier_squared);
                 assert!((found - (re * re + im * im)).abs() < 1e-5 * (1e-2 + found), "{k}");
             }
         }
@@ -273,12 +270,14 @@ mod tests {
 
     #[test]
     fn nothing_is_left_of_what_was_four_carrier_periods_ago() {
-        let (mut state, axis) = (SynchronousState::default(), Angle::ZERO);
+        let (mut demodulation, axis) = (InTurn::default(), Angle::ZERO);
         for (k, x) in [(0, f32::NAN), (7, f32::INFINITY), (100_007, 3.0), (100_015, -4e3)] {
-            state.step(&sample(AlphaBeta::new(x, -x), axis, k, x));
+            (demodulation.k, demodulation.i_q) = (k, x);
+            demodulation.step(&sample(AlphaBeta::new(x, -x), axis, k));
+            demodulation.i_q = 0.0;
             let mut rest = Saliency::default();
             for k in k + 1..k + 65 {
-                rest = state.step(&sample(AlphaBeta::ZERO, axis, k, 0.0));
+                rest = demodulation.step(&sample(AlphaBeta::ZERO, axis, k));
             }
             assert_eq!(rest, Saliency::default(), "{x}");
         }
@@ -288,8 +287,9 @@ mod tests {
     fn no_carrier_is_no_saliency_and_no_number_is_seen() {
         assert_eq!(steady(0.0, 0.0, 0.0).seen.q, 0.0);
         let mut state = SynchronousState::default();
-        state.step(&sample(AlphaBeta::new(f32::NAN, 0.0), Angle::ZERO, 7, 0.0));
-        let seen = (8..14).map(|k| state.step(&sample(AlphaBeta::ZERO, Angle::ZERO, k, 0.0)).q);
-        assert!(seen.last().is_some_and(f32::is_nan));
+        state.mix(&sample(AlphaBeta::new(f32::NAN, 0.0), Angle::ZERO, 7));
+        state.average();
+        state.see();
+        assert!(state.seen.q.is_nan());
     }
 }

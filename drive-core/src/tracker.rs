@@ -93,13 +93,14 @@ impl Pll {
         }
     }
 
-    /// What an angle error, rad, turns, with the schedule's share of the proportional part.
+    /// What an angle error, rad, turns, with the schedule's share of the proportional part, while the rotor
+    /// gets faster by `known` turns per period in each: the angle does not lag by that.
     #[inline]
-    pub fn push(&self, error: f32, share: f32) -> Push {
+    pub fn push(&self, error: f32, share: f32, known: f32) -> Push {
         let error = limited(error, LARGEST_ERROR);
         Push {
             angle: self.proportional * share * error,
-            speed: self.integral * error,
+            speed: self.integral * error + known,
             acceleration: self.jerk * error,
         }
     }

@@ -5,7 +5,7 @@ use core::f64::consts::{SQRT_2, TAU};
 
 use super::*;
 use crate::angle::Angle;
-use crate::synchronous::SynchronousState;
+use crate::synchronous::tests::InTurn;
 
 /// Gain (-0.490 dB) and phase of the band-pass at 600 Hz, and of the post-processing filter at dc.
 const BPF_GAIN: f64 = 0.9452;
@@ -43,10 +43,8 @@ impl Carried {
                 voltage,
                 cos: x.cos() as f32,
                 sin: x.sin() as f32,
-                index: k % 10,
                 ..CarrierPeriod::default()
             },
-            i_q: 0.0,
         }
     }
 
@@ -130,7 +128,7 @@ fn all_see_nothing_where_the_channels_are_alike() {
         c.steady(&mut Rectified::default()).0,
         c.steady(&mut Envelope::default()).0,
         c.steady(&mut RmsImpedance::new(20)).0 / 1000.0,
-        c.steady(&mut SynchronousState::default()).0,
+        c.steady(&mut InTurn::default()).0,
     ];
     for (n, x) in rest.into_iter().enumerate() {
         assert!(x.abs() < 2e-5, "{n}: {x}");
@@ -157,8 +155,8 @@ fn delays_are_those_of_the_filters() {
         ("rms 20", delay(RmsImpedance::new(20)), 8.83 + 9.5 + 24.46),
         ("rms 60", delay(RmsImpedance::new(60)), 8.83 + 29.5 + 24.46),
         ("envelope", delay(Envelope::default()), 8.83 + 1.0 + 4.5),
-        // 4.5 for being looked at once a carrier period, and 4 for being there in its fourth sample.
-        ("synchronous", delay(SynchronousState::default()), 19.0 + 4.5 + 4.0),
+        // 4.5 for being looked at once a carrier period, and 1 for being there in the first of the next.
+        ("synchronous", delay(InTurn::default()), 19.0 + 4.5 + 1.0),
     ];
     for (name, found, expected) in found {
         println!("{name}: {found:.2} samples, {expected:.2} expected");

@@ -145,7 +145,8 @@ impl Drive {
         }
         self.control = ControlState::default();
         self.control.references = self.no_torque(self.c.sequence.i_d);
-        self.control.axes = self.c.axes(0.0, self.c.injection_axis);
+        self.c.turn(&mut self.control.axes, 0.0, self.c.injection_axis);
+        self.c.sensing.start(&mut self.control.sensing);
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
         Ok(Taken::AsGiven)

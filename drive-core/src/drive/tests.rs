@@ -4,7 +4,8 @@
 use super::*;
 use crate::frames::Abc;
 
-use crate::io::{Command, Refused, Taken};
+use crate::angle::Angle;
+use crate::io::{Command, Hardware, Refused, Taken};
 use crate::sensing::Line;
 use crate::settings::{CurrentPlant, Settings};
 use proptest::prelude::*;

@@ -172,7 +172,8 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
     Some(Solution { step, information })
 }
 
-#[inline]
+// Not inlined: it is called twice.
+#[inline(never)]
 fn dot(a: &Column, b: &Column) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.re * b.re + a.im * b.im).sum()
 }

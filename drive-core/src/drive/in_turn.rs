@@ -1,0 +1,150 @@
+//! What is done once a carrier period, in turn: in each of its ten samples something else, so that no step
+//! takes much longer than another.
+
+use super::ControlState;
+use crate::angle::UnitVector;
+use crate::fault::Fault;
+use crate::frames::Dq;
+use crate::io::Sample;
+use crate::sensing::Measured;
+use crate::settings::{AngleSource, Coefficients};
+use crate::synchronous::REFERENCE_AT;
+
+/// What it sees of the step, beside the state.
+pub(super) struct Seen<'a> {
+    pub sample: &'a Sample,
+    pub measured: &'a Measured,
+    /// Current that makes flux and slip, A.
+    pub flux_current: Dq,
+    /// Filtered reference of the quadrature current, A.
+    pub i_q: f32,
+    /// Voltage without the carrier, V.
+    pub voltage: Dq,
+    /// The injection axis where it was when the carrier current flowed that is sampled now.
+    pub carrier_axis: UnitVector,
+    /// The flux when the filtered current flowed.
+    pub flux_axis: UnitVector,
+    /// How fast it turns, turns per period.
+    pub flux_step: f32,
+    /// Electrical speed of the rotor, turns per period.
+    pub rotor_step: f32,
+    /// Whether the flux is held still.
+    pub held: bool,
+    /// Whether the drive learns: then nothing is tracked, and what to compare with is not known yet.
+    pub learning: bool,
+}
+
+impl Coefficients {
+    /// What is due in sample `index` of the carrier period, which counts with or without a carrier.
+    #[inline(always)]
+    pub(super) fn in_turn(
+        &self,
+        s: &mut ControlState,
+        index: usize,
+        step: &Seen,
+    ) -> Result<(), Fault> {
+        match index {
+            0 => {
+                self.estimator.see(&mut s.estimator);
+                self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
+                if self.source == AngleSource::Injection {
+                    s.seen.rotor_count = s.count_by_flux();
+                }
+                self.listen(s, 0, step.sample)
+            }
+            1 => {
+                let acceleration = self.step_per_speed * s.motion.acceleration;
+                self.estimator.push(&mut s.estimator, acceleration);
+                s.prediction.take();
+                self.listen(s, 1, step.sample)
+            }
+            2 => {
+                self.expect(s, step);
+                self.listen(s, 2, step.sample)
+            }
+            3 => {
+                self.does_the_carrier_fit(s, step)?;
+                self.prediction.judge(&mut s.prediction, step.measured.current)
+            }
+            4 => self.is_the_flux_tracked(s, step),
+            REFERENCE_AT => {
+                s.estimator.synchronous.see_reference(step.i_q);
+                self.turn(&mut s.axes, step.flux_step, s.references.injection_axis);
+                Ok(())
+            }
+            6 => {
+                s.prediction.take();
+                self.do_both_sensors_see_the_carrier(s, step)
+            }
+            7 => {
+                self.expect(s, step);
+                self.listen(s, 3, step.sample)
+            }
+            8 => {
+                if step.rotor_step.abs() > self.protection.rotor_step {
+                    return Err(Fault::OverSpeed);
+                }
+                self.prediction.judge(&mut s.prediction, step.measured.current)?;
+                self.listen(s, 4, step.sample)
+            }
+            _ => {
+                s.estimator.synchronous.average();
+                self.listen(s, 5, step.sample)
+            }
+        }
+    }
+
+    /// For the noise of the sensors.
+    #[inline(always)]
+    fn listen(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
+        match &self.noise_watch {
+            Some(watch) => watch.step(&mut s.noise, look, sample),
+            None => Ok(()),
+        }
+    }
+
+    /// What the current will be compared with.
+    #[inline]
+    fn expect(&self, s: &mut ControlState, step: &Seen) {
+        let rotor = (s.indirect.magnetising, step.rotor_step);
+        self.prediction.expect(&mut s.prediction, rotor, (step.flux_axis, step.flux_step));
+    }
+
+    #[inline]
+    fn is_the_flux_tracked(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+        match &self.lock_monitor {
+            Some(monitor)
+                if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
+            {
+                let seen = s.estimator.synchronous.seen;
+                monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, step.held)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    #[inline]
+    fn do_both_sensors_see_the_carrier(
+        &self,
+        s: &mut ControlState,
+        step: &Seen,
+    ) -> Result<(), Fault> {
+        if !self.inject {
+            return Ok(());
+        }
+        let amplitude = s.carrier.share * self.injection.current_amplitude;
+        let current = s.estimator.synchronous.carrier_current();
+        s.carrier_watch.step(current, step.carrier_axis, amplitude)
+    }
+
+    /// Beside the fundamental.
+    #[inline]
+    fn does_the_carrier_fit(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+        if !self.inject {
+            return Ok(());
+        }
+        let largest = self.modulator.circle(step.measured.dc_link);
+        let fit = s.carrier.fit(&self.injection, step.voltage, largest);
+        fit.map_err(|_| Fault::CarrierNoRoom)
+    }
+}

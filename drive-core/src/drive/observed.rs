@@ -1,0 +1,84 @@
+//! What the drive shows of a step.
+
+use super::Drive;
+use crate::angle::Angle;
+use crate::frames::{AlphaBeta, Dq};
+
+/// What the drive saw and did in the last step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Telemetry {
+    /// Estimated rotor-flux angle at the sample.
+    pub phi: Angle,
+    /// How fast it turns, electrical turns per period.
+    pub flux_step: f32,
+    /// Electrical speed of the rotor, turns per period.
+    pub rotor_step: f32,
+    /// Filtered current reference, A.
+    pub reference: Dq,
+    /// Filtered current in the estimated flux frame, A.
+    pub current: Dq,
+    /// Wanted voltage without the carrier, V.
+    pub voltage: Dq,
+    /// Measured current in the stator frame, A: nothing filtered, the carrier's part in it.
+    pub measured: AlphaBeta,
+    /// Voltage of the period that begins with the next sample, limited, dead-time compensation not
+    /// counted, V.
+    pub realised: AlphaBeta,
+    /// Current difference that any but the synchronous demodulation sees, A.
+    pub delta_i: f32,
+    /// Saliency that the synchronous demodulation sees.
+    pub saliency: f32,
+    /// Square of the carrier current along the injection axis, A^2.
+    pub carrier_squared: f32,
+    /// Share of the carrier that is put out: below 1 where the fundamental leaves too little voltage.
+    pub carrier_share: f32,
+    /// Share of the flux-fixed saliency that the lock monitor misses; 1 is a flux that is gone.
+    pub saliency_loss: f32,
+    /// Dc-link voltage, V.
+    pub dc_link: f32,
+    /// Voltage per phase that the power stage drops beyond its dead time, as measured at the start, V.
+    pub inverter_drop: f32,
+    /// Position in mechanical turns from the start; without the encoder it drifts, see
+    /// [`motion`](crate::motion).
+    pub turns: f32,
+}
+
+/// What of a step stands nowhere else in the state; see [`Telemetry`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Observed {
+    pub phi: Angle,
+    pub flux_step: f32,
+    pub reference: Dq,
+    pub current: Dq,
+    pub voltage: Dq,
+    pub measured: AlphaBeta,
+    pub realised: AlphaBeta,
+    pub dc_link: f32,
+    pub rotor_count: u32,
+}
+
+impl Drive {
+    /// What it saw and did in the last step.
+    #[inline]
+    pub fn telemetry(&self) -> Telemetry {
+        let (t, s) = (&self.control.seen, &self.control);
+        Telemetry {
+            phi: t.phi,
+            flux_step: t.flux_step,
+            rotor_step: if self.counts() { s.indirect.rotor_step } else { s.estimator.rotor_step },
+            reference: t.reference,
+            current: t.current,
+            voltage: t.voltage,
+            measured: t.measured,
+            realised: t.realised,
+            delta_i: s.estimator.delta_i,
+            saliency: s.estimator.saliency().q,
+            carrier_squared: s.estimator.saliency().carrier_squared,
+            carrier_share: s.carrier.share,
+            saliency_loss: s.lock.loss,
+            dc_link: t.dc_link,
+            inverter_drop: s.inverter_drop.volts,
+            turns: self.c.motion.turns(&s.motion, t.rotor_count),
+        }
+    }
+}

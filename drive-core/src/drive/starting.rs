@@ -1,0 +1,119 @@
+//! From off to regulating: offsets, bootstraps, wiring, flux, saliency, lock.
+
+use super::Drive;
+use crate::fault::Fault;
+use crate::frames::Dq;
+use crate::io::{Compare, Mode, Sample};
+use crate::saliency_check::{Phase, SaliencyCheck};
+use crate::sensing::Measured;
+use crate::settings::AngleSource;
+use crate::state::State;
+use crate::wiring_check::{Next, WiringCheckState};
+
+impl Drive {
+    /// A step without current control: off, in fault, or on the way to it.
+    #[inline(never)]
+    pub(super) fn prepare(&mut self, sample: &Sample) -> Result<Compare, State> {
+        if matches!(self.state, State::Off | State::Fault(_)) {
+            return Ok(Compare::OFF);
+        }
+        let measured = self.c.sensing.step(&self.control.sensing, sample);
+        self.c.protect(&self.control.sensing, sample, &measured)?;
+        Ok(match self.state {
+            State::Calibrating => self.calibrate(sample)?,
+            State::Precharge => self.precharge(sample),
+            _ => self.check_wiring(sample, &measured)?,
+        })
+    }
+
+    fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
+        if self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
+            self.enter(State::Precharge);
+        }
+        Ok(Compare::OFF)
+    }
+
+    fn precharge(&mut self, sample: &Sample) -> Compare {
+        if self.elapsed >= self.c.sequence.precharge {
+            if self.wiring_unchecked {
+                self.wiring = WiringCheckState::default();
+                self.enter(State::CheckingWiring);
+            } else {
+                self.magnetising_from_here(sample);
+            }
+        }
+        Compare::LOW_SIDES_ON
+    }
+
+    /// Short voltage pulses, without control.
+    fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
+        Ok(match self.c.wiring.step(&mut self.wiring, measured.phases)? {
+            Next::Apply(voltage, flowing) => {
+                let signs = self.c.dead_time.signs(flowing.to_abc());
+                let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
+                // (Which is there already; `step` would be written out again.)
+                let modulated = self.c.modulator.limited(voltage, compensation, measured.dc_link);
+                Compare::on(modulated.compare)
+            }
+            Next::Passed => {
+                self.wiring_unchecked = false;
+                self.magnetising_from_here(sample);
+                Compare::LOW_SIDES_ON
+            }
+        })
+    }
+
+    fn magnetising_from_here(&mut self, sample: &Sample) {
+        let s = &mut self.control;
+        s.seen.rotor_count = match self.c.source {
+            AngleSource::Encoder => sample.encoder,
+            AngleSource::Injection => s.count_by_flux(),
+        };
+        self.c.motion.start(&mut s.motion, s.seen.rotor_count);
+        self.enter(State::Magnetising);
+    }
+
+    /// The current while the flux is built up, and while the saliency is checked, A.
+    pub(super) fn magnetise(&mut self) -> Result<Dq, Fault> {
+        let s = &mut self.control;
+        let r = &mut s.references;
+        let level = self.c.inverter_drop.level(self.elapsed);
+        let magnetising = Dq { d: level * r.current.d, q: 0.0 };
+        let phase =
+            match (self.elapsed.checked_sub(self.c.sequence.magnetise), self.c.saliency_check) {
+                (None, _) => return Ok(magnetising),
+                (Some(_), None) => Phase::Passed,
+                (Some(n), Some(check)) => {
+                    check.step(&mut s.saliency_check, n, s.estimator.saliency().q)
+                }
+            };
+        match phase {
+            Phase::Look => {
+                r.injection_axis = SaliencyCheck::LOOK_AXIS;
+                return Ok(Dq::ZERO);
+            }
+            Phase::Restore => {
+                s.lock.share = s.saliency_check.share;
+                r.injection_axis = self.c.injection_axis;
+            }
+            Phase::Passed => {
+                let watched = self.c.lock_monitor.is_some() && self.mode != Mode::Learning;
+                self.enter(if watched { State::Verifying } else { State::of_mode(self.mode) });
+            }
+            Phase::Failed => return Err(Fault::NoSaliency),
+        }
+        Ok(magnetising)
+    }
+
+    /// The current while the lock is verified, A: the axis is tracked for a while without torque.
+    pub(super) fn verify(&mut self) -> Result<Dq, Fault> {
+        if self.elapsed >= self.c.sequence.verify {
+            let step = self.control.estimator.rotor_step;
+            if self.c.lock_monitor.is_some_and(|monitor| !monitor.stands(step)) {
+                return Err(Fault::LostLock);
+            }
+            self.enter(State::of_mode(self.mode));
+        }
+        Ok(Dq { d: self.control.references.current.d, q: 0.0 })
+    }
+}
