@@ -178,13 +178,12 @@ impl Running {
         let since_top = pwm.since_top();
         let since_last = began.wrapping_sub(core::mem::replace(&mut self.began, began));
         // (The first has waited for the interrupt to be let run.)
-        if self.periods > 0 {
-            if !timer.updated
+        if self.periods > 0
+            && (!timer.updated
                 || since_top > u32::from(board::PWM_TOP)
-                || since_last > 3 * u32::from(board::PWM_TOP)
-            {
-                self.late = Hardware::DEADLINE_MISS;
-            }
+                || since_last > 3 * u32::from(board::PWM_TOP))
+        {
+            self.late = Hardware::DEADLINE_MISS;
         }
         let mut hardware = self.late.and(self.over);
         self.over = Hardware::NONE;
