@@ -8,7 +8,7 @@
 
 use std::hint::black_box;
 
-use drive_core::rls::{Rls, RlsSettings};
+use drive_core::identify::rls::{Rls, RlsSettings};
 use drive_core::{AlphaBeta, Command, Drive, Mode, Sample};
 use gungraun::{library_benchmark, library_benchmark_group, main};
 use hil_sim::Config;

@@ -14,16 +14,17 @@ pub mod line;
 
 use core::fmt::{self, Write};
 
-use drive_core::decimal::{Fixed, Shortest};
-use drive_core::learning::Learned;
-use drive_core::settings::{PERIOD_S, Scales, SettingsError};
+use drive_core::identify::learning::Learned;
+use drive_core::io::PERIOD_S;
+use drive_core::math::decimal::{Fixed, Shortest};
+use drive_core::settings::{Scales, SettingsError};
 use drive_core::{Coefficients, Mode, Refused, State, Taken};
 
 use crate::board::CYCLES_PER_US;
+use crate::link::trace::{self, Choice};
 use crate::link::{Order, Status};
-use crate::saved::Failed;
-use crate::trace::{self, Choice};
-use crate::tracking::Report;
+use crate::rotor_tracking::Report;
+use crate::store::Failed;
 use grammar::{HELP, Level, Request};
 use keys::{Everything, KEYS, Value};
 use line::{Garbled, Lines, Text};

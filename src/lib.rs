@@ -1,4 +1,4 @@
-//! What of the firmware touches no register: tested on a host, fuzzed there, and linked into the image.
+//! The hardware-independent part of the firmware: tested and fuzzed on a host, and linked into the image.
 //!
 //! Start reading at `main.rs`.
 #![cfg_attr(not(test), no_std)]
@@ -8,11 +8,6 @@
 pub mod board;
 pub mod console;
 pub mod link;
-pub mod mailbox;
-pub mod memory_check;
-pub mod record;
-pub mod ring;
-pub mod saved;
-pub mod trace;
-pub mod tracking;
-pub mod watchdog;
+pub mod monitor;
+pub mod rotor_tracking;
+pub mod store;

@@ -1,5 +1,9 @@
 //! What goes between the main loop and the control interrupt.
 
+pub mod mailbox;
+pub mod ring;
+pub mod trace;
+
 use drive_core::{Coefficients, Command, Hardware, Mode, Refused, Sample, State, Taken, Telemetry};
 
 /// From the main loop to the drive.

@@ -3,39 +3,25 @@
 //! What runs when:
 //!
 //! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, converters, the
-//!   drive (`bring_up.rs`).
-//! * the control interrupt (`control.rs`), 6000 times a second, before all others: samples in,
+//!   drive (`task/bring_up.rs`).
+//! * the control interrupt (`task/control.rs`), 6000 times a second, before all others: samples in,
 //!   `Drive::step`, compare values out, then one order from the console if there is one.
-//! * the interrupt of the serial port (`serial.rs`): a byte in, a byte out.
+//! * the interrupt of the serial port (`chip/serial.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console, the log ten times a second, the
-//!   rotor time constant where it is tracked (`desk.rs`), and the check of the control's memory
-//!   (`memory_check.rs`).
-//! * `stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
-//! * the watchdog (`watchdog.rs`), when the loop or the control interrupt does not come round.
+//!   rotor time constant where it is tracked (`task/desk.rs`), and the check of the control's memory
+//!   (`monitor/memory_check.rs`).
+//! * `chip/stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
+//! * the watchdog (`monitor/watchdog.rs`), when the loop or the control interrupt does not come round.
 //!
 //! The drive starts off; `start` at the console is what switches the outputs on.
 //!
 //! On a host this is a program that says how to flash.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-mod adc;
-mod bring_up;
-mod clocks;
-mod control;
-mod desk;
-mod encoder;
-mod flash;
-mod memory;
-mod over_voltage;
-mod pwm;
-mod serial;
-mod stop;
-
-// What touches no register is a library, which a host tests.
 #[cfg(target_os = "none")]
-use induction_drive::{
-    board, console, link, mailbox, memory_check, record, ring, saved, trace, tracking, watchdog,
-};
+mod chip;
+#[cfg(target_os = "none")]
+mod task;
 
 /// See the top of this file.
 #[cfg(target_os = "none")]
@@ -43,10 +29,10 @@ use induction_drive::{
 fn main() -> ! {
     use defmt_rtt as _; // the log goes to the debug probe
 
-    memory::paint_stack();
-    defmt::info!("induction-drive {}", desk::VERSION);
-    let bring_up::Board { settings, mut port, mut desk } = bring_up::bring_up();
-    let mut console = console::Console::new(settings);
+    chip::memory::paint_stack();
+    defmt::info!("induction-drive {}", task::desk::VERSION);
+    let task::bring_up::Board { settings, mut port, mut desk } = task::bring_up::bring_up();
+    let mut console = induction_drive::console::Console::new(settings);
     console.greet(&desk);
 
     loop {

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
-use drive_core::settings::{SettingsError, Tracking};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::settings::SettingsError;
 use drive_core::{Command, Settings};
 use hil_sim::config::{Config, Demodulator, LoadMode};
 use hil_sim::learn;
@@ -138,7 +139,7 @@ fn all_but_the_literal_chain_track() {
 fn lengths_out_of_range_are_refused() {
     for samples in [0, 1, 61, 255] {
         let mut settings = Settings::default();
-        settings.injection.demodulator = Tracking::RmsImpedance;
+        settings.injection.demodulator = DemodulatorKind::RmsImpedance;
         settings.injection.printed.rms_samples = samples;
         let error = settings.build().unwrap_err();
         assert!(

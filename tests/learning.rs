@@ -3,8 +3,8 @@
 mod common;
 
 use common::{all, config, run};
-use drive_core::learning::Learned;
-use drive_core::schedule::ReferenceTable;
+use drive_core::identify::learning::Learned;
+use drive_core::settings::table::ReferenceTable;
 use drive_core::{Command, Fault, Mode, State};
 use hil_sim::learn;
 use hil_sim::plant::Load;

@@ -6,7 +6,8 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::config;
-use drive_core::online::{Doubt, LIMITS, Online, Speed};
+use drive_core::flux::indirect::LIMITS;
+use drive_core::identify::online::{Doubt, Online, Speed};
 use drive_core::{AlphaBeta, Command, Dq, Mode, Refused, Settings, Taken};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};

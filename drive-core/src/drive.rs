@@ -1,44 +1,49 @@
 //! The whole drive: one step per PWM period.
 
 mod axes;
+mod coefficients;
+mod command;
 mod commands;
 mod in_turn;
 mod learn;
 mod observed;
 mod protect;
 mod starting;
+mod state;
 #[cfg(test)]
 mod tests;
 
 use core::mem::offset_of;
 use core::ops::Range;
 
-use crate::angle::UnitVector;
-use crate::demodulator::CarrierSample;
-use crate::estimator::EstimatorState;
+use crate::carrier::CarrierSample;
+use crate::carrier::injection::{Carrier, CarrierPeriod};
+use crate::current::inverter_drop::InverterDropState;
+use crate::current::pi::{DqPiState, ReferenceState};
+use crate::current::sensing::SensingState;
 use crate::fault::Fault;
-use crate::filters::{LPF, LpfState};
-use crate::frames::{AlphaBeta, Dq};
-use crate::indirect::IndirectState;
-use crate::injection::{Carrier, CarrierPeriod};
-use crate::inverter_drop::InverterDropState;
-use crate::io::{Compare, Mode, Sample};
-use crate::learning::{Learned, LearningState};
-use crate::lock_monitor::LockMonitorState;
+use crate::filter::dissertation::{LPF, LpfState};
+use crate::flux::estimator::EstimatorState;
+use crate::flux::indirect::IndirectState;
+use crate::identify::learning::{Learned, LearningState};
+use crate::io::{Compare, Sample};
+use crate::math::angle::UnitVector;
+use crate::math::frames::{AlphaBeta, Dq};
 use crate::motion::{Goal, MotionState, RotorCount};
-use crate::noise_watch::NoiseWatchState;
-use crate::pi::{DqPiState, ReferenceState};
-use crate::plausibility::{CarrierWatch, PredictionState};
-use crate::saliency_check::SaliencyCheckState;
-use crate::sensing::SensingState;
-use crate::settings::{AngleSource, Coefficients};
-use crate::state::State;
-use crate::wiring_check::WiringCheckState;
+use crate::protect::lock_monitor::LockMonitorState;
+use crate::protect::noise_watch::NoiseWatchState;
+use crate::protect::plausibility::{CarrierWatch, PredictionState};
+use crate::protect::saliency_check::SaliencyCheckState;
+use crate::protect::wiring_check::WiringCheckState;
+use crate::settings::AngleSource;
 
 use axes::Axes;
+pub use coefficients::Coefficients;
+pub use command::{Command, Refused, Taken};
 use in_turn::Seen;
 use observed::Observed;
 pub use observed::Telemetry;
+pub use state::{Mode, State};
 
 /// The drive: coefficients, state, and the references it was given.
 ///
@@ -153,7 +158,7 @@ impl Drive {
         self.state
     }
 
-    /// Whether [`online`](crate::online) is to be given what the last step saw.
+    /// Whether [`online`](crate::identify::online) is to be given what the last step saw.
     #[inline]
     pub fn tracks_rotor(&self) -> bool {
         self.c.track_rotor && self.state.regulates()

@@ -10,7 +10,8 @@
 //! * a voltage takes effect one period after the sample it was computed from, and
 //! * its mean acts at `(k + 1.5) T`.
 
-use crate::decimal::Shortest;
+/// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
+pub const PERIOD_S: f32 = 1.0 / 6000.0;
 
 /// What the converters and the encoder read at the instant `k T` of one PWM period.
 ///
@@ -91,114 +92,3 @@ impl Compare {
         Self { a, b, c, enabled: true }
     }
 }
-
-/// What the drive is to regulate once it runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Torque, by the current on the quadrature axis.
-    Torque,
-    /// Speed of the rotor; see [`motion`](crate::motion).
-    Speed,
-    /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
-    Position,
-    /// Identification of the motor. Not available yet: refused.
-    Commissioning,
-    /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::learning`]), then
-    /// stops.
-    Learning,
-}
-
-/// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command<'a> {
-    /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
-    /// angle comes from the injection, then regulate as `Mode` says.
-    Start(Mode),
-    /// While regulating with the injection: no torque, magnetise again, verify that the flux is
-    /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
-    Relock,
-    /// From off: the next start checks the wiring first; see [`crate::wiring_check`].
-    CheckWiring,
-    /// Take the torque to zero, then switch off.
-    Stop,
-    /// Forget the latched fault and be off.
-    Clear,
-    /// Reference of the quadrature-axis current, A peak; limited to the machine's limits.
-    Torque(f32),
-    /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
-    Speed(f32),
-    /// Reference of the position, mechanical turns from where the drive was started; limited to
-    /// what is counted.
-    Position(f32),
-    /// Reference of the direct-axis (magnetising) current, A peak.
-    Magnetising(f32),
-    /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i
-    /// over the angle (Figure 19). Only with the encoder as angle source; a start takes it back.
-    TurnInjection(f32),
-    /// A voltage in the flux frame, V, added to that of the current loop from the next period on: to
-    /// identify the plant of the loop. Up to 60 V a component; a start takes it back.
-    TestVoltage(crate::Dq),
-    /// Rotor time constant, s, as [`online`](crate::online) finds it: what the slip is computed with.
-    /// Only with [`track_rotor`](crate::Settings::track_rotor); within
-    /// [`LIMITS`](crate::online::LIMITS), and approached by no more than 2 % with each command.
-    RotorTimeConstant(f32),
-    /// Replace all settings. Only while off or in fault.
-    Configure(&'a crate::Coefficients),
-}
-
-/// How a command was taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Taken {
-    /// As it was given.
-    AsGiven,
-    /// Limited to what the machine can bear: the value that holds now.
-    Limited(f32),
-}
-
-/// Why a command was refused; nothing has changed then.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refused {
-    /// The value is not a number or infinite.
-    NotFinite,
-    /// Not in this state.
-    State(crate::State),
-    /// This mode is not available.
-    ModeNotAvailable(Mode),
-    /// The encoder is needed for this mode and the settings name another angle source.
-    NeedsEncoder,
-    /// The injection is needed as angle source; to learn, with a demodulation that tracks.
-    NeedsInjection,
-    /// The settings do not want the rotor time constant tracked.
-    RotorNotTracked,
-    /// A fault is latched; clear it first.
-    Fault(crate::Fault),
-    /// The value is outside the allowed range.
-    OutOfRange {
-        /// Smallest allowed value.
-        min: f32,
-        /// Largest allowed value.
-        max: f32,
-    },
-}
-
-impl core::fmt::Display for Refused {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::NotFinite => write!(f, "the value is not a finite number"),
-            Self::State(state) => write!(f, "not possible while the drive is {state}"),
-            Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
-            Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
-            Self::NeedsInjection => {
-                write!(f, "this needs the injection, demodulated by a way that tracks")
-            }
-            Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
-            Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
-            Self::OutOfRange { min, max } => {
-                let (min, max) = (Shortest(*min), Shortest(*max));
-                write!(f, "the value is outside the allowed range {min} to {max}")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Refused {}

@@ -27,44 +27,23 @@
 //! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]
 
-pub mod angle;
-pub mod dead_time;
-pub mod demodulator;
+pub mod carrier;
+pub mod current;
 mod drive;
-pub mod estimator;
 pub mod fault;
-pub mod filters;
-pub mod frames;
-pub mod indirect;
-pub mod injection;
-pub mod inverter_drop;
+pub mod filter;
+pub mod flux;
+pub mod identify;
 pub mod io;
-pub mod learning;
-pub mod lock_monitor;
-pub mod modulation;
+pub mod math;
 pub mod motion;
-pub mod moving_sum;
-pub mod noise_watch;
-pub mod online;
-pub mod pi;
-pub mod plausibility;
-pub mod rls;
-pub mod saliency_check;
-pub mod schedule;
-pub mod sensing;
+pub mod protect;
 pub mod settings;
-pub mod sos;
-pub mod state;
-pub mod synchronous;
-pub mod tracker;
 pub mod tuning;
-pub mod wiring_check;
 
-pub use angle::{Angle, UnitVector};
-pub use drive::{Drive, Telemetry};
-pub use drive_design::decimal;
+pub use drive::{Coefficients, Command, Drive, Mode, Refused, State, Taken, Telemetry};
 pub use fault::Fault;
-pub use frames::{Abc, AlphaBeta, DmQm, Dq};
-pub use io::{Command, Compare, Hardware, Mode, Refused, Sample, Taken};
-pub use settings::{Coefficients, Settings};
-pub use state::State;
+pub use io::{Compare, Hardware, Sample};
+pub use math::angle::{Angle, UnitVector};
+pub use math::frames::{Abc, AlphaBeta, DmQm, Dq};
+pub use settings::Settings;

@@ -25,15 +25,18 @@
 //! The acceleration that is asked for is fed to the tracking loop, too: it would lag by the
 //! acceleration over the square of its natural frequency.
 
-use crate::angle::Angle;
-use crate::pi::{Pi, PiState};
-use crate::settings::LARGEST_POSITION;
+use crate::current::pi::{Pi, PiState};
+use crate::math::angle::Angle;
+use crate::math::limited;
 use crate::tuning::MotionDesign;
 
 /// Control periods per step of the loops: 100 Hz.
 pub const DIVIDER: u8 = 60;
 /// Counts per electrical turn of the rotor angle without the encoder.
 pub const COUNTS_PER_TURN: u32 = 1 << 16;
+
+/// Largest position reference, turns: an f32 still resolves 0.02° there.
+pub const LARGEST_POSITION: f32 = 1000.0;
 
 /// Coefficients of the loops. Speeds in mechanical turns/s, positions in mechanical turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,18 +181,6 @@ impl RotorCount {
         let moved = now.wrapping_sub(self.count as u16) as i16;
         self.count = self.count.wrapping_add_signed(i32::from(moved));
         self.count
-    }
-}
-
-/// `value` within ±`largest`.
-#[inline]
-pub(crate) fn limited(value: f32, largest: f32) -> f32 {
-    if value > largest {
-        largest
-    } else if value < -largest {
-        -largest
-    } else {
-        value
     }
 }
 

@@ -5,21 +5,17 @@
 //! dissertation.
 
 mod check;
-mod coefficients;
-pub mod learned;
+mod learned;
+pub mod table;
 
 use core::fmt;
 
-use crate::decimal::Shortest;
-use crate::lock_monitor::CarrierTable;
-use crate::schedule::ReferenceTable;
-use crate::sensing::Line;
+use crate::carrier::DemodulatorKind;
+use crate::current::sensing::Line;
+use crate::math::decimal::Shortest;
 use crate::tuning::{FirstOrder, TuningError};
 
-pub use coefficients::Coefficients;
-
-/// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
-pub const PERIOD_S: f32 = 1.0 / 6000.0;
+use table::{CarrierTable, ReferenceTable};
 
 /// The motor: T-equivalent circuit per phase (Figure 21), star, SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,22 +162,6 @@ impl Default for CurrentPlant {
     }
 }
 
-/// How the carrier is demodulated and the angle tracked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tracking {
-    /// The chain of the dissertation as printed; see [`crate::demodulator::Literal`]. It cannot track.
-    Literal,
-    /// The same with a rectifier; see [`crate::demodulator::Rectified`].
-    Rectified,
-    /// Ha and Sul, with the carrier along the flux; see [`crate::demodulator::RmsImpedance`].
-    RmsImpedance,
-    /// Difference of envelopes; see [`crate::demodulator::Envelope`].
-    Envelope,
-    /// Synchronous demodulation with a learned reference; see [`crate::synchronous`].
-    #[default]
-    Synchronous,
-}
-
 /// The loop of sections 3.4 and 3.11: behind all demodulations but the synchronous one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrintedChain {
@@ -198,7 +178,7 @@ pub struct PrintedChain {
     /// Reference of the current difference over the torque current, A, learned with the shaft locked;
     /// takes the place of the constant one.
     pub learned: Option<ReferenceTable>,
-    /// Length of the rms filters of [`Tracking::RmsImpedance`], samples.
+    /// Length of the rms filters of [`DemodulatorKind::RmsImpedance`], samples.
     pub rms_samples: u8,
 }
 
@@ -228,10 +208,10 @@ pub struct SynchronousTracking {
     pub current_saliency: f32,
     /// Reference of the saliency over the torque current, learned with the shaft locked.
     pub reference: ReferenceTable,
-    /// Whether a start checks that the motor has the saliency (see [`crate::saliency_check`]). Without
+    /// Whether a start checks that the motor has the saliency (see [`crate::protect::saliency_check`]). Without
     /// it a start trusts that it has, and that the shaft stands still.
     pub check: bool,
-    /// Whether the lock is verified at a start and watched (see [`crate::lock_monitor`]).
+    /// Whether the lock is verified at a start and watched (see [`crate::protect::lock_monitor`]).
     pub monitor: bool,
     /// Carrier current over the torque current, learned with the shaft locked; for the monitor.
     pub carrier: CarrierTable,
@@ -267,7 +247,7 @@ pub struct InjectionSettings {
     /// Amplitude of the injected voltage, V peak; 0 for none.
     pub amplitude_v: f32,
     /// What is made of the carrier current.
-    pub demodulator: Tracking,
+    pub demodulator: DemodulatorKind,
     /// Settings of the chain of the dissertation.
     pub printed: PrintedChain,
     /// Settings of the synchronous demodulation.
@@ -281,7 +261,7 @@ impl Default for InjectionSettings {
     fn default() -> Self {
         Self {
             amplitude_v: 50.0,
-            demodulator: Tracking::default(),
+            demodulator: DemodulatorKind::default(),
             printed: PrintedChain::default(),
             synchronous: SynchronousTracking::default(),
             beside_encoder: false,
@@ -388,7 +368,7 @@ pub struct Settings {
     /// dissertation does, to show what they cost: with the encoder 4.7° at 1440 rpm, with the
     /// injection some 9° at standstill already (the flux slips) and 35° at 150 rpm.
     pub ignore_delays: bool,
-    /// Whether the drive takes the rotor time constant that [`online`](crate::online) finds.
+    /// Whether the drive takes the rotor time constant that [`online`](crate::identify::online) finds.
     pub track_rotor: bool,
     /// The injection.
     pub injection: InjectionSettings,
@@ -437,6 +417,3 @@ impl From<TuningError> for SettingsError {
         Self::Tuning(error)
     }
 }
-
-/// Largest position reference, turns: an f32 still resolves 0.02° there.
-pub const LARGEST_POSITION: f32 = 1000.0;

@@ -1,7 +1,7 @@
 //! The PI controller against Appendix B and section 3.8.
 
 use drive_core::Dq;
-use drive_core::pi::{DqPi, DqPiState, Pi, PiState, ReferenceFilter, ReferenceState};
+use drive_core::current::pi::{DqPi, DqPiState, Pi, PiState, ReferenceFilter, ReferenceState};
 use proptest::prelude::*;
 
 /// Figure 40: an integrator y += sat(u, 0.15) under K_c = 0.25, z_c = 0.1, unit step.

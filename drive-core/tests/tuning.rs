@@ -2,8 +2,10 @@
 
 use core::f64::consts::{PI, TAU};
 
-use drive_core::filters::{LPF, LPF_AS_PRINTED};
-use drive_core::sos::{Complex, Section, SosState};
+use drive_core::filter::dissertation::{LPF, LPF_AS_PRINTED};
+use drive_core::filter::section::Section;
+use drive_core::filter::sos::SosState;
+use drive_core::math::complex::Complex;
 use drive_core::tuning::{
     DELAY, FirstOrder, IntegratorLag, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, Motor, TuningError,
     current_loop_margins, design_current_loop, design_motion_loops, motor_plant, pi_response,

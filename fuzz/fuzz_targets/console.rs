@@ -4,7 +4,7 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use drive_core::learning::Learned;
+use drive_core::identify::learning::Learned;
 use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
 use induction_drive::console::doubles::{Desk, Wire, found};

@@ -1,7 +1,7 @@
 //! The drive learns on its motor, with the shaft locked.
 
-use drive_core::learning::Learned;
-use drive_core::schedule::ReferenceTable;
+use drive_core::identify::learning::Learned;
+use drive_core::settings::table::ReferenceTable;
 use drive_core::{Command, Mode, State};
 
 use crate::config::{Config, Demodulator, LoadMode};

@@ -19,10 +19,11 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::filters::{LPF, LpfState};
-use drive_core::frames::AlphaBeta;
-use drive_core::schedule::Schedule;
-use drive_core::settings::{Coefficients, PERIOD_S};
+use drive_core::Coefficients;
+use drive_core::filter::dissertation::{LPF, LpfState};
+use drive_core::flux::schedule::Schedule;
+use drive_core::io::PERIOD_S;
+use drive_core::math::frames::AlphaBeta;
 use drive_core::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign};
 use drive_core::{Settings, motion};
 
@@ -201,7 +202,7 @@ impl MovingAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_core::schedule::ReferenceTable;
+    use drive_core::settings::table::ReferenceTable;
 
     fn linear(i_q: f64, settings: &Settings) -> Linear {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());

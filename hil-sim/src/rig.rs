@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::settings::{self, PERIOD_S, PrintedChain, SynchronousTracking, Tracking};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::io::PERIOD_S;
+use drive_core::settings::{self, PrintedChain, SynchronousTracking};
 use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State, Taken};
 
 use crate::config::{self, Config};
@@ -275,7 +277,7 @@ pub fn drive_settings(config: &Config) -> Settings {
     let (believed, base) = (config.believed_motor(), Settings::default());
     let measurement = plant_settings(config).measurement;
     let [line_a, line_b] = measurement.calibration();
-    let line = |l: CalibrationLine| drive_core::sensing::Line {
+    let line = |l: CalibrationLine| drive_core::current::sensing::Line {
         gain: l.a_per_code as f32,
         offset: l.a_at_zero as f32,
     };
@@ -310,11 +312,11 @@ pub fn drive_settings(config: &Config) -> Settings {
         injection: settings::InjectionSettings {
             amplitude_v: config.injection.amplitude_v as f32,
             demodulator: match config.injection.demodulator {
-                config::Demodulator::Literal => Tracking::Literal,
-                config::Demodulator::Rectified => Tracking::Rectified,
-                config::Demodulator::RmsImpedance => Tracking::RmsImpedance,
-                config::Demodulator::Envelope => Tracking::Envelope,
-                config::Demodulator::Synchronous => Tracking::Synchronous,
+                config::Demodulator::Literal => DemodulatorKind::Literal,
+                config::Demodulator::Rectified => DemodulatorKind::Rectified,
+                config::Demodulator::RmsImpedance => DemodulatorKind::RmsImpedance,
+                config::Demodulator::Envelope => DemodulatorKind::Envelope,
+                config::Demodulator::Synchronous => DemodulatorKind::Synchronous,
             },
             printed: PrintedChain {
                 reference_a: config.injection.reference_a as f32,

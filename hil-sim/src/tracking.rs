@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::online::{Doubt, Online, SAMPLE_S, Speed, Tracked};
+use drive_core::identify::online::{Doubt, Online, SAMPLE_S, Speed, Tracked};
 use drive_core::{Command, Mode};
 
 use crate::config::{AngleSource, Config};

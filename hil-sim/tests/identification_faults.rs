@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use drive_core::rls::{Rls, RlsError, RlsSettings};
+use drive_core::identify::rls::{Rls, RlsError, RlsSettings};
 use hil_sim::identification::signals::noise;
 use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Parameters, Signal, Trial};

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use drive_core::rls::{Complex32, Rls, RlsSettings};
+use drive_core::identify::rls::{Complex32, Rls, RlsSettings};
 use hil_sim::identification::models::model_c;
 use hil_sim::identification::recursive::{Plain, Reference};
 use hil_sim::identification::signals::{Filter, noise};

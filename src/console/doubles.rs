@@ -6,19 +6,19 @@ use std::collections::VecDeque;
 use std::string::String;
 use std::vec::Vec;
 
-use drive_core::learning::{Fitted, Learned};
-use drive_core::lock_monitor::CarrierTable;
-use drive_core::schedule::ReferenceTable;
+use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::settings::SettingsError;
+use drive_core::settings::table::CarrierTable;
+use drive_core::settings::table::ReferenceTable;
 use drive_core::{Coefficients, Drive, Hardware, Sample, State, Taken};
 
 use super::grammar::{LONGEST_TRACE, Level};
 use super::keys::Everything;
 use super::{Machine, NotDone, Port};
+use crate::link::trace::{self, Choice};
 use crate::link::{Order, Status};
-use crate::saved::Failed;
-use crate::trace::{self, Choice};
-use crate::tracking::{Report, Tracking};
+use crate::rotor_tracking::{Report, Tracking};
+use crate::store::Failed;
 
 /// A drive on the desk.
 pub struct Desk {

@@ -5,7 +5,7 @@ use core::{fmt, str};
 use drive_core::Mode;
 use drive_core::settings::AngleSource;
 
-use crate::trace::{self, Choice};
+use crate::link::trace::{self, Choice};
 
 use super::keys::{self, Key, NotTaken};
 

@@ -5,9 +5,10 @@
 use core::fmt;
 
 use drive_core::Settings;
-use drive_core::decimal::Shortest;
-use drive_core::learning::Learned;
-use drive_core::settings::{AngleSource, CurrentPlant, SettingsError, Tracking, learned};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::identify::learning::Learned;
+use drive_core::math::decimal::Shortest;
+use drive_core::settings::{AngleSource, CurrentPlant, SettingsError};
 
 use super::grammar::number;
 
@@ -44,7 +45,7 @@ impl Everything {
     /// What a learning has found holds from now on, if it was accepted.
     pub fn learn(&mut self, found: &Learned) {
         if found.accepted {
-            self.learned = Some(learned::together(self.learned.as_ref(), found));
+            self.learned = Some(found.on_top_of(self.learned.as_ref()));
         }
     }
 
@@ -273,11 +274,11 @@ pub static KEYS: [Key; 54] = [
     yes_or_no!("track_rotor", drive.track_rotor),
     number!("injection.amplitude_v", "V", drive.injection.amplitude_v),
     word!("injection.demodulator", |s| s.drive.injection.demodulator,
-        "literal" = Tracking::Literal => Tracking::Literal,
-        "rectified" = Tracking::Rectified => Tracking::Rectified,
-        "synchronous" = Tracking::Synchronous => Tracking::Synchronous,
-        "rms-impedance" = Tracking::RmsImpedance => Tracking::RmsImpedance,
-        "envelope" = Tracking::Envelope => Tracking::Envelope),
+        "literal" = DemodulatorKind::Literal => DemodulatorKind::Literal,
+        "rectified" = DemodulatorKind::Rectified => DemodulatorKind::Rectified,
+        "synchronous" = DemodulatorKind::Synchronous => DemodulatorKind::Synchronous,
+        "rms-impedance" = DemodulatorKind::RmsImpedance => DemodulatorKind::RmsImpedance,
+        "envelope" = DemodulatorKind::Envelope => DemodulatorKind::Envelope),
     number!("injection.reference_a", "A", drive.injection.printed.reference_a),
     number!("injection.full_reference_iq_a", "A", drive.injection.printed.full_reference_iq_a),
     number!("injection.k_s", "rad/A", drive.injection.printed.k_s),

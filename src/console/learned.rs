@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use drive_core::decimal::Fixed;
-use drive_core::learning::{Fitted, Learned};
-use drive_core::schedule::STEP_A;
+use drive_core::identify::learning::{Fitted, Learned};
+use drive_core::math::decimal::Fixed;
+use drive_core::settings::table::STEP_A;
 
 /// A line of the list.
 pub enum Line<'a> {

@@ -1,4 +1,4 @@
-use drive_core::online::Doubt;
+use drive_core::identify::online::Doubt;
 use drive_core::{Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 

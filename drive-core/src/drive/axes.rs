@@ -2,9 +2,9 @@
 
 use core::f32::consts::TAU;
 
-use crate::angle::UnitVector;
-use crate::filters::lpf_lag_samples;
-use crate::settings::Coefficients;
+use crate::drive::coefficients::Coefficients;
+use crate::filter::dissertation::lpf_lag_samples;
+use crate::math::angle::UnitVector;
 
 /// What turns slowly against the flux, as unit vectors seen from where it is at the sample; new once a
 /// carrier period.

@@ -2,13 +2,14 @@
 
 use super::{ControlState, Drive, References};
 
-use crate::angle::Angle;
-use crate::frames::Dq;
-use crate::io::{Command, Mode, Refused, Taken};
-use crate::lock_monitor::LockMonitorState;
-use crate::motion::limited;
-use crate::settings::{AngleSource, Coefficients};
-use crate::state::State;
+use crate::drive::coefficients::Coefficients;
+use crate::drive::command::{Command, Refused, Taken};
+use crate::drive::state::{Mode, State};
+use crate::math::angle::Angle;
+use crate::math::frames::Dq;
+use crate::math::limited;
+use crate::protect::lock_monitor::LockMonitorState;
+use crate::settings::AngleSource;
 
 /// Largest test voltage of an axis, V: a step of it moves the current by 0.2 A a period.
 const LARGEST_TEST_V: f32 = 60.0;

@@ -2,13 +2,14 @@
 //! takes much longer than another.
 
 use super::ControlState;
-use crate::angle::UnitVector;
+use crate::carrier::synchronous::REFERENCE_AT;
+use crate::current::sensing::Measured;
+use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
-use crate::frames::Dq;
 use crate::io::Sample;
-use crate::sensing::Measured;
-use crate::settings::{AngleSource, Coefficients};
-use crate::synchronous::REFERENCE_AT;
+use crate::math::angle::UnitVector;
+use crate::math::frames::Dq;
+use crate::settings::AngleSource;
 
 /// What it sees of the step, beside the state.
 pub(super) struct Seen<'a> {

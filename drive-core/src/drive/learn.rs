@@ -1,12 +1,13 @@
 //! Learning with the shaft locked, as a state of the drive.
 
 use super::Drive;
-use crate::angle::Angle;
-use crate::estimator::AngleLoop;
+use crate::carrier::DemodulatorKind;
+use crate::drive::coefficients::Coefficients;
+use crate::drive::state::State;
 use crate::fault::Fault;
-use crate::learning::{Learned, Next};
-use crate::settings::{Coefficients, Tracking};
-use crate::state::State;
+use crate::flux::estimator::AngleLoop;
+use crate::identify::learning::{Learned, Next};
+use crate::math::angle::Angle;
 
 impl Drive {
     /// What the last learning found, used or not; none before the end of the first.
@@ -21,7 +22,7 @@ impl Drive {
     }
 
     pub(super) fn can_learn(&self) -> bool {
-        let literal = self.c.estimator.demodulator == Tracking::Literal;
+        let literal = self.c.estimator.demodulator == DemodulatorKind::Literal;
         self.c.inject && self.c.demodulate && !literal
     }
 
@@ -60,7 +61,8 @@ impl Coefficients {
         if !learned.accepted {
             return;
         }
-        self.estimator.take(learned);
+        let b = learned.current_saliency;
+        self.estimator.take(&learned.reference, b.accepted.then_some(b.value));
         if let (Some(monitor), Some(carrier)) = (&mut self.lock_monitor, &learned.carrier) {
             monitor.take(carrier);
         }

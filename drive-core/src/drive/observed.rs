@@ -1,8 +1,8 @@
 //! What the drive shows of a step.
 
 use super::Drive;
-use crate::angle::Angle;
-use crate::frames::{AlphaBeta, Dq};
+use crate::math::angle::Angle;
+use crate::math::frames::{AlphaBeta, Dq};
 
 /// What the drive saw and did in the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,10 +1,10 @@
 //! What must hold in every step.
 
 use super::Drive;
+use crate::current::sensing::{Measured, SensingState};
+use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Sample};
-use crate::sensing::{Measured, SensingState};
-use crate::settings::Coefficients;
 
 impl Coefficients {
     /// What must hold in every period with the outputs on or about to be.

@@ -1,14 +1,14 @@
 //! From off to regulating: offsets, bootstraps, wiring, flux, saliency, lock.
 
 use super::Drive;
+use crate::current::sensing::Measured;
+use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
-use crate::frames::Dq;
-use crate::io::{Compare, Mode, Sample};
-use crate::saliency_check::{Phase, SaliencyCheck};
-use crate::sensing::Measured;
+use crate::io::{Compare, Sample};
+use crate::math::frames::Dq;
+use crate::protect::saliency_check::{Phase, SaliencyCheck};
+use crate::protect::wiring_check::{Next, WiringCheckState};
 use crate::settings::AngleSource;
-use crate::state::State;
-use crate::wiring_check::{Next, WiringCheckState};
 
 impl Drive {
     /// A step without current control: off, in fault, or on the way to it.

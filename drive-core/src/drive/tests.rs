@@ -2,11 +2,11 @@
 //! is tested with the simulator.
 
 use super::*;
-use crate::frames::Abc;
+use crate::math::frames::Abc;
 
-use crate::angle::Angle;
-use crate::io::{Command, Hardware, Refused, Taken};
-use crate::sensing::Line;
+use crate::current::sensing::Line;
+use crate::io::Hardware;
+use crate::math::angle::Angle;
 use crate::settings::{CurrentPlant, Settings};
 use proptest::prelude::*;
 

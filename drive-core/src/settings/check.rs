@@ -1,7 +1,9 @@
 //! The range of every setting.
 
-use super::{AngleSource, PERIOD_S, Settings, SettingsError, Tracking};
-use crate::demodulator::{LONGEST, SHORTEST};
+use super::{AngleSource, Settings, SettingsError};
+use crate::carrier::DemodulatorKind;
+use crate::carrier::demodulator::{LONGEST, SHORTEST};
+use crate::io::PERIOD_S;
 
 /// The first value outside its range.
 #[derive(Default)]
@@ -21,7 +23,7 @@ impl Ranges {
 
 impl Settings {
     /// Every value against its range.
-    pub(super) fn check(&self) -> Result<(), SettingsError> {
+    pub(crate) fn check(&self) -> Result<(), SettingsError> {
         let mut ranges = Ranges::default();
         let mut check = |name, value, min, max| ranges.check(name, value, min, max);
         let m = &self.motor;
@@ -52,7 +54,7 @@ impl Settings {
         let inj = &self.injection;
         // Without a carrier there is nothing to watch the lock by.
         let watched = self.angle_source == AngleSource::Injection
-            && inj.demodulator == Tracking::Synchronous
+            && inj.demodulator == DemodulatorKind::Synchronous
             && inj.synchronous.monitor;
         let least = if watched { 1.0 } else { 0.0 };
         check("injection.amplitude_v", inj.amplitude_v, least, 150.0);

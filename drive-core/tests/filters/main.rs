@@ -7,7 +7,7 @@ mod states;
 
 use core::f64::consts::{PI, TAU};
 
-use drive_core::sos::Complex;
+use drive_core::math::complex::Complex;
 
 const RATE: f64 = 6000.0;
 

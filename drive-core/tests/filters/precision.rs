@@ -2,8 +2,9 @@
 
 use core::f64::consts::TAU;
 
-use drive_core::filters::{BPF, LPF_AS_PRINTED, PP};
-use drive_core::sos::{Section, Sos, SosState};
+use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
+use drive_core::filter::section::Section;
+use drive_core::filter::sos::{Sos, SosState};
 
 use super::printed::{Direct32, Direct64, Printed, TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
 use super::{RATE, largest_distance, rad};

@@ -2,8 +2,10 @@
 
 use core::f64::consts::PI;
 
-use drive_core::filters::{BPF, LPF, LPF_AS_PRINTED, PP, lpf_lag_samples};
-use drive_core::sos::{Complex, Section, Sos, SosState, response};
+use drive_core::filter::dissertation::{BPF, LPF, LPF_AS_PRINTED, PP, lpf_lag_samples};
+use drive_core::filter::section::{Section, response};
+use drive_core::filter::sos::{Sos, SosState};
+use drive_core::math::complex::Complex;
 
 use super::printed::{TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
 use super::{largest_distance, rad};

@@ -1,8 +1,8 @@
 //! States: what a filter remembers is linear, bounded, and forgotten.
 
 use drive_core::AlphaBeta;
-use drive_core::filters::{BPF, LPF, PP};
-use drive_core::sos::{AlphaBetaState, Sos, SosState};
+use drive_core::filter::dissertation::{BPF, LPF, PP};
+use drive_core::filter::sos::{AlphaBetaState, Sos, SosState};
 use proptest::prelude::*;
 
 proptest! {

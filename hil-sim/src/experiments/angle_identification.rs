@@ -117,7 +117,7 @@ fn metrics(outcome: &mut Outcome, subject: &Subject, points: &[Point]) {
     }
 }
 
-fn complex(pole: drive_core::sos::Complex) -> String {
+fn complex(pole: drive_core::math::complex::Complex) -> String {
     format!("{:.4} {} j{:.4}", pole.re, if pole.im < 0.0 { '-' } else { '+' }, pole.im.abs())
 }
 
@@ -319,7 +319,7 @@ fn bode_figure(subject: &Subject, points: &[Point]) -> Figure {
         .collect();
     let responses: Vec<_> =
         models.iter().map(|(name, model)| (name.as_str(), |w: f64| model.response(w))).collect();
-    let as_functions: Vec<(&str, &dyn Fn(f64) -> drive_core::sos::Complex)> =
+    let as_functions: Vec<(&str, &dyn Fn(f64) -> drive_core::math::complex::Complex)> =
         responses.iter().map(|(name, response)| (*name, response as _)).collect();
     let (gain, phase) = bode.panels(&as_functions);
     let title = format!("{}: identified, gain in {} per rad", subject.name, subject.unit);

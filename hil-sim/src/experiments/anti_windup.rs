@@ -1,7 +1,7 @@
 //! What anti-windup is for, on the example of Appendix B.
 
-use drive_core::pi::{Pi, PiState};
-use drive_core::sos::Complex;
+use drive_core::current::pi::{Pi, PiState};
+use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
 use super::{Context, Experiment};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::sos::Complex;
+use drive_core::math::complex::Complex;
 
 use crate::outcome::{Panel, Series};
 

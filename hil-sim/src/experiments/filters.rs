@@ -4,8 +4,8 @@ mod direct;
 mod precision;
 mod subject;
 
-use drive_core::filters::LPF;
-use drive_core::sos::Complex;
+use drive_core::filter::dissertation::LPF;
+use drive_core::math::complex::Complex;
 
 use super::bode::{Bode, RATE, frequencies, omega_t};
 use super::{Context, Experiment};

@@ -1,7 +1,7 @@
 //! The drive learns what its angle tracking compares with.
 
-use drive_core::learning::Fitted;
-use drive_core::schedule::STEP_A;
+use drive_core::identify::learning::Fitted;
+use drive_core::settings::table::STEP_A;
 
 use super::torque::assumptions;
 use super::{Context, Experiment};

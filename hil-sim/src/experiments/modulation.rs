@@ -4,8 +4,9 @@ mod carrier;
 
 use std::f64::consts::TAU;
 
-use drive_core::modulation::Modulator;
-use drive_core::settings::{self, PERIOD_S};
+use drive_core::current::modulation::Modulator;
+use drive_core::io::PERIOD_S;
+use drive_core::settings;
 use drive_core::{Abc, AlphaBeta};
 
 use super::{Context, Experiment};

@@ -3,8 +3,8 @@
 
 mod differences;
 
-use drive_core::filters::LPF;
-use drive_core::sos::Complex;
+use drive_core::filter::dissertation::LPF;
+use drive_core::math::complex::Complex;
 use drive_core::tuning::{
     CurrentLoopDesign, DELAY, FirstOrder, Motor, Rule, TuningError, design_current_loop,
     motor_plant, pi_response, rule_3_8,

@@ -1,7 +1,7 @@
 //! The plants of the current loop, identified through the drive's own loop, and the controllers that
 //! follow from them.
 
-use drive_core::filters::{LPF, LpfState};
+use drive_core::filter::dissertation::{LPF, LpfState};
 use drive_core::tuning::{FirstOrder, Motor, design_current_loop, motor_plant, rule_3_8};
 use drive_core::{AlphaBeta, Command, Dq, Mode};
 

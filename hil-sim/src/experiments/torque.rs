@@ -1,7 +1,7 @@
 //! The torque experiments of section 4.2: steps (Figure 38) and ramp (Figure 39) of the current on
 //! the quadrature axis, shaft locked, without a position sensor.
 
-use drive_core::injection::CARRIER_SAMPLES;
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State, Taken};
 
 use crate::config::{Config, Demodulator};

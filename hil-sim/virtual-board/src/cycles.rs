@@ -20,34 +20,48 @@ use crate::pair::Pair;
 
 /// Blocks, and the paths of functions that belong to them; the first that fits counts.
 const BLOCKS: [(&str, &[&str]); 10] = [
-    ("sensing", &["drive_core::sensing", "induction_drive::adc", "induction_drive::encoder"]),
-    ("protection", &["Drive>::protect", "drive_core::plausibility", "drive_core::lock_monitor"]),
-    ("injection", &["drive_core::injection", "drive_core::saliency_check"]),
-    ("tracker", &["drive_core::tracker"]),
+    (
+        "sensing",
+        &[
+            "drive_core::current::sensing",
+            "induction_drive::chip::adc",
+            "induction_drive::chip::encoder",
+        ],
+    ),
+    (
+        "protection",
+        &[
+            "Drive>::protect",
+            "drive_core::protect::plausibility",
+            "drive_core::protect::lock_monitor",
+        ],
+    ),
+    ("injection", &["drive_core::carrier::injection", "drive_core::protect::saliency_check"]),
+    ("tracker", &["drive_core::flux::tracker"]),
     (
         "estimator",
         &[
-            "drive_core::estimator",
-            "drive_core::synchronous",
-            "drive_core::demodulator",
-            "drive_core::schedule",
-            "drive_core::indirect",
+            "drive_core::flux::estimator",
+            "drive_core::carrier::synchronous",
+            "drive_core::carrier::demodulator",
+            "drive_core::flux::schedule",
+            "drive_core::flux::indirect",
             "drive_core::position",
         ],
     ),
-    ("current loop", &["drive_core::pi"]),
-    ("modulation", &["drive_core::modulation", "drive_core::dead_time"]),
+    ("current loop", &["drive_core::current::pi"]),
+    ("modulation", &["drive_core::current::modulation", "drive_core::current::dead_time"]),
     (
         "frames, filters",
         &[
-            "drive_core::frames",
-            "drive_core::filters",
-            "drive_core::sos",
-            "drive_core::angle",
+            "drive_core::math::frames",
+            "drive_core::filter::dissertation",
+            "drive_core::filter::sos",
+            "drive_core::math::angle",
             "idsp::",
         ],
     ),
-    ("identification", &["drive_core::online", "drive_core::rls"]),
+    ("identification", &["drive_core::identify::online", "drive_core::identify::rls"]),
     ("sequence", &["drive_core::drive", "drive_core::motion"]),
 ];
 /// What belongs to none: the timer.

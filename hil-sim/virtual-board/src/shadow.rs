@@ -10,7 +10,7 @@ use crate::bench::Period;
 use crate::console::grammar::{self, Request};
 use crate::console::keys::Everything;
 use crate::link::Order;
-use crate::tracking::{Seen, Tracking};
+use crate::rotor_tracking::{Seen, Tracking};
 
 /// A drive with the settings of the board.
 pub struct Shadow {

@@ -1,6 +1,6 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use drive_core::sos::Complex;
+use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
 use super::measure::Record;

@@ -1,7 +1,7 @@
 //! The demodulations that are compared, and the drives that use them.
 
 use drive_core::Settings;
-use drive_core::schedule::ReferenceTable;
+use drive_core::settings::table::ReferenceTable;
 
 use crate::config::{Config, Demodulator};
 use crate::error::Error;

@@ -1,6 +1,6 @@
 //! What the drive makes of it without a position sensor.
 
-use drive_core::injection::CARRIER_SAMPLES;
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, Settings, State};
 
 use super::super::steady::{Case, SteadyRun, steady_run_of};

@@ -1,7 +1,7 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 #![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
-use drive_core::sos::Complex;
+use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
 /// Table 7: numerator, denominator.

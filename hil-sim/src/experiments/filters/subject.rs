@@ -1,7 +1,8 @@
 //! The filters, each in the forms that are compared.
 
-use drive_core::filters::{BPF, LPF_AS_PRINTED, PP};
-use drive_core::sos::{Complex, Sos, SosState};
+use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
+use drive_core::filter::sos::{Sos, SosState};
+use drive_core::math::complex::Complex;
 
 use super::direct;
 use crate::stats::Stats;

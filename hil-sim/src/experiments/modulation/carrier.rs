@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::filters::BPF;
-use drive_core::sos::SosState;
+use drive_core::filter::dissertation::BPF;
+use drive_core::filter::sos::SosState;
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;

@@ -5,7 +5,7 @@ use drive_core::State;
 use hil_sim::Config;
 use hil_sim::plant::Load;
 use induction_drive::console::keys::Everything;
-use induction_drive::saved::{Failed, Flash, Loaded, Saved};
+use induction_drive::store::{Failed, Flash, Loaded, Saved};
 
 use crate::bench::snapshot::Snapshot;
 use crate::bench::{Board, Options};

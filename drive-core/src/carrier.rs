@@ -1,0 +1,10 @@
+//! The injected carrier: its voltage, and the demodulation of its current.
+
+pub mod demodulator;
+pub mod injection;
+mod kind;
+mod sample;
+pub mod synchronous;
+
+pub use kind::DemodulatorKind;
+pub use sample::{CarrierCurrent, CarrierSample, Saliency};

@@ -1,0 +1,231 @@
+//! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
+//! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
+
+use crate::math::complex::Complex;
+use crate::math::frames::Dq;
+use crate::tuning::FirstOrder;
+
+/// Samples per period of the carrier.
+pub const CARRIER_SAMPLES: usize = 10;
+
+/// `cos(2 pi k / 10)`.
+pub const CARRIER_COS: [f32; CARRIER_SAMPLES] = [
+    1.0, 0.809_017, 0.309_017, -0.309_017, -0.809_017, -1.0, -0.809_017, -0.309_017, 0.309_017,
+    0.809_017,
+];
+
+/// `sin(2 pi k / 10)`.
+pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
+    0.0,
+    0.587_785_24,
+    0.951_056_5,
+    0.951_056_5,
+    0.587_785_24,
+    0.0,
+    -0.587_785_24,
+    -0.951_056_5,
+    -0.951_056_5,
+    -0.587_785_24,
+];
+
+/// Coefficients of the injection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Injection {
+    periods: [CarrierPeriod; CARRIER_SAMPLES],
+    /// Amplitude of the voltage, V.
+    amplitude: f32,
+    /// Amplitude of the sampled current, A.
+    pub current_amplitude: f32,
+}
+
+impl Injection {
+    /// For an amplitude in V, the current response of the motor, A/V, sampled at ten times the carrier
+    /// frequency, and the time constant of the analog filter in samples.
+    #[inline]
+    pub fn new(amplitude_v: f32, plant: FirstOrder, analog: f32) -> Self {
+        // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
+        // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of
+        // the samples at both ends, to 0.1 %.
+        let one = Complex { re: 1.0, im: 0.0 };
+        let turn = Complex { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
+        let response = Complex { re: plant.k, im: 0.0 } / (turn - one * plant.p);
+        let mean = response * (one + turn) * 0.5;
+        // What is computed in step k acts from the sample k + 1 on: at sample k the response is that
+        // of period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
+        let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
+        let sampled = response / (turn * Complex { re: 1.0, im: w * f64::from(analog) });
+        let single = |z: Complex| (z.re as f32, z.im as f32);
+        let ((s_re, s_im), (m_re, m_im)) = (single(sampled), single(mean));
+        let mut periods = [CarrierPeriod::default(); CARRIER_SAMPLES];
+        // (By a length that the compiler does not know: else it writes this out ten times.)
+        for (index, period) in core::hint::black_box(periods.as_mut_slice()).iter_mut().enumerate()
+        {
+            let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
+            *period = CarrierPeriod {
+                voltage: amplitude_v * cos,
+                mean_current: amplitude_v * (m_re * cos - m_im * sin),
+                sampled: amplitude_v * (s_re * cos - s_im * sin),
+                cos,
+                sin,
+            };
+        }
+        Self {
+            amplitude: amplitude_v,
+            periods,
+            current_amplitude: response.abs() as f32 * amplitude_v,
+        }
+    }
+}
+
+/// Where in its period the carrier is, and how much of it is put out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carrier {
+    index: usize,
+    /// Share of the amplitude that is put out: 1 unless the fundamental leaves less.
+    pub share: f32,
+    /// 1 over its square.
+    pub per_share_squared: f32,
+    /// Carrier periods since the share changed.
+    unchanged: u8,
+}
+
+impl Default for Carrier {
+    /// At its beginning, all of it.
+    fn default() -> Self {
+        Self { index: 0, share: 1.0, per_share_squared: 1.0, unchanged: u8::MAX }
+    }
+}
+
+/// There is too little voltage left for the carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoRoom;
+
+/// By how much the share of the carrier goes down in a carrier period, and up again: quickly, since a
+/// voltage that does not fit is shortened, which turns the carrier; slowly back.
+const SHARE_DOWN: f32 = 1.0 / 16.0;
+const SHARE_UP: f32 = 1.0 / 64.0;
+/// Room that must be there beyond the next step up, as a share: without it the share would hunt.
+const SHARE_MARGIN: f32 = 0.125;
+/// Least share: noise makes twice the angle error there.
+const LEAST_SHARE: f32 = 0.5;
+/// Carrier periods until the demodulation has forgotten a change: 40 samples.
+const FORGOTTEN: u8 = 4;
+
+/// The carrier during one PWM period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CarrierPeriod {
+    /// Voltage along the injection axis, V.
+    pub voltage: f32,
+    /// Mean current expected from it along the injection axis, A.
+    pub mean_current: f32,
+    /// Current expected from it in the sample from which this period is computed, A.
+    pub sampled: f32,
+    /// Cosine of its phase.
+    pub cos: f32,
+    /// Sine of its phase.
+    pub sin: f32,
+}
+
+impl Carrier {
+    /// Fits the carrier, once a carrier period, into what the `fundamental` voltage, V, leaves of the
+    /// `largest` vector that can be put out in every direction, V.
+    ///
+    /// # Errors
+    /// [`NoRoom`] when less than half of it fits.
+    pub fn fit(
+        &mut self,
+        injection: &Injection,
+        fundamental: Dq,
+        largest: f32,
+    ) -> Result<(), NoRoom> {
+        let at_most_all = |share: f32| if share < 1.0 { share } else { 1.0 };
+        let used = fundamental.length_squared();
+        let fits = |share: f32| {
+            let room = largest - share * injection.amplitude;
+            room > 0.0 && used <= room * room
+        };
+        let share = if !fits(self.share) {
+            self.share - SHARE_DOWN
+        } else if self.share < 1.0 && fits(at_most_all(self.share + SHARE_MARGIN)) {
+            at_most_all(self.share + SHARE_UP)
+        } else {
+            self.share
+        };
+        if share == self.share {
+            self.unchanged = self.unchanged.saturating_add(1);
+        } else {
+            self.unchanged = 0;
+            (self.share, self.per_share_squared) = (share, 1.0 / (share * share));
+        }
+        if share < LEAST_SHARE { Err(NoRoom) } else { Ok(()) }
+    }
+
+    /// Whether what is demodulated is of the present share throughout.
+    pub fn is_settled(&self) -> bool {
+        self.unchanged > FORGOTTEN
+    }
+
+    /// Goes on to the next PWM period: its number in the carrier period, 0 to 9, which counts with or
+    /// without a carrier.
+    #[inline]
+    pub fn advance(&mut self) -> usize {
+        // Below ten by construction: this is for a flipped bit.
+        let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
+        self.index = index + 1;
+        index
+    }
+
+    /// The carrier in PWM period `index`.
+    #[inline]
+    pub fn at(&self, injection: &Injection, index: usize) -> CarrierPeriod {
+        let full = &injection.periods[if index < CARRIER_SAMPLES { index } else { 0 }];
+        CarrierPeriod {
+            voltage: self.share * full.voltage,
+            mean_current: self.share * full.mean_current,
+            sampled: self.share * full.sampled,
+            ..*full
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+
+    #[test]
+    fn the_tables_are_ten_samples_of_a_turn() {
+        for k in 0..CARRIER_SAMPLES {
+            let x = core::f64::consts::TAU * k as f64 / 10.0;
+            assert!((f64::from(CARRIER_COS[k]) - x.cos()).abs() < 6e-8);
+            assert!((f64::from(CARRIER_SIN[k]) - x.sin()).abs() < 6e-8);
+        }
+    }
+
+    #[test]
+    fn expected_current_is_the_simulated_one() {
+        // Motor of Table 5 (R' = 6.22 ohm, sigma L_s = 51.5 mH), 50 V: 0.26 A (notes: 50 / 194).
+        let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
+        let injection = Injection::new(50.0, plant, 0.0);
+        let mut carrier = Carrier::default();
+        let (mut i, mut peak) = (0.0_f64, 0.0_f64);
+        for n in 0..6000 {
+            let index = carrier.advance();
+            let now = carrier.at(&injection, index);
+            // `i` is the current at the start of the period in which the voltage acts, one sample
+            // after the one it was computed from.
+            let next = plant.p * i + plant.k * f64::from(now.voltage);
+            if n > 5000 {
+                assert!((0.5 * (i + next) - f64::from(now.mean_current)).abs() < 1e-5);
+                let one_later = injection.periods[(index + 1) % CARRIER_SAMPLES].sampled;
+                assert!((i - f64::from(one_later)).abs() < 1e-5);
+                peak = peak.max(next.abs());
+            }
+            i = next;
+        }
+        // Ten samples a period reach the peak to within 5 %.
+        let ratio = peak / f64::from(injection.current_amplitude);
+        assert!((0.95..=1.0001).contains(&ratio), "{ratio}");
+        assert!((injection.current_amplitude - 0.26).abs() < 0.01);
+    }
+}

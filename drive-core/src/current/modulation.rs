@@ -1,0 +1,248 @@
+//! Space-vector modulation (section 2.2, Table 2, Figures 4 and 5).
+//!
+//! The symmetric sequence O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the
+//! two zero vectors is what comes out when the middle between the highest and the lowest phase
+//! voltage is put at half the dc link: no sectors, no tables. A test compares it with the on-times
+//! of Table 2.
+
+use crate::math::frames::{Abc, AlphaBeta, SQRT_3};
+
+/// Pulses shorter than the dead time plus this much are dropped or extended, s.
+const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
+
+/// Coefficients of the modulator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Modulator {
+    /// Compare value of a high side that is on throughout.
+    top: f32,
+    /// Shortest pulse that is put out, in counts.
+    shortest: f32,
+    /// Share of the dc link that is left when the dead-time compensation has taken its part.
+    usable: f32,
+}
+
+/// The result for one period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Modulated {
+    /// Compare values of a, b, c.
+    pub compare: [u16; 3],
+    /// The mean voltage at the motor, V peak: what was asked for, limited to the hexagon, and
+    /// without the pulses that were dropped or extended. Rounding to counts (11 mV at 311 V) is not
+    /// in it: a controller fed with that would stall on increments below half a count.
+    pub realised: AlphaBeta,
+    /// Whether that is anything but what was asked for.
+    pub limited: bool,
+}
+
+impl Modulator {
+    /// For a timer that counts to `top`, a period and a dead time in s.
+    ///
+    /// `compensated`: whether a dead-time compensation is going to be added, which takes twice its
+    /// amplitude from the dc link.
+    #[inline]
+    pub fn new(top: u16, period_s: f32, dead_time_s: f32, compensated: bool) -> Self {
+        let ratio = dead_time_s / period_s;
+        Self {
+            top: f32::from(top),
+            shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / period_s) * f32::from(top),
+            usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
+        }
+    }
+
+    /// The largest vector that can be put out in every direction at a dc link of `v_dc`, V peak: the
+    /// circle inside the hexagon.
+    pub fn circle(&self, v_dc: f32) -> f32 {
+        self.usable * v_dc * (1.0 / SQRT_3)
+    }
+
+    /// Compare values for a `wanted` mean voltage, V peak, and a `compensation` of the dead time that
+    /// the power stage takes off again, V per phase, at a dc link of `v_dc` > 0, V.
+    ///
+    /// A voltage outside the hexagon is shortened without turning its angle.
+    #[inline]
+    pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
+        let leg = wanted.to_abc() + compensation;
+        let per_volt = self.top / v_dc;
+        let (low, high) = extremes(leg);
+        // Shortest pulses fit in above and below: nothing to limit. Not-a-number fails the test.
+        if (high - low) * per_volt <= self.top - 2.0 * self.shortest {
+            let [a, b, c] = self.centred(leg, low + high, per_volt);
+            let compare = [rounded(a), rounded(b), rounded(c)];
+            return Modulated { compare, realised: wanted, limited: false };
+        }
+        let Modulated { compare, realised, limited } = self.limited(wanted, compensation, v_dc);
+        Modulated { compare, realised, limited }
+    }
+
+    /// The same without the short cut for what needs no limiting.
+    #[inline(always)]
+    pub(crate) fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
+        let Abc { a, b, c } = compensation;
+        self.limited_by_parts(wanted, a, b, c, v_dc)
+    }
+
+    // By parts: they come in registers, and need not be stored where nothing is limited.
+    #[inline(never)]
+    fn limited_by_parts(&self, wanted: AlphaBeta, a: f32, b: f32, c: f32, v_dc: f32) -> Modulated {
+        let compensation = Abc { a, b, c };
+        let mut motor = wanted.to_abc();
+        let (low, high) = extremes(motor);
+        let (span, usable) = (high - low, self.usable * v_dc);
+        if span > usable {
+            motor = motor * (usable / span);
+        }
+        let leg = motor + compensation;
+        let (low, high) = extremes(leg);
+        let counts = self.centred(leg, low + high, self.top / v_dc).map(|c| self.drop_or_extend(c));
+        let volts = v_dc / self.top;
+        let [a, b, c] = counts;
+        let realised = (Abc::new(a, b, c) * volts - compensation).to_alpha_beta();
+        Modulated { compare: counts.map(rounded), realised, limited: true }
+    }
+
+    /// Counts of the legs, V, with `ends`, the sum of the lowest and the highest of them, at half the
+    /// dc link.
+    #[inline]
+    fn centred(&self, leg: Abc, ends: f32, per_volt: f32) -> [f32; 3] {
+        let centre = 0.5 * (self.top - ends * per_volt);
+        [centre + leg.a * per_volt, centre + leg.b * per_volt, centre + leg.c * per_volt]
+    }
+
+    /// Moves a pulse of either switch that is too short to the nearer of none and the shortest.
+    #[inline(never)]
+    fn drop_or_extend(&self, count: f32) -> f32 {
+        let from_top = self.top - count;
+        if count < self.shortest {
+            if count < 0.5 * self.shortest { 0.0 } else { self.shortest }
+        } else if from_top < self.shortest {
+            if from_top < 0.5 * self.shortest { self.top } else { self.top - self.shortest }
+        } else {
+            count
+        }
+    }
+}
+
+/// The nearest whole count of a count from 0 to `top`; 0 for not-a-number.
+fn rounded(count: f32) -> u16 {
+    // By way of u32: that cast is one instruction of the core, the saturating one to u16 is twelve.
+    (count + 0.5) as u32 as u16
+}
+
+fn extremes(v: Abc) -> (f32, f32) {
+    let (low, high) = if v.a < v.b { (v.a, v.b) } else { (v.b, v.a) };
+    (if v.c < low { v.c } else { low }, if v.c > high { v.c } else { high })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use core::f64::consts::PI;
+    use proptest::prelude::*;
+
+    const TOP: u16 = 14_167;
+    const V_DC: f32 = 311.0;
+    const PERIOD: f32 = 1.0 / 6000.0;
+    /// Half a count, as a phase voltage, plus what f32 loses.
+    const COUNT_V: f64 = 311.0 / 14_167.0;
+
+    fn modulator() -> Modulator {
+        Modulator::new(TOP, PERIOD, 2.2e-6, false)
+    }
+
+    fn polar(length: f64, angle: f64) -> AlphaBeta {
+        AlphaBeta::new((length * angle.cos()) as f32, (length * angle.sin()) as f32)
+    }
+
+    /// Mean voltage that the compare values put out, V peak.
+    fn mean(compare: [u16; 3]) -> AlphaBeta {
+        let [a, b, c] = compare.map(|c| f32::from(c) / f32::from(TOP) * V_DC);
+        Abc::new(a, b, c).to_alpha_beta()
+    }
+
+    /// On-times of the two neighbouring vectors from Table 2, in f64 and by sectors.
+    fn table_2(length: f64, angle: f64) -> [f64; 3] {
+        let sector = (angle / (PI / 3.0)).floor();
+        let within = angle - sector * PI / 3.0;
+        let m = 3f64.sqrt() * length / f64::from(V_DC);
+        let (t1, t2) = (m * (PI / 3.0 - within).sin(), m * within.sin());
+        let t0 = 1.0 - t1 - t2;
+        // U_0, U_60, … of Table 2 as legs abc
+        let vectors = [[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]];
+        let (u1, u2) = (vectors[sector as usize % 6], vectors[(sector as usize + 1) % 6]);
+        core::array::from_fn(|leg| 0.5 * t0 + t1 * f64::from(u1[leg]) + t2 * f64::from(u2[leg]))
+    }
+
+    #[test]
+    fn the_on_times_are_those_of_table_2() {
+        for degrees in 0..360 {
+            let angle = (f64::from(degrees) + 0.5).to_radians();
+            for length in [1.0, 50.0, 120.0, 170.0] {
+                let ours = modulator().step(polar(length, angle), Abc::ZERO, V_DC).compare;
+                for (count, duty) in ours.iter().zip(table_2(length, angle)) {
+                    let difference = f64::from(*count) - duty * f64::from(TOP);
+                    assert!(difference.abs() < 0.6, "{length} V at {degrees}: {difference}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn compensation_does_not_cost_the_wanted_voltage() {
+        // With the part for the compensation kept free, the compensated legs never saturate.
+        let m = Modulator::new(TOP, PERIOD, 2.2e-6, true);
+        let dt = V_DC * 2.2e-6 / PERIOD;
+        for degrees in 0..360 {
+            let w = polar(400.0, f64::from(degrees).to_radians());
+            let out = m.step(w, Abc::new(dt, -dt, dt), V_DC);
+            assert!(out.compare.iter().all(|&c| c <= TOP));
+            let put_out = mean(out.compare) - Abc::new(dt, -dt, dt).to_alpha_beta();
+            let error = put_out - out.realised;
+            assert!(error.length_squared() < (2.0 * COUNT_V as f32).powi(2));
+        }
+    }
+
+    #[test]
+    fn not_a_number_does_not_panic() {
+        let out = modulator().step(AlphaBeta::new(f32::NAN, 1.0), Abc::ZERO, V_DC);
+        assert!(out.compare.iter().all(|&c| c <= TOP));
+        let _ = modulator().step(AlphaBeta::ZERO, Abc::ZERO, 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn realised_is_what_the_counts_put_out(length in 0f64..500.0, angle in 0f64..std::f64::consts::TAU) {
+            let wanted = polar(length, angle);
+            let out = modulator().step(wanted, Abc::ZERO, V_DC);
+            let error = mean(out.compare) - out.realised;
+            prop_assert!(f64::from(error.length_squared()).sqrt() < COUNT_V, "{error:?}");
+        }
+
+        #[test]
+        fn inside_the_hexagon_nothing_is_limited(length in 0f64..165.0, angle in 0f64..std::f64::consts::TAU) {
+            // 165 V < 311/sqrt(3) less the shortest pulses
+            let wanted = polar(length, angle);
+            prop_assert_eq!(modulator().step(wanted, Abc::ZERO, V_DC).realised, wanted);
+        }
+
+        #[test]
+        fn limiting_keeps_the_angle(length in 210f64..2000.0, angle in 0f64..std::f64::consts::TAU) {
+            // No shortest pulse here: dropping pulses turns the angle by up to 0.5 degrees.
+            let m = Modulator { shortest: 0.0, ..modulator() };
+            let out = m.step(polar(length, angle), Abc::ZERO, V_DC).realised;
+            let turned = f64::from(out.beta).atan2(f64::from(out.alpha)) - angle;
+            prop_assert!((turned + PI).rem_euclid(2.0 * PI) - PI < 1e-5);
+            // and the result lies on the hexagon: the span is the dc link
+            let (low, high) = extremes(out.to_abc());
+            prop_assert!((high - low - V_DC).abs() < 1e-3);
+        }
+
+        #[test]
+        fn no_pulse_is_shorter_than_dead_time_and_a_microsecond(length in 0f64..2000.0, angle in 0f64..std::f64::consts::TAU) {
+            let shortest = (3.2e-6 * 6000.0 * f64::from(TOP)).floor() as u16;
+            for c in modulator().step(polar(length, angle), Abc::ZERO, V_DC).compare {
+                prop_assert!(c == 0 || c == TOP || (shortest..=TOP - shortest).contains(&c), "{c}");
+            }
+        }
+    }
+}

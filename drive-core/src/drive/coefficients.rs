@@ -1,0 +1,403 @@
+//! From settings to what the control step works with.
+
+use core::f32::consts::TAU;
+
+use crate::carrier::DemodulatorKind;
+use crate::carrier::injection::{CARRIER_SAMPLES, Injection};
+use crate::current::dead_time::DeadTime;
+use crate::current::inverter_drop::InverterDrop;
+use crate::current::modulation::Modulator;
+use crate::current::pi::{DqPi, Pi, ReferenceFilter};
+use crate::current::sensing::{Sensing, Window};
+use crate::flux::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
+use crate::flux::indirect::Indirect;
+use crate::flux::schedule::Schedule;
+use crate::flux::tracker::{Pll, Tracker};
+use crate::identify::learning::Learning;
+use crate::io::PERIOD_S;
+use crate::math::angle::{Angle, UnitVector};
+use crate::math::complex::Complex;
+use crate::motion::{self, Motion};
+use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
+use crate::protect::noise_watch::NoiseWatch;
+use crate::protect::plausibility::{Prediction, RotorFlux};
+use crate::protect::saliency_check::SaliencyCheck;
+use crate::protect::wiring_check::WiringCheck;
+use crate::settings::{AngleSource, CurrentPlant, Settings, SettingsError};
+use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
+
+/// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
+/// lags.
+const BPF_GROUP_DELAY: f32 = 8.83;
+
+/// Time for which the lock is verified, s: the tracking loop settles in a third of it.
+const VERIFY_S: f32 = 0.3;
+/// Speed up to which the shaft counts as standing when the lock is verified, rpm.
+const STANDING_RPM: f32 = 30.0;
+
+/// Everything the control step needs, made from [`Settings`] outside the interrupt.
+// In this order: what every step needs comes first and lies together; see the drive's state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Coefficients {
+    pub(crate) sensing: Sensing,
+    pub(crate) protection: Protection,
+    pub(crate) source: AngleSource,
+    /// Inject a carrier at all.
+    pub(crate) inject: bool,
+    /// Demodulate and, with the injection as source, track.
+    pub(crate) demodulate: bool,
+    pub(crate) track_rotor: bool,
+    pub(crate) reference_filter: [ReferenceFilter; 2],
+    pub(crate) current_loop: DqPi,
+    pub(crate) modulator: Modulator,
+    pub(crate) dead_time: DeadTime,
+    pub(crate) prediction: Prediction,
+    pub(crate) indirect: Indirect,
+    /// Electrical turns per period for one mechanical turn/s.
+    pub(crate) step_per_speed: f32,
+    /// Delay of the measured current beside the filter, samples.
+    pub(crate) current_lag: f32,
+    /// 1 where the delays of the current are compensated, 0 where not.
+    pub(crate) lag_share: f32,
+    pub(crate) sequence: SequenceSteps,
+    pub(crate) estimator: Estimator,
+    /// The watch on the sensors' noise, where the angle is the injection's.
+    pub(crate) noise_watch: Option<NoiseWatch>,
+    pub(crate) injection: Injection,
+    /// The watch on the lock, if it is wanted.
+    pub(crate) lock_monitor: Option<LockMonitor>,
+    pub(crate) motion: Motion,
+    /// Injection axis seen from the flux, as an angle and a unit vector.
+    pub(crate) injection_turn: Angle,
+    pub(crate) injection_axis: UnitVector,
+    /// The check of a sensorless start, if it is wanted.
+    pub(crate) saliency_check: Option<SaliencyCheck>,
+    pub(crate) wiring: WiringCheck,
+    pub(crate) inverter_drop: InverterDrop,
+    pub(crate) learning: Learning,
+    /// What the design of the current controllers came to, d and q.
+    pub designs: [CurrentLoopDesign; 2],
+    /// What the design of the speed and the position loop came to.
+    pub motion_design: MotionDesign,
+}
+
+impl Coefficients {
+    /// Whether what was set is still finite numbers: a flipped bit may have changed that.
+    pub(crate) fn is_finite(&self) -> bool {
+        let (s, l) = (&self.sensing, &self.current_loop);
+        let sum = s.current_a.gain
+            + s.current_a.offset
+            + s.current_b.gain
+            + s.current_b.offset
+            + s.dc_link.gain
+            + s.dc_link.offset
+            + l.d.k_c
+            + l.d.z_c
+            + l.q.k_c
+            + l.q.z_c
+            + self.injection.current_amplitude
+            + self.estimator.lag
+            + self.current_lag
+            + self.reference_filter[0].one_minus_p
+            + self.reference_filter[1].one_minus_p
+            + self.motion.pi.k_c
+            + self.motion.limit
+            + self.sequence.i_d
+            + self.sequence.stop_ramp;
+        sum.is_finite()
+    }
+}
+
+/// Limits in the units of the control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Protection {
+    pub dc_over: f32,
+    pub dc_under: f32,
+    /// Electrical turns per period.
+    pub rotor_step: f32,
+    /// Square of the largest regulated current, A^2.
+    pub current_squared: f32,
+}
+
+/// The sequence in control periods.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SequenceSteps {
+    pub precharge: u32,
+    pub magnetise: u32,
+    pub verify: u32,
+    pub i_d: f32,
+    /// A per period.
+    pub stop_ramp: f32,
+}
+
+fn periods(seconds: f32) -> u32 {
+    libm::roundf(seconds / PERIOD_S) as u32
+}
+
+/// Delay, samples, of the envelope of the carrier current behind that of its voltage: the group delay
+/// of the plant k / (z - p) at the carrier, less the half sample by which the voltage is held. The
+/// angle of the voltage is that of the middle of its period already. 0.053 for the motor of Table 5:
+/// left out, it is 0.9° at 600 rpm.
+fn carrier_lag(plant: FirstOrder) -> f32 {
+    let turn = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
+    let Complex { re: c, im: s } = Complex::unit(turn);
+    let (re, im) = (c - plant.p, s);
+    ((1.0 - plant.p * c) / (re * re + im * im) - 0.5) as f32
+}
+
+impl Settings {
+    /// Checks every value and runs the design rules.
+    ///
+    /// # Errors
+    /// The first value outside its range, by name, with the range; or why a design rule cannot be
+    /// met.
+    // `inline`, as the other design code: compiled where it is called, in the firmware for size.
+    #[inline]
+    pub fn build(&self) -> Result<Coefficients, SettingsError> {
+        self.check()?;
+        let m = &self.motor;
+        let motor_plant = tuning::motor_plant(
+            &tuning::Motor {
+                r_s: f64::from(m.r_s),
+                r_r: f64::from(m.r_r),
+                l_m: f64::from(m.l_m),
+                l_ls: f64::from(m.l_ls),
+                l_lr: f64::from(m.l_lr),
+            },
+            f64::from(PERIOD_S),
+        )?;
+        let (d, q) = match self.current_plant {
+            CurrentPlant::Identified { d, q } => (d, q),
+            CurrentPlant::Motor => (motor_plant, motor_plant),
+        };
+        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
+        let designs = [design(d)?, design(q)?];
+        let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
+
+        let injecting =
+            self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
+        let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
+        let rotor_flux = RotorFlux {
+            coupled_inductance: m.l_m / m.l_r() * m.l_m,
+            t_sec: m.t_sec(),
+            period_s: PERIOD_S,
+        };
+        let synchronous = self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == DemodulatorKind::Synchronous;
+        let t = &self.injection.synchronous;
+        let highest_rpm = if synchronous && t.tracked_rpm < self.limits.speed_rpm {
+            t.tracked_rpm
+        } else {
+            self.limits.speed_rpm
+        };
+        let current_lag = self.scales.current_delay_s / PERIOD_S;
+        let inj = &self.injection;
+        let motion_design = self.motion_design()?;
+        let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
+        let injection = Injection::new(inj.amplitude_v, motor_plant, current_lag);
+        let (injection_turn, injection_axis) = match inj.demodulator {
+            DemodulatorKind::RmsImpedance => (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 }),
+            _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
+        };
+
+        let lock_monitor = (synchronous && t.monitor).then(|| {
+            LockMonitor::new(
+                &t.carrier,
+                &LockMonitorSettings {
+                    flux_saliency: t.flux_saliency,
+                    smoothing_s: t.loss_s,
+                    allowed: t.allowed_loss,
+                    carrier_a: injection.current_amplitude,
+                    standing_step: turns_per_step(STANDING_RPM),
+                    period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
+                },
+            )
+        });
+        Ok(Coefficients {
+            sensing: Sensing {
+                current_a: self.scales.current_a,
+                current_b: self.scales.current_b,
+                dc_link: self.scales.dc_link,
+                full_scale: self.scales.full_scale,
+                heat_sink_trip: self.scales.heat_sink_trip,
+                calibration_samples: periods(self.sequence.calibrate_s) as u16,
+                largest_offset: 0.2,
+                trip_a: self.limits.trip_a,
+                dc_window: Window::new(
+                    self.scales.dc_link,
+                    [self.limits.dc_under_v, self.limits.dc_over_v],
+                    self.scales.full_scale,
+                ),
+            },
+            source: self.angle_source,
+            track_rotor: self.track_rotor,
+            indirect: Indirect::new(
+                self.scales.encoder_counts,
+                m.pole_pairs,
+                m.t_sec(),
+                PERIOD_S,
+                self.sequence.i_d,
+                2.0 * self.limits.speed_rpm / 60.0,
+            ),
+            inject: injecting && inj.amplitude_v > 0.0,
+            demodulate: injecting,
+            injection,
+            injection_turn,
+            injection_axis,
+            lock_monitor,
+            saliency_check: self.saliency_check(),
+            noise_watch: (self.angle_source == AngleSource::Injection).then(|| {
+                let gains = [self.scales.current_a.gain, self.scales.current_b.gain];
+                NoiseWatch::new(t.flux_saliency, injection.current_amplitude, gains)
+            }),
+            wiring: WiringCheck::new(m.sigma_l_s(), PERIOD_S),
+            estimator: self.estimator(
+                lag_share,
+                current_lag + carrier_lag(motor_plant),
+                turns_per_step(self.limits.speed_rpm),
+                injection.current_amplitude,
+            ),
+            current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
+            reference_filter: [
+                ReferenceFilter::new(designs[0].p_f),
+                ReferenceFilter::new(designs[1].p_f),
+            ],
+            current_lag,
+            lag_share,
+            modulator: Modulator::new(
+                self.inverter.top,
+                PERIOD_S,
+                self.inverter.dead_time_s,
+                self.inverter.compensate,
+            ),
+            dead_time: if self.inverter.compensate {
+                DeadTime::new(
+                    self.inverter.dead_time_s,
+                    PERIOD_S,
+                    self.inverter.full_compensation_a,
+                )
+            } else {
+                DeadTime::NONE
+            },
+            inverter_drop: InverterDrop::new(
+                self.sequence.magnetise_s,
+                m.t_sec(),
+                PERIOD_S,
+                (self.sequence.i_d, self.limits.current_a),
+                m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
+                m.r_s,
+            ),
+            learning: Learning::new(
+                m.t_sec(),
+                PERIOD_S,
+                (self.sequence.i_d, self.limits.current_a),
+                (m.l_ls + m.l_m - rotor_flux.coupled_inductance, rotor_flux.coupled_inductance),
+            ),
+            prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
+            motion: self.motion(&motion_design),
+            step_per_speed: turns_per_step(60.0),
+            protection: Protection {
+                dc_over: self.limits.dc_over_v,
+                dc_under: self.limits.dc_under_v,
+                rotor_step: turns_per_step(highest_rpm),
+                current_squared: self.limits.current_a * self.limits.current_a,
+            },
+            sequence: SequenceSteps {
+                precharge: periods(self.sequence.precharge_s),
+                magnetise: periods(self.sequence.magnetise_s),
+                verify: periods(VERIFY_S),
+                i_d: self.sequence.i_d,
+                stop_ramp: self.sequence.stop_a_per_s * PERIOD_S,
+            },
+            designs,
+            motion_design,
+        })
+    }
+
+    #[inline]
+    fn motion_design(&self) -> Result<MotionDesign, TuningError> {
+        let m = &self.motor;
+        let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
+        let tracking_hz = match self.angle_source {
+            AngleSource::Encoder => None,
+            AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
+        };
+        tuning::design_motion_loops(
+            f64::from(acceleration),
+            tracking_hz,
+            f64::from(self.speed.phase_margin_deg),
+            f64::from(PERIOD_S) * f64::from(motion::DIVIDER),
+        )
+    }
+
+    #[inline]
+    fn motion(&self, design: &MotionDesign) -> Motion {
+        let counts = match self.angle_source {
+            AngleSource::Encoder => self.scales.encoder_counts,
+            AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
+        };
+        let v = &self.speed;
+        let (limit, ramp) = (v.limit_rpm / 60.0, v.ramp_rpm_per_s / 60.0);
+        Motion::new(design, counts, limit, ramp, v.i_q_limit_a)
+    }
+
+    /// Only a sensorless start with the synchronous demodulation is checked.
+    fn saliency_check(&self) -> Option<SaliencyCheck> {
+        let t = &self.injection.synchronous;
+        let checked = t.check
+            && self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == DemodulatorKind::Synchronous;
+        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.t_sec(), PERIOD_S))
+    }
+
+    /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
+    /// `carrier_a` the amplitude of that current, A.
+    #[inline]
+    fn estimator(
+        &self,
+        lag_share: f32,
+        carrier_lag: f32,
+        speed_limit: f32,
+        carrier_a: f32,
+    ) -> Estimator {
+        let limit = 1.5 * speed_limit;
+        let inj = &self.injection;
+        let (p, t) = (&inj.printed, &inj.synchronous);
+        let angle_loop = match inj.demodulator {
+            DemodulatorKind::Synchronous => AngleLoop::Pll {
+                schedule: Schedule::new(
+                    &t.reference,
+                    t.flux_saliency,
+                    t.current_saliency,
+                    self.sequence.i_d,
+                ),
+                pll: Pll::new(t.bandwidth_hz, PERIOD_S),
+            },
+            _ => AngleLoop::Pii {
+                reference: match p.learned {
+                    Some(table) => Reference::Learned(table),
+                    None => Reference::Constant(ConstantReference {
+                        full: p.reference_a,
+                        slope: p.reference_a / p.full_reference_iq_a,
+                        from: p.full_reference_iq_a,
+                    }),
+                },
+                tracker: Tracker::new(p.k_s, p.z_s, limit),
+            },
+        };
+        Estimator {
+            demodulator: inj.demodulator,
+            rms_samples: p.rms_samples,
+            // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
+            ampere_per_ohm: if inj.amplitude_v > 0.0 {
+                carrier_a * carrier_a / inj.amplitude_v * core::f32::consts::FRAC_1_SQRT_2
+            } else {
+                0.0
+            },
+            angle_loop,
+            lag: lag_share * carrier_lag,
+            band_pass_lag: lag_share * BPF_GROUP_DELAY,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The states of the drive.
+
+use core::fmt;
+
+use crate::fault::Fault;
+
+/// What the drive is to regulate once it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Torque, by the current on the quadrature axis.
+    Torque,
+    /// Speed of the rotor; see [`motion`](crate::motion).
+    Speed,
+    /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
+    Position,
+    /// Identification of the motor. Not available yet: refused.
+    Commissioning,
+    /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::identify::learning`]), then
+    /// stops.
+    Learning,
+}
+
+/// What the drive is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum State {
+    /// Outputs off.
+    #[default]
+    Off,
+    /// Outputs off, offsets of the current sensors being measured.
+    Calibrating,
+    /// Low sides on, to charge the bootstrap capacitors of the high-side gate drives.
+    Precharge,
+    /// Short voltage pulses show whether sensors and phases belong together.
+    CheckingWiring,
+    /// Current on the direct axis only, until the flux stands.
+    Magnetising,
+    /// Flux built up, tracking without torque: is it the flux that is tracked?
+    Verifying,
+    /// Regulating torque.
+    Torque,
+    /// Regulating speed.
+    Speed,
+    /// Regulating position.
+    Position,
+    /// Identifying the motor.
+    Commissioning,
+    /// Learning with the shaft locked.
+    Learning,
+    /// Taking the torque to zero, then off.
+    Stopping,
+    /// Outputs off until the fault is cleared.
+    Fault(Fault),
+}
+
+impl State {
+    /// The state in which a drive started in `mode` runs.
+    pub const fn of_mode(mode: Mode) -> Self {
+        match mode {
+            Mode::Torque => Self::Torque,
+            Mode::Speed => Self::Speed,
+            Mode::Position => Self::Position,
+            Mode::Commissioning => Self::Commissioning,
+            Mode::Learning => Self::Learning,
+        }
+    }
+
+    /// Whether the current is regulated, for whatever purpose.
+    #[inline]
+    pub(crate) const fn has_current(self) -> bool {
+        matches!(
+            self,
+            Self::Magnetising
+                | Self::Verifying
+                | Self::Torque
+                | Self::Speed
+                | Self::Position
+                | Self::Commissioning
+                | Self::Learning
+                | Self::Stopping
+        )
+    }
+
+    /// Whether torque, speed or position is regulated as asked for.
+    #[inline]
+    pub const fn regulates(self) -> bool {
+        matches!(self, Self::Torque | Self::Speed | Self::Position)
+    }
+}
+
+impl From<Fault> for State {
+    #[inline]
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+impl fmt::Display for State {
+    #[inline(never)] // not once more for every reference to it
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Off => "off",
+            Self::Calibrating => "calibrating",
+            Self::Precharge => "precharging",
+            Self::CheckingWiring => "checking the wiring",
+            Self::Magnetising => "magnetising",
+            Self::Verifying => "verifying the lock",
+            Self::Torque => "regulating torque",
+            Self::Speed => "regulating speed",
+            Self::Position => "regulating position",
+            Self::Commissioning => "commissioning",
+            Self::Learning => "learning",
+            Self::Stopping => "stopping",
+            Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),
+        })
+    }
+}

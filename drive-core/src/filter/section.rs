@@ -1,0 +1,91 @@
+//! Second-order sections and their frequency response.
+
+use crate::math::complex::Complex;
+
+/// One section,
+///
+/// ```text
+///          b0 + b1 z⁻¹ + b2 z⁻²
+/// H(z) =  ----------------------
+///           1 + a1 z⁻¹ + a2 z⁻²
+/// ```
+///
+/// so `a1` and `a2` have the sign of Eq. C.2 and are subtracted in the step, as in Eq. C.1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Coefficient of the input.
+    pub b0: f32,
+    /// Coefficient of the input one sample ago.
+    pub b1: f32,
+    /// Coefficient of the input two samples ago.
+    pub b2: f32,
+    /// Coefficient of the output one sample ago.
+    pub a1: f32,
+    /// Coefficient of the output two samples ago.
+    pub a2: f32,
+}
+
+impl Section {
+    /// The section that changes nothing.
+    pub const IDENTITY: Self = Self { b0: 1.0, b1: 0.0, b2: 0.0, a1: 0.0, a2: 0.0 };
+
+    /// From `[b0, b1, b2, a1, a2]`, each rounded to the nearest `f32`.
+    pub const fn from_f64(c: [f64; 5]) -> Self {
+        Self { b0: c[0] as f32, b1: c[1] as f32, b2: c[2] as f32, a1: c[3] as f32, a2: c[4] as f32 }
+    }
+
+    /// Whether both poles lie inside the unit circle (Jury: |a2| < 1 and |a1| < 1 + a2).
+    pub const fn is_stable(&self) -> bool {
+        let (a1, a2) = (self.a1 as f64, self.a2 as f64);
+        a2 < 1.0 && a1 < 1.0 + a2 && -a1 < 1.0 + a2
+    }
+
+    /// H(1) of the rounded coefficients.
+    pub const fn dc_gain(&self) -> f64 {
+        (self.b0 as f64 + self.b1 as f64 + self.b2 as f64) / (1.0 + self.a1 as f64 + self.a2 as f64)
+    }
+
+    /// The section with its gain multiplied by `gain`.
+    pub const fn scaled(self, gain: f64) -> Self {
+        Self {
+            b0: (self.b0 as f64 * gain) as f32,
+            b1: (self.b1 as f64 * gain) as f32,
+            b2: (self.b2 as f64 * gain) as f32,
+            ..self
+        }
+    }
+
+    fn numerator(&self) -> [f64; 3] {
+        [self.b0.into(), self.b1.into(), self.b2.into()]
+    }
+
+    fn denominator(&self) -> [f64; 3] {
+        [1.0, self.a1.into(), self.a2.into()]
+    }
+}
+
+/// H(e^(j ωT)) of a cascade, with the coefficients as they are stored; `omega_t` in rad/sample.
+///
+/// Not for the control step.
+pub fn response(sections: &[Section], omega_t: f64) -> Complex {
+    let delay = Complex::unit(-omega_t);
+    sections.iter().fold(Complex::ONE, |h, s| {
+        h * polynomial(s.numerator(), delay) / polynomial(s.denominator(), delay)
+    })
+}
+
+/// Group delay -d arg H / d(ωT) of a cascade in samples, analytically; `omega_t` in rad/sample.
+///
+/// A zero exactly at this frequency makes it not-a-number. Not for the control step.
+pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
+    let delay = Complex::unit(-omega_t);
+    let of = |[c0, c1, c2]: [f64; 3]| {
+        let derivative = polynomial([0.0, c1, 2.0 * c2], delay);
+        (derivative / polynomial([c0, c1, c2], delay)).re
+    };
+    sections.iter().map(|s| of(s.numerator()) - of(s.denominator())).sum()
+}
+
+fn polynomial([c0, c1, c2]: [f64; 3], x: Complex) -> Complex {
+    Complex::new(c0, 0.0) + x * (Complex::new(c1, 0.0) + x * Complex::new(c2, 0.0))
+}

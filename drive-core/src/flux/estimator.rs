@@ -1,0 +1,239 @@
+//! The flux angle from the injected carrier: demodulation, reference, tracking.
+//!
+//! Any of the [demodulations](crate::carrier::demodulator) feeds one of two loops: that of the dissertation (a
+//! reference of the current difference and the PII controller) or, behind the synchronous one, a
+//! learned reference, scheduled gain and slip feed-forward.
+
+use crate::carrier::demodulator::{Demodulate, Demodulator};
+use crate::carrier::synchronous::SynchronousState;
+use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
+use crate::flux::indirect::FluxAngle;
+use crate::flux::schedule::Schedule;
+use crate::flux::tracker::{Pll, Push, Tracker, TrackerState};
+use crate::math::angle::Angle;
+use crate::settings::table::ReferenceTable;
+
+/// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantReference {
+    /// Value from there on, A.
+    pub full: f32,
+    /// Slope below, A/A.
+    pub slope: f32,
+    /// Where it becomes constant, A.
+    pub from: f32,
+}
+
+impl ConstantReference {
+    /// Reference of the current difference, A.
+    fn at(&self, i_q: f32) -> f32 {
+        if i_q > self.from {
+            self.full
+        } else if i_q < -self.from {
+            -self.full
+        } else {
+            self.slope * i_q
+        }
+    }
+}
+
+/// What the current difference is compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reference {
+    /// Section 3.3.
+    Constant(ConstantReference),
+    /// Learned over i_q, A.
+    Learned(ReferenceTable),
+}
+
+impl Reference {
+    /// Reference of the current difference, A.
+    fn at(&self, i_q: f32) -> f32 {
+        match self {
+            Self::Constant(constant) => constant.at(i_q),
+            Self::Learned(table) => table.at(i_q),
+        }
+    }
+}
+
+/// How the axis is turned by what was seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AngleLoop {
+    /// Section 3.11.
+    Pii {
+        /// What the current difference is compared with.
+        reference: Reference,
+        /// What turns the axis.
+        tracker: Tracker,
+    },
+    /// Behind the synchronous demodulation.
+    Pll {
+        /// What the saliency is compared with.
+        schedule: Schedule,
+        /// What turns the axis.
+        pll: Pll,
+    },
+}
+
+/// Coefficients.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimator {
+    /// What is made of the carrier current.
+    pub demodulator: DemodulatorKind,
+    /// Length of the rms filters of Ha and Sul, samples.
+    pub rms_samples: u8,
+    /// Current difference that an impedance difference of theirs stands for, A/ohm.
+    pub ampere_per_ohm: f32,
+    /// How the axis is turned by it.
+    pub angle_loop: AngleLoop,
+    /// Samples by which the sampled carrier current lags the injection axis.
+    pub lag: f32,
+    /// The same of the band-pass, for the demodulations that rotate behind it.
+    pub band_pass_lag: f32,
+}
+
+/// State.
+// In this order: the large one that is hardly used comes last.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct EstimatorState {
+    tracker: TrackerState,
+    /// The carrier current, and what the synchronous demodulation sees.
+    pub synchronous: SynchronousState,
+    /// Mean speed of the flux, turns per period, for the lag of the printed chain: the present one
+    /// would feed the tracker's own steps back to it.
+    mean_step: f32,
+    /// Electrical speed of the rotor, turns per period.
+    pub rotor_step: f32,
+    /// Current difference that any but the synchronous demodulation sees, A.
+    pub delta_i: f32,
+    /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.1 ms older,
+    /// on average, than what the averages themselves delay by 3.2 ms: little for a loop of 4 Hz.
+    push: Push,
+    demodulator: Demodulator,
+}
+
+/// Share of the newest value in the mean speed of the flux: 50 ms.
+const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
+/// Share of the newest value in the mean speed of the rotor: 5 ms.
+const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
+
+/// The tracker ran away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lost;
+
+impl EstimatorState {
+    /// The flux angle at the present sample.
+    pub fn flux(&self) -> FluxAngle {
+        FluxAngle { phi: self.tracker.angle - Angle::QUARTER, step: self.tracker.step }
+    }
+
+    /// Whether everything is a finite number.
+    pub fn is_finite(&self) -> bool {
+        (self.tracker.step + self.mean_step + self.rotor_step + self.delta_i).is_finite()
+            && self.synchronous.seen.q.is_finite()
+    }
+
+    /// What the synchronous demodulation sees; nothing where it does not track.
+    pub fn saliency(&self) -> &Saliency {
+        &self.synchronous.seen
+    }
+}
+
+impl Estimator {
+    /// Starts with the flux along phase a.
+    pub fn start(&self, state: &mut EstimatorState) {
+        let EstimatorState {
+            tracker,
+            demodulator,
+            mean_step,
+            rotor_step,
+            delta_i,
+            synchronous,
+            push,
+        } = state;
+        // The tracker turns the axis of section 3.4, 90° ahead of the flux.
+        *tracker = TrackerState::default();
+        tracker.angle = Angle::QUARTER;
+        demodulator.start(self.demodulator, self.rms_samples);
+        (*mean_step, *rotor_step, *delta_i) = (0.0, 0.0, 0.0);
+        (*synchronous, *push) = (SynchronousState::default(), Push::default());
+    }
+
+    /// Replaces the reference by a learned one, and the saliency per ampere of stator current, 1/A,
+    /// where one was learned.
+    pub fn take(&mut self, learned: &ReferenceTable, current_saliency: Option<f32>) {
+        match &mut self.angle_loop {
+            AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(*learned),
+            AngleLoop::Pll { schedule, .. } => {
+                *schedule = schedule.with(learned, current_saliency);
+            }
+        }
+    }
+
+    /// Demodulates one sample: the current, A; the injection axis, delayed by [`lag`](Self::lag), and how
+    /// fast it turns, turns per period; the carrier; the reference of the quadrature current, A.
+    #[inline]
+    pub fn observe(&self, state: &mut EstimatorState, sample: &CarrierSample, step: f32) {
+        state.synchronous.mix(sample);
+        if let AngleLoop::Pii { .. } = self.angle_loop {
+            self.observe_printed(state, *sample, step);
+        }
+    }
+
+    /// Once a carrier period, where the synchronous demodulation tracks: the saliency that the one before shows.
+    #[inline]
+    pub fn see(&self, state: &mut EstimatorState) {
+        if let AngleLoop::Pll { .. } = self.angle_loop {
+            state.synchronous.see();
+        }
+    }
+
+    /// Once a carrier period, with the saliency of the one before: which way the axis is pushed by it. An
+    /// acceleration of the rotor that is asked for is known, turns per period in each.
+    #[inline]
+    pub fn push(&self, state: &mut EstimatorState, acceleration: f32) {
+        if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
+            let (error, share) = schedule.correction(state.saliency());
+            state.push = pll.push(error, share, acceleration);
+        }
+    }
+
+    /// The other demodulations.
+    #[inline(never)]
+    fn observe_printed(&self, state: &mut EstimatorState, mut sample: CarrierSample, step: f32) {
+        if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
+            // These rotate what has passed the band-pass.
+            state.mean_step += FLUX_SMOOTHING * (step - state.mean_step);
+            sample.axis = sample.axis.turned_slightly(-state.mean_step * self.band_pass_lag);
+        }
+        state.delta_i = match &mut state.demodulator {
+            Demodulator::Literal(d) => d.step(&sample),
+            Demodulator::Rectified(d) => d.step(&sample),
+            Demodulator::RmsImpedance(d) => self.ampere_per_ohm * d.step(&sample),
+            Demodulator::Envelope(d) => d.step(&sample),
+        };
+    }
+
+    /// Turns the axis on to the next sample by what was observed, with the reference of the
+    /// quadrature current, A, and the slip, turns per period.
+    ///
+    /// # Errors
+    /// [`Lost`] when the speed has reached its limit.
+    #[inline]
+    pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
+        match &self.angle_loop {
+            AngleLoop::Pii { reference, tracker } => {
+                let error = reference.at(i_q) - state.delta_i;
+                let held = tracker.step(&mut state.tracker, error);
+                let rotor_step = state.tracker.step - slip_step;
+                state.rotor_step += ROTOR_SMOOTHING * (rotor_step - state.rotor_step);
+                if held { Ok(()) } else { Err(Lost) }
+            }
+            AngleLoop::Pll { .. } => {
+                Pll::step(&mut state.tracker, &mut state.rotor_step, state.push, slip_step);
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,539 @@
+//! Learning on the motor itself what the angle tracking compares with: the reference over the torque
+//! current, the saliency that the current makes, and how far the gains of the two current sensors
+//! differ.
+//!
+//! The shaft is locked. The rotor then stands, the flux turns with the slip alone, and its angle is
+//! known from the currents without any sensor. The torque current goes through the points of the
+//! table, each with both signs; at each the demodulated signal is averaged over whole half turns of
+//! the flux. What repeats with every half turn falls out of the mean, and is the measure of the
+//! sensors: with the gain of a high by `d` and that of b low by `d`, the carrier's negative sequence
+//! adds
+//!
+//! ```text
+//! q_d = d 2/sqrt3 sin(2 theta - 30°) - d/sqrt3
+//! ```
+//!
+//! A shaft that is turned induces a voltage on the quadrature axis that is the same for both signs of
+//! the torque current, where all others change sign with it. A shaft that is free follows the current
+//! after a moment and the flux lies along the current: then the whole stator inductance acts on the
+//! direct axis, where it is the leakage `sigma L_s` alone on a locked shaft. (The inverter's drop must
+//! be compensated for that to be seen.)
+
+use core::f32::consts::TAU;
+
+use crate::math::angle::{Angle, UnitVector};
+use crate::math::frames::{Dq, SQRT_3};
+use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, STEP_A};
+
+/// Time for flux and averages to settle at a point, in rotor time constants.
+const SETTLE_T: f32 = 2.0;
+/// Least and longest time to average at a point, s. A second leaves 0.2° of a sensor noise of 5 mA.
+const AVERAGE_S: (f32, f32) = (1.0, 30.0);
+/// Samples by which the synchronous demodulation lags: 19 of the averages, and 4.5 because they are
+/// looked at once in ten samples.
+const LAG: f32 = 23.5;
+/// Voltage that may be the same for both signs of the torque current, V: the noise of the mean is
+/// below 0.05 V, a shaft at 22 rpm with the flux of the default motor gives 0.5 V.
+const MOVED_V: f32 = 0.5;
+/// Voltage of a free shaft on the direct axis from which on it is judged, V. Half of it counts as
+/// moved.
+const JUDGED_V: f32 = 1.0;
+/// A twelfth of a turn, 30°.
+const TWELFTH: Angle = Angle::from_bits(357_913_941);
+
+/// Largest even part of the reference that is believed. Noise gives 0.001.
+const ASYMMETRY: f32 = 0.005;
+/// Largest difference of the two gains that is believed.
+const LARGEST_MISMATCH: f32 = 0.1;
+/// Part of the negative sequence that no gain can make: at most this and a quarter of what one can.
+const WRONG_PHASE: (f32, f32) = (0.001, 0.25);
+/// Largest saliency of the current, 1/A, and rms misfit of its law, of the reference's rms.
+const CURRENT_SALIENCY: (f32, f32) = (0.3, 0.35);
+
+/// Coefficients of the learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learning {
+    /// Control periods until a point has settled.
+    settle: u32,
+    /// Least and most control periods to average.
+    average: (u32, u32),
+    /// Points of the table to learn beside zero.
+    points: usize,
+    /// Direct current, A.
+    i_d: f32,
+    /// sigma L_s, H.
+    leakage: f32,
+    /// L_m^2 / L_r, H.
+    coupled: f32,
+    /// rad/s of a turn per period.
+    per_step: f32,
+}
+
+/// Sums over one point.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    elapsed: u32,
+    count: u32,
+    /// Turns of the flux since averaging began.
+    turned: f32,
+    /// Half turns that were completed.
+    halves: u32,
+    signal: f32,
+    /// Squares of the carrier current, A^2.
+    carrier: f32,
+    in_phase: f32,
+    quadrature: f32,
+    voltage: Dq,
+}
+
+/// State of the learning.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LearningState {
+    /// The point at work: two for every current of the table, plus and minus.
+    point: usize,
+    sums: Sums,
+    /// Mean signal at plus and minus every current.
+    signal: [[f32; POINTS]; 2],
+    /// Mean square of the carrier current at both signs of every current, A^2.
+    carrier: [f32; POINTS],
+    /// Mean voltage at plus, V.
+    voltage: Dq,
+    /// Direct voltage of the first current without the leakage's, V, and slip times torque current,
+    /// rad/s A.
+    first: Option<(f32, f32)>,
+    /// Sums of the components of the negative sequence over the points.
+    in_phase: f32,
+    quadrature: f32,
+}
+
+/// What to do next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Regulate this torque current, A.
+    Current(f32),
+    /// All points are there.
+    Done,
+    /// The shaft is not locked.
+    Moved,
+    /// A point took too long: the flux does not turn.
+    Stuck,
+}
+
+/// A value that was found, how well it fits, and whether it is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fitted {
+    /// The value.
+    pub value: f32,
+    /// How much of what was measured it leaves unexplained; see where it is used.
+    pub misfit: f32,
+    /// Whether value and misfit are within their bounds. If not, what was set before still holds.
+    pub accepted: bool,
+}
+
+/// What was learned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learned {
+    /// The reference over the torque current: of the saliency, or of the current difference in A.
+    pub reference: ReferenceTable,
+    /// The carrier current over the torque current, where it is believable.
+    pub carrier: Option<CarrierTable>,
+    /// How many points of it were measured beside zero; it is held beyond.
+    pub points: usize,
+    /// Largest even part of the reference, which has none: its misfit. Beyond 0.005 all is refused.
+    pub asymmetry: f32,
+    /// Gain of current sensor a over that of b, less one (within ±0.1). Misfit: the part of the
+    /// negative sequence that no difference of the gains can make, as a gain. Not with the rectified
+    /// chain.
+    pub gain_mismatch: Fitted,
+    /// Saliency by the stator current, 1/A (within ±0.3): least squares of the reference on
+    /// 2 i_d i_q/|i|. Misfit: rms of the rest, of the reference's (at most 0.35).
+    pub current_saliency: Fitted,
+    /// Saliency fixed to the flux at nominal flux, as the check at the start saw it (±5 % by noise); 0
+    /// where there was no check. It is for the reader and changes nothing.
+    pub flux_saliency: f32,
+    /// Whether the reference, and with it anything, is used.
+    pub accepted: bool,
+}
+
+impl Learning {
+    /// For the rotor time constant and the control period, s, the direct and the largest current, A,
+    /// sigma L_s and L_m^2 / L_r, H.
+    #[inline]
+    pub fn new(
+        t_sec: f32,
+        period_s: f32,
+        (i_d, largest_a): (f32, f32),
+        (leakage, coupled): (f32, f32),
+    ) -> Self {
+        let periods = |s: f32| libm::roundf(s / period_s) as u32;
+        let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
+        Self {
+            settle: periods(SETTLE_T * t_sec),
+            average: (periods(AVERAGE_S.0), periods(AVERAGE_S.1)),
+            points: (most as usize).min(POINTS - 1),
+            i_d,
+            leakage,
+            coupled,
+            per_step: TAU / period_s,
+        }
+    }
+
+    /// Points that are gone through: two for every current of the table.
+    pub fn points(&self) -> usize {
+        2 * self.points
+    }
+
+    /// The torque current of a point, A.
+    fn current(&self, point: usize) -> f32 {
+        let i_q = (point / 2 + 1) as f32 * STEP_A;
+        if point.is_multiple_of(2) { i_q } else { -i_q }
+    }
+
+    /// One period: the demodulated signal and the square of the carrier current, A^2; the injection axis
+    /// and how fast it turns, turns per period; the voltage, V.
+    pub fn step(
+        &self,
+        state: &mut LearningState,
+        (signal, carrier_squared): (f32, f32),
+        theta: Angle,
+        flux_step: f32,
+        voltage: Dq,
+    ) -> Next {
+        if state.point >= self.points() {
+            return Next::Done;
+        }
+        let s = &mut state.sums;
+        s.elapsed = s.elapsed.saturating_add(1);
+        if s.elapsed <= self.settle {
+            return Next::Current(self.current(state.point));
+        }
+        let seen = theta - Angle::within_turn(flux_step * LAG);
+        let UnitVector { cos, sin } = (seen + seen - TWELFTH).unit_vector();
+        s.count += 1;
+        s.turned += flux_step;
+        s.signal += signal;
+        s.carrier += carrier_squared;
+        s.in_phase += signal * sin;
+        s.quadrature += signal * cos;
+        s.voltage += voltage;
+        if s.count > self.average.1 {
+            return Next::Stuck;
+        }
+        // A point ends with a half turn.
+        let half_turned = 2.0 * s.turned.abs() >= (s.halves + 1) as f32;
+        s.halves += u32::from(half_turned);
+        if half_turned && s.count >= self.average.0 && !self.finish(state) {
+            return Next::Moved;
+        }
+        if state.point >= self.points() {
+            Next::Done
+        } else {
+            Next::Current(self.current(state.point))
+        }
+    }
+
+    /// Takes a point in. False when the shaft moved.
+    fn finish(&self, state: &mut LearningState) -> bool {
+        let (s, point) = (state.sums, state.point);
+        state.sums = Sums::default();
+        state.point += 1;
+        let mean = 1.0 / s.count as f32;
+        if let Some(q) = state.signal.get_mut(point % 2).and_then(|t| t.get_mut(point / 2 + 1)) {
+            *q = s.signal * mean;
+        }
+        if let Some(carrier) = state.carrier.get_mut(point / 2 + 1) {
+            *carrier += 0.5 * s.carrier * mean;
+        }
+        state.in_phase += 2.0 * s.in_phase * mean;
+        state.quadrature += 2.0 * s.quadrature * mean;
+        let voltage = s.voltage * mean;
+        if point.is_multiple_of(2) {
+            state.voltage = voltage;
+            return true;
+        }
+        let even = (voltage + state.voltage) * 0.5;
+        let x = self.per_step * s.turned * mean * self.current(point);
+        let direct = even.d + self.leakage * x;
+        let (first_v, first_x) = *state.first.get_or_insert((direct, x));
+        let of_free = self.coupled * (x - first_x);
+        let follows = of_free > JUDGED_V && direct - first_v < -0.5 * of_free;
+        even.q.abs() <= MOVED_V && !follows
+    }
+
+    /// What follows from all points. `normalised`: the signal is the saliency, not a current.
+    /// `baseline`: the square of the carrier current at no torque current, A^2.
+    pub fn result(
+        &self,
+        state: &LearningState,
+        normalised: bool,
+        flux_saliency: f32,
+        baseline: f32,
+    ) -> Learned {
+        let [plus, minus] = &state.signal;
+        let per_point = 1.0 / self.points().max(1) as f32;
+        let to_gain = SQRT_3 * per_point; // of a over b: 2 d
+        let mut gain_mismatch = Fitted {
+            value: to_gain * state.in_phase,
+            misfit: to_gain * state.quadrature.abs(),
+            accepted: false,
+        };
+        gain_mismatch.accepted = normalised
+            && gain_mismatch.value.abs() <= LARGEST_MISMATCH
+            && gain_mismatch.misfit <= WRONG_PHASE.0 + WRONG_PHASE.1 * gain_mismatch.value.abs();
+        // What the mismatch adds to both signs, -d/sqrt3.
+        let offset = if gain_mismatch.accepted { -0.5 / SQRT_3 * gain_mismatch.value } else { 0.0 };
+
+        let mut q = [0.0; POINTS];
+        let (mut asymmetry, mut held) = (0.0_f32, 0.0);
+        let (mut xx, mut xq, mut qq) = (0.0_f32, 0.0_f32, 0.0_f32);
+        // (By a length that the compiler does not know: else it writes this out sixteen times.)
+        let places = core::hint::black_box(q.as_mut_slice()).iter_mut();
+        for (n, (place, (p, m))) in places.zip(plus.iter().zip(minus)).enumerate() {
+            if n <= self.points {
+                held = 0.5 * (p - m);
+                let even = 0.5 * (p + m) - offset;
+                // Not-a-number is found in the reference.
+                if n > 0 && even.abs() > asymmetry {
+                    asymmetry = even.abs();
+                }
+                let i_q = n as f32 * STEP_A;
+                let x = 2.0 * self.i_d * i_q / libm::sqrtf(self.i_d * self.i_d + i_q * i_q);
+                xx += x * x;
+                xq += x * held;
+                qq += held * held;
+            }
+            *place = held;
+        }
+        let value = xq / xx;
+        let rest = qq - value * xq;
+        let misfit = libm::sqrtf(if rest > 0.0 { rest / qq } else { 0.0 });
+        let current_saliency = Fitted {
+            value,
+            misfit,
+            accepted: normalised
+                && value.abs() <= CURRENT_SALIENCY.0
+                && misfit <= CURRENT_SALIENCY.1,
+        };
+        let mut ratio = [1.0; POINTS];
+        let mut held = 1.0;
+        let places = core::hint::black_box(ratio.as_mut_slice()).iter_mut();
+        for (n, (place, square)) in places.zip(state.carrier).enumerate().skip(1) {
+            if n <= self.points {
+                held = libm::sqrtf(square / baseline);
+            }
+            *place = held;
+        }
+        let reference = ReferenceTable::of_points(q);
+        Learned {
+            reference: reference.unwrap_or_default(),
+            carrier: CarrierTable::of_points(ratio),
+            points: self.points,
+            asymmetry,
+            gain_mismatch,
+            current_saliency,
+            flux_saliency,
+            accepted: reference.is_some() && asymmetry <= ASYMMETRY && self.points > 0,
+        }
+    }
+}
+
+impl Learned {
+    /// Whether a stored result is one that a learning can have found and accepted; the tables check
+    /// their own values.
+    #[inline]
+    pub fn is_believable(&self) -> bool {
+        let within = |fitted: &Fitted, largest: f32| {
+            fitted.misfit.is_finite() && (!fitted.accepted || fitted.value.abs() <= largest)
+        };
+        self.accepted
+            && self.asymmetry <= ASYMMETRY
+            && (1..POINTS).contains(&self.points)
+            && within(&self.gain_mismatch, LARGEST_MISMATCH)
+            && within(&self.current_saliency, CURRENT_SALIENCY.0)
+            && self.flux_saliency.is_finite()
+    }
+
+    /// The result that holds after this learning, done on a drive that worked with `before`. A value
+    /// that was not found stays as it was; the gain mismatch adds to the one corrected already.
+    #[inline]
+    pub fn on_top_of(&self, before: Option<&Self>) -> Self {
+        let mut learned = *self;
+        if let Some(before) = before {
+            let gains = before.gain_mismatch;
+            if !self.gain_mismatch.accepted {
+                learned.gain_mismatch = gains;
+            } else if gains.accepted {
+                learned.gain_mismatch.value += gains.value;
+            }
+            if !self.current_saliency.accepted {
+                learned.current_saliency = before.current_saliency;
+            }
+            learned.carrier = self.carrier.or(before.carrier);
+        }
+        learned
+    }
+}
+
+impl LearningState {
+    /// Points that are done.
+    pub fn done(&self) -> usize {
+        self.point
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use core::f64::consts::TAU as TURN;
+
+    const PERIOD: f32 = 1.0 / 6000.0;
+    /// Carrier current at no torque current, A.
+    const CARRIER: f32 = 0.26;
+
+    /// Square of the carrier current, 5 % larger for every ampere.
+    fn carrier(i_q: f32) -> f32 {
+        (CARRIER * (1.0 + 0.05 * i_q.abs())).powi(2)
+    }
+
+    fn learning() -> Learning {
+        Learning::new(0.186, PERIOD, (0.7, 3.5), (0.0515, 0.153))
+    }
+
+    /// Goes through all points with the signal that `q(i_q, theta)` gives and the voltage `v(i_q)`.
+    fn learn(q: impl Fn(f64, f64) -> f64, v: impl Fn(f32) -> Dq) -> (Next, LearningState) {
+        let (learning, mut state) = (learning(), LearningState::default());
+        let (mut i_q, mut theta) = (0.0_f32, 0.25_f64);
+        for _ in 0..3_000_000 {
+            let step = i_q / (0.7 * 0.186) * PERIOD / TAU;
+            theta += f64::from(step);
+            let seen = (theta - f64::from(LAG) * f64::from(step)) * TURN;
+            let signal = q(i_q.into(), seen) as f32;
+            let angle = Angle::from_turns(theta as f32);
+            match learning.step(&mut state, (signal, carrier(i_q)), angle, step, v(i_q)) {
+                Next::Current(next) => i_q = next,
+                other => return (other, state),
+            }
+        }
+        panic!("it does not end");
+    }
+
+    fn locked(i_q: f32) -> Dq {
+        Dq::new(3.8 - 0.0515 * i_q * i_q / (0.7 * 0.186), 6.2 * i_q)
+    }
+
+    fn reference(i_q: f64) -> f64 {
+        2.0 * 0.034 * 0.7 * i_q / i_q.hypot(0.7)
+    }
+
+    /// What gains that differ by `mismatch` add.
+    fn negative_sequence(mismatch: f64, theta: f64) -> f64 {
+        let d = 0.5 * mismatch;
+        d / 0.75_f64.sqrt() * ((2.0 * theta - TURN / 12.0).sin() - 0.5)
+    }
+
+    #[test]
+    fn splits_the_reference_from_the_mismatch() {
+        for mismatch in [0.0, 0.01, -0.05] {
+            let q = |i_q, theta: f64| reference(i_q) + negative_sequence(mismatch, theta);
+            let (next, state) = learn(q, locked);
+            assert_eq!(next, Next::Done);
+            let learned = learning().result(&state, true, 0.0, CARRIER * CARRIER);
+            assert!(learned.accepted && learned.gain_mismatch.accepted, "{learned:?}");
+            // A half turn ends within a period: 1/800 at the highest slip.
+            assert!((f64::from(learned.gain_mismatch.value) - mismatch).abs() < 1e-4);
+            assert!((learned.current_saliency.value - 0.034).abs() < 1e-4);
+            let ratios = learned.carrier.unwrap();
+            assert!((ratios.points()[8] - 1.1).abs() < 1e-4, "{:?}", ratios.points());
+            for n in 1..=learned.points {
+                let i_q = 0.25 * n as f32;
+                let difference = f64::from(learned.reference.at(i_q)) - reference(i_q.into());
+                assert!(difference.abs() < 1e-4, "{i_q} A: {difference}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_not_accepted() {
+        let result = |q: &dyn Fn(f64, f64) -> f64| {
+            learning().result(&learn(q, locked).1, true, 0.0, CARRIER * CARRIER)
+        };
+        // A negative sequence that no gain makes, and a mismatch that no sensor has.
+        let learned = result(&|i_q, theta| reference(i_q) + 0.005 * (2.0 * theta + 1.05).sin());
+        assert!(learned.accepted && !learned.gain_mismatch.accepted, "{learned:?}");
+        let learned = result(&|i_q, theta| reference(i_q) + negative_sequence(0.2, theta));
+        assert!(!learned.gain_mismatch.accepted, "{learned:?}");
+        // A reference that is not odd, too large, or not a number.
+        for q in [0.01, 1.0, f64::NAN] {
+            assert!(!result(&|i_q, _| reference(i_q) + q).accepted, "{q}");
+        }
+        assert!(!result(&|i_q, _| 0.2 * i_q).accepted);
+        // A saliency that does not follow the law of the current.
+        let learned = result(&|i_q: f64, _| 0.02 * (4.0 * i_q).sin());
+        assert!(learned.accepted && !learned.current_saliency.accepted, "{learned:?}");
+    }
+
+    #[test]
+    fn a_moving_shaft_is_noticed() {
+        let q = |i_q, _| reference(i_q);
+        let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
+        let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
+        assert_eq!(learn(q, turned).0, Next::Moved);
+        assert_eq!(learn(q, free).0, Next::Moved);
+    }
+
+    #[test]
+    fn a_flux_that_does_not_turn_ends_it() {
+        let (learning, mut state) = (learning(), LearningState::default());
+        let stuck = (0..200_000).any(|_| {
+            learning.step(&mut state, (0.0, 0.0), Angle::ZERO, 0.0, Dq::ZERO) == Next::Stuck
+        });
+        assert!(stuck);
+    }
+
+    fn found() -> Learned {
+        Learned {
+            reference: ReferenceTable::default(),
+            carrier: None,
+            points: 13,
+            asymmetry: 0.001,
+            gain_mismatch: Fitted { value: 0.01, misfit: 0.0, accepted: true },
+            current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
+            flux_saliency: -0.035,
+            accepted: true,
+        }
+    }
+
+    #[test]
+    fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
+        let first = found();
+        assert_eq!(first.on_top_of(None), first);
+        let mut second = found();
+        second.gain_mismatch.value = -0.002;
+        second.current_saliency.accepted = false;
+        let both = second.on_top_of(Some(&first));
+        assert!((both.gain_mismatch.value - 0.008).abs() < 1e-6);
+        assert_eq!(both.current_saliency, first.current_saliency);
+        second.gain_mismatch.accepted = false;
+        assert_eq!(second.on_top_of(Some(&first)).gain_mismatch, first.gain_mismatch);
+    }
+
+    #[test]
+    fn what_no_learning_can_have_found_is_not_believed() {
+        assert!(found().is_believable());
+        let spoilt: [fn(&mut Learned); 7] = [
+            |l| l.accepted = false,
+            |l| l.asymmetry = f32::NAN,
+            |l| l.points = 0,
+            |l| l.points = 16,
+            |l| l.gain_mismatch.value = 0.2,
+            |l| l.gain_mismatch.misfit = f32::INFINITY,
+            |l| l.current_saliency.value = -0.4,
+        ];
+        for spoil in spoilt {
+            let mut learned = found();
+            spoil(&mut learned);
+            assert!(!learned.is_believable(), "{learned:?}");
+        }
+    }
+}

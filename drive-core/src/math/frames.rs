@@ -1,0 +1,251 @@
+//! Reference frames as types, with the transformations of Clarke and Park (section 2.1).
+//!
+//! Amplitude-invariant: a component is a peak phase value. Frames cannot be mixed by accident:
+//! each has its own type, and only a transformation turns one into another.
+
+use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+
+use crate::math::angle::UnitVector;
+
+macro_rules! frame {
+    ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident),+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $name {
+            $($(#[$field_doc])* pub $field: f32,)+
+        }
+
+        impl $name {
+            /// The zero vector.
+            pub const ZERO: Self = Self { $($field: 0.0,)+ };
+
+            /// The vector with these components.
+            pub const fn new($($field: f32),+) -> Self {
+                Self { $($field,)+ }
+            }
+
+            /// Whether every component is finite.
+            pub fn is_finite(self) -> bool {
+                $(self.$field.is_finite() &)+ true
+            }
+        }
+
+        impl Add for $name {
+            type Output = Self;
+            fn add(self, o: Self) -> Self {
+                Self { $($field: self.$field + o.$field,)+ }
+            }
+        }
+
+        impl Sub for $name {
+            type Output = Self;
+            fn sub(self, o: Self) -> Self {
+                Self { $($field: self.$field - o.$field,)+ }
+            }
+        }
+
+        impl Neg for $name {
+            type Output = Self;
+            fn neg(self) -> Self {
+                Self { $($field: -self.$field,)+ }
+            }
+        }
+
+        impl Mul<f32> for $name {
+            type Output = Self;
+            fn mul(self, k: f32) -> Self {
+                Self { $($field: self.$field * k,)+ }
+            }
+        }
+
+        impl AddAssign for $name {
+            fn add_assign(&mut self, o: Self) {
+                *self = *self + o;
+            }
+        }
+
+        impl SubAssign for $name {
+            fn sub_assign(&mut self, o: Self) {
+                *self = *self - o;
+            }
+        }
+    };
+}
+
+frame! {
+    /// The three phases.
+    Abc {
+        /// Phase a.
+        a,
+        /// Phase b.
+        b,
+        /// Phase c.
+        c
+    }
+}
+
+frame! {
+    /// The stator frame: alpha along the magnetic axis of phase a, beta 90° ahead of it.
+    AlphaBeta {
+        /// Along the axis of phase a.
+        alpha,
+        /// 90° ahead of phase a.
+        beta
+    }
+}
+
+frame! {
+    /// The frame of the (estimated) rotor flux: d along it, q 90° ahead.
+    Dq {
+        /// Along the rotor flux.
+        d,
+        /// 90° ahead of the rotor flux.
+        q
+    }
+}
+
+frame! {
+    /// The measuring frame of the injection: dm and qm lie 45° before and behind the injected
+    /// voltage, which is their bisector (section 2.4, Figure 8).
+    DmQm {
+        /// 45° behind the injection axis.
+        dm,
+        /// 45° ahead of the injection axis.
+        qm
+    }
+}
+
+/// sqrt(3)
+pub const SQRT_3: f32 = 1.732_050_8;
+/// 1 / sqrt(3)
+pub const FRAC_1_SQRT_3: f32 = 0.577_350_26;
+
+impl Abc {
+    /// Clarke transformation, Eq. 2.3. The zero-sequence component is dropped.
+    pub fn to_alpha_beta(self) -> AlphaBeta {
+        AlphaBeta {
+            alpha: (2.0 / 3.0) * self.a - (1.0 / 3.0) * (self.b + self.c),
+            beta: FRAC_1_SQRT_3 * (self.b - self.c),
+        }
+    }
+}
+
+impl AlphaBeta {
+    /// Clarke transformation of two measured phases, Eq. 2.4, where a + b + c = 0.
+    pub fn from_two_phases(a: f32, b: f32) -> Self {
+        Self { alpha: a, beta: FRAC_1_SQRT_3 * a + (2.0 * FRAC_1_SQRT_3) * b }
+    }
+
+    /// Inverse of Eq. 2.3 with no zero-sequence component.
+    pub fn to_abc(self) -> Abc {
+        let (half_alpha, other) = (0.5 * self.alpha, (0.5 * SQRT_3) * self.beta);
+        Abc { a: self.alpha, b: other - half_alpha, c: -other - half_alpha }
+    }
+
+    /// Park transformation, Eq. 2.5 / 2.6: into the frame whose d axis lies along `axis`.
+    pub fn to_dq(self, axis: UnitVector) -> Dq {
+        let (d, q) = self.seen_from(axis);
+        Dq { d, q }
+    }
+
+    /// Rotation into the measuring frame; `axis` is the dm axis, `e^(j (theta - 45°))`.
+    pub fn to_dm_qm(self, axis: UnitVector) -> DmQm {
+        let (dm, qm) = self.seen_from(axis);
+        DmQm { dm, qm }
+    }
+
+    /// A vector of this length along `axis` (negative lengths point the other way).
+    pub fn along(axis: UnitVector, length: f32) -> Self {
+        Self { alpha: axis.cos * length, beta: axis.sin * length }
+    }
+
+    /// The square of the length.
+    pub fn length_squared(self) -> f32 {
+        self.alpha * self.alpha + self.beta * self.beta
+    }
+
+    /// The components along `axis` and across it, 90° ahead.
+    pub fn seen_from(self, axis: UnitVector) -> (f32, f32) {
+        (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
+    }
+}
+
+impl Mul<f32> for UnitVector {
+    type Output = Dq;
+    /// A vector of this length along an axis that is seen from the flux.
+    fn mul(self, length: f32) -> Dq {
+        Dq { d: self.cos * length, q: self.sin * length }
+    }
+}
+
+impl Dq {
+    /// Inverse Park transformation: back from the frame whose d axis lies along `axis`.
+    pub fn to_alpha_beta(self, axis: UnitVector) -> AlphaBeta {
+        AlphaBeta {
+            alpha: axis.cos * self.d - axis.sin * self.q,
+            beta: axis.sin * self.d + axis.cos * self.q,
+        }
+    }
+
+    /// The square of the length.
+    pub fn length_squared(self) -> f32 {
+        self.d * self.d + self.q * self.q
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::angle::Angle;
+    use proptest::prelude::*;
+
+    #[test]
+    fn clarke_agrees_with_the_printed_matrices() {
+        // Eq. 2.3 on a balanced set of peak 1 at angle 0: alpha = 1, beta = 0.
+        let i = Abc::new(1.0, -0.5, -0.5).to_alpha_beta();
+        assert!((i.alpha - 1.0).abs() < 1e-7 && i.beta.abs() < 1e-7);
+        // Phase b alone, -c: beta = 2/sqrt(3).
+        let i = Abc::new(0.0, 1.0, -1.0).to_alpha_beta();
+        assert!(i.alpha.abs() < 1e-7 && (i.beta - 2.0 * FRAC_1_SQRT_3).abs() < 1e-7);
+    }
+
+    #[test]
+    fn q_is_ahead_of_d() {
+        // A vector at 90° seen from a frame at 30°: d = cos 60°, q = sin 60°.
+        let v = AlphaBeta::new(0.0, 1.0).to_dq(Angle::from_degrees(30.0).unit_vector());
+        assert!((v.d - 0.5).abs() < 2e-5 && (v.q - 0.866_025_4).abs() < 2e-5);
+    }
+
+    #[test]
+    fn the_injection_axis_is_the_bisector_of_dm_and_qm() {
+        let theta = Angle::from_degrees(73.0);
+        let i = AlphaBeta::along(theta.unit_vector(), 1.0)
+            .to_dm_qm((theta - Angle::EIGHTH).unit_vector());
+        assert!(
+            (i.dm - i.qm).abs() < 2e-5 && (i.dm - core::f32::consts::FRAC_1_SQRT_2).abs() < 2e-5
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn clarke_and_back(a in -5f32..5.0, b in -5f32..5.0) {
+            let abc = Abc::new(a, b, -a - b);
+            let two = AlphaBeta::from_two_phases(a, b);
+            let three = abc.to_alpha_beta();
+            prop_assert!((two.alpha - three.alpha).abs() < 2e-6 && (two.beta - three.beta).abs() < 2e-6);
+            let back = two.to_abc();
+            for (x, y) in [(back.a, a), (back.b, b), (back.c, -a - b)] {
+                prop_assert!((x - y).abs() < 2e-6);
+            }
+        }
+
+        #[test]
+        fn park_and_back(alpha in -5f32..5.0, beta in -5f32..5.0, bits in any::<i32>()) {
+            let axis = Angle::from_bits(bits).unit_vector();
+            let v = AlphaBeta::new(alpha, beta);
+            let back = v.to_dq(axis).to_alpha_beta(axis);
+            // |axis|^2 differs from 1 by up to 2.4e-5
+            prop_assert!((back.alpha - alpha).abs() < 1.5e-4 && (back.beta - beta).abs() < 1.5e-4);
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Checks of sensors, wiring, saliency and lock; each ends in a fault.
+
+pub mod lock_monitor;
+pub mod noise_watch;
+pub mod plausibility;
+pub mod saliency_check;
+pub mod wiring_check;

@@ -1,0 +1,280 @@
+//! Is the angle that is tracked the flux's? Watched in every carrier period.
+//!
+//! The tracker looks at one component of the saliency alone, the one across the injection axis (`q`,
+//! [`crate::carrier::synchronous`]), and brings it to its reference. That does not say where the flux is: the
+//! reference is met as well when the flux is gone, or turns away under the axis too fast to be
+//! followed. A false lock comes to just that: current in the wrong direction lets the flux decay, and
+//! with it the saliency that would have pulled the axis back.
+//!
+//! The other component comes with the demodulation: it makes the carrier current along the axis larger
+//! or smaller. With `s` the saliency vector seen from the estimated flux axis,
+//!
+//! ```text
+//! |C| ~ 1 - Re s     q ~ Im s     s = a f e^(2 j e) + (the current's part)
+//! loss = (1 - |C| / |C|_ref) / |a| = 1 - f cos 2e
+//! ```
+//!
+//! (a < 0 fixed to the flux, e the angle error, f = 1 at nominal flux). The loss is 0 at the right
+//! angle, 1 without flux, 2 at an error of 90°, and averages to 1 when the flux turns under the axis.
+//! Resistances, dead time and speed are hardly in it, and nothing has to be perturbed. The voltage
+//! equation is no help at low speed: a wrong angle changes it by less than 1 V there, and the dead time
+//! alone leaves 2 V.
+//!
+//! An error of 180° looks right by symmetry, but the current does not hold it: the flux decays through
+//! zero to the right sign, or its loss is seen on the way.
+//!
+//! `|C|_ref` is the carrier current seen while the drive magnetises, where the direction of the flux is
+//! known, times a learned even function of i_q. `a` is what the saliency check saw, if there was one.
+//!
+//! The mean loss of the simulated motor, 80 ms, stays below 0.22 in 10 000 runs within 300 rpm, with
+//! reversals of the torque and load steps, below 0.35 with a dead-time residual of 4.1 V or a carrier
+//! of 30 V, and passes 0.65 in every false lock. A load that speeds the shaft up against the torque of the
+//! drive makes the flux itself smaller: at 2 A and 600 rpm/s to a third, which is seen as a loss.
+
+use crate::carrier::Saliency;
+use crate::fault::Fault;
+use crate::settings::table::{CarrierTable, POINTS, between, each, place};
+
+/// Coefficients of the monitor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LockMonitor {
+    /// 1 / ratio^2 of the carrier table.
+    inverse_square: [f32; POINTS],
+    /// 1 / |a|.
+    per_saliency: f32,
+    /// Share of the newest value in the mean loss and in the mean baseline.
+    smoothing: f32,
+    baseline_smoothing: f32,
+    /// Allowed loss.
+    allowed: f32,
+    /// Square of the least carrier current, A^2.
+    least: f32,
+    /// Electrical speed up to which the shaft counts as standing, turns per control period.
+    standing: f32,
+}
+
+/// What the monitor takes of the settings; SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LockMonitorSettings {
+    /// The saliency fixed to the flux.
+    pub flux_saliency: f32,
+    /// Time constant of the mean loss, s.
+    pub smoothing_s: f32,
+    /// Allowed loss; 1 is a flux that is gone.
+    pub allowed: f32,
+    /// Carrier current that is expected, A.
+    pub carrier_a: f32,
+    /// Electrical speed up to which the shaft counts as standing, turns per control period.
+    pub standing_step: f32,
+    /// Period of the carrier, s: that of the monitor's steps.
+    pub period_s: f32,
+}
+
+/// State of the monitor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LockMonitorState {
+    /// Square of the carrier current at i_q = 0, A^2, mean.
+    pub baseline: f32,
+    /// Saliency of the motor as a share of the expected one.
+    pub share: f32,
+    /// Loss per relative change of the squared carrier current; 0 until it is first needed.
+    per_change: f32,
+    per_baseline: f32,
+    /// Mean loss.
+    pub loss: f32,
+    /// Carrier periods in a row with too little carrier current.
+    weak: u8,
+}
+
+impl Default for LockMonitorState {
+    /// Nothing seen yet, the expected saliency taken for granted.
+    fn default() -> Self {
+        Self { baseline: 0.0, share: 1.0, per_change: 0.0, per_baseline: 0.0, loss: 0.0, weak: 0 }
+    }
+}
+
+/// Time constant of the mean of the baseline, s: noise of 5 mA makes 0.1 % of it, 0.03 in the loss.
+const BASELINE_S: f32 = 0.1;
+/// Share of the expected carrier current below which there is too little. An open phase leaves the
+/// square of the cosine between the axis and what is left to flow along.
+const LEAST_CARRIER: f32 = 0.5;
+/// Carrier periods in a row until that is a fault. The averages of the demodulation take four to fill.
+const WEAK_PERIODS: u8 = 8;
+
+fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
+    let mut squares = *table.points();
+    each(&mut squares, |_, r| 1.0 / (r * r));
+    squares
+}
+
+impl LockMonitor {
+    /// See [`LockMonitorSettings`].
+    #[inline]
+    pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
+        let least = LEAST_CARRIER * s.carrier_a;
+        Self {
+            inverse_square: inverse_square(table),
+            per_saliency: 1.0 / s.flux_saliency.abs(),
+            smoothing: s.period_s / (s.smoothing_s + s.period_s),
+            baseline_smoothing: s.period_s / BASELINE_S,
+            allowed: s.allowed,
+            least: least * least,
+            standing: s.standing_step,
+        }
+    }
+
+    /// Compares with what was learned from now on.
+    pub fn take(&mut self, table: &CarrierTable) {
+        self.inverse_square = inverse_square(table);
+    }
+
+    /// One carrier period: what is demodulated, and `per_share_squared`, one over the square of the share of
+    /// the carrier that is put out. While the axis is `held` the flux is where it must be, with i_q = 0, and the baseline is
+    /// taken.
+    ///
+    /// # Errors
+    /// [`Fault::CarrierWeak`] after eight carrier periods with hardly any carrier current, whatever the
+    /// angle; [`Fault::LostLock`] when the mean loss is too large.
+    pub fn step(
+        &self,
+        state: &mut LockMonitorState,
+        seen: &Saliency,
+        per_share_squared: f32,
+        held: bool,
+    ) -> Result<(), Fault> {
+        let carrier = seen.carrier_squared * per_share_squared;
+        state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
+        if state.weak >= WEAK_PERIODS {
+            return Err(Fault::CarrierWeak);
+        }
+        if held {
+            state.baseline += self.baseline_smoothing * (carrier - state.baseline);
+            (state.loss, state.per_change) = (0.0, 0.0);
+            return Ok(());
+        }
+        if state.per_change == 0.0 {
+            // 1 - |C|/|C|_ref is half of what it is for the squares.
+            state.per_change = 0.5 * self.per_saliency / state.share;
+            state.per_baseline = 1.0 / state.baseline;
+        }
+        let relative = carrier * state.per_baseline * self.inverse_square(seen.i_q);
+        let loss = (1.0 - relative) * state.per_change;
+        state.loss += self.smoothing * (loss - state.loss);
+        // Not-a-number is not within the limit.
+        if state.loss <= self.allowed { Ok(()) } else { Err(Fault::LostLock) }
+    }
+
+    /// 1 / ratio^2 at a quadrature current, A.
+    fn inverse_square(&self, i_q: f32) -> f32 {
+        between(&self.inverse_square, place(i_q))
+    }
+
+    /// Whether the shaft stands by an electrical speed, turns per control period.
+    pub fn stands(&self, rotor_step: f32) -> bool {
+        rotor_step.abs() <= self.standing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nominal 0.26 A of carrier, 80 ms.
+    fn monitor() -> LockMonitor {
+        LockMonitor::new(
+            &CarrierTable::default(),
+            &LockMonitorSettings {
+                flux_saliency: -0.035,
+                smoothing_s: 0.08,
+                allowed: 0.55,
+                carrier_a: 0.26,
+                standing_step: 1e-4,
+                period_s: 1.0 / 600.0,
+            },
+        )
+    }
+
+    fn seen(carrier_a: f32, i_q: f32) -> Saliency {
+        Saliency { q: 0.0, carrier_squared: carrier_a * carrier_a, i_q }
+    }
+
+    /// A state with the baseline taken at 0.27 A.
+    fn ready(monitor: &LockMonitor) -> LockMonitorState {
+        let mut state = LockMonitorState::default();
+        for _ in 0..600 {
+            assert_eq!(monitor.step(&mut state, &seen(0.27, 0.0), 1.0, true), Ok(()));
+        }
+        state
+    }
+
+    /// Steps until the fault: how many, and which.
+    fn until(monitor: &LockMonitor, state: &mut LockMonitorState, seen: Saliency) -> (u32, Fault) {
+        for n in 1..=6000 {
+            if let Err(fault) = monitor.step(state, &seen, 1.0, false) {
+                return (n, fault);
+            }
+        }
+        panic!("no fault")
+    }
+
+    #[test]
+    fn a_lost_flux_is_seen_in_the_time_the_mean_takes() {
+        let monitor = monitor();
+        for i_q in [0.0_f32, 0.6, -1.0, 3.0, -3.6] {
+            let table = [(0.0, 1.0), (0.6, 1.0192), (1.0, 1.04167), (3.0, 1.14488), (3.6, 1.15781)];
+            let ratio = table.iter().find(|p| p.0 == i_q.abs()).unwrap().1;
+            let mut state = ready(&monitor);
+            for _ in 0..600 {
+                let right = monitor.step(&mut state, &seen(0.27 * ratio, i_q), 1.0, false);
+                assert_eq!(right, Ok(()));
+            }
+            assert!(state.loss.abs() < 0.02, "{i_q}: {}", state.loss);
+            // Without flux: 80 ms ln(1 / 0.45) = 64 ms.
+            let gone = seen(0.27 * ratio * (1.0 - 0.035), i_q);
+            let (n, fault) = until(&monitor, &mut state, gone);
+            assert_eq!(fault, Fault::LostLock);
+            assert!((36..=42).contains(&n), "{i_q}: {n} carrier periods");
+        }
+    }
+
+    #[test]
+    fn the_unit_is_the_saliency_that_the_motor_has() {
+        let monitor = monitor();
+        let mut state = ready(&monitor);
+        state.share = 0.5;
+        let (n, _) = until(&monitor, &mut state, seen(0.27 * (1.0 - 0.0175), 0.0));
+        assert!((36..=42).contains(&n), "{n} carrier periods");
+    }
+
+    #[test]
+    fn a_smaller_carrier_on_purpose_is_no_loss() {
+        let monitor = monitor();
+        let mut state = ready(&monitor);
+        for _ in 0..600 {
+            assert_eq!(monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 1.0 / 0.36, false), Ok(()));
+        }
+        assert!(state.loss.abs() < 1e-3, "{}", state.loss);
+    }
+
+    #[test]
+    fn no_carrier_and_no_number_are_faults() {
+        let monitor = monitor();
+        let mut state = ready(&monitor);
+        let mut result = Ok(());
+        for n in 0..WEAK_PERIODS {
+            assert_eq!(result, Ok(()), "{n}");
+            result = monitor.step(&mut state, &seen(0.12, 0.0), 1.0, true);
+        }
+        assert_eq!(result, Err(Fault::CarrierWeak));
+        // A number that is not finite, and a baseline that was never taken.
+        for (mut state, carrier) in [
+            (ready(&monitor), f32::NAN),
+            (ready(&monitor), f32::INFINITY),
+            (LockMonitorState::default(), 0.27),
+        ] {
+            let mut steps =
+                (0..600).map(|_| monitor.step(&mut state, &seen(carrier, 0.0), 1.0, false));
+            assert!(steps.any(|result| result == Err(Fault::LostLock)), "{carrier}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Are the sensors where the settings say, and the right way round? Asked once, before there is flux,
+//! with voltage pulses so short that no current reaches 0.5 A.
+//!
+//! Each leg in turn gets a pulse along its phase, and the same the other way round. Over so short a time
+//! the motor is its transient inductance, so the current of that phase rises to a known height, and
+//! those of the two others to half of it on the other side. A sensor that is right answers the pulse of
+//! its own phase most, and with its sign:
+//!
+//! | what is wrong | what is seen |
+//! |---|---|
+//! | sensor or phase open | no answer to any pulse |
+//! | sensor turned round | the largest answer to its own phase, negative |
+//! | sensors exchanged, or legs against sensors | the largest answer to another phase |
+//!
+//! Whether the cable exchanges two phases behind the sensors is not seen: a motor at rest is the same
+//! both ways round, it only turns the other way.
+//!
+//! # The bound
+//! The pulse is made for [`EXPECTED_A`] with the inductance of the settings. The current is checked at
+//! every sample against what half that inductance gives, and a little for noise. So as long as the
+//! motor has half of the inductance, 0.4 A are not exceeded, whatever the sensors say; with less, a
+//! sensor that works ends it at the next sample: down to a fifth below 0.5 A.
+
+use crate::fault::Fault;
+use crate::math::frames::{Abc, AlphaBeta};
+
+/// Height to which the pulses are made, A.
+pub const EXPECTED_A: f32 = 0.2;
+/// What half the inductance makes of it, A.
+const LARGEST_A: f32 = 2.0 * EXPECTED_A;
+/// Noise, and what is left of the pulse before, A: ten times 5 mA rms.
+const NOISE_A: f32 = 0.05;
+/// Share of [`EXPECTED_A`] below which a sensor sees nothing: half of what twice the inductance gives.
+const LEAST_SHARE: f32 = 0.25;
+/// Highest voltage of a pulse, V: what the lowest dc link in use gives; a motor with more inductance
+/// gets a longer pulse. It is far above what the dead time costs (4 V).
+const HIGHEST_V: f32 = 60.0;
+/// Shortest rise, periods: the first sample in it ends it if the current rises too fast.
+const SHORTEST_RISE: u32 = 2;
+/// Longest, periods: the answer would be the resistance's, no longer the inductance's.
+const LONGEST_RISE: u32 = 60;
+/// Periods of rest after a pulse.
+const REST: u32 = 8;
+/// Pulses on each phase and sign.
+const ROUNDS: u32 = 2;
+/// Phases times signs.
+const PULSES_PER_ROUND: u32 = 6;
+
+/// Coefficients of the check.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WiringCheck {
+    /// Height of the pulses, V.
+    volts: f32,
+    /// Periods up, and as many down.
+    rise: u32,
+}
+
+/// State of the check.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WiringCheckState {
+    /// Period of the pulse.
+    period: u32,
+    /// Number of the pulse.
+    pulse: u32,
+    /// Sum of the answers to pulses on a, b, c: of the sensors a and b, A.
+    answers: [[f32; 2]; 3],
+}
+
+/// What the drive is to do in the next period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Put this voltage out, V, while this current flows, A.
+    Apply(AlphaBeta, AlphaBeta),
+    /// Go on: the wiring is right.
+    Passed,
+}
+
+/// Unit vectors along phases a, b, c.
+const AXES: [AlphaBeta; 3] = [
+    AlphaBeta { alpha: 1.0, beta: 0.0 },
+    AlphaBeta { alpha: -0.5, beta: 0.866_025_4 },
+    AlphaBeta { alpha: -0.5, beta: -0.866_025_4 },
+];
+
+impl WiringCheck {
+    /// For the transient inductance of the motor, H, and the control period, s.
+    #[inline]
+    pub fn new(sigma_ls: f32, period_s: f32) -> Self {
+        let volt_periods = EXPECTED_A * sigma_ls / period_s;
+        let rise = (volt_periods / HIGHEST_V) as u32 + 1;
+        let rise = rise.clamp(SHORTEST_RISE, LONGEST_RISE);
+        let volts = volt_periods / rise as f32;
+        Self { volts: if volts < HIGHEST_V { volts } else { HIGHEST_V }, rise }
+    }
+
+    /// One sample: phase currents, A.
+    ///
+    /// # Errors
+    /// What is wrong with the wiring.
+    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<Next, Fault> {
+        // Of the voltage computed in period n, the sample n + 1 is the first that could know, and the
+        // sample n + 2 does.
+        let risen = state.period.saturating_sub(1);
+        let share = if risen < self.rise { risen as f32 / self.rise as f32 } else { 1.0 };
+        let allowed = LARGEST_A * share + NOISE_A;
+        // Not-a-number is not below.
+        if !(phases.a.abs() < allowed && phases.b.abs() < allowed) {
+            return Err(Fault::WiringCurrent);
+        }
+        let sign = if state.pulse.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let leg = (state.pulse / 2 % 3) as usize;
+        if risen == self.rise
+            && let Some(answer) = state.answers.get_mut(leg)
+        {
+            answer[0] += sign * phases.a;
+            answer[1] += sign * phases.b;
+        }
+        let volts = if state.period < self.rise {
+            sign * self.volts
+        } else if state.period < 2 * self.rise {
+            -sign * self.volts
+        } else {
+            0.0
+        };
+        let flowing = if state.period <= 2 * self.rise { sign * EXPECTED_A } else { 0.0 };
+        state.period += 1;
+        if state.period >= 2 * self.rise + REST {
+            state.period = 0;
+            state.pulse += 1;
+            if state.pulse >= PULSES_PER_ROUND * ROUNDS {
+                return judge(&state.answers).map_or(Ok(Next::Passed), Err);
+            }
+        }
+        let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
+        Ok(Next::Apply(axis * volts, axis * flowing))
+    }
+}
+
+/// What is wrong, by the answers.
+fn judge(answers: &[[f32; 2]; 3]) -> Option<Fault> {
+    let [a, b, c] = *answers;
+    let least = LEAST_SHARE * EXPECTED_A * (2 * ROUNDS) as f32;
+    // What a sensor answers to its own phase and to the two others.
+    let sensors = [
+        ([a[0], b[0], c[0]], Fault::WiringPolarityA),
+        ([b[1], a[1], c[1]], Fault::WiringPolarityB),
+    ];
+    let silent = |[x, y, z]: [f32; 3]| x.abs() < least && y.abs() < least && z.abs() < least;
+    let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
+    let [(at_a, _), (at_b, _)] = sensors;
+    if silent(at_a) || silent(at_b) {
+        return Some(Fault::WiringNoCurrent);
+    }
+    if exchanged(at_a) || exchanged(at_b) {
+        return Some(Fault::WiringExchanged);
+    }
+    sensors.into_iter().find(|([own, ..], _)| *own < 0.0).map(|(_, fault)| fault)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Whatever is measured, it ends, and a voltage is never higher than asked for.
+        #[test]
+        fn it_ends(sigma_ls in 1e-6_f32..100.0, bits: [u32; 16]) {
+            let check = WiringCheck::new(sigma_ls, 1.0 / 6000.0);
+            let mut state = WiringCheckState::default();
+            let longest = (2 * LONGEST_RISE + REST) * PULSES_PER_ROUND * ROUNDS;
+            let ends = (0..longest).any(|n| {
+                let current = |k: usize| f32::from_bits(bits[(n as usize + k) % 16]);
+                match check.step(&mut state, Abc::new(current(0), current(1), 0.0)) {
+                    Ok(Next::Apply(voltage, _)) => {
+                        assert!(voltage.length_squared() <= HIGHEST_V * HIGHEST_V * 1.000_1);
+                        false
+                    }
+                    _ => true,
+                }
+            });
+            prop_assert!(ends);
+        }
+    }
+
+    #[test]
+    fn not_a_number_is_no_current() {
+        let check = WiringCheck::new(0.05, 1.0 / 6000.0);
+        let nan = Abc::new(f32::NAN, 0.0, 0.0);
+        let next = check.step(&mut WiringCheckState::default(), nan);
+        assert_eq!(next, Err(Fault::WiringCurrent));
+    }
+}

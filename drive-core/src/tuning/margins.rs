@@ -1,0 +1,223 @@
+//! Margins of an open loop by a frequency scan with refinement.
+
+use core::f64::consts::{PI, TAU};
+
+use crate::math::complex::Complex;
+use crate::math::elementary::{exp_m1, sqrt};
+
+/// How far a loop is from instability.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// Smallest angle between the open loop and -180° wherever its gain is 1, degrees; negative if
+    /// the closed loop is unstable.
+    pub phase_margin_deg: f64,
+    /// Where that is, Hz.
+    pub crossover_hz: f64,
+    /// Sensitivity peak, max |1/(1 + L)|: the inverse of the distance to -1.
+    pub ms: f64,
+    /// Where that is, Hz.
+    pub ms_hz: f64,
+    /// Smallest factor on the gain above 1 that puts the open loop on -1; infinite if none does.
+    pub gain_margin: f64,
+    /// Whether the closed loop is stable, by counting encirclements of -1.
+    pub stable: bool,
+}
+
+/// Points of the grid below and above `SPLIT`, where its spacing turns from even in the logarithm
+/// to even: 3.7 Hz at 6 kHz.
+const LOW: u32 = 200;
+const HIGH: u32 = 800;
+/// rad/sample
+const START: f64 = 1e-5;
+const SPLIT: f64 = 0.05;
+/// ln(SPLIT / START), asserted in a test.
+const LN_SPLIT_OVER_START: f64 = 8.517_193_191_416_238;
+
+fn grid(n: u32) -> f64 {
+    if n < LOW {
+        // Even in the logarithm: START (SPLIT / START)^(n / LOW).
+        START * (1.0 + exp_m1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
+    } else {
+        SPLIT + (PI - SPLIT) * (f64::from(n - LOW) / f64::from(HIGH))
+    }
+}
+
+/// Margins of an open loop, a function of ωT, that has `integrators` poles at z = 1 and no pole
+/// outside the unit circle. `None` if its gain never crosses 1 on the grid.
+pub(super) fn scan(
+    open_loop: &dyn Fn(f64) -> Complex,
+    integrators: u8,
+    period_s: f64,
+) -> Option<Margins> {
+    let hz = |omega_t: f64| omega_t / (TAU * period_s);
+    let distance = |w: f64| (Complex::ONE + open_loop(w)).abs();
+
+    let mut nearest = (grid(0), f64::INFINITY, 0);
+    let mut phase_margin: Option<(f64, f64)> = None;
+    let mut gain_margin = f64::INFINITY;
+    let mut turned = 0.0;
+
+    let mut w_before = grid(0);
+    let mut before = open_loop(w_before);
+    for n in 1..=LOW + HIGH {
+        let w = grid(n);
+        let l = open_loop(w);
+        // Argument of 1 + L, summed over the small steps.
+        turned += ((Complex::ONE + l) / (Complex::ONE + before)).arg();
+        let d = (Complex::ONE + l).abs();
+        if d < nearest.1 {
+            nearest = (w, d, n);
+        }
+        if (before.abs() >= 1.0) != (l.abs() >= 1.0) {
+            let w = crossing(&|w| open_loop(w).abs() - 1.0, w_before, w);
+            let angle = 180.0 - open_loop(w).arg_deg().abs();
+            if phase_margin.is_none_or(|(smallest, _)| angle < smallest) {
+                phase_margin = Some((angle, w));
+            }
+        }
+        if (before.im < 0.0) != (l.im < 0.0) && before.re < 0.0 && l.re < 0.0 {
+            let gain = open_loop(crossing(&|w| open_loop(w).im, w_before, w)).abs();
+            if gain < 1.0 && 1.0 / gain < gain_margin {
+                gain_margin = 1.0 / gain;
+            }
+        }
+        (w_before, before) = (w, l);
+    }
+
+    let (phase_margin, crossover) = phase_margin?;
+    let n = nearest.2;
+    let (ms_w, least) = if n == 0 {
+        (nearest.0, nearest.1)
+    } else {
+        minimum(&distance, grid(n - 1), grid(if n < LOW + HIGH { n + 1 } else { n }))
+    };
+    // Argument principle: with all closed-loop poles inside, 1 + L turns by +90° per integrator on
+    // the upper half circle, and by 180° less per pole outside.
+    let stable = 0.5 * PI * f64::from(integrators) - turned < 0.5 * PI;
+    Some(Margins {
+        phase_margin_deg: if stable { phase_margin } else { -phase_margin },
+        crossover_hz: hz(crossover),
+        ms: 1.0 / least,
+        ms_hz: hz(ms_w),
+        gain_margin,
+        stable,
+    })
+}
+
+/// The largest gain up to which, from zero on, an open loop keeps a phase margin and a sensitivity
+/// peak.
+///
+/// No search over the gain: at each frequency the gains that violate are known in closed form. With
+/// gain g, |1 + g L| >= 1/Ms is a quadratic in g; the phase margin forbids g = 1/|L| wherever L lies
+/// within the margin of the negative real axis.
+pub(super) fn gain_limit(
+    open_loop: &dyn Fn(f64) -> Complex,
+    phase_margin_deg: f64,
+    ms: f64,
+) -> f64 {
+    let limit = |w: f64| {
+        let l = open_loop(w);
+        let a = l.re * l.re + l.im * l.im;
+        let c = 1.0 - 1.0 / (ms * ms);
+        let root = l.re * l.re - a * c;
+        // Smaller root of a g² + 2 re g + c = 0, written without cancellation.
+        let by_ms = if l.re < 0.0 && root >= 0.0 { c / (sqrt(root) - l.re) } else { f64::INFINITY };
+        let by_phase = if 180.0 - l.arg_deg().abs() < phase_margin_deg {
+            1.0 / sqrt(a)
+        } else {
+            f64::INFINITY
+        };
+        if by_ms < by_phase { by_ms } else { by_phase }
+    };
+    let mut best = (f64::INFINITY, 0);
+    for n in 0..=LOW + HIGH {
+        let g = limit(grid(n));
+        if g < best.0 {
+            best = (g, n);
+        }
+    }
+    let (from, to) = (best.1.max(1) - 1, if best.1 < LOW + HIGH { best.1 + 1 } else { best.1 });
+    // Where the phase margin binds the limit jumps to infinity beside its minimum: the golden section
+    // still ends at the lower side.
+    let refined = minimum(&limit, grid(from), grid(to)).1;
+    if refined < best.0 { refined } else { best.0 }
+}
+
+/// Where `f` changes its sign.
+fn crossing(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let sign = f(low) < 0.0;
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if (f(middle) < 0.0) == sign {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Minimum of a function with one valley, by golden section: place and value.
+fn minimum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut f_a, mut f_b) = (f(a), f(b));
+    for _ in 0..40 {
+        if f_a < f_b {
+            high = b;
+            (b, f_b) = (a, f_a);
+            a = high - GOLDEN * (high - low);
+            f_a = f(a);
+        } else {
+            low = a;
+            (a, f_a) = (b, f_b);
+            b = low + GOLDEN * (high - low);
+            f_b = f(b);
+        }
+    }
+    if f_a < f_b { (a, f_a) } else { (b, f_b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tuning::{FirstOrder, pi_response};
+
+    #[test]
+    fn the_logarithm_is_that_of_the_grid() {
+        assert!((LN_SPLIT_OVER_START - libm::log(SPLIT / START)).abs() < 1e-14);
+        assert!((grid(LOW) / SPLIT - 1.0).abs() < 1e-12 && (grid(0) / START - 1.0).abs() < 1e-12);
+    }
+
+    /// The closed form against a bisection over the gain, where the peak binds and where the phase
+    /// margin does.
+    #[test]
+    fn gain_limit_agrees_with_a_search() {
+        let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
+        let open_loop = |w: f64| {
+            // The filter as its delay of 1.53 samples, and one period.
+            pi_response(1.0, 0.9538, w) * plant.response(w) * Complex::unit(-2.53 * w)
+        };
+        for (phase_margin_deg, ms) in
+            [(45.0, 2.2), (55.0, 2.2), (50.0, 5.0), (20.0, 1.5), (1.0, 50.0)]
+        {
+            let holds = |gain: f64| {
+                let m = scan(&|w| open_loop(w) * gain, 1, 1.0 / 6000.0).expect("crosses");
+                m.stable && m.phase_margin_deg >= phase_margin_deg && m.ms <= ms
+            };
+            let (mut low, mut high) = (20.0, 200.0);
+            assert!(holds(low) && !holds(high));
+            for _ in 0..30 {
+                let middle = 0.5 * (low + high);
+                if holds(middle) {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let closed = gain_limit(&open_loop, phase_margin_deg, ms);
+            println!("{phase_margin_deg}°, {ms}: {closed:.6} by search {low:.6}");
+            assert!((closed / low - 1.0).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Clocks: 170 MHz from the crystal, or from the internal oscillator where the crystal is dead.
+
+use cortex_m::asm;
+use stm32g4xx_hal::pac;
+use stm32g4xx_hal::pwr::{PwrExt, VoltageScale};
+use stm32g4xx_hal::rcc::{
+    Config, PllConfig, PllMDiv, PllNMul, PllRDiv, PllSrc, Rcc, RccExt, SysClockSrc,
+};
+use stm32g4xx_hal::time::RateExtU32;
+
+use induction_drive::board;
+
+/// What the core runs from.
+#[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]
+pub enum Source {
+    /// The crystal.
+    Crystal,
+    /// The internal oscillator: 1 % accurate, and so are the control rate and all speeds.
+    Internal,
+}
+
+// Both oscillators are divided to 4 MHz, multiplied to 340 MHz and halved: inside what the PLL
+// allows (input 2.66 to 16 MHz, oscillator 96 to 344 MHz).
+const CRYSTAL_DIVIDER: PllMDiv = PllMDiv::DIV_6;
+const INTERNAL_DIVIDER: PllMDiv = PllMDiv::DIV_4;
+const MULTIPLIER: PllNMul = PllNMul::MUL_85;
+const OUTPUT_DIVIDER: PllRDiv = PllRDiv::DIV_2;
+
+const fn pll_hz(oscillator_hz: u32, divider: PllMDiv) -> u32 {
+    oscillator_hz / divider.divisor() * MULTIPLIER.multiplier() / OUTPUT_DIVIDER.divisor()
+}
+const _: () = assert!(pll_hz(board::HSE_HZ, CRYSTAL_DIVIDER) == board::CLOCK_HZ);
+const _: () = assert!(pll_hz(board::HSI_HZ, INTERNAL_DIVIDER) == board::CLOCK_HZ);
+
+/// Brings core, buses and timers to [`board::CLOCK_HZ`].
+pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) {
+    let rcc = rcc.constrain();
+    let (source, mux, divider) = if crystal_starts(&rcc) {
+        (Source::Crystal, PllSrc::HSE(board::HSE_HZ.Hz()), CRYSTAL_DIVIDER)
+    } else {
+        rcc.cr().modify(|_, w| w.hseon().off());
+        (Source::Internal, PllSrc::HSI, INTERNAL_DIVIDER)
+    };
+
+    // The supply is watched; what comes of it goes to the break of TIM1 (`pwm.rs`).
+    // SAFETY: three bits, all of them levels.
+    pwr.cr2().modify(|_, w| unsafe { w.pvdls().bits(board::SUPPLY_LEVEL) }.pvde().set_bit());
+
+    let pll =
+        PllConfig { mux, m: divider, n: MULTIPLIER, r: Some(OUTPUT_DIVIDER), q: None, p: None };
+    // Above 150 MHz the core needs its boosted voltage range.
+    let power = pwr.constrain().vos(VoltageScale::Range1 { enable_boost: true }).freeze();
+    // The HAL sets the flash wait states (4) that belong to voltage range and clock.
+    let rcc = rcc.freeze(Config::new(SysClockSrc::PLL).pll_cfg(pll), power);
+
+    // The HAL leaves the prefetch off; the caches are on after reset.
+    flash.acr().modify(|_, w| w.prften().set_bit());
+    if source == Source::Crystal {
+        // A crystal that stops raises the NMI, and TIM1's break with it.
+        rcc.cr().modify(|_, w| w.csson().on());
+    }
+    (rcc, source)
+}
+
+/// Switches the crystal on and waits for it, not for ever.
+fn crystal_starts(rcc: &Rcc) -> bool {
+    rcc.cr().modify(|_, w| w.hseon().on());
+    for _ in 0..board::HSE_START_MS * 10 {
+        if rcc.cr().read().hserdy().is_ready() {
+            return true;
+        }
+        // A tenth of a millisecond: the core still runs from the internal oscillator.
+        asm::delay(board::HSI_HZ / 10_000);
+    }
+    false
+}

@@ -1,0 +1,139 @@
+//! The flash pages of the settings: reading past torn double words, erasing, programming.
+//!
+//! Erasing and programming follow RM0440 (FLASH main memory erase and programming sequences). With two
+//! banks the code, in the first, goes on while the second is written; with one, the core waits for as
+//! long as an erasure takes (22 ms), which is why the outputs must be off.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::asm;
+use cortex_m::peripheral::DWT;
+use stm32g4xx_hal::pac;
+
+use induction_drive::board;
+use induction_drive::store::{Failed, Flash};
+
+/// The pages of the settings.
+pub struct Pages {
+    registers: pac::FLASH,
+    dual_bank: bool,
+}
+
+/// Whether a double word of the settings is being read, which may be torn.
+static READING: AtomicBool = AtomicBool::new(false);
+/// Whether it was.
+static TORN: AtomicBool = AtomicBool::new(false);
+
+/// The two keys that unlock the flash (RM0440, FLASH_KEYR).
+const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+/// All error flags and the end flag of FLASH_SR; written back they are cleared.
+const STATUS_FLAGS: u32 = 0xc3fb;
+/// Of these, the end of an operation.
+const STATUS_END: u32 = 1;
+
+/// Takes an error that the flash cannot correct back, if it is one of a read in here: for the
+/// non-maskable interrupt.
+///
+/// While a double word of the settings is read, an error in the code that reads it would be taken for
+/// one of the settings; the code is read again without that, and the error comes again.
+pub fn forgive_torn() -> bool {
+    // SAFETY: FLASH exists for as long as the chip does; only its error flags are touched.
+    let registers = unsafe { &*pac::FLASH::ptr() };
+    let errors = registers.eccr().read();
+    let torn = errors.eccd().bit() || errors.eccd2().bit();
+    if !(torn && READING.load(Ordering::Relaxed)) {
+        return false;
+    }
+    registers.eccr().modify(|_, w| w.eccd().set_bit().eccd2().set_bit());
+    TORN.store(true, Ordering::Relaxed);
+    true
+}
+
+impl Pages {
+    /// The pages, through the registers of the flash.
+    pub fn new(registers: pac::FLASH) -> Self {
+        let dual_bank = registers.optr().read().dbank().is_dual_bank_mode();
+        Self { registers, dual_bank }
+    }
+
+    fn unlocked(&mut self, work: impl FnOnce(&mut Self) -> u32) -> u32 {
+        if self.registers.cr().read().lock().bit() {
+            for key in KEYS {
+                // SAFETY: the keys of the reference manual.
+                self.registers.keyr().write(|w| unsafe { w.bits(key) });
+            }
+        }
+        // SAFETY: flags only; written as 1 they are cleared.
+        self.registers.sr().write(|w| unsafe { w.bits(STATUS_FLAGS) });
+        let status = work(self);
+        self.registers.cr().modify(|_, w| w.per().clear_bit().pg().clear_bit());
+        self.registers.cr().modify(|_, w| w.lock().set_bit());
+        // The data cache does not notice. It is emptied, which it only is while it is off.
+        self.registers.acr().modify(|_, w| w.dcen().clear_bit());
+        self.registers.acr().modify(|_, w| w.dcrst().set_bit());
+        self.registers.acr().modify(|_, w| w.dcrst().clear_bit());
+        self.registers.acr().modify(|_, w| w.dcen().set_bit());
+        status
+    }
+
+    /// Waits for the end of the operation; gives the errors, or all bits if it does not end.
+    fn finished(&self) -> u32 {
+        let began = DWT::cycle_count();
+        while self.registers.sr().read().bsy().bit() {
+            let us = DWT::cycle_count().wrapping_sub(began) / board::CYCLES_PER_US;
+            if us > board::FLASH_TIMEOUT_US {
+                return u32::MAX;
+            }
+        }
+        self.registers.sr().read().bits() & STATUS_FLAGS & !STATUS_END
+    }
+}
+
+impl Flash for Pages {
+    fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
+        let address = board::settings_address(slot, word) as *const u32;
+        TORN.store(false, Ordering::Relaxed);
+        READING.store(true, Ordering::SeqCst);
+        // SAFETY: the pages of the settings, aligned, which nothing else uses; volatile, because they
+        // change without the compiler's knowledge.
+        let (low, high) = unsafe { (address.read_volatile(), address.add(1).read_volatile()) };
+        // The interrupt comes with the read, not some instructions later.
+        asm::dsb();
+        asm::isb();
+        forgive_torn();
+        READING.store(false, Ordering::SeqCst);
+        let torn = TORN.load(Ordering::Relaxed);
+        (!torn).then_some(u64::from(low) | u64::from(high) << 32)
+    }
+
+    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+        let (second_bank, page) = board::settings_page(slot, self.dual_bank);
+        let status = self.unlocked(|pages| {
+            pages.registers.cr().modify(|_, w| {
+                // SAFETY: seven bits; `board` keeps the page inside.
+                unsafe { w.pnb().bits(page) };
+                w.per().set_bit().bker().bit(second_bank)
+            });
+            pages.registers.cr().modify(|_, w| w.strt().set_bit());
+            pages.finished()
+        });
+        if status == 0 { Ok(()) } else { Err(Failed::Erase(status)) }
+    }
+
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+        let address = board::settings_address(slot, word) as *mut u32;
+        let status = self.unlocked(|pages| {
+            pages.registers.cr().modify(|_, w| w.pg().set_bit());
+            // SAFETY: as in `read`. Both halves of one double word, the lower first: the second write
+            // begins the programming.
+            unsafe {
+                address.write_volatile(value as u32);
+                asm::isb();
+                address.add(1).write_volatile((value >> 32) as u32);
+            }
+            asm::dsb();
+            pages.finished()
+        });
+        if status == 0 { Ok(()) } else { Err(Failed::Program(status)) }
+    }
+}

@@ -1,0 +1,107 @@
+//! What the linker script lays out: the control code in CCM, and the stack, with nothing below it.
+
+use core::ptr;
+
+use cortex_m::register::msp;
+
+use induction_drive::monitor::memory_check::Part;
+
+unsafe extern "C" {
+    static mut _stack_start: u32;
+    static mut _stack_end: u32;
+}
+
+/// Copies the control code from the flash to CCM, where it is fetched without wait states.
+///
+/// Called by the start-up code before anything else, because the functions that copy and clear memory
+/// are among what is copied; in assembler, because no Rust may run before statics are initialised.
+#[unsafe(naked)]
+#[unsafe(export_name = "__pre_init")] // SAFETY: the name cortex-m-rt calls, defined nowhere else.
+unsafe extern "C" fn copy_control_code() {
+    core::arch::naked_asm!(
+        "ldr r0, =__sccm",
+        "ldr r1, =__eccm",
+        "ldr r2, =__siccm",
+        "2:",
+        "cmp r0, r1",
+        "beq 3f",
+        "ldm r2!, {{r3}}",
+        "stm r0!, {{r3}}",
+        "b 2b",
+        "3:",
+        // What was written must be what is fetched.
+        "dsb",
+        "isb",
+        "bx lr",
+    )
+}
+
+/// Where the code in CCM is, and where it was copied from.
+pub fn control_code() -> (Part, u32) {
+    unsafe extern "C" {
+        static __sccm: u32;
+        static __eccm: u32;
+        static __siccm: u32;
+    }
+    let [begin, end, source] =
+        [&raw const __sccm, &raw const __eccm, &raw const __siccm].map(|at| at as u32);
+    (Part { address: begin, words: (end - begin) / size_of::<u32>() as u32 }, source)
+}
+
+/// The word at an address that is a multiple of 4, in the flash or in RAM.
+pub fn word(address: u32) -> u32 {
+    let word;
+    // SAFETY: all callers' addresses are those of statics, and reading memory changes nothing. By an
+    // instruction that the compiler does not look into: the word may be padding or the interrupt's own,
+    // which no read of Rust's may touch. A word is read whole, before the interrupt wrote it or after.
+    unsafe {
+        core::arch::asm!(
+            "ldr {word}, [{address}]",
+            address = in(reg) address,
+            word = lateout(reg) word,
+            options(readonly, nostack, preserves_flags),
+        );
+    }
+    word
+}
+
+/// The build id: a hash that the linker makes of the image, so that what runs can be told from what was
+/// built. Behind the note's header (12 bytes) and its name, `GNU`.
+pub fn build_id() -> [u8; 8] {
+    const BEHIND: usize = 16;
+    unsafe extern "C" {
+        static _build_id: u8;
+    }
+    // SAFETY: memory.x puts the note there; it holds a hash of 8 bytes at least, and never changes.
+    unsafe { (&raw const _build_id).add(BEHIND).cast::<[u8; 8]>().read() }
+}
+
+/// What unused stack holds.
+const PAINT: u32 = 0xc5c5_c5c5;
+/// Words above the stack pointer's next use that are left alone, for what calls `paint_stack`.
+const MARGIN_WORDS: usize = 16;
+
+/// Paints the unused stack. Once, first thing in `main`.
+pub fn paint_stack() {
+    let end = &raw mut _stack_end;
+    let used_from = msp::read() as usize;
+    let words = used_from.saturating_sub(end as usize) / size_of::<u32>();
+    for i in 0..words.saturating_sub(MARGIN_WORDS) {
+        // SAFETY: between the end of the stack and the stack pointer lies nothing that is in use.
+        unsafe { ptr::write_volatile(end.add(i), PAINT) };
+    }
+}
+
+/// Most bytes of the stack that were ever used.
+pub fn stack_used() -> usize {
+    let end = &raw const _stack_end;
+    let words = stack_size() / size_of::<u32>();
+    // SAFETY: all of it is stack; volatile, because interrupts write there.
+    let unused = (0..words).take_while(|i| unsafe { ptr::read_volatile(end.add(*i)) } == PAINT);
+    stack_size() - unused.count() * size_of::<u32>()
+}
+
+/// Size of the stack, bytes.
+pub fn stack_size() -> usize {
+    (&raw const _stack_start as usize) - (&raw const _stack_end as usize)
+}

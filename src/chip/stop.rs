@@ -1,0 +1,157 @@
+//! What happens when the firmware cannot go on: outputs off first, then the reason into RAM that
+//! start-up does not clear, then a reset; the next boot reports it.
+
+use core::cell::UnsafeCell;
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use core::ptr;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::exception;
+use defmt::Display2Format;
+use stm32g4xx_hal::pac;
+
+use crate::chip::{flash, pwm};
+use induction_drive::board;
+use induction_drive::monitor::record::{Reason, Record, WORDS};
+
+/// RAM that keeps its contents over a reset.
+struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
+
+// SAFETY: plain words, only read and written volatile, by start-up code and by handlers that do not
+// return; the main loop writes, and a handler may interrupt it, which the check of the record finds.
+unsafe impl<T> Sync for Kept<T> {}
+
+// SAFETY: the section that cortex-m-rt leaves as it is, which `MaybeUninit` allows for.
+#[unsafe(link_section = ".uninit.record")]
+static RECORD: Kept<[u32; WORDS]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+/// Resets in a row that were no one's wish, and its complement.
+// SAFETY: as above.
+#[unsafe(link_section = ".uninit.resets")]
+static RESETS: Kept<[u32; 2]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
+
+impl<T: Copy> Kept<T> {
+    fn write(&self, value: T) {
+        // SAFETY: see `Kept`.
+        unsafe { ptr::write_volatile(self.0.get().cast(), value) };
+    }
+
+    fn read(&self) -> T
+    where
+        T: Words,
+    {
+        // SAFETY: see `Kept`; whatever the RAM holds is a value of words.
+        unsafe { ptr::read_volatile(self.0.get().cast()) }
+    }
+}
+
+/// Types for which every content of the RAM is a value.
+trait Words {}
+impl<const N: usize> Words for [u32; N] {}
+
+/// Keeps a record for the next boot.
+pub fn keep(reason: Reason, details: [u32; 4]) {
+    RECORD.write(Record { reason, details }.to_words());
+}
+
+/// The record of the last run, once.
+pub fn take_record() -> Option<Record> {
+    let record = Record::from_words(&RECORD.read());
+    RECORD.write([0; WORDS]);
+    record
+}
+
+/// Counts resets that nobody wished, without [`forget_resets`] between them.
+pub fn count_reset(unwished: bool) -> u32 {
+    let [count, complement] = RESETS.read();
+    let before = if unwished && count == !complement { count } else { 0 };
+    let count = before.saturating_add(u32::from(unwished));
+    RESETS.write([count, !count]);
+    count
+}
+
+/// The firmware has run well for a while.
+pub fn forget_resets() {
+    RESETS.write([0, !0]);
+}
+
+/// Outputs off, the reason kept, and a reset.
+pub fn end(reason: Reason, details: [u32; 4]) -> ! {
+    pwm::outputs_off();
+    keep(reason, details);
+    SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    pwm::outputs_off();
+    cortex_m::interrupt::disable();
+    // Once: a panic while logging would come back here for ever.
+    static PANICKED: AtomicBool = AtomicBool::new(false);
+    if !PANICKED.swap(true, Ordering::Relaxed) {
+        defmt::error!("{}", Display2Format(info));
+    }
+    end(Reason::Panic, [info.location().map_or(0, |place| place.line()), 0, 0, 0])
+}
+
+/// A fault of the processor, maybe because the stack is at its end: clears MOE before anything else,
+/// and takes a fresh stack, both without a memory access to the old one.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")] // SAFETY: the name cortex-m-rt's vector table has.
+#[unsafe(link_section = ".HardFault.user")] // SAFETY: where cortex-m-rt wants its code.
+unsafe extern "C" fn hard_fault() -> ! {
+    core::arch::naked_asm!(
+        "ldr r0, ={bdtr}",
+        "ldr r1, [r0]",
+        "bic r1, r1, #{moe}",
+        "str r1, [r0]",
+        // The frame of the fault, if there is one: program counter and link register.
+        "mrs r3, msp",
+        "movs r0, #0",
+        "movs r1, #0",
+        "ldr r2, =_stack_end",
+        "cmp r3, r2",
+        "blo 2f",
+        "ldr r2, =_stack_start",
+        "subs r2, #32",
+        "cmp r3, r2",
+        "bhi 2f",
+        "ldr r0, [r3, #24]",
+        "ldr r1, [r3, #20]",
+        "2:",
+        "ldr r2, =_stack_start",
+        "msr msp, r2",
+        "b {after}",
+        bdtr = const board::TIM1_BDTR,
+        moe = const board::TIM1_BDTR_MOE,
+        after = sym after_hard_fault,
+    )
+}
+
+extern "C" fn after_hard_fault(program_counter: u32, link: u32) -> ! {
+    // SAFETY: reads two registers; nothing else runs any more.
+    let scb = unsafe { &*SCB::PTR };
+    end(Reason::HardFault, [program_counter, link, scb.cfsr.read(), scb.bfar.read()])
+}
+
+/// The crystal has stopped, or the flash has an error that cannot be corrected. After the reset the
+/// firmware runs from the internal oscillator, if the crystal does not come back.
+///
+/// A double word of the settings that a power failure has torn is no reason to stop.
+#[exception]
+unsafe fn NonMaskableInt() {
+    if flash::forgive_torn() {
+        return;
+    }
+    pwm::outputs_off();
+    // SAFETY: reads two registers; nothing else runs any more.
+    let (rcc, flash) = unsafe { (&*pac::RCC::ptr(), &*pac::FLASH::ptr()) };
+    end(Reason::NonMaskable, [rcc.cifr().read().bits(), flash.eccr().read().bits(), 0, 0])
+}
+
+/// Everything nobody expects.
+#[exception]
+unsafe fn DefaultHandler(number: i16) -> ! {
+    end(Reason::Unexpected, [number as u32, 0, 0, 0])
+}

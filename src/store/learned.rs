@@ -1,0 +1,107 @@
+//! What was learned as values of the flash: all of them, or none.
+//!
+//! | value | what |
+//! |---|---|
+//! | 0 to 14 | reference at the currents of its table, but for zero |
+//! | 15 to 29 | carrier current at the same, 0 where it was not learned |
+//! | 30 | asymmetry of the reference |
+//! | 31, 32 | gain mismatch, its misfit |
+//! | 33, 34 | saliency of the current, its misfit |
+//! | 35 | saliency of the flux |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier |
+//!
+//! But for the last all are of single precision.
+
+use drive_core::identify::learning::{Fitted, Learned};
+use drive_core::settings::table::CarrierTable;
+use drive_core::settings::table::{POINTS, ReferenceTable};
+
+use crate::console::keys::number_of;
+
+/// How many there are.
+pub const WORDS: usize = FLAGS + 1;
+/// A bit for each.
+pub const ALL: u64 = (1 << WORDS) - 1;
+/// The name by which their numbers are made, and by which they are refused.
+pub const NAME: &str = "learned";
+
+const REFERENCE: usize = 0;
+const CARRIER: usize = REFERENCE + POINTS - 1;
+const FITS: usize = CARRIER + POINTS - 1;
+const FLAGS: usize = FITS + 6;
+
+const HAS_GAINS: u32 = 1 << 8;
+const HAS_CURRENT: u32 = 1 << 9;
+const HAS_CARRIER: u32 = 1 << 10;
+
+/// The number of a value, made of the name and its place.
+pub fn id(place: usize) -> u32 {
+    number_of(NAME).wrapping_add(place as u32)
+}
+
+/// The place of the value with this number.
+pub fn place(id: u32) -> Option<usize> {
+    let place = id.wrapping_sub(number_of(NAME)) as usize;
+    (place < WORDS).then_some(place)
+}
+
+/// What was learned, as it is kept.
+#[inline(never)]
+pub fn to_words(learned: &Learned) -> [u32; WORDS] {
+    let (gains, current) = (learned.gain_mismatch, learned.current_saliency);
+    let fits = [
+        learned.asymmetry,
+        gains.value,
+        gains.misfit,
+        current.value,
+        current.misfit,
+        learned.flux_saliency,
+    ];
+    let carrier = learned.carrier.map_or([0.0; POINTS], |table| *table.points());
+    let reference = learned.reference.points().iter().skip(1);
+    let values = reference.chain(carrier.iter().skip(1)).chain(&fits);
+    let mut words = [0; WORDS];
+    for (word, value) in words.iter_mut().zip(values) {
+        *word = value.to_bits();
+    }
+    let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+    words[FLAGS] = learned.points as u32
+        | flag(gains.accepted, HAS_GAINS)
+        | flag(current.accepted, HAS_CURRENT)
+        | flag(learned.carrier.is_some(), HAS_CARRIER);
+    words
+}
+
+/// What was kept, if a learning can have found it.
+#[inline(never)]
+pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
+    let carrier = CarrierTable::of_points(table(words, CARRIER, 1.0));
+    let value = |place: usize| f32::from_bits(words[place]);
+    let flags = words[FLAGS];
+    let fitted = |place, bit| Fitted {
+        value: value(place),
+        misfit: value(place + 1),
+        accepted: flags & bit != 0,
+    };
+    let learned = Learned {
+        reference: ReferenceTable::of_points(table(words, REFERENCE, 0.0))?,
+        carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
+        points: (flags & 0xff) as usize,
+        asymmetry: value(FITS),
+        gain_mismatch: fitted(FITS + 1, HAS_GAINS),
+        current_saliency: fitted(FITS + 3, HAS_CURRENT),
+        flux_saliency: value(FITS + 5),
+        accepted: true,
+    };
+    let whole = learned.carrier.is_some() || flags & HAS_CARRIER == 0;
+    (whole && learned.is_believable()).then_some(learned)
+}
+
+#[inline(never)]
+fn table(words: &[u32; WORDS], first: usize, at_zero: f32) -> [f32; POINTS] {
+    let mut points = [at_zero; POINTS];
+    for (point, word) in points.iter_mut().skip(1).zip(words.iter().skip(first)) {
+        *point = f32::from_bits(*word);
+    }
+    points
+}

@@ -1,0 +1,384 @@
+use drive_core::identify::learning::{Fitted, Learned};
+use drive_core::settings::table::CarrierTable;
+use drive_core::settings::table::{POINTS, ReferenceTable};
+use proptest::prelude::*;
+
+use super::learned as learned_words;
+use super::*;
+use crate::console::keys::{KEYS, Value};
+
+/// Flash that loses power, with what a power failure leaves drawn from random bits.
+#[derive(Clone, Debug)]
+struct Fake {
+    /// `None` is torn.
+    words: [[Option<u64>; SLOT_WORDS]; SLOTS],
+    /// Operations until the power fails.
+    left: Option<usize>,
+    random: u64,
+}
+
+impl Fake {
+    fn new() -> Self {
+        Self { words: [[Some(u64::MAX); SLOT_WORDS]; SLOTS], left: None, random: 1 }
+    }
+
+    /// A record is in this slot.
+    fn hold(&mut self, slot: usize, record: [u64; codec::WORDS]) {
+        for (word, value) in record.into_iter().enumerate() {
+            self.words[slot][word] = Some(value);
+        }
+    }
+
+    /// Splitmix64.
+    fn next(&mut self) -> u64 {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.random ^ self.random >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// Whether the power fails in this operation.
+    fn fails(&mut self) -> bool {
+        match &mut self.left {
+            None => false,
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+        }
+    }
+
+    /// Of `old` and `new`, what a power failure leaves.
+    fn left_of(&mut self, old: Option<u64>, new: u64) -> Option<u64> {
+        match self.next() % 4 {
+            0 => old,
+            1 => Some(new),
+            _ => None,
+        }
+    }
+}
+
+impl Flash for &mut Fake {
+    fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
+        self.words[slot][word]
+    }
+    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+        let fails = self.fails();
+        for word in 0..SLOT_WORDS {
+            let old = self.words[slot][word];
+            self.words[slot][word] =
+                if fails { self.left_of(old, u64::MAX) } else { Some(u64::MAX) };
+        }
+        if fails { Err(Failed::Erase(0)) } else { Ok(()) }
+    }
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+        let old = self.words[slot][word];
+        assert_eq!(old, Some(u64::MAX), "double word {word} is not erased");
+        let fails = self.fails();
+        self.words[slot][word] = if fails { self.left_of(old, value) } else { Some(value) };
+        if fails { Err(Failed::Program(0)) } else { Ok(()) }
+    }
+}
+
+fn board() -> Everything {
+    Everything::of_the_board()
+}
+
+fn with_r_s(r_s: f32) -> Everything {
+    let mut settings = board();
+    settings.drive.motor.r_s = r_s;
+    settings
+}
+
+/// Something that a learning can have found, of 16 numbers from -1 to 1.
+fn learned(random: [f32; POINTS]) -> Learned {
+    let mut reference = random.map(|x| 0.3 * x);
+    let mut carrier = random.map(|x| 1.25 + 0.75 * x);
+    (reference[0], carrier[0]) = (0.0, 1.0);
+    Learned {
+        reference: ReferenceTable::of_points(reference).unwrap(),
+        carrier: CarrierTable::of_points(carrier).filter(|_| random[1] > -0.5),
+        points: 13,
+        asymmetry: 0.005 * random[2].abs(),
+        gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },
+        current_saliency: Fitted { value: random[5], misfit: 1.0, accepted: random[5].abs() < 0.3 },
+        flux_saliency: 0.05 * random[6],
+        accepted: true,
+    }
+}
+
+fn with_learned() -> Everything {
+    let random = core::array::from_fn(|n| (n as f32 * 0.7).sin());
+    Everything { learned: Some(learned(random)), ..with_r_s(6.0) }
+}
+
+fn load(fake: &mut Fake) -> Loaded {
+    Saved::load(fake, &board()).1
+}
+
+fn save(fake: &mut Fake, settings: &Everything) -> Result<(), Failed> {
+    Saved::load(fake, &board()).0.save(settings)
+}
+
+#[test]
+fn an_erased_flash_holds_nothing() {
+    assert_eq!(load(&mut Fake::new()), Loaded::Nothing);
+}
+
+#[test]
+fn what_is_saved_is_loaded_and_the_slots_take_turns() {
+    let mut fake = Fake::new();
+    let mut erased = Vec::new();
+    for n in 1..7 {
+        let before = fake.words;
+        save(&mut fake, &with_r_s(n as f32)).unwrap();
+        erased.push([0, 1].map(|slot| fake.words[slot] != before[slot]));
+        assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(n as f32)));
+    }
+    let turns = [[true, false], [false, true]];
+    assert_eq!(erased, [turns, turns, turns].concat());
+    // The same without a reset between.
+    let (mut saved, _) = Saved::load(&mut fake, &board());
+    for n in 7..10 {
+        saved.save(&with_r_s(n as f32)).unwrap();
+    }
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(9.0)));
+}
+
+/// The record that the firmware wrote before there was anything learned: the same, without it.
+#[test]
+fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by_older_firmware() {
+    let old = codec::record(&with_r_s(7.0), 0);
+    assert_eq!(codec::length(&old), 2 + KEYS.len());
+    // Magic, version 1 and one entry a key: what is in the flash of boards.
+    assert_eq!(old[0], (KEYS.len() as u64) << 48 | 0x0001_7672_6469);
+    assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(7.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+
+    let new = codec::record(&with_learned(), 0);
+    assert_eq!(codec::length(&new), codec::WORDS);
+    // No key has a number that what was learned has: those who do not know it leave it alone.
+    for word in &new[2 + KEYS.len()..] {
+        assert!(learned_words::place(*word as u32).is_some());
+        assert!(KEYS.iter().all(|key| key.id() != *word as u32));
+    }
+}
+
+#[test]
+fn what_was_learned_is_saved_and_loaded_with_its_settings_and_gone_with_the_defaults() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_learned()).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_learned()));
+    save(&mut fake, &board()).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(board()));
+}
+
+/// Half of it, or what no learning can have found: refused by name, whatever the settings.
+#[test]
+fn what_cannot_have_been_learned_is_refused() {
+    let first = 2 + KEYS.len();
+    let spoil: [fn(&mut u64); 3] =
+        [|word| *word ^= 1, |word| *word |= 0x7f80_0000 << 32, |word| *word = u64::MAX];
+    for (n, spoil) in spoil.into_iter().enumerate() {
+        let mut record = codec::record(&with_learned(), 3);
+        spoil(&mut record[first + 3 * n]);
+        let mut fake = Fake::new();
+        fake.hold(0, resealed(record));
+        assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("learned")), "{n}");
+    }
+}
+
+#[test]
+fn sequence_numbers_wrap() {
+    let mut fake = Fake::new();
+    for (slot, sequence) in [(0, u32::MAX), (1, 0)] {
+        let record = codec::record(&with_r_s(slot as f32 + 1.0), sequence);
+        fake.hold(slot, record);
+    }
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(2.0)));
+    save(&mut fake, &with_r_s(3.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+}
+
+/// Power fails in every operation of a save, and again in every operation of the next one.
+#[test]
+fn whenever_the_power_fails_the_old_or_the_new_set_is_there() {
+    // One erasure, and every double word of the record.
+    let operations = 2 + KEYS.len() + 1;
+    for seed in 0..20 {
+        for first in 0..=operations {
+            let mut fake = Fake::new();
+            fake.random = seed * 1000 + first as u64;
+            save(&mut fake, &with_r_s(1.0)).unwrap();
+            save(&mut fake, &with_r_s(2.0)).unwrap();
+            fake.left = Some(first);
+            let done = save(&mut fake, &with_r_s(3.0)).is_ok();
+            assert_eq!(done, first == operations);
+            let Loaded::Settings(now) = load(&mut fake) else { panic!("none left at {first}") };
+            let r_s = now.drive.motor.r_s;
+            assert!(r_s == 3.0 || (r_s == 2.0 && !done), "{r_s} at {first}");
+
+            let second = (first * 7 + seed as usize) % operations;
+            fake.left = Some(second);
+            assert!(save(&mut fake, &with_r_s(4.0)).is_err());
+            let Loaded::Settings(then) = load(&mut fake) else { panic!("{first}, then {second}") };
+            let next = then.drive.motor.r_s;
+            assert!(next == r_s || next == 4.0, "{next} at {first}, then {second}");
+            fake.left = None;
+            save(&mut fake, &with_r_s(5.0)).unwrap();
+            assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(5.0)));
+        }
+    }
+}
+
+#[test]
+fn a_failed_save_leaves_the_set_before_and_says_why() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(1.0)).unwrap();
+    fake.left = Some(0);
+    assert_eq!(save(&mut fake, &with_r_s(2.0)), Err(Failed::Erase(0)));
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+}
+
+#[test]
+fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
+    let mut fake = Fake::new();
+    save(&mut fake, &with_r_s(1.0)).unwrap();
+    let mut record = codec::record(&with_r_s(2.0), 1);
+    record[0] += 1 << 32;
+    // As a later firmware computes it.
+    fake.hold(1, resealed(record));
+    let kept = fake.words[1];
+    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Newer(2)));
+    save(&mut fake, &with_r_s(3.0)).unwrap();
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    assert_eq!(fake.words[1], kept);
+}
+
+#[test]
+fn keys_may_come_and_go() {
+    let mut record = codec::record(&with_r_s(7.0), 3);
+    // The second key is one that this firmware does not know.
+    record[3] ^= 1;
+    let mut fake = Fake::new();
+    fake.hold(0, resealed(record));
+    assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
+}
+
+#[test]
+fn a_value_that_nobody_knows_is_named() {
+    let place = KEYS.iter().position(|key| key.name == "angle_source").unwrap();
+    let mut record = codec::record(&board(), 3);
+    record[2 + place] ^= 1 << 40;
+    let mut fake = Fake::new();
+    fake.hold(0, resealed(record));
+    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("angle_source")));
+}
+
+/// The record with its checksum made right again.
+fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
+    let mut bytes = record[0].to_le_bytes().to_vec();
+    bytes.extend((record[1] as u32).to_le_bytes());
+    bytes.extend(record[2..codec::length(&record)].iter().flat_map(|word| word.to_le_bytes()));
+    let checksum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
+    record[1] = record[1] & 0xffff_ffff | u64::from(checksum) << 32;
+    record
+}
+
+#[test]
+fn numbers_of_settings_follow_those_of_the_records() {
+    let all = [NotUsed::Broken, NotUsed::Newer(2), NotUsed::Value("x"), NotUsed::Refused];
+    assert_eq!(all.map(NotUsed::code), [70, 71, 72, 73]);
+    assert!(all.iter().all(|why| why.to_string().starts_with("7")));
+}
+
+/// With what was learned, too: never the settings of one set and what was learned with another.
+#[test]
+fn whenever_the_power_fails_what_was_learned_is_with_its_settings() {
+    let mut before = with_learned();
+    before.drive.motor.r_s = 2.0;
+    let mut after = before;
+    after.drive.motor.r_s = 3.0;
+    after.learned = Some(learned([0.4; POINTS]));
+    for seed in 0..20 {
+        for operation in 0..=codec::WORDS {
+            let mut fake = Fake::new();
+            fake.random = seed * 1000 + operation as u64;
+            save(&mut fake, &before).unwrap();
+            fake.left = Some(operation);
+            assert!(save(&mut fake, &after).is_err());
+            let Loaded::Settings(now) = load(&mut fake) else { panic!("none at {operation}") };
+            assert!(now == before || now == after, "{now:?} at {operation}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn whatever_was_learned_survives(
+        random in proptest::array::uniform16(-1.0_f32..=1.0), r_s in 0.1_f32..100.0,
+    ) {
+        let settings = Everything { learned: Some(learned(random)), ..with_r_s(r_s) };
+        let mut fake = Fake::new();
+        save(&mut fake, &settings).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+    }
+
+    #[test]
+    fn every_value_of_every_key_survives(bits: u32, i in 0..KEYS.len()) {
+        let mut settings = board();
+        let key = &KEYS[i];
+        let text = match key.get(&settings) {
+            Value::Number(_) => f32::from_bits(bits).to_string(),
+            Value::Whole(_) => bits.to_string(),
+            Value::Word { .. } => key.words()[bits as usize % key.words().len()].to_owned(),
+        };
+        if let Ok(value) = key.parse(&text) {
+            key.set(&mut settings, value);
+        }
+        let mut fake = Fake::new();
+        save(&mut fake, &settings).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+    }
+
+    #[test]
+    fn a_flipped_bit_is_found_and_the_set_before_counts(
+        word in 0..2 + KEYS.len(), bit in 0_u32..64, both: bool,
+    ) {
+        let mut fake = Fake::new();
+        save(&mut fake, &with_r_s(1.0)).unwrap();
+        save(&mut fake, &with_r_s(2.0)).unwrap();
+        let flip = |value: &mut Option<u64>| *value = value.map(|value| value ^ 1 << bit);
+        flip(&mut fake.words[1][word]);
+        if both {
+            flip(&mut fake.words[0][word]);
+            prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+        } else {
+            prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
+        }
+    }
+
+    #[test]
+    fn any_contents_are_looked_at_without_harm(
+        seed: u64, torn in 0_u64..4, header: bool, entries: u16,
+    ) {
+        let mut fake = Fake::new();
+        fake.random = seed;
+        for slot in 0..SLOTS {
+            for word in 0..SLOT_WORDS {
+                let value = fake.next();
+                fake.words[slot][word] = (fake.next() % 4 >= torn).then_some(value);
+            }
+            if header {
+                let record = codec::record(&board(), 0);
+                fake.words[slot][0] = Some(record[0] & 0xffff_ffff_ffff | u64::from(entries) << 48);
+            }
+        }
+        prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+        save(&mut fake, &with_r_s(3.0)).unwrap();
+        prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
+    }
+}
