@@ -18,7 +18,7 @@ use hil_sim::rig::Rig;
 fn regulating() -> (Drive, Sample) {
     let mut rig = Rig::from_config(&Config::default(), 1).expect("the default rig");
     rig.start(Mode::Torque).expect("a start");
-    rig.command(Command::Torque(1.5)).expect("a reference");
+    rig.command(&Command::Torque(1.5)).expect("a reference");
     rig.run(0.5, |_| {});
     let sample = rig.plant.sample();
     (rig.drive, sample)

@@ -17,7 +17,7 @@ fn rig(changes: &[&str]) -> Rig {
     let config = Config::load(None, &changes).expect("keys of the configuration");
     let mut rig = Rig::from_config(&config, 1).expect("the default rig");
     rig.start(Mode::Torque).expect("a start");
-    rig.command(Command::Torque(1.5)).expect("a reference");
+    rig.command(&Command::Torque(1.5)).expect("a reference");
     rig.run(0.5, |_| {});
     rig
 }

@@ -18,15 +18,15 @@ use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::math::decimal::{Fixed, Shortest};
 use drive_core::settings::{Scales, SettingsError};
-use drive_core::{Coefficients, Mode, Refused, State, Taken};
+use drive_core::{Accepted, Coefficients, Command, Mode, Refused, State};
 
 use crate::board::CYCLES_PER_US;
+use crate::link::Status;
 use crate::link::trace::{self, Choice};
-use crate::link::{Order, Status};
 use crate::rotor_tracking::Report;
 use crate::store::Failed;
 use grammar::{HELP, Level, Request};
-use keys::{Everything, KEYS, Value};
+use keys::{FirmwareSettings, KEYS, Value};
 use line::{Garbled, Lines, Text};
 
 /// How long a line may take from its first character to its end, ms: a slow hand.
@@ -51,12 +51,12 @@ impl fmt::Display for NotDone {
 }
 
 /// What the console talks about.
-pub trait Machine {
+pub trait DriveHandle {
     /// Gives the drive an order and waits for its answer, a few control periods at most.
     ///
     /// # Errors
     /// Why it is not carried out.
-    fn order(&mut self, order: Order) -> Result<Taken, NotDone>;
+    fn order(&mut self, order: Command) -> Result<Accepted, NotDone>;
     /// What the drive does now.
     fn status(&self) -> Option<Status>;
     /// Whether the outputs are off and stay off until the next order.
@@ -65,16 +65,16 @@ pub trait Machine {
     ///
     /// # Errors
     /// Why the settings are none.
-    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError>;
+    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError>;
     /// The drive has taken these settings.
-    fn configured(&mut self, settings: &Everything);
+    fn configured(&mut self, settings: &FirmwareSettings);
     /// What is known of the rotor time constant, where it is tracked.
     fn tracking(&self) -> Option<Report>;
     /// Keeps the settings over a reset, which takes long: only while the outputs are off.
     ///
     /// # Errors
     /// Why not.
-    fn save(&mut self, settings: &Everything) -> Result<(), Failed>;
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed>;
     /// Starts a trace, if none is being recorded; says whether it did.
     fn begin_trace(&mut self, records: u16, divider: u16, choice: &Choice) -> bool;
     /// Whether a trace is being recorded.
@@ -149,7 +149,7 @@ impl Out {
 
 /// The console.
 pub struct Console {
-    settings: Everything,
+    settings: FirmwareSettings,
     lines: Lines,
     out: Out,
     list: Option<List>,
@@ -170,7 +170,7 @@ const BYTES_AT_ONCE: usize = 64;
 
 impl Console {
     /// A console over settings that the drive has.
-    pub const fn new(settings: Everything) -> Self {
+    pub const fn new(settings: FirmwareSettings) -> Self {
         Self {
             settings,
             lines: Lines::new(),
@@ -185,14 +185,14 @@ impl Console {
     }
 
     /// Says who this is and what ended the last run.
-    pub fn greet(&mut self, machine: &impl Machine) {
+    pub fn greet(&mut self, machine: &impl DriveHandle) {
         let (version, last_run) =
             (fmt::from_fn(|f| machine.version(f)), fmt::from_fn(|f| machine.last_run(f)));
         self.out.line(format_args!("induction-drive {version}; last run: {last_run}"));
     }
 
     /// Reads what came and writes what is due; never waits. `now_ms` wraps.
-    pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl Machine, now_ms: u32) {
+    pub fn poll(&mut self, port: &mut impl Port, machine: &mut impl DriveHandle, now_ms: u32) {
         self.watch_silence(machine, now_ms);
         self.watch_wiring(machine);
         machine.learned(&mut |found| {
@@ -238,11 +238,11 @@ impl Console {
     }
 
     /// Stops the drive when nobody has spoken for too long.
-    fn watch_silence(&mut self, machine: &mut impl Machine, now_ms: u32) {
+    fn watch_silence(&mut self, machine: &mut impl DriveHandle, now_ms: u32) {
         let limit = self.settings.command.timeout_s;
         let silence = now_ms.wrapping_sub(self.heard_ms) as f32 * 1e-3;
         if limit > 0.0 && silence > limit && self.out.0.is_none() && !machine.is_off() {
-            let answer = machine.order(Order::Stop);
+            let answer = machine.order(Command::Stop);
             self.heard_ms = now_ms;
             match answer {
                 Ok(_) => {
@@ -254,7 +254,7 @@ impl Console {
     }
 
     /// A drive that has got past the check of the wiring need not check it again.
-    fn watch_wiring(&mut self, machine: &impl Machine) {
+    fn watch_wiring(&mut self, machine: &impl DriveHandle) {
         let (Some(began), Some(status)) = (self.checking, machine.status()) else { return };
         let past = matches!(
             status.state,
@@ -268,12 +268,13 @@ impl Console {
     }
 
     /// Starts; the first time since the defaults were set with a check of the wiring.
-    fn start(&mut self, mode: Mode, machine: &mut impl Machine) {
+    fn start(&mut self, mode: Mode, machine: &mut impl DriveHandle) {
         if self.settings.command.wiring_checked {
-            return self.give(Order::Start(mode), machine);
+            return self.give(Command::Start(mode), machine);
         }
         let began = machine.status().map(|status| status.periods);
-        match machine.order(Order::CheckWiring).and_then(|_| machine.order(Order::Start(mode))) {
+        match machine.order(Command::CheckWiring).and_then(|_| machine.order(Command::Start(mode)))
+        {
             Ok(_) => {
                 self.checking = began;
                 self.out.line(format_args!("ok: the wiring is checked first"));
@@ -282,7 +283,7 @@ impl Console {
         }
     }
 
-    fn take(&mut self, byte: u8, machine: &mut impl Machine, now_ms: u32) {
+    fn take(&mut self, byte: u8, machine: &mut impl DriveHandle, now_ms: u32) {
         let request = match self.lines.push(byte) {
             None => return,
             Some(Err(why)) => {
@@ -302,7 +303,7 @@ impl Console {
         }
     }
 
-    fn answer(&mut self, request: Request, machine: &mut impl Machine) {
+    fn answer(&mut self, request: Request, machine: &mut impl DriveHandle) {
         match request {
             Request::Help => self.list = Some(List::Help(0)),
             Request::Status => match machine.status() {
@@ -318,12 +319,12 @@ impl Console {
                 None => self.out.error(&NotDone::NoAnswer),
             },
             Request::Start(mode) => self.start(mode, machine),
-            Request::Stop => self.give(Order::Stop, machine),
-            Request::Relock => self.give(Order::Relock, machine),
-            Request::Torque(i_q) => self.give(Order::Torque(i_q), machine),
-            Request::Speed(rpm) => self.give(Order::Speed(rpm), machine),
-            Request::Position(turns) => self.give(Order::Position(turns), machine),
-            Request::Clear => self.give(Order::Clear, machine),
+            Request::Stop => self.give(Command::Stop, machine),
+            Request::Relock => self.give(Command::Relock, machine),
+            Request::Torque(i_q) => self.give(Command::Torque(i_q), machine),
+            Request::Speed(rpm) => self.give(Command::Speed(rpm), machine),
+            Request::Position(turns) => self.give(Command::Position(turns), machine),
+            Request::Clear => self.give(Command::Clear, machine),
             Request::Angle(source) => {
                 let mut settings = self.settings;
                 settings.drive.angle_source = source;
@@ -334,7 +335,7 @@ impl Console {
                 key.set(&mut settings, value);
                 self.configure(settings, machine);
             }
-            Request::Defaults => self.configure(Everything::of_the_board(), machine),
+            Request::Defaults => self.configure(FirmwareSettings::of_the_board(), machine),
             Request::Get(Some(key)) => {
                 self.out.line(format_args!("{}", Shown::new(key, &self.settings)));
             }
@@ -384,10 +385,10 @@ impl Console {
         }
     }
 
-    fn give(&mut self, order: Order, machine: &mut impl Machine) {
+    fn give(&mut self, order: Command, machine: &mut impl DriveHandle) {
         match machine.order(order) {
-            Ok(Taken::AsGiven) => self.out.ok(),
-            Ok(Taken::Limited(value)) => {
+            Ok(Accepted::AsGiven) => self.out.ok(),
+            Ok(Accepted::Limited(value)) => {
                 self.out.line(format_args!("ok: limited to {}", Shortest(value)));
             }
             Err(why) => self.out.error(&why),
@@ -396,14 +397,14 @@ impl Console {
 
     /// Takes other settings, if the drive is off and the design rules take them. What was learned with
     /// others is forgotten.
-    fn configure(&mut self, mut settings: Everything, machine: &mut impl Machine) {
+    fn configure(&mut self, mut settings: FirmwareSettings, machine: &mut impl DriveHandle) {
         if !machine.is_off() {
             return self.out.error(&MUST_BE_OFF);
         }
         settings.forget_unless_as(&self.settings);
         match machine.build(&settings) {
             Err(why) => self.out.error(&why),
-            Ok(coefficients) => match machine.order(Order::Configure(coefficients)) {
+            Ok(coefficients) => match machine.order(Command::Configure(coefficients)) {
                 Err(why) => self.out.error(&why),
                 Ok(_) => {
                     let waits = settings.drive.inverter.dead_time_s
@@ -422,7 +423,7 @@ impl Console {
     }
 
     /// Puts the next line of the list out; `false` if it has to wait for it.
-    fn next_of_list(&mut self, machine: &impl Machine) -> bool {
+    fn next_of_list(&mut self, machine: &impl DriveHandle) -> bool {
         let Some(list) = self.list else { return false };
         let written = match list {
             List::Help(i) => {
@@ -485,7 +486,7 @@ fn write_status(
         Fixed::<2>(t.current.d),
         Fixed::<2>(t.current.q),
         Fixed::<2>(t.reference.q),
-        Fixed::<1>(rpm(t.rotor_step)),
+        Fixed::<1>(rpm(t.rotor_freq)),
         Fixed::<0>(scales.dc_link.at(s.sample.dc_link)),
         s.sample.heat_sink,
         scales.heat_sink_trip,
@@ -509,7 +510,7 @@ struct Shown {
 
 impl Shown {
     #[inline(never)]
-    fn new(key: &'static keys::Key, settings: &Everything) -> Self {
+    fn new(key: &'static keys::Key, settings: &FirmwareSettings) -> Self {
         Self { key, value: key.get(settings), range: key.range(settings) }
     }
 }

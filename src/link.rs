@@ -4,55 +4,10 @@ pub mod mailbox;
 pub mod ring;
 pub mod trace;
 
-use drive_core::{Coefficients, Command, Hardware, Mode, Refused, Sample, State, Taken, Telemetry};
+use drive_core::{Accepted, Hardware, Refused, Sample, State, Telemetry};
 
-/// From the main loop to the drive.
-// The large one is there at most once, in a mailbox.
-#[allow(clippy::large_enum_variant)]
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    /// See [`Command::Start`].
-    Start(Mode),
-    /// See [`Command::CheckWiring`].
-    CheckWiring,
-    /// See [`Command::Stop`].
-    Stop,
-    /// See [`Command::Relock`].
-    Relock,
-    /// See [`Command::Clear`].
-    Clear,
-    /// See [`Command::Torque`].
-    Torque(f32),
-    /// See [`Command::Speed`].
-    Speed(f32),
-    /// See [`Command::Position`].
-    Position(f32),
-    /// See [`Command::RotorTimeConstant`].
-    RotorTimeConstant(f32),
-    /// See [`Command::Configure`].
-    Configure(Coefficients),
-}
-
-impl Order {
-    /// As the drive takes it.
-    pub fn command(&self) -> Command<'_> {
-        match self {
-            Self::Start(mode) => Command::Start(*mode),
-            Self::CheckWiring => Command::CheckWiring,
-            Self::Stop => Command::Stop,
-            Self::Relock => Command::Relock,
-            Self::Clear => Command::Clear,
-            Self::Torque(i_q) => Command::Torque(*i_q),
-            Self::Speed(rpm) => Command::Speed(*rpm),
-            Self::Position(turns) => Command::Position(*turns),
-            Self::RotorTimeConstant(tau_r) => Command::RotorTimeConstant(*tau_r),
-            Self::Configure(coefficients) => Command::Configure(coefficients),
-        }
-    }
-}
-
-/// What the drive makes of an [`Order`].
-pub type Answer = Result<Taken, Refused>;
+/// The drive's answer to a command.
+pub type Answer = Result<Accepted, Refused>;
 
 /// What the main loop hears from the interrupt, `board::PERIODS_PER_STATUS` apart.
 #[derive(Clone, Copy, Debug, Default)]

@@ -8,7 +8,7 @@
 //!   `Drive::step`, compare values out, then one order from the console if there is one.
 //! * the interrupt of the serial port (`chip/serial.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console, the log ten times a second, the
-//!   rotor time constant where it is tracked (`task/desk.rs`), and the check of the control's memory
+//!   rotor time constant where it is tracked (`task/supervisor.rs`), and the check of the control's memory
 //!   (`monitor/memory_check.rs`).
 //! * `chip/stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
 //! * the watchdog (`monitor/watchdog.rs`), when the loop or the control interrupt does not come round.
@@ -30,16 +30,16 @@ fn main() -> ! {
     use defmt_rtt as _; // the log goes to the debug probe
 
     chip::memory::paint_stack();
-    defmt::info!("induction-drive {}", task::desk::VERSION);
-    let task::bring_up::Board { settings, mut port, mut desk } = task::bring_up::bring_up();
+    defmt::info!("induction-drive {}", task::supervisor::VERSION);
+    let task::bring_up::Board { settings, mut port, mut supervisor } = task::bring_up::bring_up();
     let mut console = induction_drive::console::Console::new(settings);
-    console.greet(&desk);
+    console.greet(&supervisor);
 
     loop {
-        let now_ms = desk.listen();
-        console.poll(&mut port, &mut desk, now_ms);
-        desk.check_memory();
-        desk.feed_watchdog();
+        let now_ms = supervisor.listen();
+        console.poll(&mut port, &mut supervisor, now_ms);
+        supervisor.check_memory();
+        supervisor.feed_watchdog();
         // Until an interrupt. At the end: without the control's, what is to be said wakes nobody before it
         // is begun.
         cortex_m::asm::wfi();

@@ -8,7 +8,7 @@ use drive_core::identify::online::{Doubt, Online, Speed, Tracked};
 use drive_core::io::PERIOD_S;
 use drive_core::math::decimal::Fixed;
 use drive_core::settings::AngleSource;
-use drive_core::{AlphaBeta, Dq, Settings, Taken, Telemetry};
+use drive_core::{Accepted, AlphaBeta, Dq, Settings, Telemetry};
 
 use crate::board;
 
@@ -23,15 +23,15 @@ pub struct Seen {
     measured: AlphaBeta,
     realised: AlphaBeta,
     reference: Dq,
-    rotor_step: f32,
+    rotor_freq: f32,
 }
 
 impl Seen {
     /// What control period `number` has seen and done.
     #[inline]
     pub fn new(number: u32, t: &Telemetry) -> Self {
-        let Telemetry { measured, realised, reference, rotor_step, .. } = *t;
-        Self { number, measured, realised, reference, rotor_step }
+        let Telemetry { measured, realised, reference, rotor_freq, .. } = *t;
+        Self { number, measured, realised, reference, rotor_freq }
     }
 }
 
@@ -67,7 +67,7 @@ impl Tracking {
             source: settings.angle_source,
             next: 0,
             wait: PERIODS_PER_FIT,
-            report: Report { found: Err(Doubt::Settling), used: settings.motor.t_sec() },
+            report: Report { found: Err(Doubt::Settling), used: settings.motor.tau_r() },
         })
     }
 
@@ -87,7 +87,7 @@ impl Tracking {
             return None;
         }
         self.wait = PERIODS_PER_FIT;
-        let omega_m = seen.rotor_step * (TAU / PERIOD_S);
+        let omega_m = seen.rotor_freq * (TAU / PERIOD_S);
         let speed = match self.source {
             AngleSource::Encoder => Speed::Known(omega_m),
             AngleSource::Injection => Speed::Guess(omega_m),
@@ -97,10 +97,10 @@ impl Tracking {
     }
 
     /// What the drive makes of the time constant `tau_r` that it was ordered, s.
-    pub fn taken(&mut self, tau_r: f32, taken: Taken) {
+    pub fn taken(&mut self, tau_r: f32, taken: Accepted) {
         self.report.used = match taken {
-            Taken::AsGiven => tau_r,
-            Taken::Limited(used) => used,
+            Accepted::AsGiven => tau_r,
+            Accepted::Limited(used) => used,
         };
     }
 
@@ -142,7 +142,7 @@ mod tests {
         config.motor.rr *= 1.3;
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Torque).unwrap();
-        rig.command(Command::Torque(2.0)).unwrap();
+        rig.command(&Command::Torque(2.0)).unwrap();
         rig.run(0.5, |_| {});
         assert!(rig.drive.tracks_rotor());
         (rig, Tracking::new(&settings).unwrap())
@@ -170,7 +170,7 @@ mod tests {
             let number = (u32::MAX - 9).wrapping_add(n);
             if let Some(tau_r) = tracking.take(&seen(&mut rig, number)) {
                 assert_eq!((n + 1) % PERIODS_PER_FIT, 0);
-                let taken = rig.drive.command(Command::RotorTimeConstant(tau_r)).unwrap();
+                let taken = rig.drive.command(&Command::RotorTimeConstant(tau_r)).unwrap();
                 tracking.taken(tau_r, taken);
                 ordered.push(tau_r);
             }

@@ -15,7 +15,7 @@ pub mod learned;
 use core::fmt;
 
 use crate::board;
-use crate::console::keys::Everything;
+use crate::console::keys::FirmwareSettings;
 use codec::{COMMIT, Found, WORDS};
 
 /// How many places there are.
@@ -106,7 +106,7 @@ pub enum Loaded {
     /// Nothing was ever saved.
     Nothing,
     /// The settings.
-    Settings(Everything),
+    Settings(FirmwareSettings),
     /// Something that is left as it is until the next `save`.
     NotUsed(NotUsed),
 }
@@ -123,7 +123,7 @@ pub struct Saved<F> {
 
 impl<F: Flash> Saved<F> {
     /// Looks at both slots. Settings that were saved before a key existed leave it as in `defaults`.
-    pub fn load(mut flash: F, defaults: &Everything) -> (Self, Loaded) {
+    pub fn load(mut flash: F, defaults: &FirmwareSettings) -> (Self, Loaded) {
         let found = [0, 1].map(|slot| codec::find(&mut |word| flash.read(slot, word)));
         let sequence = |slot: usize| match found.get(slot) {
             Some(Found::Whole { sequence, .. }) => Some(*sequence),
@@ -150,7 +150,7 @@ impl<F: Flash> Saved<F> {
     ///
     /// # Errors
     /// Why not; the set before still counts then.
-    pub fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
+    pub fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
         let (slot, sequence) = match self.newest {
             Some((newest, sequence)) => (1 - newest, sequence.wrapping_add(1)),
             None => (self.free, 0),

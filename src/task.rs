@@ -2,4 +2,4 @@
 
 pub mod bring_up;
 pub mod control;
-pub mod desk;
+pub mod supervisor;

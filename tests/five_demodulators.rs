@@ -44,7 +44,7 @@ fn all_but_the_literal_chain_see_the_saliency() {
     for (name, _) in ALL {
         let mut rig = demodulating(name, &[], 1.5);
         let here = signal(&mut rig);
-        rig.command(Command::TurnInjection(5.0)).unwrap();
+        rig.command(&Command::TurnInjection(5.0)).unwrap();
         rig.run(0.1, |_| {});
         let slope = (signal(&mut rig) - here) / 5f64.to_radians();
         let without = signal(&mut demodulating(name, &[&ISOTROPIC], 1.5));

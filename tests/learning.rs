@@ -89,11 +89,11 @@ fn learning_takes_stop_and_no_other_reference() {
     let mut rig = Rig::from_config(&config(&[]), 6).unwrap();
     rig.start(Mode::Learning).unwrap();
     rig.run(5.0, |_| {});
-    assert!(rig.command(Command::Torque(1.0)).is_err());
-    assert!(rig.command(Command::Magnetising(1.0)).is_err());
+    assert!(rig.command(&Command::Torque(1.0)).is_err());
+    assert!(rig.command(&Command::Magnetising(1.0)).is_err());
     let (done, all) = rig.drive.learning_progress().unwrap();
     assert!(done > 0 && done < all && all == 26, "{done} of {all}");
-    rig.command(Command::Stop).unwrap();
+    rig.command(&Command::Stop).unwrap();
     rig.run(0.5, |_| {});
     assert_eq!(rig.drive.state(), State::Off);
     assert!(rig.drive.learned().is_none());
@@ -104,7 +104,7 @@ fn learning_takes_stop_and_no_other_reference() {
     ];
     for changes in without {
         let mut rig = Rig::from_config(&config(changes), 6).unwrap();
-        assert!(rig.command(Command::Start(Mode::Learning)).is_err(), "{changes:?}");
+        assert!(rig.command(&Command::Start(Mode::Learning)).is_err(), "{changes:?}");
     }
 }
 
@@ -118,14 +118,14 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
         let (mut squares, mut count, mut largest) = (0.0, 0.0, 0.0_f64);
         for i_q in [1.0, 2.0, 3.0, -0.75, -1.5, -2.5] {
             rig.start(Mode::Torque).unwrap();
-            rig.command(Command::Torque(i_q)).unwrap();
+            rig.command(&Command::Torque(i_q)).unwrap();
             rig.run(1.0, |_| {});
             rig.run(1.0, |p| {
                 squares += p.angle_error_deg.powi(2);
                 count += 1.0;
                 largest = largest.max(p.angle_error_deg.abs());
             });
-            rig.command(Command::Stop).unwrap();
+            rig.command(&Command::Stop).unwrap();
             rig.run(1.5, |_| {}); // until the flux is gone
         }
         let rms: f64 = (squares / count).sqrt();

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use common::config;
 use drive_core::flux::indirect::LIMITS;
 use drive_core::identify::online::{Doubt, Online, Speed};
-use drive_core::{AlphaBeta, Command, Dq, Mode, Refused, Settings, Taken};
+use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
 use hil_sim::tracking::{Case, Moment, run};
@@ -105,9 +105,9 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
     let mut online = Online::new(&settings).unwrap();
     let truth = rig.plant.motor().machine.tau_r();
     let error = |tau_r: f32| f64::from(tau_r) / truth - 1.0;
-    let (mut errors, mut used, mut n) = (Vec::new(), settings.motor.t_sec(), 0_u32);
+    let (mut errors, mut used, mut n) = (Vec::new(), settings.motor.tau_r(), 0_u32);
     for (seconds, i_q) in profile {
-        rig.command(Command::Torque(*i_q)).unwrap();
+        rig.command(&Command::Torque(*i_q)).unwrap();
         for _ in 0..(seconds * RATE_HZ) as u32 {
             rig.step();
             let telemetry = rig.drive.telemetry();
@@ -116,13 +116,13 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
             if !n.is_multiple_of(600) {
                 continue;
             }
-            let speed = Speed::Known(telemetry.rotor_step * (TAU * RATE_HZ) as f32);
+            let speed = Speed::Known(telemetry.rotor_freq * (TAU * RATE_HZ) as f32);
             if let Ok(tracked) = online.refine(telemetry.reference, speed) {
                 errors.push(error(tracked.tau_r));
                 let order = Command::RotorTimeConstant(tracked.tau_r);
-                used = match rig.drive.command(order).unwrap() {
-                    Taken::AsGiven => tracked.tau_r,
-                    Taken::Limited(now) => now,
+                used = match rig.drive.command(&order).unwrap() {
+                    Accepted::AsGiven => tracked.tau_r,
+                    Accepted::Limited(now) => now,
                 };
             }
         }
@@ -190,27 +190,27 @@ fn the_drive_takes_a_time_constant_only_if_it_is_wanted_bounded_and_slowly() {
     let settings = drive_settings(&config);
     let mut rig = Rig::new(&plant_settings(&config), &settings, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
-    let nominal = settings.motor.t_sec();
+    let nominal = settings.motor.tau_r();
     let asked = Command::RotorTimeConstant(0.9 * nominal);
-    assert_eq!(rig.drive.command(asked), Err(Refused::RotorNotTracked));
+    assert_eq!(rig.drive.command(&asked), Err(Refused::RotorNotTracked));
 
     let tracked = Settings { track_rotor: true, ..settings };
     let mut rig = Rig::new(&plant_settings(&config), &tracked, 1).unwrap();
-    assert!(matches!(rig.drive.command(asked), Err(Refused::State(_))), "not while it is off");
+    assert!(matches!(rig.drive.command(&asked), Err(Refused::State(_))), "not while it is off");
     rig.start(Mode::Torque).unwrap();
     for factor in [0.9 * LIMITS[0], 1.1 * LIMITS[1], -1.0] {
-        let refused = rig.drive.command(Command::RotorTimeConstant(factor * nominal));
+        let refused = rig.drive.command(&Command::RotorTimeConstant(factor * nominal));
         let Err(Refused::OutOfRange { min, max }) = refused else { panic!("{refused:?}") };
         assert!(
             (min / nominal - LIMITS[0]).abs() < 1e-6 && (max / nominal - LIMITS[1]).abs() < 1e-6
         );
     }
-    let nan = rig.drive.command(Command::RotorTimeConstant(f32::NAN));
+    let nan = rig.drive.command(&Command::RotorTimeConstant(f32::NAN));
     assert_eq!(nan, Err(Refused::NotFinite));
     // 11 % more rate by steps of 2 %.
     for n in 1..=5 {
-        let Ok(Taken::Limited(now)) = rig.drive.command(asked) else { panic!() };
+        let Ok(Accepted::Limited(now)) = rig.drive.command(&asked) else { panic!() };
         assert!((nominal / now - 1.0 - 0.02 * f32::from(n as u8)).abs() < 1e-5, "{now}");
     }
-    assert_eq!(rig.drive.command(asked), Ok(Taken::AsGiven));
+    assert_eq!(rig.drive.command(&asked), Ok(Accepted::AsGiven));
 }

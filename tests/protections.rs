@@ -90,11 +90,11 @@ fn nothing_trips_without_reason() {
         for _ in 0..2 {
             rig.start(Mode::Torque).unwrap();
             for i_q in [3.0, -3.0, 3.0, -2.0, 0.5, -0.5, 0.0] {
-                rig.command(Command::Torque(i_q)).unwrap();
+                rig.command(&Command::Torque(i_q)).unwrap();
                 rig.run(0.25, |_| {});
                 assert_eq!(rig.drive.state(), State::Torque, "seed {seed}, i_q {i_q}");
             }
-            rig.command(Command::Stop).unwrap();
+            rig.command(&Command::Stop).unwrap();
             rig.run(0.5, |_| {});
             assert_eq!(rig.drive.state(), State::Off, "seed {seed}");
             // Off is off: the motor is without current before it is started again.
@@ -107,7 +107,7 @@ fn nothing_trips_without_reason() {
         let mut rig = Rig::from_config(&config(&[]), seed).unwrap();
         rig.start(Mode::Torque).unwrap();
         for i_q in [1.0, 2.0, 3.0, -3.0, -1.0, 1.5] {
-            rig.command(Command::Torque(i_q)).unwrap();
+            rig.command(&Command::Torque(i_q)).unwrap();
             rig.run(0.4, |_| {});
             assert_eq!(rig.drive.state(), State::Torque, "sensorless, seed {seed}, i_q {i_q}");
         }
@@ -122,9 +122,9 @@ fn a_cleared_drive_works_again() {
     rig.run(0.5, |_| {});
     assert!(matches!(rig.drive.state(), State::Fault(_)));
     rig.plant.set_dc_link(311.0).unwrap();
-    rig.command(Command::Clear).unwrap();
+    rig.command(&Command::Clear).unwrap();
     rig.start(Mode::Torque).unwrap();
-    rig.command(Command::Torque(1.5)).unwrap();
+    rig.command(&Command::Torque(1.5)).unwrap();
     rig.run(0.5, |_| {});
     let mut worst = 0.0_f64;
     rig.run(0.5, |p| worst = worst.max(p.angle_error_deg.abs()));

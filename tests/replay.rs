@@ -7,7 +7,7 @@ use std::fs;
 
 use drive_core::{Command, Compare, Drive, Sample};
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::console::keys::Everything;
+use induction_drive::console::keys::FirmwareSettings;
 
 /// Interrupts to a hash, so that a difference is located.
 const BLOCK: usize = 6000;
@@ -18,7 +18,7 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     let samples = fs::read(format!("{path}.samples")).unwrap();
     let orders = fs::read_to_string(format!("{path}.orders")).unwrap();
     let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
-    let mut settings = Everything::of_the_board();
+    let mut settings = FirmwareSettings::of_the_board();
     let mut drive = Drive::new(settings.build().unwrap());
 
     let mut compares = Vec::new();
@@ -42,21 +42,21 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
 }
 
 /// Gives an order that the board's drive took.
-fn order(drive: &mut Drive, settings: &mut Everything, line: &str) {
+fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
     let request = if line == "check wiring" { None } else { Some(grammar::parse(line).unwrap()) };
     let taken = match request {
-        None => drive.command(Command::CheckWiring),
-        Some(Request::Start(mode)) => drive.command(Command::Start(mode)),
-        Some(Request::Stop) => drive.command(Command::Stop),
-        Some(Request::Torque(i_q)) => drive.command(Command::Torque(i_q)),
-        Some(Request::Position(turns)) => drive.command(Command::Position(turns)),
+        None => drive.command(&Command::CheckWiring),
+        Some(Request::Start(mode)) => drive.command(&Command::Start(mode)),
+        Some(Request::Stop) => drive.command(&Command::Stop),
+        Some(Request::Torque(i_q)) => drive.command(&Command::Torque(i_q)),
+        Some(Request::Position(turns)) => drive.command(&Command::Position(turns)),
         Some(Request::Angle(source)) => {
             settings.drive.angle_source = source;
-            drive.command(Command::Configure(&settings.build().unwrap()))
+            drive.command(&Command::Configure(settings.build().unwrap()))
         }
         Some(Request::Set(key, value)) => {
             key.set(settings, value);
-            drive.command(Command::Configure(&settings.build().unwrap()))
+            drive.command(&Command::Configure(settings.build().unwrap()))
         }
         Some(other) => panic!("{other:?} is no order to the drive"),
     };

@@ -26,7 +26,7 @@ fn a_step_arrives_without_an_encoder() {
     for (seed, turns) in [(1, 5.0), (2, -5.0), (3, 0.25)] {
         let mut rig = started(&config(&["load.mode=free"]), seed);
         let origin = degrees(&rig);
-        rig.command(Command::Position(turns as f32)).unwrap();
+        rig.command(&Command::Position(turns as f32)).unwrap();
         let (mut furthest, mut angle) = (0.0_f64, 0.0_f64);
         rig.run(5.0, |p| {
             furthest = furthest.max(p.turns.abs() * 360.0);

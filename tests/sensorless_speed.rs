@@ -14,7 +14,7 @@ use hil_sim::rig::Rig;
 fn regulating(config: &Config, seed: u64, rpm: f64) -> Rig {
     let mut rig = Rig::from_config(config, seed).unwrap();
     rig.start(Mode::Speed).unwrap();
-    rig.command(Command::Speed(rpm as f32)).unwrap();
+    rig.command(&Command::Speed(rpm as f32)).unwrap();
     rig.run(1.5 + rpm.abs() / 300.0, |_| {});
     rig
 }
@@ -41,7 +41,7 @@ fn the_rotor_turns_as_asked_for_in_both_directions_and_through_standstill() {
         let mut rig = regulating(&config(&[FREE]), seed, 0.0);
         let mut before = 0.0_f64;
         for rpm in speeds {
-            rig.command(Command::Speed(rpm as f32)).unwrap();
+            rig.command(&Command::Speed(rpm as f32)).unwrap();
             // The ramp of 300 rpm/s, and a second to settle.
             let (.., on_the_way) = watch(&mut rig, rpm, (rpm - before).abs() / 300.0 + 1.0);
             let (mean, most, angle) = watch(&mut rig, rpm, 0.5);
@@ -87,7 +87,7 @@ fn the_inertia_need_not_be_known_well() {
         settings.motor.inertia *= factor;
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Speed).unwrap();
-        rig.command(Command::Speed(150.0)).unwrap();
+        rig.command(&Command::Speed(150.0)).unwrap();
         let (.., angle) = watch(&mut rig, 150.0, 2.0);
         let (mean, most, _) = watch(&mut rig, 150.0, 1.0);
         println!("x{factor}: {mean:.2} {most:.2} rpm, {angle:.1} deg");
@@ -104,7 +104,7 @@ fn the_inertia_need_not_be_known_well() {
 fn a_blocked_shaft_is_survived() {
     let mut rig = regulating(&config(&[FREE]), 7, 0.0);
     rig.set_load(Load::Locked).unwrap();
-    rig.command(Command::Speed(100.0)).unwrap();
+    rig.command(&Command::Speed(100.0)).unwrap();
     let (.., angle) = watch(&mut rig, 100.0, 2.0);
     let i_q = rig.drive.telemetry().reference.q;
     assert!(i_q > 2.9 && angle < 15.0, "{i_q} A, {angle} deg");

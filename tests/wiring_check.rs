@@ -31,8 +31,8 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
     if let Wiring::Open(channel) = wiring {
         plant.set_current_fault(channel, CurrentFault::Open);
     }
-    drive.command(Command::CheckWiring).unwrap();
-    drive.command(Command::Start(Mode::Torque)).unwrap();
+    drive.command(&Command::CheckWiring).unwrap();
+    drive.command(&Command::Start(Mode::Torque)).unwrap();
     let mut pending = Compare::OFF;
     let mut peak = 0.0_f64;
     for _ in 0..6000 {

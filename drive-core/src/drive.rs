@@ -39,7 +39,7 @@ use crate::settings::AngleSource;
 
 use axes::Axes;
 pub use coefficients::Coefficients;
-pub use command::{Command, Refused, Taken};
+pub use command::{Accepted, Command, Refused};
 use in_turn::Seen;
 use observed::Observed;
 pub use observed::Telemetry;
@@ -51,7 +51,7 @@ pub use state::{Mode, State};
 /// use drive_core::{Command, Drive, Mode, Sample, State, settings::Settings};
 ///
 /// let mut drive = Drive::new(Settings::default().build()?);
-/// drive.command(Command::Start(Mode::Torque))?;
+/// drive.command(&Command::Start(Mode::Torque))?;
 /// // Codes of zero current and 311 V.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, ..Sample::default() };
 /// let compare = drive.step(&sample);
@@ -212,7 +212,7 @@ impl Drive {
         } else {
             s.estimator.flux()
         };
-        (s.seen.phi, s.seen.flux_step) = (flux.phi, flux.step);
+        (s.seen.phi, s.seen.flux_freq) = (flux.phi, flux.step);
         let phi = flux.phi.unit_vector();
         let axes = &s.axes;
 
@@ -243,7 +243,7 @@ impl Drive {
         (s.seen.measured, s.seen.realised) = (measured.current, modulated.realised);
         s.seen.dc_link = measured.dc_link;
         if modulated.limited {
-            s.current_loop.realised((modulated.realised - total).to_dq(applied));
+            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
         }
 
         if held {
@@ -261,23 +261,23 @@ impl Drive {
             let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
             c.estimator.observe(&mut s.estimator, &sample, flux.step);
         }
-        let rotor_step = if counts {
+        let rotor_freq = if counts {
             c.indirect.slip(&mut s.indirect, current.q);
-            s.indirect.rotor_step
+            s.indirect.rotor_freq
         } else {
             // The slip of what is asked for: that of the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
-            let slip_step = s.indirect.slip_step;
+            let slip_freq = s.indirect.slip_freq;
             // The flux is held still until it stands.
-            if !held && c.estimator.track(&mut s.estimator, reference.q, slip_step).is_err() {
+            if !held && c.estimator.track(&mut s.estimator, reference.q, slip_freq).is_err() {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
-            s.estimator.rotor_step
+            s.estimator.rotor_freq
         };
 
         // What was computed must make sense before it is put out. (The current and the reference of the step
         // before are in the voltage, and what the demodulation sees is in the speed.)
-        if !(voltage.d + voltage.q + flux.step + rotor_step).is_finite() {
+        if !(voltage.d + voltage.q + flux.step + rotor_freq).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
         }
 
@@ -291,8 +291,8 @@ impl Drive {
             voltage,
             carrier_axis,
             flux_axis,
-            flux_step: flux.step,
-            rotor_step,
+            flux_freq: flux.step,
+            rotor_freq,
             held,
             learning: self.mode == Mode::Learning,
         };

@@ -10,6 +10,8 @@
 //! * a voltage takes effect one period after the sample it was computed from, and
 //! * its mean acts at `(k + 1.5) T`.
 
+use bitflags::bitflags;
+
 /// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
 pub const PERIOD_S: f32 = 1.0 / 6000.0;
 
@@ -33,32 +35,20 @@ pub struct Sample {
     pub hardware: Hardware,
 }
 
-/// Events that the hardware around the drive reports with a sample; each latches a fault.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Hardware(u8);
-
-impl Hardware {
-    /// Nothing to report.
-    pub const NONE: Self = Self(0);
-    /// The power stage has pulled the timer's break input: outputs are off already.
-    pub const BREAK: Self = Self(1);
-    /// An analog watchdog or comparator has seen a current beyond its limit.
-    pub const ANALOG_WATCHDOG: Self = Self(1 << 1);
-    /// The control interrupt came late, was skipped, or took too long.
-    pub const DEADLINE_MISS: Self = Self(1 << 2);
-    /// A conversion was overwritten before it was read, or did not take place.
-    pub const CONVERTER_OVERRUN: Self = Self(1 << 3);
-    /// The clock has failed over.
-    pub const CLOCK_FAILURE: Self = Self(1 << 4);
-
-    /// Both sets of events.
-    pub const fn and(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-
-    /// Whether any event of `other` is in this set.
-    pub const fn has(self, other: Self) -> bool {
-        self.0 & other.0 != 0
+bitflags! {
+    /// Events that the hardware around the drive reports with a sample; each latches a fault.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub struct Hardware: u8 {
+        /// The power stage has pulled the timer's break input: outputs are off already.
+        const BREAK = 1;
+        /// An analog watchdog or comparator has seen a current beyond its limit.
+        const ANALOG_WATCHDOG = 1 << 1;
+        /// The control interrupt came late, was skipped, or took too long.
+        const DEADLINE_MISS = 1 << 2;
+        /// A conversion was overwritten before it was read, or did not take place.
+        const CONVERTER_OVERRUN = 1 << 3;
+        /// The clock has failed over.
+        const CLOCK_FAILURE = 1 << 4;
     }
 }
 

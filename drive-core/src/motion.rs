@@ -13,7 +13,7 @@
 //!
 //! # Without the encoder
 //! The rotor is where the flux is less the slip since the start:
-//! `theta_r = phi - (1/T_sec) ∫ i_q/i_d dt`, Eq. 2.10 solved for the other angle. The injection
+//! `theta_r = phi - (1/tau_r) ∫ i_q/i_d dt`, Eq. 2.10 solved for the other angle. The injection
 //! observes the flux, and nothing observes the rotor inside it: a cage looks the same from everywhere.
 //! An error of the slip is therefore an error of the speed, and its integral one of the position
 //! that nothing takes back. Measured on the simulated motor (experiment `sensorless-position`),
@@ -149,7 +149,7 @@ impl Motion {
                 let error = state.reference - state.speed;
                 let wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
                 state.output = limited(wanted, self.i_q_limit);
-                state.pi.realised(state.output - wanted);
+                state.pi.back_calculate(state.output - wanted);
             }
             _ => {}
         }

@@ -63,7 +63,7 @@ impl Motor {
     }
 
     /// Rotor time constant L_r / r_r, s.
-    pub fn t_sec(&self) -> f32 {
+    pub fn tau_r(&self) -> f32 {
         self.l_r() / self.r_r
     }
 

@@ -21,7 +21,7 @@ fn figure_40(anti_windup: bool) -> Figure40 {
         let u = pi.step(&mut state, 1.0 - y);
         let applied = u.clamp(-0.15, 0.15);
         if anti_windup {
-            state.realised(applied - u);
+            state.back_calculate(applied - u);
         }
         r.saturated += usize::from(applied != u);
         r.u_max = r.u_max.max(u);
@@ -131,9 +131,9 @@ proptest! {
             let (u_d, u_q) = (pi.d.step(&mut d, e_d), pi.q.step(&mut q, e_q));
             prop_assert_eq!((u.d.to_bits(), u.q.to_bits()), (u_d.to_bits(), u_q.to_bits()));
             let applied = Dq::new(u_d.clamp(-limit, limit), u_q.clamp(-limit, limit));
-            both.realised(applied - u);
-            d.realised(applied.d - u_d);
-            q.realised(applied.q - u_q);
+            both.back_calculate(applied - u);
+            d.back_calculate(applied.d - u_d);
+            q.back_calculate(applied.q - u_q);
             prop_assert_eq!(both.output(), Dq::new(d.output(), q.output()));
             // Never wound up beyond the limit, but for rounding.
             prop_assert!(d.output().abs() <= limit * 1.000_001 + 1e-4);
@@ -146,7 +146,7 @@ proptest! {
         let (mut told, mut untold) = (PiState::ZERO, PiState::ZERO);
         for e in errors {
             let u = pi.step(&mut told, e);
-            told.realised(0.0);
+            told.back_calculate(0.0);
             prop_assert_eq!(u.to_bits(), pi.step(&mut untold, e).to_bits());
             prop_assert_eq!(told, untold);
         }

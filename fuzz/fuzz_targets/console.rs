@@ -9,12 +9,12 @@ use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
 use induction_drive::console::doubles::{Desk, Wire, found};
 use induction_drive::console::grammar::{HELP, LEVELS};
-use induction_drive::console::keys::{Everything, KEYS};
+use induction_drive::console::keys::{FirmwareSettings, KEYS};
 use induction_drive::trace::SIGNALS;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    let settings = Everything::of_the_board();
+    let settings = FirmwareSettings::of_the_board();
     // (The design rules take longer than all else.)
     static DRIVE: OnceLock<Drive> = OnceLock::new();
     let drive = DRIVE.get_or_init(|| Drive::new(settings.build().expect("the defaults")));

@@ -3,7 +3,7 @@
 #![no_main]
 
 use induction_drive::console::doubles::found;
-use induction_drive::console::keys::Everything;
+use induction_drive::console::keys::FirmwareSettings;
 use induction_drive::saved::{Failed, Flash, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
 use libfuzzer_sys::fuzz_target;
 
@@ -25,7 +25,7 @@ impl Flash for &mut Fake {
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    let defaults = Everything::of_the_board();
+    let defaults = FirmwareSettings::of_the_board();
     let mut fake = Fake([[Some(u64::MAX); SLOT_WORDS]; SLOTS]);
     // A whole record with everything in each slot, and changes of it: slot, place, what to do, eight bytes.
     for slot in 0..SLOTS {
@@ -59,8 +59,8 @@ fuzz_target!(|bytes: &[u8]| {
 });
 
 /// Settings, and what may have been learned with them.
-fn full() -> Everything {
-    let mut settings = Everything::of_the_board();
+fn full() -> FirmwareSettings {
+    let mut settings = FirmwareSettings::of_the_board();
     settings.learn(&found());
     settings
 }

@@ -18,7 +18,7 @@ const LONGEST_S: u32 = 1000;
 /// # Errors
 /// When it refuses the command, or stops with a fault.
 pub fn with(rig: &mut Rig) -> Result<Learned, Error> {
-    rig.command(Command::Start(Mode::Learning))?;
+    rig.command(&Command::Start(Mode::Learning))?;
     for _ in 0..LONGEST_S {
         rig.run(1.0, |_| {});
         match (rig.drive.state(), rig.drive.learned()) {
@@ -91,7 +91,7 @@ pub fn reference_of(
     let mut table = Vec::with_capacity(points + 1);
     for n in 0..=points {
         let i_q = n as f64 * STEP_A;
-        rig.command(Command::Torque(i_q as f32))?;
+        rig.command(&Command::Torque(i_q as f32))?;
         rig.run(SETTLE_S, |_| {});
         let (mut q, mut carrier) = (Stats::default(), Stats::default());
         rig.run(AVERAGE_S, |p| {

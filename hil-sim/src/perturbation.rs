@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 
 use drive_core::Coefficients;
 use drive_core::filter::dissertation::{LPF, LpfState};
-use drive_core::flux::schedule::Schedule;
+use drive_core::flux::schedule::GainSchedule;
 use drive_core::io::PERIOD_S;
 use drive_core::math::frames::AlphaBeta;
 use drive_core::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign};
@@ -95,7 +95,7 @@ impl Linear {
         )
         .map_err(|e| refused(&e))?;
         let tracking = &settings.injection.synchronous;
-        let schedule = Schedule::new(
+        let schedule = GainSchedule::new(
             &tracking.reference,
             tracking.flux_saliency,
             tracking.current_saliency,
@@ -108,7 +108,7 @@ impl Linear {
         Ok(Self {
             i_d: settings.sequence.i_d.into(),
             i_q,
-            t_r: [l_r / machine.rr, settings.motor.t_sec().into()],
+            t_r: [l_r / machine.rr, settings.motor.tau_r().into()],
             torque: 1.5 * pole_pairs * machine.lm * machine.lm / l_r,
             mechanics: *mechanics,
             pole_pairs,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use drive_core::carrier::DemodulatorKind;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{self, PrintedChain, SynchronousTracking};
-use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, State, Taken};
+use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
 
 use crate::config::{self, Config};
 use crate::error::Error;
@@ -157,7 +157,7 @@ impl Rig {
             point.saliency = telemetry.saliency.into();
             point.loss = telemetry.saliency_loss.into();
             point.carrier = f64::from(telemetry.carrier_squared).sqrt();
-            point.speed_estimate_rpm = rpm(telemetry.rotor_step);
+            point.speed_estimate_rpm = rpm(telemetry.rotor_freq);
             point.turns_estimate = telemetry.turns.into();
             let error = phi - f64::from(telemetry.phi.to_turns()) * TAU;
             point.angle_error_deg = wrapped_degrees(error);
@@ -170,7 +170,7 @@ impl Rig {
     /// # Errors
     /// When the command is refused, or the drive does not get there within 30 s.
     pub fn start(&mut self, mode: Mode) -> Result<(), Error> {
-        self.command(Command::Start(mode))?;
+        self.command(&Command::Start(mode))?;
         for _ in 0..(30.0 * RATE_HZ) as u32 {
             self.step();
             match self.drive.state() {
@@ -186,7 +186,7 @@ impl Rig {
     ///
     /// # Errors
     /// When the drive refuses it.
-    pub fn command(&mut self, command: Command) -> Result<Taken, Error> {
+    pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
         let refused = |e| Error::Refused(format!("{command:?}: {e}"));
         self.drive.command(command).map_err(refused)
     }

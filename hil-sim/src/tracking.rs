@@ -67,7 +67,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
     let mut rig = Rig::new(&start, &settings, seed)?;
     let mut online = Online::new(&settings).map_err(|e| refused(format!("{e:?}")))?;
     rig.start(Mode::Torque)?;
-    rig.command(Command::Torque(case.iq_a as f32))?;
+    rig.command(&Command::Torque(case.iq_a as f32))?;
     let steps = 1 + (100.0 * case.speed_rpm.abs() / RAMP_RPM_PER_S) as u32;
     for n in 1..=steps {
         let rpm = case.speed_rpm * f64::from(n) / f64::from(steps);
@@ -93,18 +93,18 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
             if case.excitation.0 > 0.0 && k.is_multiple_of(block / 10) {
                 let t = t + k as f64 / RATE_HZ;
                 let more = case.excitation.0 * (TAU * case.excitation.1 * t).sin();
-                rig.command(Command::Magnetising((i_d + more) as f32))?;
+                rig.command(&Command::Magnetising((i_d + more) as f32))?;
             }
             rig.run(1.0 / RATE_HZ, |p| angle_error += p.angle_error_deg / block as f64);
             let telemetry = rig.drive.telemetry();
             online.push(telemetry.measured, telemetry.realised);
         }
         let telemetry = rig.drive.telemetry();
-        let seen = telemetry.rotor_step * (TAU * RATE_HZ) as f32;
+        let seen = telemetry.rotor_freq * (TAU * RATE_HZ) as f32;
         let speed = if encoder { Speed::Known(seen) } else { Speed::Guess(seen) };
         let estimate = online.refine(telemetry.reference, speed);
         if let (true, Ok(tracked)) = (case.used, &estimate) {
-            rig.command(Command::RotorTimeConstant(tracked.tau_r))?;
+            rig.command(&Command::RotorTimeConstant(tracked.tau_r))?;
         }
         moments.push(Moment {
             t: (n + 1) as f64 / REFINES_PER_S,

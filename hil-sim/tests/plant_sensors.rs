@@ -210,8 +210,8 @@ fn the_other_channels() {
     assert!(plant.set_dc_link(f64::NAN).is_err() && plant.dc_link() == 500.0);
     plant.report(Hardware::BREAK);
     plant.report(Hardware::CLOCK_FAILURE);
-    assert_eq!(plant.sample().hardware, Hardware::BREAK.and(Hardware::CLOCK_FAILURE));
-    assert_eq!(plant.sample().hardware, Hardware::NONE, "reported once");
+    assert_eq!(plant.sample().hardware, Hardware::BREAK.union(Hardware::CLOCK_FAILURE));
+    assert_eq!(plant.sample().hardware, Hardware::empty(), "reported once");
 }
 
 #[test]

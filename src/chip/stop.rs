@@ -150,7 +150,7 @@ unsafe fn NonMaskableInt() {
     end(Reason::NonMaskable, [rcc.cifr().read().bits(), flash.eccr().read().bits(), 0, 0])
 }
 
-/// Everything nobody expects.
+/// FirmwareSettings nobody expects.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     end(Reason::Unexpected, [number as u32, 0, 0, 0])

@@ -10,13 +10,13 @@ use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::settings::SettingsError;
 use drive_core::settings::table::CarrierTable;
 use drive_core::settings::table::ReferenceTable;
-use drive_core::{Coefficients, Drive, Hardware, Sample, State, Taken};
+use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State};
 
 use super::grammar::{LONGEST_TRACE, Level};
-use super::keys::Everything;
-use super::{Machine, NotDone, Port};
+use super::keys::FirmwareSettings;
+use super::{DriveHandle, NotDone, Port};
+use crate::link::Status;
 use crate::link::trace::{self, Choice};
-use crate::link::{Order, Status};
 use crate::rotor_tracking::{Report, Tracking};
 use crate::store::Failed;
 
@@ -31,9 +31,9 @@ pub struct Desk {
     /// How many records the trace has.
     pub records: u16,
     /// What it was ordered.
-    pub orders: Vec<Order>,
+    pub orders: Vec<Command>,
     /// What was saved last.
-    pub saved: Option<Everything>,
+    pub saved: Option<FirmwareSettings>,
     /// Whether the flash fails.
     pub worn_out: bool,
     /// What a learning has found.
@@ -59,13 +59,13 @@ impl Desk {
     }
 }
 
-impl Machine for Desk {
-    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
+impl DriveHandle for Desk {
+    fn order(&mut self, order: Command) -> Result<Accepted, NotDone> {
         if !self.running {
             return Err(NotDone::NoAnswer);
         }
         self.orders.push(order);
-        self.drive.command(order.command()).map_err(NotDone::Refused)
+        self.drive.command(&order).map_err(NotDone::Refused)
     }
     fn status(&self) -> Option<Status> {
         self.running.then(|| Status {
@@ -76,22 +76,22 @@ impl Machine for Desk {
             worst_cycles: u32::MAX,
             last_cycles: 800,
             worst_latency: u32::MAX,
-            hardware: Hardware::NONE,
+            hardware: Hardware::empty(),
         })
     }
     fn is_off(&self) -> bool {
         matches!(self.drive.state(), State::Off | State::Fault(_))
     }
-    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
         settings.build()
     }
-    fn configured(&mut self, settings: &Everything) {
+    fn configured(&mut self, settings: &FirmwareSettings) {
         self.tracking = Tracking::new(&settings.drive);
     }
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
     }
-    fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
         if self.worn_out {
             return Err(Failed::Erase(0x10));
         }

@@ -12,9 +12,9 @@ use drive_core::settings::{AngleSource, CurrentPlant, SettingsError};
 
 use super::grammar::number;
 
-/// Everything that can be set at the console.
+/// FirmwareSettings that can be set at the console.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Everything {
+pub struct FirmwareSettings {
     /// Of the drive.
     pub drive: Settings,
     /// Of the firmware around it.
@@ -35,7 +35,7 @@ pub struct Commands {
 /// Longest time-out of commands, s.
 const LONGEST_TIMEOUT_S: f32 = 3600.0;
 
-impl Everything {
+impl FirmwareSettings {
     /// What is set in the image. Not inlined: every number of it is an instruction or two.
     #[inline(never)]
     pub fn of_the_board() -> Self {
@@ -122,18 +122,18 @@ impl PartialEq for Key {
 
 #[derive(Debug)]
 enum Access {
-    Number(fn(&mut Everything) -> &mut f32),
+    Number(fn(&mut FirmwareSettings) -> &mut f32),
     /// `checked` says whether a range stands in the settings: 0 is in none of them.
     Whole {
-        get: fn(&Everything) -> u32,
-        set: fn(&mut Everything, u32),
+        get: fn(&FirmwareSettings) -> u32,
+        set: fn(&mut FirmwareSettings, u32),
         max: u32,
         checked: bool,
     },
     Word {
         words: &'static [&'static str],
-        get: fn(&Everything) -> u8,
-        set: fn(&mut Everything, u8),
+        get: fn(&FirmwareSettings) -> u8,
+        set: fn(&mut FirmwareSettings, u8),
     },
 }
 
@@ -212,9 +212,9 @@ macro_rules! whole {
 macro_rules! word {
     ($name:literal, |$s:ident| $place:expr, $($word:literal = $value:pat => $make:expr),+) => {{
         const WORDS: &[&str] = &[$($word),+];
-        let get: fn(&Everything) -> u8 =
+        let get: fn(&FirmwareSettings) -> u8 =
             |$s| match $place { $($value => const { place($word, WORDS) },)+ };
-        let set: fn(&mut Everything, u8) =
+        let set: fn(&mut FirmwareSettings, u8) =
             |$s, index| { $(if index == const { place($word, WORDS) } { $place = $make; })+ };
         Key { name: $name, unit: "", access: Access::Word { words: WORDS, get, set } }
     }};
@@ -327,7 +327,7 @@ pub fn find(name: &str) -> Option<&'static Key> {
 
 impl Key {
     /// What is set.
-    pub fn get(&self, settings: &Everything) -> Value {
+    pub fn get(&self, settings: &FirmwareSettings) -> Value {
         match self.access {
             Access::Number(place) => Value::Number(*place(&mut { *settings })),
             Access::Whole { get, .. } => Value::Whole(get(settings)),
@@ -338,7 +338,7 @@ impl Key {
         }
     }
 
-    /// The value that a text stands for. Whether it is in range, [`Everything::build`] says.
+    /// The value that a text stands for. Whether it is in range, [`FirmwareSettings::build`] says.
     ///
     /// # Errors
     /// The text is no value for this setting.
@@ -358,7 +358,7 @@ impl Key {
     }
 
     /// Sets a value that [`parse`](Self::parse) gave.
-    pub fn set(&self, settings: &mut Everything, value: Value) {
+    pub fn set(&self, settings: &mut FirmwareSettings, value: Value) {
         match (&self.access, value) {
             (Access::Number(place), Value::Number(value)) => *place(settings) = value,
             (Access::Whole { set, .. }, Value::Whole(value)) => set(settings, value),
@@ -374,7 +374,7 @@ impl Key {
     }
 
     /// What is set, as it is kept in the flash.
-    pub fn to_bits(&self, settings: &Everything) -> u32 {
+    pub fn to_bits(&self, settings: &FirmwareSettings) -> u32 {
         match self.get(settings) {
             Value::Number(value) => value.to_bits(),
             Value::Whole(value) => value,
@@ -383,8 +383,8 @@ impl Key {
     }
 
     /// Sets what [`to_bits`](Self::to_bits) gave; `None` if it is no value of this setting. Whether it
-    /// is in range, [`Everything::build`] says.
-    pub fn set_bits(&self, settings: &mut Everything, bits: u32) -> Option<()> {
+    /// is in range, [`FirmwareSettings::build`] says.
+    pub fn set_bits(&self, settings: &mut FirmwareSettings, bits: u32) -> Option<()> {
         let value = match self.access {
             Access::Number(_) => Value::Number(f32::from_bits(bits)),
             Access::Whole { max, .. } => Value::Whole(Some(bits).filter(|bits| *bits <= max)?),
@@ -398,7 +398,7 @@ impl Key {
     }
 
     /// What may be set beside the present settings, where a range says it.
-    pub fn range(&self, settings: &Everything) -> Option<(f32, f32)> {
+    pub fn range(&self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let mut probe = *settings;
         match self.access {
             // In no range.
@@ -440,7 +440,7 @@ mod tests {
 
     #[test]
     fn every_number_has_a_range_that_holds_what_is_set() {
-        let settings = Everything::of_the_board();
+        let settings = FirmwareSettings::of_the_board();
         for key in &KEYS {
             let value = match key.get(&settings) {
                 Value::Number(value) => value,
@@ -458,7 +458,7 @@ mod tests {
     #[test]
     fn what_is_set_is_read_back_and_nothing_else_moves() {
         for (i, key) in KEYS.iter().enumerate() {
-            let before = Everything::of_the_board();
+            let before = FirmwareSettings::of_the_board();
             let mut after = before;
             let value = match key.get(&before) {
                 Value::Number(value) => key.parse(&format!("{}", value * 1.5 + 1.0)),
@@ -478,7 +478,7 @@ mod tests {
 
     #[test]
     fn values_out_of_range_are_named() {
-        let mut settings = Everything::of_the_board();
+        let mut settings = FirmwareSettings::of_the_board();
         for (name, text) in [("limits.trip_a", "5"), ("command.timeout_s", "-1")] {
             let key = find(name).unwrap();
             let mut other = settings;
@@ -493,7 +493,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_is_a_value_or_refused(text in ".*", i in 0..KEYS.len()) {
-            let mut settings = Everything::of_the_board();
+            let mut settings = FirmwareSettings::of_the_board();
             if let Ok(value) = KEYS[i].parse(&text) {
                 KEYS[i].set(&mut settings, value);
                 prop_assert_eq!(KEYS[i].get(&settings), value);

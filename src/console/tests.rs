@@ -1,5 +1,5 @@
 use drive_core::identify::online::Doubt;
-use drive_core::{Drive, Fault, Hardware, Mode, Sample};
+use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
 use super::doubles::{Desk, Wire, found};
@@ -14,7 +14,7 @@ struct Talk {
 
 impl Talk {
     fn new() -> Self {
-        let mut settings = Everything::of_the_board();
+        let mut settings = FirmwareSettings::of_the_board();
         settings.command.wiring_checked = true;
         Self {
             console: Console::new(settings),
@@ -99,7 +99,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
     assert_eq!(talk.ask("defaults"), "ok");
     assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    assert_eq!(talk.desk.orders[1..], [Order::CheckWiring, Order::Start(Mode::Torque)]);
+    assert_eq!(talk.desk.orders[1..], [Command::CheckWiring, Command::Start(Mode::Torque)]);
     assert_eq!(talk.ask("stop"), "ok");
     // It was not got past: it is checked again.
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
@@ -118,7 +118,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
 
 #[test]
 fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
-    let mut settings = Everything::of_the_board();
+    let mut settings = FirmwareSettings::of_the_board();
     // The simulated converter is calibrated for its own reference.
     settings.drive.scales = drive_core::settings::Scales::default();
     let mut talk = Talk::new();
@@ -277,7 +277,7 @@ fn commands_reach_the_drive_as_they_were_given() {
     talk.say("start\ntorque 1.5\nstop\nclear\n");
     assert_eq!(
         talk.desk.orders,
-        [Order::Start(Mode::Torque), Order::Torque(1.5), Order::Stop, Order::Clear]
+        [Command::Start(Mode::Torque), Command::Torque(1.5), Command::Stop, Command::Clear]
     );
 }
 
@@ -302,8 +302,8 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_eq!(talk.desk.saved.unwrap().learned, Some(found()));
     // What it does not depend on leaves it, and the drive works with it.
     assert_eq!(talk.ask("set limits.dc_over_v 390"), "ok");
-    let Some(Order::Configure(with)) = talk.desk.orders.last() else { panic!("no order") };
-    let mut settings = Everything::of_the_board();
+    let Some(Command::Configure(with)) = talk.desk.orders.last() else { panic!("no order") };
+    let mut settings = FirmwareSettings::of_the_board();
     settings.drive.limits.dc_over_v = 390.0;
     assert_ne!(*with, settings.build().unwrap());
     settings.learn(&found());

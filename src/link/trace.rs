@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
 
-/// Everything that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
+/// FirmwareSettings that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
 pub const SIGNALS: [&str; 13] = [
     "phi_deg",
     "flux_step",
@@ -72,8 +72,8 @@ impl Choice {
         for (value, signal) in record.iter_mut().zip(self.signals) {
             *value = match signal {
                 0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
-                1 => t.flux_step,
-                2 => t.rotor_step,
+                1 => t.flux_freq,
+                2 => t.rotor_freq,
                 3 => t.reference.d,
                 4 => t.reference.q,
                 5 => t.current.d,
@@ -258,8 +258,8 @@ mod tests {
     fn signals_are_recorded_as_they_were_chosen() {
         let telemetry = Telemetry {
             phi: drive_core::Angle::QUARTER,
-            flux_step: 1.0,
-            rotor_step: 2.0,
+            flux_freq: 1.0,
+            rotor_freq: 2.0,
             reference: drive_core::Dq::new(3.0, 4.0),
             current: drive_core::Dq::new(5.0, 6.0),
             voltage: drive_core::Dq::new(7.0, 8.0),

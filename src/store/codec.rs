@@ -14,7 +14,7 @@
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use super::{NotUsed, SLOT_WORDS, learned};
-use crate::console::keys::{Everything, KEYS, find_id};
+use crate::console::keys::{FirmwareSettings, KEYS, find_id};
 
 /// The layout that is written.
 pub const VERSION: u16 = 1;
@@ -55,7 +55,7 @@ fn halves(word: u64) -> (u32, u32) {
 }
 
 /// The record of `settings`, erased behind its [`length`].
-pub fn record(settings: &Everything, sequence: u32) -> [u64; WORDS] {
+pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
     for (key, word) in KEYS.iter().zip(words.iter_mut().skip(FIRST)) {
         *word = pair(key.id(), key.to_bits(settings));
@@ -131,8 +131,8 @@ fn whole(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
 #[inline(never)]
 pub fn settings(
     read: &mut dyn FnMut(usize) -> Option<u64>,
-    defaults: &Everything,
-) -> Result<Everything, NotUsed> {
+    defaults: &FirmwareSettings,
+) -> Result<FirmwareSettings, NotUsed> {
     let (version, entries) = read(0).and_then(header).ok_or(NotUsed::Broken)?;
     if version > VERSION {
         return Err(NotUsed::Newer(version));

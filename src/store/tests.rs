@@ -81,11 +81,11 @@ impl Flash for &mut Fake {
     }
 }
 
-fn board() -> Everything {
-    Everything::of_the_board()
+fn board() -> FirmwareSettings {
+    FirmwareSettings::of_the_board()
 }
 
-fn with_r_s(r_s: f32) -> Everything {
+fn with_r_s(r_s: f32) -> FirmwareSettings {
     let mut settings = board();
     settings.drive.motor.r_s = r_s;
     settings
@@ -108,16 +108,16 @@ fn learned(random: [f32; POINTS]) -> Learned {
     }
 }
 
-fn with_learned() -> Everything {
+fn with_learned() -> FirmwareSettings {
     let random = core::array::from_fn(|n| (n as f32 * 0.7).sin());
-    Everything { learned: Some(learned(random)), ..with_r_s(6.0) }
+    FirmwareSettings { learned: Some(learned(random)), ..with_r_s(6.0) }
 }
 
 fn load(fake: &mut Fake) -> Loaded {
     Saved::load(fake, &board()).1
 }
 
-fn save(fake: &mut Fake, settings: &Everything) -> Result<(), Failed> {
+fn save(fake: &mut Fake, settings: &FirmwareSettings) -> Result<(), Failed> {
     Saved::load(fake, &board()).0.save(settings)
 }
 
@@ -321,7 +321,7 @@ proptest! {
     fn whatever_was_learned_survives(
         random in proptest::array::uniform16(-1.0_f32..=1.0), r_s in 0.1_f32..100.0,
     ) {
-        let settings = Everything { learned: Some(learned(random)), ..with_r_s(r_s) };
+        let settings = FirmwareSettings { learned: Some(learned(random)), ..with_r_s(r_s) };
         let mut fake = Fake::new();
         save(&mut fake, &settings).unwrap();
         prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));

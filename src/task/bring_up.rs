@@ -6,7 +6,7 @@ use cortex_m::peripheral::DWT;
 use cortex_m::singleton;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
-use drive_core::{Coefficients, Drive, Taken};
+use drive_core::{Accepted, Coefficients, Command, Drive};
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
@@ -14,13 +14,13 @@ use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, stop};
 use crate::task::control;
-use crate::task::desk::{Chip, Desk, Ends};
+use crate::task::supervisor::{Chip, Ends, Supervisor};
 use induction_drive::board;
-use induction_drive::console::keys::Everything;
+use induction_drive::console::keys::FirmwareSettings;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::ring::Ring;
 use induction_drive::link::trace::Trace;
-use induction_drive::link::{Answer, Order, Status};
+use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{Rule, Verdict, Watchdog};
 use induction_drive::rotor_tracking::{Seen, Tracking};
@@ -29,11 +29,11 @@ use induction_drive::store::{Loaded, NotUsed, Saved};
 /// What the main loop works with.
 pub struct Board {
     /// What is set: what was saved, or the defaults.
-    pub settings: Everything,
+    pub settings: FirmwareSettings,
     /// The serial port of the console.
     pub port: Port,
     /// The drive.
-    pub desk: Desk,
+    pub supervisor: Supervisor,
 }
 
 /// Why the drive was not started.
@@ -120,20 +120,20 @@ fn with(mut core: cortex_m::Peripherals, chip: pac::Peripherals) -> Board {
     };
     *tracking = Tracking::new(&settings.drive);
     let chip = Chip { cause, record, options, dual_bank, saved, not_used, dead_time_s };
-    Board { settings, port, desk: Desk::new(ends.ok(), watchdog, chip, tracking) }
+    Board { settings, port, supervisor: Supervisor::new(ends.ok(), watchdog, chip, tracking) }
 }
 
 /// What the drive starts with.
 struct Start {
     saved: Saved<Pages>,
-    settings: Everything,
+    settings: FirmwareSettings,
     /// Why what was saved is not used, if it is not.
     not_used: Option<NotUsed>,
 }
 
 /// The settings that were saved, or the defaults and why.
 fn load(pages: Pages) -> Start {
-    let defaults = Everything::of_the_board();
+    let defaults = FirmwareSettings::of_the_board();
     let (saved, loaded) = Saved::load(pages, &defaults);
     let (mut settings, mut not_used) = match loaded {
         Loaded::Settings(settings) => (settings, None),
@@ -152,7 +152,8 @@ impl Start {
     /// not take what was saved, the defaults hold.
     fn build(&mut self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
         let built = self.settings.build_for(dead_time_s).or_else(|_| {
-            (self.settings, self.not_used) = (Everything::of_the_board(), Some(NotUsed::Refused));
+            (self.settings, self.not_used) =
+                (FirmwareSettings::of_the_board(), Some(NotUsed::Refused));
             self.settings.build_for(dead_time_s)
         });
         if let Some(why) = self.not_used {
@@ -224,8 +225,8 @@ fn start_control(
     let status =
         singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(NotStarted::Twice)?;
     let orders =
-        singleton!(: Mailbox<Order> = Mailbox::new(Order::Stop)).ok_or(NotStarted::Twice)?;
-    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Taken::AsGiven)))
+        singleton!(: Mailbox<Command> = Mailbox::new(Command::Stop)).ok_or(NotStarted::Twice)?;
+    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Accepted::AsGiven)))
         .ok_or(NotStarted::Twice)?;
     let learned =
         singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(NotStarted::Twice)?;

@@ -10,7 +10,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::identify::learning::Learned;
-use drive_core::{Drive, Hardware, Sample, State};
+use drive_core::{Command, Drive, Hardware, Sample, State};
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
@@ -21,11 +21,11 @@ use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::ring::Writer;
 use induction_drive::link::trace::Recorder;
-use induction_drive::link::{Answer, Order, Status};
+use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::Part;
 use induction_drive::rotor_tracking::Seen;
 
-/// Everything the interrupt works with.
+/// FirmwareSettings the interrupt works with.
 pub struct Control {
     /// The drive.
     pub drive: Drive,
@@ -38,7 +38,7 @@ pub struct Control {
     /// The way to the main loop.
     pub status: Sender<'static, Status>,
     /// What the console wants of the drive.
-    pub orders: Receiver<'static, Order>,
+    pub orders: Receiver<'static, Command>,
     /// What the drive makes of it.
     pub answers: Sender<'static, Answer>,
     /// What a learning found.
@@ -68,9 +68,9 @@ impl Control {
             periods: 0,
             worst_cycles: 0,
             worst_latency: 0,
-            late: Hardware::NONE,
-            over: Hardware::NONE,
-            seen: Hardware::NONE,
+            late: Hardware::empty(),
+            over: Hardware::empty(),
+            seen: Hardware::empty(),
             began: 0,
             reported: None,
         };
@@ -94,7 +94,7 @@ pub fn constants() -> ([Part; 5], u32) {
     let constants = [
         part(drive + Drive::COEFFICIENTS.start, Drive::COEFFICIENTS.len()),
         part(offset_of!(Control, status), size_of::<Sender<'static, Status>>()),
-        part(offset_of!(Control, orders), size_of::<Receiver<'static, Order>>()),
+        part(offset_of!(Control, orders), size_of::<Receiver<'static, Command>>()),
         part(offset_of!(Control, answers), size_of::<Sender<'static, Answer>>()),
         part(offset_of!(Control, trace), size_of::<Recorder<'static, { board::TRACE_RECORDS }>>()),
     ];
@@ -140,10 +140,10 @@ fn ADC1_2() {
 #[inline(never)]
 fn take_order(
     drive: &mut Drive,
-    orders: &mut Receiver<'static, Order>,
+    orders: &mut Receiver<'static, Command>,
     answers: &mut Sender<'static, Answer>,
 ) {
-    if let Some(answer) = orders.take_with(|order| drive.command(order.command())) {
+    if let Some(answer) = orders.take_with(|order| drive.command(order)) {
         // There is room: the main loop takes the last answer before it sends an order.
         answers.send(answer);
     }
@@ -184,13 +184,13 @@ impl Running {
         {
             self.late = Hardware::DEADLINE_MISS;
         }
-        let mut hardware = self.late.and(self.over);
-        self.over = Hardware::NONE;
+        let mut hardware = self.late | self.over;
+        self.over = Hardware::empty();
         if timer.pulled {
-            hardware = hardware.and(Hardware::BREAK);
+            hardware |= Hardware::BREAK;
         }
         if !converters.complete {
-            hardware = hardware.and(Hardware::CONVERTER_OVERRUN);
+            hardware |= Hardware::CONVERTER_OVERRUN;
         }
         let codes = adc.read();
         let sample = Sample {
@@ -206,7 +206,7 @@ impl Running {
         pwm.apply(drive.step(&sample));
 
         // The timer was at its top again before all compare values were written.
-        self.late = Hardware::NONE;
+        self.late = Hardware::empty();
         if pwm.updated() {
             self.late = Hardware::DEADLINE_MISS;
         }
@@ -215,7 +215,7 @@ impl Running {
             self.worst_latency = latency;
         }
         // With the outputs off a miss harms nobody, and is only told.
-        let missed = hardware.and(self.late).has(Hardware::DEADLINE_MISS);
+        let missed = (hardware | self.late).contains(Hardware::DEADLINE_MISS);
         if missed && !was_off {
             pwm.trip();
             MISSED.store(true, Ordering::Relaxed);
@@ -232,7 +232,7 @@ impl Running {
             seen.push(Seen::new(self.periods, &drive.telemetry()));
         }
 
-        self.seen = self.seen.and(hardware);
+        self.seen |= hardware;
         self.periods = self.periods.wrapping_add(1);
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
@@ -270,7 +270,7 @@ impl Running {
             report.hardware = self.seen;
         });
         if sent {
-            self.seen = Hardware::NONE;
+            self.seen = Hardware::empty();
             self.reported = Some(state);
         }
     }

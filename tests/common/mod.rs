@@ -59,7 +59,7 @@ pub fn regulating_with(
 }
 
 fn settled(mut rig: Rig, i_q: f32, settle: f64) -> Rig {
-    rig.command(Command::Torque(i_q)).unwrap();
+    rig.command(&Command::Torque(i_q)).unwrap();
     rig.run(settle, |_| {});
     rig
 }

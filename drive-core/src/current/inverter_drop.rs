@@ -65,7 +65,7 @@ impl InverterDrop {
     #[inline]
     pub fn new(
         magnetise_s: f32,
-        t_sec: f32,
+        tau_r: f32,
         period_s: f32,
         (i_d, largest): (f32, f32),
         rotor: f32,
@@ -73,7 +73,7 @@ impl InverterDrop {
     ) -> Self {
         let room = if FORCED * i_d < largest { FORCED } else { largest / i_d };
         // Until the flux has the value of the lower level: 1 - e^(-t/T) = 1/forced.
-        let until_s = t_sec * libm::logf(room / (room - 1.0));
+        let until_s = tau_r * libm::logf(room / (room - 1.0));
         let fits = room >= LEAST_FORCED && magnetise_s >= 2.0 * (until_s + AVERAGE_S);
         Self {
             forced: if fits { room } else { 1.0 },
@@ -145,13 +145,13 @@ mod tests {
 
     /// What is found on a motor of `r_s` ohm behind a drop of `volts`.
     fn found(r_s: f32, volts: f32, i_d: f32, largest: f32) -> f32 {
-        let (t_sec, rotor) = (0.186, 0.823);
-        let drop = InverterDrop::new(0.8, t_sec, PERIOD, (i_d, largest), rotor, 5.4);
+        let (tau_r, rotor) = (0.186, 0.823);
+        let drop = InverterDrop::new(0.8, tau_r, PERIOD, (i_d, largest), rotor, 5.4);
         let mut state = InverterDropState::default();
         let mut magnetising = 0.0;
         for k in 0..4800 {
             let i = drop.level(k) * i_d;
-            magnetising += PERIOD / t_sec * (i - magnetising);
+            magnetising += PERIOD / tau_r * (i - magnetising);
             let v = r_s * i + rotor * (i - magnetising) + 4.0 / 3.0 * volts;
             let (current, voltage) = (Dq::new(i, 0.0), Dq::new(v, 0.0));
             let signs = Dq::new(4.0 / 3.0, 0.0);

@@ -51,7 +51,7 @@ impl PiState {
 
     /// Tells what was realised: `correction` = applied - wanted, zero if nothing was limited.
     #[inline]
-    pub fn realised(&mut self, correction: f32) {
+    pub fn back_calculate(&mut self, correction: f32) {
         self.output += correction;
     }
 
@@ -114,7 +114,7 @@ impl DqPiState {
     /// Tells what was realised: `correction` = applied - wanted voltage, zero if nothing was
     /// limited.
     #[inline]
-    pub fn realised(&mut self, correction: Dq) {
+    pub fn back_calculate(&mut self, correction: Dq) {
         self.output += correction;
     }
 

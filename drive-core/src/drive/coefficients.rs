@@ -11,7 +11,7 @@ use crate::current::pi::{DqPi, Pi, ReferenceFilter};
 use crate::current::sensing::{Sensing, Window};
 use crate::flux::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 use crate::flux::indirect::Indirect;
-use crate::flux::schedule::Schedule;
+use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, Tracker};
 use crate::identify::learning::Learning;
 use crate::io::PERIOD_S;
@@ -55,7 +55,7 @@ pub struct Coefficients {
     pub(crate) prediction: Prediction,
     pub(crate) indirect: Indirect,
     /// Electrical turns per period for one mechanical turn/s.
-    pub(crate) step_per_speed: f32,
+    pub(crate) freq_per_speed: f32,
     /// Delay of the measured current beside the filter, samples.
     pub(crate) current_lag: f32,
     /// 1 where the delays of the current are compensated, 0 where not.
@@ -115,7 +115,7 @@ pub(crate) struct Protection {
     pub dc_over: f32,
     pub dc_under: f32,
     /// Electrical turns per period.
-    pub rotor_step: f32,
+    pub rotor_freq: f32,
     /// Square of the largest regulated current, A^2.
     pub current_squared: f32,
 }
@@ -180,7 +180,7 @@ impl Settings {
         let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
         let rotor_flux = RotorFlux {
             coupled_inductance: m.l_m / m.l_r() * m.l_m,
-            t_sec: m.t_sec(),
+            tau_r: m.tau_r(),
             period_s: PERIOD_S,
         };
         let synchronous = self.angle_source == AngleSource::Injection
@@ -209,7 +209,7 @@ impl Settings {
                     smoothing_s: t.loss_s,
                     allowed: t.allowed_loss,
                     carrier_a: injection.current_amplitude,
-                    standing_step: turns_per_step(STANDING_RPM),
+                    standing_freq: turns_per_step(STANDING_RPM),
                     period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
                 },
             )
@@ -235,7 +235,7 @@ impl Settings {
             indirect: Indirect::new(
                 self.scales.encoder_counts,
                 m.pole_pairs,
-                m.t_sec(),
+                m.tau_r(),
                 PERIOD_S,
                 self.sequence.i_d,
                 2.0 * self.limits.speed_rpm / 60.0,
@@ -282,25 +282,25 @@ impl Settings {
             },
             inverter_drop: InverterDrop::new(
                 self.sequence.magnetise_s,
-                m.t_sec(),
+                m.tau_r(),
                 PERIOD_S,
                 (self.sequence.i_d, self.limits.current_a),
                 m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
                 m.r_s,
             ),
             learning: Learning::new(
-                m.t_sec(),
+                m.tau_r(),
                 PERIOD_S,
                 (self.sequence.i_d, self.limits.current_a),
                 (m.l_ls + m.l_m - rotor_flux.coupled_inductance, rotor_flux.coupled_inductance),
             ),
             prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
             motion: self.motion(&motion_design),
-            step_per_speed: turns_per_step(60.0),
+            freq_per_speed: turns_per_step(60.0),
             protection: Protection {
                 dc_over: self.limits.dc_over_v,
                 dc_under: self.limits.dc_under_v,
-                rotor_step: turns_per_step(highest_rpm),
+                rotor_freq: turns_per_step(highest_rpm),
                 current_squared: self.limits.current_a * self.limits.current_a,
             },
             sequence: SequenceSteps {
@@ -348,7 +348,7 @@ impl Settings {
         let checked = t.check
             && self.angle_source == AngleSource::Injection
             && self.injection.demodulator == DemodulatorKind::Synchronous;
-        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.t_sec(), PERIOD_S))
+        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r(), PERIOD_S))
     }
 
     /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
@@ -366,7 +366,7 @@ impl Settings {
         let (p, t) = (&inj.printed, &inj.synchronous);
         let angle_loop = match inj.demodulator {
             DemodulatorKind::Synchronous => AngleLoop::Pll {
-                schedule: Schedule::new(
+                schedule: GainSchedule::new(
                     &t.reference,
                     t.flux_saliency,
                     t.current_saliency,

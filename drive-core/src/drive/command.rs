@@ -8,7 +8,7 @@ use crate::math::frames::Dq;
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command<'a> {
+pub enum Command {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
     /// angle comes from the injection, then regulate as `Mode` says.
     Start(Mode),
@@ -41,12 +41,12 @@ pub enum Command<'a> {
     /// [`LIMITS`](crate::identify::online::LIMITS), and approached by no more than 2 % with each command.
     RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
-    Configure(&'a Coefficients),
+    Configure(Coefficients),
 }
 
 /// How a command was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Taken {
+pub enum Accepted {
     /// As it was given.
     AsGiven,
     /// Limited to what the machine can bear: the value that holds now.
@@ -60,8 +60,6 @@ pub enum Refused {
     NotFinite,
     /// Not in this state.
     State(State),
-    /// This mode is not available.
-    ModeNotAvailable(Mode),
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
     /// The injection is needed as angle source; to learn, with a demodulation that tracks.
@@ -84,7 +82,6 @@ impl core::fmt::Display for Refused {
         match self {
             Self::NotFinite => write!(f, "the value is not a finite number"),
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
-            Self::ModeNotAvailable(mode) => write!(f, "mode {mode:?} is not available"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::NeedsInjection => {
                 write!(f, "this needs the injection, demodulated by a way that tracks")

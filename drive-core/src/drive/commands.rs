@@ -3,7 +3,7 @@
 use super::{ControlState, Drive, References};
 
 use crate::drive::coefficients::Coefficients;
-use crate::drive::command::{Command, Refused, Taken};
+use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::{Mode, State};
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
@@ -22,14 +22,14 @@ impl Drive {
     ///
     /// # Errors
     /// Why it was refused; nothing has changed then.
-    pub fn command(&mut self, command: Command) -> Result<Taken, Refused> {
-        match command {
+    pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
+        match *command {
             Command::Start(mode) => self.start(mode),
             Command::Relock => self.relock(),
             Command::CheckWiring => match self.state {
                 State::Off => {
                     self.wiring_unchecked = true;
-                    Ok(Taken::AsGiven)
+                    Ok(Accepted::AsGiven)
                 }
                 State::Fault(fault) => Err(Refused::Fault(fault)),
                 state => Err(Refused::State(state)),
@@ -42,13 +42,13 @@ impl Drive {
                     }
                     _ => self.enter(State::Stopping),
                 }
-                Ok(Taken::AsGiven)
+                Ok(Accepted::AsGiven)
             }
             Command::Clear => {
                 if let State::Fault(_) = self.state {
                     self.enter(State::Off);
                 }
-                Ok(Taken::AsGiven)
+                Ok(Accepted::AsGiven)
             }
             Command::Torque(i_q) => {
                 self.takes_references(Mode::Torque, i_q)?;
@@ -56,19 +56,19 @@ impl Drive {
                 let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
                 let taken = limited(i_q, largest);
                 self.control.references.current.q = taken;
-                Ok(as_taken(i_q, taken))
+                Ok(accepted(i_q, taken))
             }
             Command::Speed(rpm) => {
                 self.takes_references(Mode::Speed, rpm)?;
                 let taken = limited(rpm, self.c.motion.limit * 60.0);
                 self.control.references.speed = taken / 60.0;
-                Ok(as_taken(rpm, taken))
+                Ok(accepted(rpm, taken))
             }
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
                 let taken = limited(turns, self.c.motion.furthest);
                 self.control.references.turns = taken;
-                Ok(as_taken(turns, taken))
+                Ok(accepted(turns, taken))
             }
             Command::Magnetising(i_d) => {
                 self.takes_references(self.mode, i_d)?;
@@ -80,7 +80,7 @@ impl Drive {
                 }
                 let taken = limited(i_d, max);
                 self.control.references.current.d = taken;
-                Ok(as_taken(i_d, taken))
+                Ok(accepted(i_d, taken))
             }
             Command::TurnInjection(degrees) => {
                 self.takes_references(self.mode, degrees)?;
@@ -89,7 +89,7 @@ impl Drive {
                 }
                 let turn = self.c.injection_turn + Angle::from_degrees(degrees);
                 self.control.references.injection_axis = turn.unit_vector();
-                Ok(Taken::AsGiven)
+                Ok(Accepted::AsGiven)
             }
             Command::TestVoltage(voltage) => {
                 self.takes_references(self.mode, voltage.d + voltage.q)?;
@@ -98,7 +98,7 @@ impl Drive {
                     return Err(Refused::OutOfRange { min: -LARGEST_TEST_V, max: LARGEST_TEST_V });
                 }
                 self.control.references.test_voltage = voltage;
-                Ok(Taken::AsGiven)
+                Ok(Accepted::AsGiven)
             }
             Command::RotorTimeConstant(tau_r) => {
                 if !self.c.track_rotor {
@@ -111,12 +111,12 @@ impl Drive {
                     .track(tau_r)
                     .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
                 self.changes = self.changes.wrapping_add(1);
-                Ok(as_taken(tau_r, taken))
+                Ok(accepted(tau_r, taken))
             }
-            Command::Configure(coefficients) => match self.state {
+            Command::Configure(ref coefficients) => match self.state {
                 State::Off | State::Fault(_) => {
                     self.configure(coefficients);
-                    Ok(Taken::AsGiven)
+                    Ok(Accepted::AsGiven)
                 }
                 state => Err(Refused::State(state)),
             },
@@ -130,10 +130,9 @@ impl Drive {
         self.changes = self.changes.wrapping_add(1);
     }
 
-    fn start(&mut self, mode: Mode) -> Result<Taken, Refused> {
+    fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
-            (State::Off, Mode::Commissioning) => return Err(Refused::ModeNotAvailable(mode)),
             (State::Off, Mode::Learning) if !self.can_learn() => {
                 return Err(Refused::NeedsInjection);
             }
@@ -150,11 +149,11 @@ impl Drive {
         self.c.sensing.start(&mut self.control.sensing);
         self.c.estimator.start(&mut self.control.estimator);
         self.enter(State::Calibrating);
-        Ok(Taken::AsGiven)
+        Ok(Accepted::AsGiven)
     }
 
     /// Magnetises again along phase a, as a start does, with the current flowing on.
-    fn relock(&mut self) -> Result<Taken, Refused> {
+    fn relock(&mut self) -> Result<Accepted, Refused> {
         match self.state {
             State::Fault(fault) => return Err(Refused::Fault(fault)),
             _ if self.c.source != AngleSource::Injection => return Err(Refused::NeedsInjection),
@@ -165,7 +164,7 @@ impl Drive {
         self.c.estimator.start(&mut self.control.estimator);
         self.control.lock = LockMonitorState::default();
         self.enter(State::Magnetising);
-        Ok(Taken::AsGiven)
+        Ok(Accepted::AsGiven)
     }
 
     /// References of nothing but this direct current, A.
@@ -191,6 +190,6 @@ impl Drive {
     }
 }
 
-fn as_taken(asked: f32, taken: f32) -> Taken {
-    if asked == taken { Taken::AsGiven } else { Taken::Limited(taken) }
+fn accepted(asked: f32, taken: f32) -> Accepted {
+    if asked == taken { Accepted::AsGiven } else { Accepted::Limited(taken) }
 }

@@ -26,9 +26,9 @@ pub(super) struct Seen<'a> {
     /// The flux when the filtered current flowed.
     pub flux_axis: UnitVector,
     /// How fast it turns, turns per period.
-    pub flux_step: f32,
+    pub flux_freq: f32,
     /// Electrical speed of the rotor, turns per period.
-    pub rotor_step: f32,
+    pub rotor_freq: f32,
     /// Whether the flux is held still.
     pub held: bool,
     /// Whether the drive learns: then nothing is tracked, and what to compare with is not known yet.
@@ -54,7 +54,7 @@ impl Coefficients {
                 self.listen(s, 0, step.sample)
             }
             1 => {
-                let acceleration = self.step_per_speed * s.motion.acceleration;
+                let acceleration = self.freq_per_speed * s.motion.acceleration;
                 self.estimator.push(&mut s.estimator, acceleration);
                 s.prediction.take();
                 self.listen(s, 1, step.sample)
@@ -64,25 +64,25 @@ impl Coefficients {
                 self.listen(s, 2, step.sample)
             }
             3 => {
-                self.does_the_carrier_fit(s, step)?;
+                self.check_carrier_headroom(s, step)?;
                 self.prediction.judge(&mut s.prediction, step.measured.current)
             }
-            4 => self.is_the_flux_tracked(s, step),
+            4 => self.check_lock(s, step),
             REFERENCE_AT => {
                 s.estimator.synchronous.see_reference(step.i_q);
-                self.turn(&mut s.axes, step.flux_step, s.references.injection_axis);
+                self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis);
                 Ok(())
             }
             6 => {
                 s.prediction.take();
-                self.do_both_sensors_see_the_carrier(s, step)
+                self.check_both_channels(s, step)
             }
             7 => {
                 self.expect(s, step);
                 self.listen(s, 3, step.sample)
             }
             8 => {
-                if step.rotor_step.abs() > self.protection.rotor_step {
+                if step.rotor_freq.abs() > self.protection.rotor_freq {
                     return Err(Fault::OverSpeed);
                 }
                 self.prediction.judge(&mut s.prediction, step.measured.current)?;
@@ -107,12 +107,12 @@ impl Coefficients {
     /// What the current will be compared with.
     #[inline]
     fn expect(&self, s: &mut ControlState, step: &Seen) {
-        let rotor = (s.indirect.magnetising, step.rotor_step);
-        self.prediction.expect(&mut s.prediction, rotor, (step.flux_axis, step.flux_step));
+        let rotor = (s.indirect.magnetising, step.rotor_freq);
+        self.prediction.expect(&mut s.prediction, rotor, (step.flux_axis, step.flux_freq));
     }
 
     #[inline]
-    fn is_the_flux_tracked(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+    fn check_lock(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
                 if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
@@ -125,11 +125,7 @@ impl Coefficients {
     }
 
     #[inline]
-    fn do_both_sensors_see_the_carrier(
-        &self,
-        s: &mut ControlState,
-        step: &Seen,
-    ) -> Result<(), Fault> {
+    fn check_both_channels(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());
         }
@@ -140,7 +136,7 @@ impl Coefficients {
 
     /// Beside the fundamental.
     #[inline]
-    fn does_the_carrier_fit(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+    fn check_carrier_headroom(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());
         }

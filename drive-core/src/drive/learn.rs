@@ -36,7 +36,7 @@ impl Drive {
         let signal = if normalised { saliency.q } else { s.estimator.delta_i };
         let theta = t.phi + Angle::QUARTER;
         let seen = (signal, saliency.carrier_squared);
-        match c.learning.step(&mut s.learning, seen, theta, t.flux_step, t.voltage) {
+        match c.learning.step(&mut s.learning, seen, theta, t.flux_freq, t.voltage) {
             Next::Current(i_q) => self.control.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
             Next::Done => {

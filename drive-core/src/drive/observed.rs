@@ -10,9 +10,9 @@ pub struct Telemetry {
     /// Estimated rotor-flux angle at the sample.
     pub phi: Angle,
     /// How fast it turns, electrical turns per period.
-    pub flux_step: f32,
+    pub flux_freq: f32,
     /// Electrical speed of the rotor, turns per period.
-    pub rotor_step: f32,
+    pub rotor_freq: f32,
     /// Filtered current reference, A.
     pub reference: Dq,
     /// Filtered current in the estimated flux frame, A.
@@ -47,7 +47,7 @@ pub struct Telemetry {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Observed {
     pub phi: Angle,
-    pub flux_step: f32,
+    pub flux_freq: f32,
     pub reference: Dq,
     pub current: Dq,
     pub voltage: Dq,
@@ -64,8 +64,8 @@ impl Drive {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {
             phi: t.phi,
-            flux_step: t.flux_step,
-            rotor_step: if self.counts() { s.indirect.rotor_step } else { s.estimator.rotor_step },
+            flux_freq: t.flux_freq,
+            rotor_freq: if self.counts() { s.indirect.rotor_freq } else { s.estimator.rotor_freq },
             reference: t.reference,
             current: t.current,
             voltage: t.voltage,

@@ -15,7 +15,7 @@ impl Coefficients {
         sample: &Sample,
         measured: &Measured,
     ) -> Result<(), Fault> {
-        let fine = sample.hardware == Hardware::NONE
+        let fine = sample.hardware == Hardware::empty()
             && self.sensing.is_well_inside(sensing, sample, measured.phases.c);
         if fine {
             return Ok(());
@@ -28,7 +28,7 @@ impl Coefficients {
     /// The first thing that is wrong, if anything is, with the currents in A and the dc link in V.
     #[inline(never)]
     fn what_is_wrong(&self, sample: &Sample, a: f32, b: f32, dc_link: f32) -> Option<Fault> {
-        if sample.hardware != Hardware::NONE {
+        if sample.hardware != Hardware::empty() {
             return Some(of_hardware(sample.hardware));
         }
         if let Some(fault) = self.sensing.check(sample) {
@@ -69,13 +69,13 @@ impl Drive {
 
 /// The most telling of the events: what switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {
-    if events.has(Hardware::BREAK) {
+    if events.intersects(Hardware::BREAK) {
         Fault::Break
-    } else if events.has(Hardware::ANALOG_WATCHDOG) {
+    } else if events.intersects(Hardware::ANALOG_WATCHDOG) {
         Fault::AnalogWatchdog
-    } else if events.has(Hardware::CLOCK_FAILURE) {
+    } else if events.intersects(Hardware::CLOCK_FAILURE) {
         Fault::ClockFailure
-    } else if events.has(Hardware::DEADLINE_MISS) {
+    } else if events.intersects(Hardware::DEADLINE_MISS) {
         Fault::DeadlineMiss
     } else {
         Fault::ConverterOverrun

@@ -108,7 +108,7 @@ impl Drive {
     /// The current while the lock is verified, A: the axis is tracked for a while without torque.
     pub(super) fn verify(&mut self) -> Result<Dq, Fault> {
         if self.elapsed >= self.c.sequence.verify {
-            let step = self.control.estimator.rotor_step;
+            let step = self.control.estimator.rotor_freq;
             if self.c.lock_monitor.is_some_and(|monitor| !monitor.stands(step)) {
                 return Err(Fault::LostLock);
             }

@@ -13,8 +13,6 @@ pub enum Mode {
     Speed,
     /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
     Position,
-    /// Identification of the motor. Not available yet: refused.
-    Commissioning,
     /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::identify::learning`]), then
     /// stops.
     Learning,
@@ -42,8 +40,6 @@ pub enum State {
     Speed,
     /// Regulating position.
     Position,
-    /// Identifying the motor.
-    Commissioning,
     /// Learning with the shaft locked.
     Learning,
     /// Taking the torque to zero, then off.
@@ -59,7 +55,6 @@ impl State {
             Mode::Torque => Self::Torque,
             Mode::Speed => Self::Speed,
             Mode::Position => Self::Position,
-            Mode::Commissioning => Self::Commissioning,
             Mode::Learning => Self::Learning,
         }
     }
@@ -74,7 +69,6 @@ impl State {
                 | Self::Torque
                 | Self::Speed
                 | Self::Position
-                | Self::Commissioning
                 | Self::Learning
                 | Self::Stopping
         )
@@ -107,7 +101,6 @@ impl fmt::Display for State {
             Self::Torque => "regulating torque",
             Self::Speed => "regulating speed",
             Self::Position => "regulating position",
-            Self::Commissioning => "commissioning",
             Self::Learning => "learning",
             Self::Stopping => "stopping",
             Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),

@@ -8,7 +8,7 @@ use crate::carrier::demodulator::{Demodulate, Demodulator};
 use crate::carrier::synchronous::SynchronousState;
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
-use crate::flux::schedule::Schedule;
+use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, Push, Tracker, TrackerState};
 use crate::math::angle::Angle;
 use crate::settings::table::ReferenceTable;
@@ -69,7 +69,7 @@ pub enum AngleLoop {
     /// Behind the synchronous demodulation.
     Pll {
         /// What the saliency is compared with.
-        schedule: Schedule,
+        schedule: GainSchedule,
         /// What turns the axis.
         pll: Pll,
     },
@@ -102,9 +102,9 @@ pub struct EstimatorState {
     pub synchronous: SynchronousState,
     /// Mean speed of the flux, turns per period, for the lag of the printed chain: the present one
     /// would feed the tracker's own steps back to it.
-    mean_step: f32,
+    mean_freq: f32,
     /// Electrical speed of the rotor, turns per period.
-    pub rotor_step: f32,
+    pub rotor_freq: f32,
     /// Current difference that any but the synchronous demodulation sees, A.
     pub delta_i: f32,
     /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.1 ms older,
@@ -130,7 +130,7 @@ impl EstimatorState {
 
     /// Whether everything is a finite number.
     pub fn is_finite(&self) -> bool {
-        (self.tracker.step + self.mean_step + self.rotor_step + self.delta_i).is_finite()
+        (self.tracker.step + self.mean_freq + self.rotor_freq + self.delta_i).is_finite()
             && self.synchronous.seen.q.is_finite()
     }
 
@@ -146,8 +146,8 @@ impl Estimator {
         let EstimatorState {
             tracker,
             demodulator,
-            mean_step,
-            rotor_step,
+            mean_freq,
+            rotor_freq,
             delta_i,
             synchronous,
             push,
@@ -156,7 +156,7 @@ impl Estimator {
         *tracker = TrackerState::default();
         tracker.angle = Angle::QUARTER;
         demodulator.start(self.demodulator, self.rms_samples);
-        (*mean_step, *rotor_step, *delta_i) = (0.0, 0.0, 0.0);
+        (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
         (*synchronous, *push) = (SynchronousState::default(), Push::default());
     }
 
@@ -204,8 +204,8 @@ impl Estimator {
     fn observe_printed(&self, state: &mut EstimatorState, mut sample: CarrierSample, step: f32) {
         if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
             // These rotate what has passed the band-pass.
-            state.mean_step += FLUX_SMOOTHING * (step - state.mean_step);
-            sample.axis = sample.axis.turned_slightly(-state.mean_step * self.band_pass_lag);
+            state.mean_freq += FLUX_SMOOTHING * (step - state.mean_freq);
+            sample.axis = sample.axis.turned_slightly(-state.mean_freq * self.band_pass_lag);
         }
         state.delta_i = match &mut state.demodulator {
             Demodulator::Literal(d) => d.step(&sample),
@@ -221,17 +221,17 @@ impl Estimator {
     /// # Errors
     /// [`Lost`] when the speed has reached its limit.
     #[inline]
-    pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_step: f32) -> Result<(), Lost> {
+    pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_freq: f32) -> Result<(), Lost> {
         match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);
-                let rotor_step = state.tracker.step - slip_step;
-                state.rotor_step += ROTOR_SMOOTHING * (rotor_step - state.rotor_step);
+                let rotor_freq = state.tracker.step - slip_freq;
+                state.rotor_freq += ROTOR_SMOOTHING * (rotor_freq - state.rotor_freq);
                 if held { Ok(()) } else { Err(Lost) }
             }
             AngleLoop::Pll { .. } => {
-                Pll::step(&mut state.tracker, &mut state.rotor_step, state.push, slip_step);
+                Pll::step(&mut state.tracker, &mut state.rotor_freq, state.push, slip_freq);
                 Ok(())
             }
         }

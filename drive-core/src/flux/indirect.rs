@@ -1,8 +1,8 @@
 //! Indirect rotor-flux angle from the encoder, Eq. 2.10:
-//! `phi = theta_r + (1 / T_sec) ∫ i_q / i_d dt`.
+//! `phi = theta_r + (1 / tau_r) ∫ i_q / i_d dt`.
 //!
 //! `i_d` is the magnetising current, which follows the current on the direct axis with the rotor
-//! time constant `T_sec = L_r / r_r`; the two are the same once the flux stands, which is where the
+//! time constant `tau_r = L_r / r_r`; the two are the same once the flux stands, which is where the
 //! printed form holds.
 
 use core::f32::consts::TAU;
@@ -16,7 +16,7 @@ pub struct Indirect {
     /// Electrical angle of one count in units of 2^-32 turn. Rounding it is a relative error of the
     /// speed below 1e-6 (10 000 counts), which the orientation takes as that much slip.
     bits_per_count: u32,
-    /// T / T_sec.
+    /// T / tau_r.
     rate: f32,
     /// The same of the settings, for [`Self::track`].
     nominal_rate: f32,
@@ -40,15 +40,15 @@ pub struct IndirectState {
     /// Integral of the slip: by so much the flux is ahead of the rotor.
     pub slip: Angle,
     /// Slip, electrical turns per period.
-    pub slip_step: f32,
+    pub slip_freq: f32,
     /// Magnetising current, A: the rotor flux over L_m.
     pub magnetising: f32,
     /// Slip per quadrature current at that flux, electrical turns per period and A.
     slip_per_ampere: f32,
     /// Mean electrical speed of the rotor, turns per period.
-    pub rotor_step: f32,
+    pub rotor_freq: f32,
     /// That speed when the counter last moved.
-    moving_step: f32,
+    moving_freq: f32,
     /// How far the rotor would have gone on since, electrical turns.
     missed: f32,
 }
@@ -75,7 +75,7 @@ const JUDGED_FROM: f32 = 100.0 / 60.0;
 /// tau_r, as a factor of the one in the settings, beyond which it is not believed: the rotor at
 /// 150 degrees has 0.65.
 pub const LIMITS: [f32; 2] = [0.5, 2.0];
-/// Most that one command changes 1 / T_sec, as a share of that of the settings: at ten commands a
+/// Most that one command changes 1 / tau_r, as a share of that of the settings: at ten commands a
 /// second a wrong estimate needs 1.5 s for the 30 % of a warm rotor.
 pub const TRACKED_STEP: f32 = 0.02;
 
@@ -89,7 +89,7 @@ impl Indirect {
     pub fn new(
         counts: u32,
         pole_pairs: u8,
-        t_sec: f32,
+        tau_r: f32,
         period_s: f32,
         nominal_a: f32,
         highest: f32,
@@ -97,8 +97,8 @@ impl Indirect {
         let bits = (u64::from(pole_pairs) << 32) as f64 / f64::from(counts);
         Self {
             bits_per_count: libm::round(bits) as u32,
-            rate: period_s / t_sec,
-            nominal_rate: period_s / t_sec,
+            rate: period_s / tau_r,
+            nominal_rate: period_s / tau_r,
             period_s,
             least: 0.2 * nominal_a,
             smoothing: period_s / SPEED_FILTER_S,
@@ -114,20 +114,20 @@ impl Indirect {
     /// # Errors
     /// The smallest and the largest one allowed, s.
     #[inline]
-    pub fn track(&mut self, t_sec: f32) -> Result<f32, [f32; 2]> {
+    pub fn track(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
         let limits = LIMITS.map(|factor| factor * self.period_s / self.nominal_rate);
-        if !(limits[0]..=limits[1]).contains(&t_sec) {
+        if !(limits[0]..=limits[1]).contains(&tau_r) {
             return Err(limits);
         }
         let most = TRACKED_STEP * self.nominal_rate;
-        let change = self.period_s / t_sec - self.rate;
+        let change = self.period_s / tau_r - self.rate;
         if change > most {
             self.rate += most;
         } else if change < -most {
             self.rate -= most;
         } else {
-            self.rate = self.period_s / t_sec;
-            return Ok(t_sec);
+            self.rate = self.period_s / tau_r;
+            return Ok(tau_r);
         }
         Ok(self.period_s / self.rate)
     }
@@ -144,24 +144,24 @@ impl Indirect {
         }
         state.last_count = Some(count);
         let moved = Angle::from_bits(moved.wrapping_mul(self.bits_per_count as i32)).to_turns();
-        state.rotor_step += self.smoothing * (moved - state.rotor_step);
+        state.rotor_freq += self.smoothing * (moved - state.rotor_freq);
         if moved == 0.0 {
-            state.missed += state.moving_step;
-            if state.missed.abs() > self.missed && state.moving_step.abs() > self.judged_from {
+            state.missed += state.moving_freq;
+            if state.missed.abs() > self.missed && state.moving_freq.abs() > self.judged_from {
                 return Err(Impossible);
             }
         } else {
-            (state.missed, state.moving_step) = (0.0, state.rotor_step);
+            (state.missed, state.moving_freq) = (0.0, state.rotor_freq);
         }
         let rotor = Angle::from_bits(count.wrapping_mul(self.bits_per_count) as i32);
-        Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_step + state.slip_step })
+        Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_freq + state.slip_freq })
     }
 
     /// Integrates the slip over one period with the quadrature current, A.
     #[inline]
     pub fn slip(&self, state: &mut IndirectState, i_q: f32) {
-        state.slip_step = state.slip_per_ampere * i_q;
-        state.slip += Angle::within_turn(state.slip_step);
+        state.slip_freq = state.slip_per_ampere * i_q;
+        state.slip += Angle::within_turn(state.slip_freq);
     }
 
     /// Once a carrier period: the magnetising current follows the direct current, A.

@@ -18,7 +18,7 @@ use crate::settings::table::{POINTS, ReferenceTable, STEP_A, between, each, odd,
 const LEAST_SHARE: f32 = 0.8;
 /// Reference and gain over i_q, for the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Schedule {
+pub struct GainSchedule {
     table: ReferenceTable,
     share: [f32; POINTS],
     /// What it was made for.
@@ -29,7 +29,7 @@ pub struct Schedule {
     pub per_saliency: f32,
 }
 
-impl Schedule {
+impl GainSchedule {
     /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
     /// current, 1/A, and the direct-axis current, A.
     #[inline]
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn lookup_is_odd_linear_and_held() {
         let table = ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
-        let schedule = Schedule::new(&table, -0.035, 0.034, 0.7);
+        let schedule = GainSchedule::new(&table, -0.035, 0.034, 0.7);
         for (i_q, q) in
             [(0.0, 0.0), (0.5, 0.02), (1.0, 0.04), (2.0, 0.045), (3.5, 0.05), (99.0, 0.05)]
         {
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn the_gain_falls_as_the_slope_rises() {
         // Of an independent study, which leaves no least share.
-        let schedule = Schedule::new(&ReferenceTable::default(), -0.035, 0.0338, 0.7);
+        let schedule = GainSchedule::new(&ReferenceTable::default(), -0.035, 0.0338, 0.7);
         for (n, share) in [1.0, 1.0, 0.71, 0.49, 0.38, 0.32, 0.27].into_iter().enumerate() {
             let found = (schedule.at(0.5 * n as f32).1 - LEAST_SHARE) / (1.0 - LEAST_SHARE);
             assert!((found - share).abs() < 0.011, "{n}: {found}");

@@ -106,12 +106,12 @@ impl Pll {
     }
 
     /// Moves on by one period, pushed by the error that was seen last, with the slip, turns per period. The
-    /// rotor's speed is kept in `rotor_step`. (The drive looks at its limit and whether it is a number.)
+    /// rotor's speed is kept in `rotor_freq`. (The drive looks at its limit and whether it is a number.)
     #[inline]
-    pub fn step(state: &mut TrackerState, rotor_step: &mut f32, push: Push, slip_step: f32) {
+    pub fn step(state: &mut TrackerState, rotor_freq: &mut f32, push: Push, slip_freq: f32) {
         state.acceleration += push.acceleration;
-        *rotor_step += push.speed + state.acceleration;
-        state.step = *rotor_step + slip_step;
+        *rotor_freq += push.speed + state.acceleration;
+        state.step = *rotor_freq + slip_freq;
         state.angle += Angle::within_turn(state.step + push.angle);
     }
 }

@@ -160,7 +160,7 @@ impl Learning {
     /// sigma L_s and L_m^2 / L_r, H.
     #[inline]
     pub fn new(
-        t_sec: f32,
+        tau_r: f32,
         period_s: f32,
         (i_d, largest_a): (f32, f32),
         (leakage, coupled): (f32, f32),
@@ -168,7 +168,7 @@ impl Learning {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
         Self {
-            settle: periods(SETTLE_T * t_sec),
+            settle: periods(SETTLE_T * tau_r),
             average: (periods(AVERAGE_S.0), periods(AVERAGE_S.1)),
             points: (most as usize).min(POINTS - 1),
             i_d,
@@ -196,7 +196,7 @@ impl Learning {
         state: &mut LearningState,
         (signal, carrier_squared): (f32, f32),
         theta: Angle,
-        flux_step: f32,
+        flux_freq: f32,
         voltage: Dq,
     ) -> Next {
         if state.point >= self.points() {
@@ -207,10 +207,10 @@ impl Learning {
         if s.elapsed <= self.settle {
             return Next::Current(self.current(state.point));
         }
-        let seen = theta - Angle::within_turn(flux_step * LAG);
+        let seen = theta - Angle::within_turn(flux_freq * LAG);
         let UnitVector { cos, sin } = (seen + seen - TWELFTH).unit_vector();
         s.count += 1;
-        s.turned += flux_step;
+        s.turned += flux_freq;
         s.signal += signal;
         s.carrier += carrier_squared;
         s.in_phase += signal * sin;

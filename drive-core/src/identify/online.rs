@@ -221,7 +221,7 @@ impl Online {
         let l_s = m.l_m + m.l_ls;
         let motor = Motor {
             r_s: m.r_s,
-            tau_r: m.t_sec(),
+            tau_r: m.tau_r(),
             sigma_l_s: l_s - m.l_m * m.l_m / m.l_r(),
             l_s,
             flux_saliency: synchronous.flux_saliency,

@@ -39,12 +39,16 @@ impl Angle {
     ///
     /// The fraction keeps the precision of `f32` (relative 6e-8).
     pub fn from_turns(turns: f32) -> Self {
-        // The saturating casts make this total: ±2^30 turns and beyond lose their fraction, which
-        // f32 has not got there anyway. Two steps, so that a large whole part cannot eat the bits
-        // of the fraction.
-        let whole = turns as i32;
-        let fraction = turns - whole as f32;
-        Self::from_bits((fraction * UNITS_PER_TURN) as i64 as i32)
+        // The saturating cast makes this total: beyond ±2^30 turns f32 has no fraction anyway.
+        let fraction = turns - (turns as i32) as f32;
+        // Exact: both have the same exponent or the difference is smaller than either.
+        Self::within_turn(if fraction >= 0.5 {
+            fraction - 1.0
+        } else if fraction < -0.5 {
+            fraction + 1.0
+        } else {
+            fraction
+        })
     }
 
     /// From turns that are known to lie within ±half a turn: one multiplication and one conversion.

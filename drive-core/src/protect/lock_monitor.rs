@@ -65,7 +65,7 @@ pub struct LockMonitorSettings {
     /// Carrier current that is expected, A.
     pub carrier_a: f32,
     /// Electrical speed up to which the shaft counts as standing, turns per control period.
-    pub standing_step: f32,
+    pub standing_freq: f32,
     /// Period of the carrier, s: that of the monitor's steps.
     pub period_s: f32,
 }
@@ -119,7 +119,7 @@ impl LockMonitor {
             baseline_smoothing: s.period_s / BASELINE_S,
             allowed: s.allowed,
             least: least * least,
-            standing: s.standing_step,
+            standing: s.standing_freq,
         }
     }
 
@@ -170,8 +170,8 @@ impl LockMonitor {
     }
 
     /// Whether the shaft stands by an electrical speed, turns per control period.
-    pub fn stands(&self, rotor_step: f32) -> bool {
-        rotor_step.abs() <= self.standing
+    pub fn stands(&self, rotor_freq: f32) -> bool {
+        rotor_freq.abs() <= self.standing
     }
 }
 
@@ -188,7 +188,7 @@ mod tests {
                 smoothing_s: 0.08,
                 allowed: 0.55,
                 carrier_a: 0.26,
-                standing_step: 1e-4,
+                standing_freq: 1e-4,
                 period_s: 1.0 / 600.0,
             },
         )

@@ -92,7 +92,7 @@ pub struct RotorFlux {
     /// (L_m / L_r) L_m, H.
     pub coupled_inductance: f32,
     /// Rotor time constant, s.
-    pub t_sec: f32,
+    pub tau_r: f32,
     /// Period of the control, s.
     pub period_s: f32,
 }
@@ -128,27 +128,27 @@ impl Prediction {
         Self {
             per_ampere: (1.0 / plant.k) as f32,
             pole: plant.p as f32,
-            decay: flux.coupled_inductance / flux.t_sec,
+            decay: flux.coupled_inductance / flux.tau_r,
             emf: flux.coupled_inductance * TAU / flux.period_s,
             allowed: allowed_v,
         }
     }
 
     /// The sample before it is judged: the voltage that the rotor flux adds to the applied one, V,
-    /// (L_m/L_r)(1/T_sec - j w_r) psi, with the magnetising current in A, the electrical speed of the rotor
-    /// in turns per period, and the flux as it is `seen` in this sample, turning by `flux_step` turns per
+    /// (L_m/L_r)(1/tau_r - j w_r) psi, with the magnetising current in A, the electrical speed of the rotor
+    /// in turns per period, and the flux as it is `seen` in this sample, turning by `flux_freq` turns per
     /// period.
     #[inline]
     pub fn expect(
         &self,
         state: &mut PredictionState,
-        (magnetising, rotor_step): (f32, f32),
-        (seen, flux_step): (UnitVector, f32),
+        (magnetising, rotor_freq): (f32, f32),
+        (seen, flux_freq): (UnitVector, f32),
     ) {
-        let rotor = Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_step };
+        let rotor = Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_freq };
         // The middle of the samples lies so far back from here.
         const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
-        state.rotor = rotor.to_alpha_beta(seen.turned_slightly(-MIDDLE * flux_step));
+        state.rotor = rotor.to_alpha_beta(seen.turned_slightly(-MIDDLE * flux_freq));
     }
 
     /// Every fifth sample: the current, A, which is [collected](PredictionState::collect)

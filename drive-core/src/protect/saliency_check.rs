@@ -64,13 +64,13 @@ const RESTORE_T: f32 = 2.4;
 impl SaliencyCheck {
     /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
     #[inline]
-    pub fn new(flux_saliency: f32, t_sec: f32, period_s: f32) -> Self {
+    pub fn new(flux_saliency: f32, tau_r: f32, period_s: f32) -> Self {
         let periods = |s: f32| libm::roundf(s / period_s) as u32;
         let average = periods(AVERAGE_S);
         Self {
             settle: periods(SETTLE_S),
             average,
-            restore: periods(RESTORE_T * t_sec),
+            restore: periods(RESTORE_T * tau_r),
             least: LEAST_SHARE * flux_saliency,
             per_expected: 1.0 / (SEEN_SHARE * flux_saliency),
             per_average: 1.0 / average as f32,

@@ -40,7 +40,7 @@ fn with() -> Controller {
     let mut state = PiState::ZERO;
     Box::new(move |e| {
         let u = pi.step(&mut state, e as f32);
-        state.realised(u.clamp(-LIMIT as f32, LIMIT as f32) - u);
+        state.back_calculate(u.clamp(-LIMIT as f32, LIMIT as f32) - u);
         f64::from(u)
     })
 }
@@ -156,7 +156,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     ));
     outcome.figures.push(figure);
     outcome.remarks.push(format!(
-        "Eq. B.1 and B.3 print u[k+1] on the left. Taken literally that is one more delay, and the \
+        "Eq. B.1 and B.3 print u[k+1] on the left. Accepted literally that is one more delay, and the \
          example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
          u[k] = u[k-1] + Kc (e[k] - zc e[k-1]), gives what Figure 40 is said to show; the drive \
          uses that."

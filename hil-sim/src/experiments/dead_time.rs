@@ -88,7 +88,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.load.speed_rpm = SPEED_RPM;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(Command::Torque(IQ_A as f32))?;
+    rig.command(&Command::Torque(IQ_A as f32))?;
     rig.run(0.5, |_| {});
 
     const BINS: usize = 120;
@@ -114,7 +114,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         let applied = rig.plant.applied_voltage();
         let error = (applied.re - wanted.0, applied.im - wanted.1);
         let t = rig.drive.telemetry();
-        let lead = TAU * (f64::from(t.phi.to_turns()) + 1.5 * f64::from(t.flux_step));
+        let lead = TAU * (f64::from(t.phi.to_turns()) + 1.5 * f64::from(t.flux_freq));
         let (v_d, v_q) = (f64::from(t.voltage.d), f64::from(t.voltage.q));
         wanted = (v_d * lead.cos() - v_q * lead.sin(), v_d * lead.sin() + v_q * lead.cos());
 

@@ -156,12 +156,12 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
         config.injection.amplitude_v = 0.0;
     }
     let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(Command::Torque(iq as f32))?;
+    rig.command(&Command::Torque(iq as f32))?;
     rig.run(0.3, |_| {});
     let mut curve = Curve::new();
     for x in (-180..=180).step_by(STEP_DEG as usize) {
         // theta = phi + 90° + turn, so phi2 - theta = -90° - turn
-        rig.command(Command::TurnInjection((-90 - x) as f32))?;
+        rig.command(&Command::TurnInjection((-90 - x) as f32))?;
         rig.run(SETTLE_S, |_| {});
         let (mut delta_i, mut error) = (Stats::default(), Stats::default());
         rig.run(AVERAGE_S, |p| {

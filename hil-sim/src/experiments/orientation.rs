@@ -92,7 +92,7 @@ fn one(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Result1, Err
     config.load.speed_rpm = rpm;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(Command::Torque(IQ_A as f32))?;
+    rig.command(&Command::Torque(IQ_A as f32))?;
     rig.run(1.0, |_| {});
     let (mut error, mut share) = (Stats::default(), Stats::default());
     rig.run(context.seconds.unwrap_or(0.3), |p| {

@@ -103,11 +103,11 @@ fn one(config: &Config, case: &Case, seed: u64) -> Result<(Vec<[f64; 2]>, f64, b
     match case.disturbance {
         Disturbance::Load(_) => {
             rig.start(Mode::Speed)?;
-            rig.command(Command::Speed(case.from as f32))?;
+            rig.command(&Command::Speed(case.from as f32))?;
         }
         Disturbance::TorqueCurrent(_) => {
             rig.start(Mode::Torque)?;
-            rig.command(Command::Torque(case.from as f32))?;
+            rig.command(&Command::Torque(case.from as f32))?;
         }
     }
     rig.run(2.0, |_| {});
@@ -119,7 +119,7 @@ fn one(config: &Config, case: &Case, seed: u64) -> Result<(Vec<[f64; 2]>, f64, b
     match case.disturbance {
         Disturbance::Load(nm) => rig.set_load(Load::Free { torque: nm })?,
         Disturbance::TorqueCurrent(by) => {
-            rig.command(Command::Torque((case.from + by) as f32))?;
+            rig.command(&Command::Torque((case.from + by) as f32))?;
         }
     }
     let (mut points, mut largest) = (Vec::new(), 0.0_f64);

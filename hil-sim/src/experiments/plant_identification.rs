@@ -117,7 +117,7 @@ const TRIALS: [Trial; 3] = [
         printed: FirstOrder { k: 0.003_721, p: 0.9503 },
         axis: Axis::Q,
         record: |rig| {
-            rig.command(Command::Torque(2.0))?;
+            rig.command(&Command::Torque(2.0))?;
             rig.run(1.0, |_| {});
             prbs(rig, Axis::Q)
         },
@@ -127,7 +127,7 @@ const TRIALS: [Trial; 3] = [
 fn steps(rig: &mut Rig) -> Result<Record, Error> {
     let mut record = Record::default();
     for level in [0.0, 2.0, -2.0, 0.0] {
-        rig.command(Command::Torque(level))?;
+        rig.command(&Command::Torque(level))?;
         for _ in 0..(LEVEL_S * RATE_HZ) as usize {
             record.push(rig, Axis::Q);
         }
@@ -142,10 +142,10 @@ fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
     for _ in 0..PRBS_PERIODS * ((1 << PRBS_BITS) - 1) {
         let volts = PRBS_V * sequence.step() as f32;
         let voltage = if axis == Axis::D { Dq::new(volts, 0.0) } else { Dq::new(0.0, volts) };
-        rig.command(Command::TestVoltage(voltage))?;
+        rig.command(&Command::TestVoltage(voltage))?;
         record.push(rig, axis);
     }
-    rig.command(Command::TestVoltage(Dq::ZERO))?;
+    rig.command(&Command::TestVoltage(Dq::ZERO))?;
     Ok(record.without_mean())
 }
 

@@ -51,7 +51,7 @@ pub fn step(
     let mut rig = Rig::from_config(&config, seed)?;
     rig.start(Mode::Position)?;
     let (start, origin) = (rig.time(), rig.plant.mechanical_angle() / TAU);
-    rig.command(Command::Position(TURNS as f32))?;
+    rig.command(&Command::Position(TURNS as f32))?;
     let mut points = Vec::new();
     rig.run(seconds, |p| {
         points.push(Point { t: p.t - start, turns: p.turns - origin, ..*p });

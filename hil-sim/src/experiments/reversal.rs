@@ -35,7 +35,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         if matches!(rig.drive.state(), State::Fault(_)) {
             break;
         }
-        rig.command(Command::Torque(iq as f32))?;
+        rig.command(&Command::Torque(iq as f32))?;
         let first = points.len();
         rig.run(level_s, |p| points.push(Point { t: p.t - start, ..*p }));
         let error = |p: &[Point]| Stats::of(p.iter().map(|p| p.angle_error_deg));

@@ -61,7 +61,7 @@ fn accepts(config: &Config, seed: u64) -> Result<bool, Error> {
     config.angle.source = AngleSource::Injection;
     config.injection.demodulator = Demodulator::Synchronous;
     let mut rig = Rig::from_config(&config, seed)?;
-    rig.command(Command::Start(Mode::Torque))?;
+    rig.command(&Command::Start(Mode::Torque))?;
     for _ in 0..(10.0 * RATE_HZ) as u32 {
         rig.step();
         match rig.drive.state() {

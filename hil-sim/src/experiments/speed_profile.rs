@@ -48,7 +48,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         if matches!(rig.drive.state(), State::Fault(_)) {
             break;
         }
-        rig.command(Command::Speed(rpm as f32))?;
+        rig.command(&Command::Speed(rpm as f32))?;
         rig.set_load(Load::Free { torque })?;
         let (begin, seconds) = (rig.time() - start, seconds * scale);
         wanted.extend([(begin, rpm), (begin + seconds, rpm)]);

@@ -43,7 +43,7 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// When the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: Case) -> Result<Rig, Error> {
     let mut rig = without_torque(&drive_settings(config), config, case)?;
-    rig.command(Command::Torque(case.iq as f32))?;
+    rig.command(&Command::Torque(case.iq as f32))?;
     Ok(rig)
 }
 
@@ -90,7 +90,7 @@ pub fn steady_run_of(
     if matches!(rig.drive.state(), State::Fault(_)) {
         return Ok(SteadyRun { error, torque: 0.0, lost: true });
     }
-    rig.command(Command::Torque(case.iq as f32))?;
+    rig.command(&Command::Torque(case.iq as f32))?;
     rig.run(1.0, |_| {});
     rig.run(seconds, |p| {
         error.push(p.angle_error_deg);

@@ -2,7 +2,7 @@
 //! the quadrature axis, shaft locked, without a position sensor.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, State, Taken};
+use drive_core::{Accepted, Command, Mode, State};
 
 use crate::config::{Config, Demodulator};
 use crate::error::Error;
@@ -98,7 +98,7 @@ impl Run {
             if matches!(rig.drive.state(), State::Fault(_)) {
                 break;
             }
-            if let Taken::Limited(a) = rig.command(Command::Torque(reference))? {
+            if let Accepted::Limited(a) = rig.command(&Command::Torque(reference))? {
                 limited = Some(a);
             }
             rig.run(CARRIER_SAMPLES as f64 / RATE_HZ, |p| {

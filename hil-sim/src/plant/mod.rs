@@ -112,7 +112,7 @@ impl Plant {
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             substeps: settings.substeps,
             applied: Complex::ZERO,
-            hardware: Hardware::NONE,
+            hardware: Hardware::empty(),
         })
     }
 
@@ -291,6 +291,6 @@ impl Plant {
 
     /// Events that the next sample reports.
     pub fn report(&mut self, events: Hardware) {
-        self.hardware = self.hardware.and(events);
+        self.hardware = self.hardware.union(events);
     }
 }

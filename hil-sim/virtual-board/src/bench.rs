@@ -96,7 +96,8 @@ impl Board {
             }
             cpu.write(segment.address, &segment.bytes);
         }
-        let (size, offset) = image.member("Mailbox<induction_drive::link::Order>", "full")?;
+        let (size, offset) =
+            image.member("Mailbox<drive_core::drive::command::Command>", "full")?;
         let order_flag =
             image.variable("start_control", size).context("mailbox of orders")? + offset;
         let log = Log::new(&image)?;

@@ -1,4 +1,4 @@
-//! Everything around the core: time, registers, events.
+//! FirmwareSettings around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
 //! its PLL.

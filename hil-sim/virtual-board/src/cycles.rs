@@ -160,7 +160,7 @@ fn regulate(pair: &mut Pair, name: &'static str, orders: &[&str]) -> Result<Line
     pair.board.worst = Worst::default();
     pair.board.worst_to_compares = Worst::default();
     for line in orders {
-        // Taken, or taken as far as the limits allow.
+        // Accepted, or taken as far as the limits allow.
         pair.say(line)?;
         pair.board.type_line("trace 500 2");
         pair.run(6000, |_, period| cycles.push(period.to_compares))?;

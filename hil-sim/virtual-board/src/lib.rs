@@ -33,7 +33,7 @@ pub mod shadow;
 pub mod unicorn;
 
 // The firmware's own board, settings and console: one source for both sides.
-use induction_drive::{board, console, link, rotor_tracking};
+use induction_drive::{board, console, rotor_tracking};
 
 pub use bench::{Board, Failure, Options, Period};
 pub use image::Image;

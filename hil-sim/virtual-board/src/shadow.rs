@@ -8,18 +8,17 @@ use drive_core::{Command, Drive, Settings, State};
 
 use crate::bench::Period;
 use crate::console::grammar::{self, Request};
-use crate::console::keys::Everything;
-use crate::link::Order;
+use crate::console::keys::FirmwareSettings;
 use crate::rotor_tracking::{Seen, Tracking};
 
 /// A drive with the settings of the board.
 pub struct Shadow {
     /// The drive.
     pub drive: Drive,
-    settings: Everything,
+    settings: FirmwareSettings,
     /// Dead time that the timer makes since its start, s.
     dead_time_s: f32,
-    orders: VecDeque<Order>,
+    orders: VecDeque<Command>,
     tracking: Option<Tracking>,
     /// Rotor time constant that the main loop is about to order, s.
     tau_r: Option<f32>,
@@ -33,7 +32,7 @@ impl Shadow {
     /// # Errors
     /// Its settings make no drive.
     pub fn new() -> Result<Self> {
-        let settings = Everything::of_the_board();
+        let settings = FirmwareSettings::of_the_board();
         let dead_time_s = crate::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
@@ -55,22 +54,22 @@ impl Shadow {
         let order = match grammar::parse(line) {
             Ok(Request::Start(mode)) => {
                 if !self.settings.command.wiring_checked {
-                    self.orders.push_back(Order::CheckWiring);
+                    self.orders.push_back(Command::CheckWiring);
                 }
-                Order::Start(mode)
+                Command::Start(mode)
             }
-            Ok(Request::Stop) => Order::Stop,
-            Ok(Request::Relock) => Order::Relock,
-            Ok(Request::Clear) => Order::Clear,
-            Ok(Request::Torque(i_q)) => Order::Torque(i_q),
-            Ok(Request::Speed(rpm)) => Order::Speed(rpm),
-            Ok(Request::Position(turns)) => Order::Position(turns),
+            Ok(Request::Stop) => Command::Stop,
+            Ok(Request::Relock) => Command::Relock,
+            Ok(Request::Clear) => Command::Clear,
+            Ok(Request::Torque(i_q)) => Command::Torque(i_q),
+            Ok(Request::Speed(rpm)) => Command::Speed(rpm),
+            Ok(Request::Position(turns)) => Command::Position(turns),
             Ok(Request::Angle(source)) => {
                 self.configure(|settings| settings.drive.angle_source = source)?
             }
             Ok(Request::Set(key, value)) => self.configure(|settings| key.set(settings, value))?,
             Ok(Request::Defaults) => {
-                self.configure(|settings| *settings = Everything::of_the_board())?
+                self.configure(|settings| *settings = FirmwareSettings::of_the_board())?
             }
             Ok(_) => return Ok(()), // no order to the drive
             Err(why) => bail!("{line}: {why}"),
@@ -80,18 +79,18 @@ impl Shadow {
     }
 
     /// Changes settings, as the firmware's console does.
-    fn configure(&mut self, change: impl FnOnce(&mut Everything)) -> Result<Order> {
+    fn configure(&mut self, change: impl FnOnce(&mut FirmwareSettings)) -> Result<Command> {
         let before = self.settings;
         change(&mut self.settings);
         self.settings.forget_unless_as(&before);
-        Ok(Order::Configure(self.settings.build_for(self.dead_time_s)?))
+        Ok(Command::Configure(self.settings.build_for(self.dead_time_s)?))
     }
 
     /// The board was reset: it has these settings, which were saved, and starts anew.
     ///
     /// # Errors
     /// They make no drive.
-    pub fn restart(&mut self, settings: Everything) -> Result<()> {
+    pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
         self.settings = settings;
         self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
         self.orders.clear();
@@ -99,7 +98,7 @@ impl Shadow {
     }
 
     /// All that is set, and what was learned.
-    pub fn everything(&self) -> &Everything {
+    pub fn everything(&self) -> &FirmwareSettings {
         &self.settings
     }
 
@@ -131,12 +130,11 @@ impl Shadow {
         }
         if period.took_order {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
-            let tracked = self.tau_r.take().map(Order::RotorTimeConstant);
+            let tracked = self.tau_r.take().map(Command::RotorTimeConstant);
             let order = tracked.or_else(|| self.orders.pop_front());
             let Some(order) = order else { bail!("an order nobody gave") };
-            let command: Command<'_> = order.command();
-            let answer = self.drive.command(command);
-            if let (Ok(_), Command::Configure(_)) = (answer, command) {
+            let answer = self.drive.command(&order);
+            if let (Ok(_), Command::Configure(_)) = (answer, order) {
                 self.tracking = Tracking::new(&self.settings.drive);
             }
         }

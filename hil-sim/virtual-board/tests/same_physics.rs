@@ -45,7 +45,7 @@ fn both(
     config: &Config,
     mode: Mode,
     before: &[&str],
-    steps: &[(&str, Command<'_>, u64)],
+    steps: &[(&str, Command, u64)],
     seed: u64,
 ) -> Result<[Vec<Point>; 2]> {
     let mut pair = common::pair(config, seed)?;

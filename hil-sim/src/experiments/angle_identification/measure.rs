@@ -39,13 +39,13 @@ fn oriented(config: &Config, demodulator: Demodulator, iq: f64, seed: u64) -> Re
     let mut config = config.clone();
     config.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed)?;
-    rig.command(Command::Torque(iq as f32))?;
+    rig.command(&Command::Torque(iq as f32))?;
     rig.run(0.8, |_| {});
     Ok(rig)
 }
 
 fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
-    rig.command(Command::TurnInjection(radians.to_degrees() as f32)).map(|_| ())
+    rig.command(&Command::TurnInjection(radians.to_degrees() as f32)).map(|_| ())
 }
 
 /// The pseudo-random sequence on theta; the current stays where the encoder puts it.

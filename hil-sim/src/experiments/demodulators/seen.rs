@@ -28,7 +28,7 @@ pub struct Seen {
 /// A drive that the encoder orients, with the shaft locked and the injection beside it.
 fn oriented(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Rig, Error> {
     let mut rig = Rig::oriented(&subject.config(config), seed)?;
-    rig.command(Command::Torque(iq as f32))?;
+    rig.command(&Command::Torque(iq as f32))?;
     rig.run(0.5, |_| {});
     Ok(rig)
 }
@@ -37,7 +37,7 @@ fn oriented(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Ri
 pub fn seen(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Seen, Error> {
     let mut rig = oriented(subject, config, iq, seed)?;
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
-        rig.command(Command::TurnInjection(turn as f32))?;
+        rig.command(&Command::TurnInjection(turn as f32))?;
         rig.run(SETTLE_S, |_| {});
         let (mut signal, mut error) = (Stats::default(), Stats::default());
         rig.run(AVERAGE_S, |p| {

@@ -39,7 +39,7 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<Steps, Erro
         if matches!(rig.drive.state(), State::Fault(_)) {
             break;
         }
-        rig.command(Command::Torque(iq as f32))?;
+        rig.command(&Command::Torque(iq as f32))?;
         for _ in 0..(LEVEL_S * RATE_HZ) as usize / CARRIER_SAMPLES {
             let t = rig.time() - start;
             let mut mean = Stats::default();

@@ -136,7 +136,7 @@ pub fn healthy(config: &Config, seed: u64, kind: Kind) -> Result<Healthy, Error>
         let mut rig = at_speed(config, case)?;
         rig.run(1.3, &mut look);
         if kind == Kind::Reversal && fault(&rig).is_none() {
-            rig.command(Command::Torque(-case.iq as f32))?;
+            rig.command(&Command::Torque(-case.iq as f32))?;
         }
         rig
     };
@@ -169,7 +169,7 @@ fn load_step(config: &Config, case: Case, look: &mut impl FnMut(&Point)) -> Resu
         let error = (case.rpm - estimate) * TAU / 60.0;
         integral += k_p * SPEED_LOOP / 4.0 * error * pace;
         let i_q = (k_p * error + integral).clamp(-IQ_A.1, IQ_A.1);
-        rig.command(Command::Torque(i_q as f32))?;
+        rig.command(&Command::Torque(i_q as f32))?;
         rig.run(pace, |p| {
             estimate = p.speed_estimate_rpm;
             look(p);
@@ -234,7 +234,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start
     let mut rig = if relock {
         let mut rig = at_speed(config, Case { rpm, iq: 1.0, seed })?;
         rig.run(0.5, |_| {});
-        rig.command(Command::Relock)?;
+        rig.command(&Command::Relock)?;
         while !matches!(rig.drive.state(), State::Torque | State::Fault(_)) {
             rig.step();
         }

@@ -55,16 +55,16 @@ impl Board {
         let had_order = self.has_order();
         let chip = self.cpu.chip_mut();
         chip.begin_interrupt();
-        let mut hardware = Hardware::NONE;
+        let mut hardware = Hardware::empty();
         if chip.adc.over_current() {
-            hardware = hardware.and(Hardware::ANALOG_WATCHDOG);
+            hardware |= Hardware::ANALOG_WATCHDOG;
         }
         if chip.tim1.broken() {
-            hardware = hardware.and(Hardware::BREAK);
+            hardware |= Hardware::BREAK;
         }
         let ended = chip.adc.ended();
         if ended[0] && !ended[1] {
-            hardware = hardware.and(Hardware::CONVERTER_OVERRUN);
+            hardware |= Hardware::CONVERTER_OVERRUN;
         }
         let [one, two] = chip.adc.data();
         let sample = Sample {

@@ -8,7 +8,7 @@ use crate::chip::Chip;
 use crate::cpu::Cpu;
 use crate::unicorn::Standing;
 
-/// Everything of a board that moves.
+/// FirmwareSettings of a board that moves.
 pub struct Snapshot {
     standing: Standing,
     chip: Chip,

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::plant::Load;
-use induction_drive::console::keys::Everything;
+use induction_drive::console::keys::FirmwareSettings;
 use induction_drive::store::{Failed, Flash, Loaded, Saved};
 
 use crate::bench::snapshot::Snapshot;
@@ -88,7 +88,7 @@ pub struct Scene {
     /// Places in its memory.
     pub places: Places,
     /// Two sets of settings.
-    pub settings: [Everything; 2],
+    pub settings: [FirmwareSettings; 2],
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
     /// of these, and the first one to be saved again.
     off: [Snapshot; 2],
@@ -192,10 +192,10 @@ impl Flash for Bank<'_> {
 ///
 /// # Errors
 /// It holds none.
-pub fn pair_settings(board: &mut Board) -> Result<Everything> {
+pub fn pair_settings(board: &mut Board) -> Result<FirmwareSettings> {
     ensure!(crate::board::settings_address(0, 0) >= BANK_2, "settings outside the second bank");
     let mut chip = board.chip().clone();
-    match Saved::load(Bank(&mut chip), &Everything::of_the_board()).1 {
+    match Saved::load(Bank(&mut chip), &FirmwareSettings::of_the_board()).1 {
         Loaded::Settings(settings) => Some(settings),
         _ => None,
     }

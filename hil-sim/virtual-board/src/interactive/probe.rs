@@ -12,7 +12,7 @@ pub struct Probe {
     phi: u32,
     /// The angle source, and the speed of the rotor with the encoder and with the injection.
     source: u32,
-    rotor_step: [u32; 2],
+    rotor_freq: [u32; 2],
     reference_q: u32,
     current_q: u32,
     dc_link: u32,
@@ -24,7 +24,7 @@ pub struct Belief {
     /// Rotor-flux angle, electrical turns.
     pub phi: f64,
     /// Electrical speed of the rotor, turns per period.
-    pub rotor_step: f64,
+    pub rotor_freq: f64,
     /// Filtered reference on the quadrature axis, A.
     pub reference_q: f64,
     /// Current on the quadrature axis, A.
@@ -52,7 +52,7 @@ impl Probe {
         Ok(Self {
             phi: at("phi")?,
             source: drive + place("Drive", "c")? + place("Coefficients", "source")?,
-            rotor_step: [
+            rotor_freq: [
                 state("indirect")? + place("IndirectState", "rotor_step")?,
                 state("estimator")? + place("EstimatorState", "rotor_step")?,
             ],
@@ -67,10 +67,10 @@ impl Probe {
         let word = |address| board.word(address).unwrap_or_default();
         let float = |address| f64::from(f32::from_bits(word(address)));
         let source = (word(self.source & !3) >> (8 * (self.source & 3))) as u8;
-        let [encoder, injection] = self.rotor_step;
+        let [encoder, injection] = self.rotor_freq;
         Belief {
             phi: f64::from(word(self.phi)) / 2_f64.powi(32),
-            rotor_step: float(if source == AngleSource::Encoder as u8 {
+            rotor_freq: float(if source == AngleSource::Encoder as u8 {
                 encoder
             } else {
                 injection

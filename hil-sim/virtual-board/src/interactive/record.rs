@@ -115,7 +115,7 @@ impl Record {
             (Quantity::Torque, plant.torque()),
             (Quantity::Flux, flux),
             (Quantity::Speed, plant.mechanical_speed() * rpm),
-            (Quantity::SpeedEstimate, belief.rotor_step * turns_to_rpm),
+            (Quantity::SpeedEstimate, belief.rotor_freq * turns_to_rpm),
             (Quantity::DcLinkSeen, belief.dc_link),
             (Quantity::DcLink, plant.dc_link()),
             (Quantity::Outputs, f64::from(u8::from(on))),

@@ -7,7 +7,7 @@ use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
-use drive_core::{Coefficients, Hardware, State, Taken};
+use drive_core::{Accepted, Coefficients, Command, Hardware, State};
 
 use crate::chip::flash::Pages;
 use crate::chip::memory;
@@ -15,12 +15,12 @@ use crate::chip::{pwm, stop};
 use crate::task::control;
 use induction_drive::board;
 use induction_drive::console::grammar::Level;
-use induction_drive::console::keys::Everything;
-use induction_drive::console::{Machine, NotDone};
+use induction_drive::console::keys::FirmwareSettings;
+use induction_drive::console::{DriveHandle, NotDone};
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::ring;
 use induction_drive::link::trace;
-use induction_drive::link::{Answer, Order, Status};
+use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::{Flipped, MemoryCheck, Places};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{Rule, Verdict, Watchdog};
@@ -35,7 +35,7 @@ pub struct Ends {
     /// Reports.
     pub status: Receiver<'static, Status>,
     /// To the drive.
-    pub orders: Sender<'static, Order>,
+    pub orders: Sender<'static, Command>,
     /// From the drive.
     pub answers: Receiver<'static, Answer>,
     /// What a learning found.
@@ -47,7 +47,7 @@ pub struct Ends {
 }
 
 /// The main loop's side of the drive.
-pub struct Desk {
+pub struct Supervisor {
     /// Nothing if the control does not run.
     ends: Option<Ends>,
     status: Option<Status>,
@@ -63,7 +63,7 @@ pub struct Desk {
     tracking: &'static mut Option<Tracking>,
 }
 
-/// What the desk knows of the chip and of its own start.
+/// What the supervisor knows of the chip and of its own start.
 pub struct Chip {
     /// What reset it.
     pub cause: &'static str,
@@ -99,8 +99,8 @@ impl Clock {
     }
 }
 
-impl Desk {
-    /// A desk; without `ends`, one whose control does not run.
+impl Supervisor {
+    /// A supervisor; without `ends`, one whose control does not run.
     pub fn new(
         ends: Option<Ends>,
         watchdog: Option<Watchdog>,
@@ -179,7 +179,7 @@ impl Desk {
         while let Some(seen) = self.ends.as_mut().and_then(|ends| ends.seen.pop()) {
             let Some(tau_r) = self.tracking.as_mut().and_then(|t| t.take(&seen)) else { continue };
             // Refused when the drive has just stopped.
-            let answer = self.order(Order::RotorTimeConstant(tau_r));
+            let answer = self.order(Command::RotorTimeConstant(tau_r));
             if let (Ok(taken), Some(tracking)) = (answer, self.tracking.as_mut()) {
                 tracking.taken(tau_r, taken);
             }
@@ -203,7 +203,7 @@ impl Desk {
                 (Hardware::DEADLINE_MISS, "a control period took too long"),
                 (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
             ] {
-                if s.hardware.has(event) {
+                if s.hardware.intersects(event) {
                     defmt::warn!("{}", text);
                 }
             }
@@ -225,8 +225,8 @@ impl Desk {
     }
 }
 
-impl Machine for Desk {
-    fn order(&mut self, order: Order) -> Result<Taken, NotDone> {
+impl DriveHandle for Supervisor {
+    fn order(&mut self, order: Command) -> Result<Accepted, NotDone> {
         let ends = self.ends.as_mut().ok_or(NotDone::NoAnswer)?;
         // An answer that came too late for its order.
         ends.answers.take();
@@ -252,11 +252,11 @@ impl Machine for Desk {
         control::IS_OFF.load(Ordering::Relaxed)
     }
 
-    fn build(&mut self, settings: &Everything) -> Result<Coefficients, SettingsError> {
+    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
         stretched(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
     }
 
-    fn configured(&mut self, settings: &Everything) {
+    fn configured(&mut self, settings: &FirmwareSettings) {
         *self.tracking = Tracking::new(&settings.drive);
     }
 
@@ -264,7 +264,7 @@ impl Machine for Desk {
         self.tracking.as_ref().map(Tracking::report)
     }
 
-    fn save(&mut self, settings: &Everything) -> Result<(), Failed> {
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
         stretched(&mut self.guard, || self.chip.saved.save(settings))?;
         self.chip.not_used = None;
         Ok(())
