@@ -133,10 +133,10 @@ mod tests {
         assert_eq!(table.len(), Fault::ALL.len());
     }
 
-    /// The README's table is these.
+    /// The page of the faults lists these.
     #[test]
     fn the_manual_lists_them() {
-        let manual = include_str!("../../README.md");
+        let manual = include_str!("../../docs/faults.md");
         for fault in Fault::ALL {
             let line = format!("| {} | {fault} |", fault.code());
             assert!(manual.contains(&line), "{line}");
