@@ -7,7 +7,6 @@ pub mod elementary;
 pub mod frames;
 
 /// `value` within ±`largest`.
-#[inline]
 pub(crate) fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {
         largest

@@ -114,7 +114,7 @@ fn what_the_rule_leaves_on_the_motor() {
 /// response to a step of the reference dies out.
 fn settles(k_c: f64, z_c: f64) -> bool {
     let plant = table_5();
-    let mut filter = SosState::ZERO;
+    let mut filter = SosState::default();
     let (mut i, mut u, mut delayed, mut e_before) = (0.0, 0.0, 0.0, 0.0);
     let mut late = 0.0f64;
     for k in 0..12_000 {

@@ -150,8 +150,7 @@ impl Linear {
             // Current loop.
             let r = filtered;
             filtered += (1.0 - self.current.p_f) * (reference - r);
-            let measured =
-                LPF.step_alpha_beta(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha;
+            let measured = LPF.step(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha;
             let now = r - f64::from(measured);
             voltage += self.current.k_c * (now - self.current.z_c * error);
             error = now;

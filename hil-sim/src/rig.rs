@@ -277,7 +277,7 @@ pub fn drive_settings(config: &Config) -> Settings {
     let (believed, base) = (config.believed_motor(), Settings::default());
     let measurement = plant_settings(config).measurement;
     let [line_a, line_b] = measurement.calibration();
-    let line = |l: CalibrationLine| drive_core::current::sensing::Line {
+    let line = |l: CalibrationLine| drive_core::settings::Line {
         gain: l.a_per_code as f32,
         offset: l.a_at_zero as f32,
     };

@@ -218,7 +218,6 @@ impl Rls {
         }
     }
 
-    #[inline]
     fn remember(&mut self, v: Filtered, i: Filtered) {
         for (history, x) in self.history.iter_mut().zip([v, i]) {
             *history = [x.change, history[2], x.value];
@@ -226,7 +225,6 @@ impl Rls {
     }
 
     /// A sample was not used.
-    #[inline]
     fn unused(&mut self) {
         self.validity.missing = self.validity.missing.saturating_add(1);
         if self.validity.missing > self.memory {
@@ -235,7 +233,6 @@ impl Rls {
     }
 
     /// A sample was used.
-    #[inline]
     fn judge(&mut self, error: Complex32, signal: Complex32) {
         let (forget, validity) = (self.forget, &mut self.validity);
         validity.missing = 0;
@@ -263,7 +260,6 @@ impl Rls {
     }
 
     /// The same, valid or not; finite in any case.
-    #[inline]
     pub fn latest(&self) -> [Complex32; N] {
         let admittance = self.scale[0] * self.settings.current_base;
         let [g1, g0, h1, u0] = self.ud.theta;
@@ -272,7 +268,6 @@ impl Rls {
 
     /// A difference of coefficients, like those of [`latest`](Self::latest), as numbers of size one that know
     /// nothing of each other; see [`Ud::whitened`].
-    #[inline]
     pub fn whitened(&self, [g1, g0, h1, u0]: [Complex32; N]) -> [Complex32; N] {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud.whitened([g1, g0, h1 * impedance, u0 * impedance])
@@ -303,15 +298,7 @@ impl Rls {
         if self.validity.signal > 0.0 { self.validity.error / self.validity.signal } else { 1.0 }
     }
 
-    /// Forgets how sure the estimate is, and keeps it: after a fault.
-    #[inline]
-    pub fn reset_covariance(&mut self) {
-        self.ud = Ud::new(self.ud.theta, self.settings.p0);
-        self.validity = Validity::NONE;
-    }
-
     /// Begins from these coefficients, as [`latest`](Self::latest) gives them, instead of from zero.
-    #[inline]
     pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
@@ -320,7 +307,6 @@ impl Rls {
 
     /// Forgets everything but the settings.
     #[cold]
-    #[inline(never)]
     pub fn reset(&mut self) {
         self.ud = Ud::new(START, self.settings.p0);
         self.voltage = Filter::new(self.settings.corner);

@@ -63,7 +63,7 @@ fn sections_against_double<const N: usize, const M: usize>(
     printed: &Printed<M>,
 ) {
     for (signal, input) in inputs() {
-        let mut state = SosState::ZERO;
+        let mut state = SosState::default();
         let mut reference = Direct64::new(printed);
         let (rms, largest) = difference(
             LONG,

@@ -56,7 +56,7 @@ fn lpf_has_unit_gain_at_dc() {
     assert!(largest_distance(|w| LPF.response(w), scaled) < 3e-6);
 
     // And so it settles on what it is fed: the noise of f32 is all that is left.
-    let mut state = SosState::ZERO;
+    let mut state = SosState::default();
     let mut y = 0.0;
     for _ in 0..20_000 {
         y = LPF.step(&mut state, 3.0);
@@ -110,7 +110,7 @@ fn responses_of_trivial_cascades() {
     let delay = Sos { sections: [Section { b0: 0.0, b1: 1.0, ..Section::IDENTITY }] };
     assert!((delay.response(0.3) - Complex::unit(-0.3)).abs() < 1e-15);
     assert!((delay.group_delay(0.3) - 1.0).abs() < 1e-15);
-    let mut state = SosState::ZERO;
+    let mut state = SosState::default();
     assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
     // Unstable ones are seen as such.
     for (a1, a2) in [(0.0, 1.0), (-2.0, 1.0), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)] {

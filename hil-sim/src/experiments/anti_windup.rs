@@ -37,7 +37,7 @@ fn without() -> Controller {
 /// The controller of the drive.
 fn with() -> Controller {
     let pi = Pi { k_c: K_C as f32, z_c: Z_C as f32 };
-    let mut state = PiState::ZERO;
+    let mut state = PiState::default();
     Box::new(move |e| {
         let u = pi.step(&mut state, e as f32);
         state.back_calculate(u.clamp(-LIMIT as f32, LIMIT as f32) - u);

@@ -69,7 +69,7 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let settings = settings::Inverter::default();
     let inverter = Inverter {
-        modulator: Modulator::new(settings.top, PERIOD_S, settings.dead_time_s, false),
+        modulator: Modulator::new(settings.top, settings.dead_time_s, false),
         top: f64::from(settings.top),
         vdc: context.config.inverter.vdc,
     };

@@ -66,9 +66,8 @@ impl Record {
     /// between the two, and the plant is that of the motor.
     fn alike(&self) -> Vec<f64> {
         let mut state = LpfState::default();
-        let filtered = |u: &f64| {
-            f64::from(LPF.step_alpha_beta(&mut state, AlphaBeta::new(*u as f32, 0.0)).alpha)
-        };
+        let filtered =
+            |u: &f64| f64::from(LPF.step(&mut state, AlphaBeta::new(*u as f32, 0.0)).alpha);
         self.u.iter().map(filtered).collect()
     }
 

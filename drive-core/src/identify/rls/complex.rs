@@ -23,13 +23,11 @@ impl Complex32 {
     }
 
     /// `re - j im`
-    #[inline]
     pub const fn conj(self) -> Self {
         Self::new(self.re, -self.im)
     }
 
     /// Square of the magnitude.
-    #[inline]
     pub const fn square(self) -> f32 {
         self.re * self.re + self.im * self.im
     }
@@ -41,14 +39,12 @@ impl Complex32 {
 }
 
 impl From<AlphaBeta> for Complex32 {
-    #[inline]
     fn from(x: AlphaBeta) -> Self {
         Self::new(x.alpha, x.beta)
     }
 }
 
 impl From<Complex32> for AlphaBeta {
-    #[inline]
     fn from(x: Complex32) -> Self {
         Self::new(x.re, x.im)
     }
@@ -56,14 +52,12 @@ impl From<Complex32> for AlphaBeta {
 
 impl Add for Complex32 {
     type Output = Self;
-    #[inline]
     fn add(self, o: Self) -> Self {
         Self::new(self.re + o.re, self.im + o.im)
     }
 }
 
 impl AddAssign for Complex32 {
-    #[inline]
     fn add_assign(&mut self, o: Self) {
         *self = *self + o;
     }
@@ -71,7 +65,6 @@ impl AddAssign for Complex32 {
 
 impl Sub for Complex32 {
     type Output = Self;
-    #[inline]
     fn sub(self, o: Self) -> Self {
         Self::new(self.re - o.re, self.im - o.im)
     }
@@ -79,7 +72,6 @@ impl Sub for Complex32 {
 
 impl Neg for Complex32 {
     type Output = Self;
-    #[inline]
     fn neg(self) -> Self {
         Self::new(-self.re, -self.im)
     }
@@ -87,7 +79,6 @@ impl Neg for Complex32 {
 
 impl Mul for Complex32 {
     type Output = Self;
-    #[inline]
     fn mul(self, o: Self) -> Self {
         Self::new(self.re * o.re - self.im * o.im, self.re * o.im + self.im * o.re)
     }
@@ -95,7 +86,6 @@ impl Mul for Complex32 {
 
 impl Mul<f32> for Complex32 {
     type Output = Self;
-    #[inline]
     fn mul(self, k: f32) -> Self {
         Self::new(self.re * k, self.im * k)
     }

@@ -28,7 +28,6 @@ impl Filter {
     }
 
     /// One sample: no more than 18 multiplications and additions per axis, no division.
-    #[inline]
     pub fn step(&mut self, x: Complex32) -> Filtered {
         let (mut now, mut before) = (x, self.input);
         self.input = x;

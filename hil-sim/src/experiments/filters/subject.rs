@@ -52,7 +52,7 @@ impl<const SECTIONS: usize, const TAPS: usize> Subject for Filter<SECTIONS, TAPS
         self.sections.group_delay(omega_t)
     }
     fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<(&'static str, Stats)> {
-        let (sections, mut state) = (self.sections, SosState::ZERO);
+        let (sections, mut state) = (self.sections, SosState::default());
         let sections = Box::new(move |x: f32| sections.step(&mut state, x));
         let mut forms: Vec<direct::Form> = vec![(SECTIONS_F32, sections)];
         forms.extend(direct::f32_forms(self.direct));
