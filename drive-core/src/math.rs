@@ -1,9 +1,7 @@
-//! Angles, vectors and their frames, complex numbers.
+//! Angles, vectors and their frames.
 
 pub mod angle;
-pub mod complex;
 pub mod decimal;
-pub mod elementary;
 pub mod frames;
 
 /// `value` within ±`largest`.

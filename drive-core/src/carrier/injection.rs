@@ -1,9 +1,9 @@
 //! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 
-use crate::math::complex::Complex;
 use crate::math::frames::Dq;
 use crate::tuning::FirstOrder;
+use num_complex::Complex64;
 
 /// Samples per period of the carrier.
 pub const CARRIER_SAMPLES: usize = 10;
@@ -45,15 +45,15 @@ impl Injection {
         // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
         // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of
         // the samples at both ends, to 0.1 %.
-        let one = Complex { re: 1.0, im: 0.0 };
-        let turn = Complex { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
-        let response = Complex { re: plant.k, im: 0.0 } / (turn - one * plant.p);
+        let one = Complex64 { re: 1.0, im: 0.0 };
+        let turn = Complex64 { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
+        let response = Complex64 { re: plant.k, im: 0.0 } / (turn - one * plant.p);
         let mean = response * (one + turn) * 0.5;
         // What is computed in step k acts from the sample k + 1 on: at sample k the response is that
         // of period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-        let sampled = response / (turn * Complex { re: 1.0, im: w * f64::from(analog) });
-        let single = |z: Complex| (z.re as f32, z.im as f32);
+        let sampled = response / (turn * Complex64 { re: 1.0, im: w * f64::from(analog) });
+        let single = |z: Complex64| (z.re as f32, z.im as f32);
         let ((s_re, s_im), (m_re, m_im)) = (single(sampled), single(mean));
         let periods = core::array::from_fn(|index| {
             let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
@@ -68,7 +68,7 @@ impl Injection {
         Self {
             amplitude: amplitude_v,
             periods,
-            current_amplitude: response.abs() as f32 * amplitude_v,
+            current_amplitude: response.norm() as f32 * amplitude_v,
         }
     }
 }

@@ -16,7 +16,6 @@ use crate::flux::tracker::{Pll, Tracker};
 use crate::identify::learning::Learning;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
-use crate::math::complex::Complex;
 use crate::motion::{self, Motion};
 use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
@@ -25,6 +24,7 @@ use crate::protect::saliency_check::SaliencyCheck;
 use crate::protect::wiring_check::WiringCheck;
 use crate::settings::{AngleSource, CurrentPlant, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
+use num_complex::Complex64;
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
@@ -140,7 +140,7 @@ pub(crate) struct SequenceSteps {
 /// left out, it is 0.9° at 600 rpm.
 fn carrier_lag(plant: FirstOrder) -> f32 {
     let turn = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-    let Complex { re: c, im: s } = Complex::unit(turn);
+    let Complex64 { re: c, im: s } = Complex64::cis(turn);
     let (re, im) = (c - plant.p, s);
     ((1.0 - plant.p * c) / (re * re + im * im) - 0.5) as f32
 }

@@ -11,7 +11,7 @@
 use core::ops::{Add, Mul, Sub};
 
 use crate::filter::section::{Section, group_delay, response};
-use crate::math::complex::Complex;
+use num_complex::Complex64;
 
 /// A cascade of `N` sections: coefficients only.
 ///
@@ -99,7 +99,7 @@ impl<const N: usize> Sos<N> {
     }
 
     /// [`response`] of this filter.
-    pub fn response(&self, omega_t: f64) -> Complex {
+    pub fn response(&self, omega_t: f64) -> Complex64 {
         response(&self.sections, omega_t)
     }
 

@@ -40,11 +40,12 @@ use core::fmt;
 
 use crate::flux::indirect::LIMITS;
 use crate::identify::rls::filter::Filter;
-use crate::identify::rls::{Complex32, Rls, RlsError, RlsSettings};
+use crate::identify::rls::{Rls, RlsError, RlsSettings};
 use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::settings::Settings;
 use fit::{Machine, Unknowns};
+use num_complex::Complex32;
 
 /// Control periods to one sample of the least squares: 750 Hz. At 6 kHz the increments, which carry
 /// the rotor, would be a thousandth of the signals.

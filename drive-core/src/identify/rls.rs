@@ -21,13 +21,12 @@
 //! A sample costs the same whatever it is, an estimated 1000 cycles of a Cortex-M4: two filters, one update of [`ud::Ud`], no loop that
 //! depends on data, no function of a maths library, no panic.
 
-mod complex;
 pub mod filter;
 pub mod ud;
 
-pub use complex::Complex32;
+use num_complex::Complex32;
 
-use crate::AlphaBeta;
+use crate::math::frames::AlphaBeta;
 use filter::{Filter, Filtered};
 use ud::{N, Ud};
 
@@ -197,7 +196,7 @@ impl Rls {
             return;
         }
         for (power, x) in self.power.iter_mut().zip([v2, i2]) {
-            *power += LOUDNESS * (x.square() - *power);
+            *power += LOUDNESS * (x.norm_sqr() - *power);
         }
         for (mean, x) in self.axes.iter_mut().zip([i2.re * i2.re, i2.im * i2.im, i2.re * i2.im]) {
             *mean += AXES * self.forget * (x - *mean);
@@ -236,10 +235,10 @@ impl Rls {
     fn judge(&mut self, error: Complex32, signal: Complex32) {
         let (forget, validity) = (self.forget, &mut self.validity);
         validity.missing = 0;
-        validity.error += forget * (error.square() - validity.error);
-        validity.signal += forget * (signal.square() - validity.signal);
-        let fits =
-            validity.error < MISFIT * validity.signal && error.square() < OUTLIER * validity.signal;
+        validity.error += forget * (error.norm_sqr() - validity.error);
+        validity.signal += forget * (signal.norm_sqr() - validity.signal);
+        let fits = validity.error < MISFIT * validity.signal
+            && error.norm_sqr() < OUTLIER * validity.signal;
         let known = self.ud.largest() < self.unknown;
         validity.good = if fits && known { validity.good.saturating_add(1) } else { 0 };
     }

@@ -3,8 +3,9 @@
 //! Everything here is inlined so that it is compiled for size with what calls it: it runs ten times a
 //! second.
 
+use crate::identify::rls::Rls;
 use crate::identify::rls::ud::N;
-use crate::identify::rls::{Complex32, Rls};
+use num_complex::Complex32;
 
 /// What is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! The plain recursion on P fails with the settings of the paper: P loses its symmetry and then its
 //! sign, in `f32` after 42 to 87 samples, in `f64` after 62 to 385, and ends as NaN.
 
-use super::Complex32;
+use num_complex::Complex32;
 
 /// Unknowns.
 pub const N: usize = 4;
