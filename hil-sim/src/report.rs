@@ -1,9 +1,7 @@
 //! Results for people: tables on the console, one page with plots, and files written whole.
 
-mod axis;
 mod console;
-mod layout;
-mod line;
+mod envelope;
 mod page;
 mod plot;
 
