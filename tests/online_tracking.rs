@@ -11,7 +11,7 @@ use drive_core::identify::online::{Doubt, Online, Speed};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
-use hil_sim::tracking::{Case, Moment, run};
+use hil_sim::experiments::warming_rotor::{Case, Moment, run};
 
 /// r_r grows by 30 % between 3 and 6 s.
 const CASE: Case = Case {

@@ -77,9 +77,9 @@ impl Config {
     }
 
     /// The motor as the drive believes it to be.
-    pub fn believed_motor(&self) -> Motor {
+    pub fn believed_motor(&self) -> MotorConfig {
         let (motor, believed) = (&self.motor, &self.drive_motor);
-        Motor {
+        MotorConfig {
             rs: believed.rs.unwrap_or(motor.rs),
             rr: believed.rr.unwrap_or(motor.rr),
             lls: believed.lls.unwrap_or(motor.lls),

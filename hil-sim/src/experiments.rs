@@ -15,6 +15,8 @@ mod identify_recursive;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
+pub mod learning;
+mod linear_model;
 mod lock_monitor;
 mod modulation;
 mod monte_carlo;
@@ -34,6 +36,7 @@ mod sweep;
 mod torque;
 mod torque_drift;
 mod tracking;
+pub mod warming_rotor;
 
 pub use torque::assumptions;
 

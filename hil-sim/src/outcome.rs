@@ -8,8 +8,6 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 pub use figure::{Figure, Panel, Series, Style};
 pub use table::{Cell, Table};
 
-use crate::identification::study::Entry;
-
 /// What came out of an experiment.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
@@ -76,6 +74,37 @@ pub struct Step {
     pub torque_nm: f64,
     /// True minus estimated rotor flux angle, electrical degrees.
     pub angle_error_mean_deg: f64,
+}
+
+/// The error of one estimated parameter, as printed in the source (if it is) and as found here.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Entry {
+    /// `A` to `D` or `S`.
+    pub model: &'static str,
+    /// `Sg` or `Ss`.
+    pub signal: &'static str,
+    /// Electrical rad/s.
+    pub speed_rad_s: f64,
+    /// Sampling period, µs.
+    pub h_us: f64,
+    /// `r_s`, `tau_r`, `sigma_l_s`, `l_s`, `omega_m`, or a coefficient like `f_1a`.
+    pub parameter: &'static str,
+    /// Printed error, %.
+    pub printed_pct: Option<f64>,
+    /// Our error, %.
+    pub ours_pct: f64,
+}
+
+impl Entry {
+    /// Ours over printed.
+    pub fn ratio(&self) -> Option<f64> {
+        self.printed_pct.map(|printed| self.ours_pct / printed)
+    }
+
+    /// Whether ours and printed differ by no more than this factor.
+    pub fn within(&self, factor: f64) -> bool {
+        self.ratio().is_some_and(|ratio| ratio <= factor && ratio * factor >= 1.0)
+    }
 }
 
 /// The one JSON object of an experiment.

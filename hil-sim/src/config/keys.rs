@@ -119,7 +119,7 @@ macro_rules! keys {
 
 keys! {
     /// The motor: T equivalent circuit of Figure 21, values of Table 5.
-    "motor." motor: Motor {
+    "motor." motor: MotorConfig {
         /// Stator resistance.
         rs: f64 = 5.4, [0.01 .. 1000], "ohm";
         /// Rotor resistance, referred to the stator.
@@ -138,7 +138,7 @@ keys! {
         friction: f64 = 0.001, [0 .. 10], "Nm s/rad";
     }
     /// What makes the motor differ from the textbook machine; all of it is assumed.
-    "saliency." saliency: Saliency {
+    "saliency." saliency: SaliencyConfig {
         /// Saliency fixed to the rotor flux, at nominal flux.
         a_psi: f64 = -0.035, [-0.25 .. 0.25], "";
         /// Saliency that follows the stator current.
@@ -147,7 +147,7 @@ keys! {
         chi: f64 = 0.0, [0 .. 10], "";
     }
     /// The inverter.
-    "inverter." inverter: Inverter {
+    "inverter." inverter: InverterConfig {
         /// Voltage of the dc link.
         vdc: f64 = 311.0, [20 .. 1000], "V";
         /// Time during which neither switch of a leg conducts, at each edge.
@@ -163,7 +163,7 @@ keys! {
         switched: bool = false, [switch], "";
     }
     /// The current sensors and their converter.
-    "measurement." measurement: Measurement {
+    "measurement." measurement: MeasurementConfig {
         /// Noise of each channel, rms.
         noise_a: f64 = 0.005, [0 .. 1], "A";
         /// Step of the converter; a finer one has more bits over the same range, up to 16.
@@ -180,7 +180,7 @@ keys! {
         offset_b: f64 = 0.0, [-5 .. 5], "A";
     }
     /// The injected voltage and what is made of the current it causes.
-    "injection." injection: Injection {
+    "injection." injection: InjectionConfig {
         /// Peak of the injected voltage.
         amplitude_v: f64 = 50.0, [0 .. 150], "V";
         /// How the angle error is taken from the carrier current.
@@ -207,14 +207,14 @@ keys! {
         bandwidth_hz: f64 = 3.5, [0.1 .. 30], "Hz";
     }
     /// The flux angle.
-    "angle." angle: Angle {
+    "angle." angle: AngleConfig {
         /// Where the drive takes the flux angle from.
         source: AngleSource = AngleSource::Injection, [AngleSource], "";
         /// Whether the known delays of measurement and demodulation are compensated.
         compensate_delays: bool = true, [switch], "";
     }
     /// The load.
-    "load." load: Load {
+    "load." load: LoadConfig {
         /// What the shaft is coupled to.
         mode: LoadMode = LoadMode::Locked, [LoadMode], "";
         /// Speed that the dynamometer holds, with load.mode = speed.
@@ -223,14 +223,14 @@ keys! {
         torque_nm: f64 = 0.0, [-1000 .. 1000], "Nm";
     }
     /// References, for experiments that do not bring their own.
-    "reference." reference: Reference {
+    "reference." reference: ReferenceConfig {
         /// Direct-axis (magnetising) current, peak.
         id_a: f64 = 0.7, [0.01 .. 3.5], "A";
         /// Quadrature-axis (torque) current, peak.
         iq_a: f64 = 1.0, [-20 .. 20], "A";
     }
     /// The speed and the position loop.
-    "speed." speed: Speed {
+    "speed." speed: SpeedConfig {
         /// Largest speed that is asked for; unset: 300, or the experiment's own.
         limit_rpm: Option<f64> = None, [1 .. 2000], "rpm";
         /// Largest acceleration that is asked for; unset: 300, or the experiment's own.
@@ -239,7 +239,7 @@ keys! {
         phase_margin_deg: f64 = 60.0, [45 .. 70], "deg";
     }
     /// What the drive believes of the motor; what is not set follows `motor.*`.
-    "drive.motor." drive_motor: DriveMotor {
+    "drive.motor." drive_motor: BelievedMotorConfig {
         /// Stator resistance; follows motor.rs.
         rs: Option<f64> = None, [0.01 .. 1000], "ohm";
         /// Rotor resistance; follows motor.rr.
@@ -252,13 +252,13 @@ keys! {
         lm: Option<f64> = None, [1e-4 .. 100], "H";
     }
     /// What the drive does before the experiment.
-    "drive." drive: DriveSteps {
+    "drive." drive: DriveConfig {
         /// In steady runs (monte-carlo, speed-torque-sweep): whether the drive learns first, with the
         /// shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
     }
     /// What monte-carlo draws anew for every run beside the operating point.
-    "spread." spread: Spread {
+    "spread." spread: SpreadConfig {
         /// Largest relative error of each parameter that the drive believes of its motor.
         motor: f64 = 0.0, [0 .. 0.5], "";
         /// Largest relative change of the sensors' noise.
@@ -267,7 +267,7 @@ keys! {
         gain: f64 = 0.0, [0 .. 0.1], "";
     }
     /// How much is simulated.
-    "" extent: Extent {
+    "" extent: ExtentConfig {
         /// Runs of a statistical experiment; unset: the experiment's own number.
         runs: Option<u32> = None, [1 .. 1000000], "";
         /// Simulated time; unset: the experiment's own.

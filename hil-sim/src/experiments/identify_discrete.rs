@@ -3,9 +3,9 @@
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::identification::Parameters;
-use crate::identification::study::{Case, Entry, errors};
+use crate::identification::study::{Case, errors};
 use crate::identification::trial::Noise;
-use crate::outcome::{Cell, Outcome, Table};
+use crate::outcome::{Cell, Entry, Outcome, Table};
 
 /// Tables 1 and 4.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::warming_rotor::{Case, Moment, run as simulate};
 use super::{Context, Experiment};
 use crate::config::{AngleSource, Config};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::tracking::{Case, Moment, run as simulate};
 
 /// Beyond the sources: what the recursive estimate is for.
 pub const EXPERIMENT: Experiment = Experiment {

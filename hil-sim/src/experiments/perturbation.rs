@@ -4,12 +4,12 @@
 use drive_core::{Command, Mode, State};
 use rayon::prelude::*;
 
+use super::linear_model::{Disturbance, Linear};
 use super::torque::{LOST_DEG, assumptions};
 use super::{Context, Experiment};
 use crate::config::{AngleSource, Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::perturbation::{Disturbance, Linear};
 use crate::plant::Load;
 use crate::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
 use crate::stats::Stats;

@@ -7,10 +7,9 @@ use rayon::prelude::*;
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{Context, Experiment, learning};
 use crate::config::{AngleSource, Config, LoadMode};
 use crate::error::Error;
-use crate::learn;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
 use crate::rig::{Point, Rig, drive_settings, plant_settings};
@@ -81,7 +80,7 @@ fn hold(
     config.motor.rr = believed * belief.0;
     let mut drive = drive_settings(&config);
     if belief.1 {
-        drive.injection.synchronous.reference = learn::on(&config, seed)?.reference;
+        drive.injection.synchronous.reference = learning::learned(&config, seed)?.reference;
     }
     let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
     rig.start(Mode::Position)?;

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode, Settings, State};
 
+use super::learning;
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
-use crate::learn;
 use crate::plant::Load;
 use crate::rig::{Rig, drive_settings, plant_settings};
 use crate::stats::Stats;
@@ -54,7 +54,7 @@ fn without_torque(drive: &Settings, config: &Config, case: Case) -> Result<Rig, 
     config.load.speed_rpm = 0.0;
     let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
     if config.drive.learn {
-        learn::with(&mut rig)?;
+        learning::learn(&mut rig)?;
     }
     rig.start(Mode::Torque)?;
     let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;

@@ -4,7 +4,7 @@
 use nalgebra::{ComplexField, DMatrix, DVector, Matrix4, Vector4};
 
 use super::models::NotIdentifiable;
-use super::{Complex, Delta};
+use super::{Complex, Delta, FirstOrderTheta};
 
 /// Largest ratio of the singular values of a regression, its columns scaled to the same length,
 /// that still gives a result. Clean six-step data have up to 1e5, a constant signal above 6e9.
@@ -95,42 +95,6 @@ pub struct Regression {
     pub condition: f64,
     /// Squared error left, A².
     pub residual: f64,
-}
-
-/// The seven unknowns of Model B (Eq. 32), the first, third, fourth and sixth of them as the small
-/// differences and sums that Eq. 34 to 37 use.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FirstOrderTheta {
-    /// theta_1 - 1.
-    pub t1_minus_1: f64,
-    /// theta_2.
-    pub t2: f64,
-    /// theta_1 + theta_3 - 1.
-    pub t1_t3_minus_1: f64,
-    /// theta_2 + theta_4.
-    pub t2_t4: f64,
-    /// theta_5, S.
-    pub t5: f64,
-    /// theta_5 + theta_6, S.
-    pub t5_t6: f64,
-    /// theta_7, S.
-    pub t7: f64,
-}
-
-impl From<Delta> for FirstOrderTheta {
-    /// Reads Eq. 32 off the coefficients of Model A; what they hold of h_1b is left out.
-    fn from(delta: Delta) -> Self {
-        let Delta { g1, g0, h1, u0 } = delta;
-        Self {
-            t1_minus_1: g1.re,
-            t2: -g1.im,
-            t1_t3_minus_1: g0.re,
-            t2_t4: -g0.im,
-            t5: h1.re,
-            t5_t6: u0.re,
-            t7: h1.im - u0.im,
-        }
-    }
 }
 
 impl Data {

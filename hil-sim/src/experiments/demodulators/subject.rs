@@ -5,7 +5,7 @@ use drive_core::settings::table::ReferenceTable;
 
 use crate::config::{Config, Demodulator};
 use crate::error::Error;
-use crate::learn;
+use crate::experiments::learning;
 use crate::rig::drive_settings;
 
 /// A demodulation.
@@ -92,7 +92,7 @@ impl Subject {
     /// When the learning drive is refused, or stops.
     pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
         let config = self.config(config);
-        learn::table(&learn::reference_of(self.demodulator, &config, seed)?)
+        learning::reference_of(self.demodulator, &config, seed)
     }
 
     /// The drive of this kind, if the demodulation has one.

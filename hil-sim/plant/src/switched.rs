@@ -9,8 +9,8 @@
 
 use drive_core::Compare;
 
-use super::complex::{Complex, phases};
-use super::inverter::Inverter;
+use crate::complex::{Complex, phases};
+use crate::inverter::Inverter;
 
 /// Current below which a leg without a switch on has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{PlantError, check};
+use crate::error::{PlantError, check};
 
 /// What is coupled to the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -21,8 +21,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::complex::{Complex, dot, square};
-use super::error::{PlantError, check};
+use crate::complex::{Complex, dot, square};
+use crate::error::{PlantError, check};
 
 /// Current up to which the current part of the saliency grows, A peak.
 pub const SALIENCY_CURRENT_A: f64 = 5.0;

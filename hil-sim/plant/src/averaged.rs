@@ -4,9 +4,9 @@
 //! smooth and few integration steps are enough; a step across a kink would cost accuracy. So a step
 //! that is about to take a phase across one is cut there.
 
-use super::complex::{Complex, clarke, phases};
-use super::integrate::Motor;
-use super::machine::MachineState;
+use crate::complex::{Complex, clarke, phases};
+use crate::integrate::MotorModel;
+use crate::machine::MachineState;
 
 /// Current, A, beyond which the sign of a phase current counts fully.
 const KINK: f64 = 0.020;
@@ -44,7 +44,7 @@ impl Averaged {
 
     /// Goes on by `h` seconds; returns the terminal voltage integrated over them, V s.
     #[inline]
-    pub(crate) fn step(&self, motor: &mut Motor, h: f64) -> Complex {
+    pub(crate) fn step(&self, motor: &mut MotorModel, h: f64) -> Complex {
         let mut rest = h;
         let mut volt_seconds = Complex::ZERO;
         loop {

@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! use drive_core::Compare;
-//! use hil_sim::plant::{Plant, PlantSettings};
+//! use motor_plant::{Plant, PlantSettings};
 //! # fn step(_: &drive_core::Sample) -> Compare { Compare::OFF }
 //!
 //! let mut plant = Plant::new(&PlantSettings::default(), 1)?;
@@ -17,7 +17,7 @@
 //!     plant.advance(&applied, 1.0 / 6000.0);
 //!     applied = next;
 //! }
-//! # Ok::<(), hil_sim::plant::PlantError>(())
+//! # Ok::<(), motor_plant::PlantError>(())
 //! ```
 
 mod averaged;
@@ -40,7 +40,7 @@ use serde::{Deserialize, Serialize};
 pub use complex::{Complex, clarke, phases};
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
 pub use error::PlantError;
-pub use integrate::{Motor, MotorState};
+pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
 pub use machine::{Machine, MachineSettings, MachineState, SALIENCY_CURRENT_A, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
@@ -87,7 +87,7 @@ impl Default for PlantSettings {
 /// The plant.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    motor: Motor,
+    motor: MotorModel,
     inverter: Inverter,
     sensors: Sensors,
     encoder: Encoder,
@@ -105,7 +105,7 @@ impl Plant {
         let machine = Machine::new(&settings.machine, &settings.saliency)?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
         Ok(Self {
-            motor: Motor::new(machine, mechanics),
+            motor: MotorModel::new(machine, mechanics),
             inverter: Inverter::new(&settings.inverter)?,
             sensors: Sensors::new(&settings.measurement)?,
             encoder: Encoder::new(&settings.encoder)?,
@@ -195,7 +195,7 @@ impl Plant {
     }
 
     /// The motor: machine, shaft and their state.
-    pub fn motor(&self) -> &Motor {
+    pub fn motor(&self) -> &MotorModel {
         &self.motor
     }
 

@@ -1,8 +1,8 @@
 //! The machine and its shaft, integrated by the classical Runge-Kutta rule.
 
-use super::complex::Complex;
-use super::machine::{Machine, MachineState};
-use super::mechanics::Mechanics;
+use crate::complex::Complex;
+use crate::machine::{Machine, MachineState};
+use crate::mechanics::Mechanics;
 
 /// State of the machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub struct MotorState {
 
 /// A machine on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motor {
+pub struct MotorModel {
     /// The machine.
     pub machine: Machine,
     /// The shaft and its load.
@@ -26,7 +26,7 @@ pub struct Motor {
     pub state: MotorState,
 }
 
-impl Motor {
+impl MotorModel {
     /// At rest, without current and flux; turning already where the load holds a speed.
     pub fn new(machine: Machine, mechanics: Mechanics) -> Self {
         let mut motor = Self { machine, mechanics, state: MotorState::default() };
