@@ -5,6 +5,8 @@ mod value;
 
 use std::path::Path;
 
+use drive_core::tuning;
+
 pub use keys::*;
 pub use value::{Allowed, Value};
 
@@ -22,6 +24,14 @@ impl Key {
     /// The values it can have, in words, with the unit.
     pub fn allowed_text(&self) -> String {
         self.allowed.describe(self.unit)
+    }
+}
+
+impl MotorConfig {
+    /// The T-equivalent circuit, ohm and H.
+    pub fn circuit(&self) -> tuning::Motor {
+        let Self { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *self;
+        tuning::Motor { r_s, r_r, l_m, l_ls, l_lr }
     }
 }
 

@@ -62,6 +62,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// The error of a part that refuses its settings.
+    pub fn refused(reason: impl std::fmt::Display) -> Self {
+        Self::Refused(reason.to_string())
+    }
+
     /// The error of a failure to write `path`.
     pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { path: path.to_owned(), source }

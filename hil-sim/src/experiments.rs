@@ -40,6 +40,8 @@ pub mod warming_rotor;
 
 pub use torque::assumptions;
 
+use rayon::prelude::*;
+
 use crate::config::Config;
 use crate::error::{Error, nearest};
 use crate::outcome::Outcome;
@@ -55,6 +57,27 @@ pub struct Context<'a> {
     pub seconds: Option<f64>,
     /// For long work.
     pub progress: Progress,
+}
+
+impl Context<'_> {
+    /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
+    ///
+    /// # Errors
+    /// The error of a job that failed.
+    pub fn in_parallel<J: Sync, T: Send>(
+        &self,
+        label: &str,
+        jobs: &[J],
+        run: impl Fn(u64, &J) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let bar = self.progress.bar(label, jobs.len() as u64);
+        let one = |(number, job): (usize, &J)| {
+            let result = run(number as u64, job);
+            bar.advance(1);
+            result
+        };
+        jobs.par_iter().enumerate().map(one).collect()
+    }
 }
 
 /// An experiment.

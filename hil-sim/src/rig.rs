@@ -82,10 +82,9 @@ impl Rig {
     /// # Errors
     /// What the plant or the drive refuse, by name.
     pub fn new(plant: &PlantSettings, drive: &Settings, seed: u64) -> Result<Self, Error> {
-        let refused = |e: &dyn std::fmt::Display| Error::Refused(e.to_string());
         Ok(Self {
-            plant: Plant::new(plant, seed).map_err(|e| refused(&e))?,
-            drive: Drive::new(drive.build().map_err(|e| refused(&e))?),
+            plant: Plant::new(plant, seed).map_err(Error::refused)?,
+            drive: Drive::new(drive.build().map_err(Error::refused)?),
             pending: Compare::OFF,
             periods: 0,
         })
@@ -187,8 +186,7 @@ impl Rig {
     /// # Errors
     /// When the drive refuses it.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
-        let refused = |e| Error::Refused(format!("{command:?}: {e}"));
-        self.drive.command(command).map_err(refused)
+        self.drive.command(command).map_err(|e| Error::refused(format!("{command:?}: {e}")))
     }
 
     /// Couples another load.
@@ -196,7 +194,7 @@ impl Rig {
     /// # Errors
     /// When the load is out of range.
     pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
-        self.plant.set_load(load).map_err(|e| Error::Refused(e.to_string()))
+        self.plant.set_load(load).map_err(Error::refused)
     }
 
     fn truth(&self) -> Point {

@@ -46,6 +46,30 @@ impl Stats {
     }
 }
 
+/// A straight line `y = slope x + intercept`.
+#[derive(Clone, Copy, Debug)]
+pub struct StraightLine {
+    /// Slope, unit of y per unit of x.
+    pub slope: f64,
+    /// Value at x = 0.
+    pub intercept: f64,
+}
+
+impl StraightLine {
+    /// Least squares of y on x.
+    pub fn through(points: &[(f64, f64)]) -> Self {
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| Stats::of(points.iter().map(f)).mean();
+        let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+        let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2));
+        Self { slope, intercept: y - slope * x }
+    }
+
+    /// The value at `x`.
+    pub fn at(self, x: f64) -> f64 {
+        self.slope * x + self.intercept
+    }
+}
+
 /// The rate, per trial, that `events` in `trials` leave possible at 95 % confidence: the largest for
 /// which so few would be seen in 5 % of all cases. With none it is 3 / trials.
 pub fn upper_bound_95(events: u64, trials: u64) -> f64 {

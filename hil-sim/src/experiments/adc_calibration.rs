@@ -3,6 +3,7 @@
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::stats::StraightLine as Line;
 
 /// Table 4, Figure 17, Eq. 3.5.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -28,33 +29,6 @@ const PRINTED: [(&str, f64, f64); 2] = [("A", 0.0022120, -4.4727134), ("B", 0.00
 
 /// Codes of the converter: 12 bits.
 const LAST_CODE: f64 = 4095.0;
-
-/// `current = slope * code + intercept`.
-#[derive(Clone, Copy)]
-struct Line {
-    slope: f64,
-    intercept: f64,
-}
-
-impl Line {
-    /// Least squares of the current on the code.
-    fn through(points: &[(f64, f64)]) -> Self {
-        let count = points.len() as f64;
-        let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / count;
-        let (code, current) = (mean(|p| p.0), mean(|p| p.1));
-        let (mut both, mut square) = (0.0, 0.0);
-        for p in points {
-            both += (p.0 - code) * (p.1 - current);
-            square += (p.0 - code) * (p.0 - code);
-        }
-        let slope = both / square;
-        Self { slope, intercept: current - slope * code }
-    }
-
-    fn at(self, code: f64) -> f64 {
-        self.slope * code + self.intercept
-    }
-}
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();

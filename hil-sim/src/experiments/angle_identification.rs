@@ -4,8 +4,6 @@
 mod measure;
 mod model;
 
-use rayon::prelude::*;
-
 use super::bode::{Bode, frequencies};
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -69,17 +67,12 @@ impl Point {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(&Subject, f64)> =
         SUBJECTS.iter().flat_map(|s| TABLE_6.iter().map(move |row| (s, row.0))).collect();
-    let bar = context.progress.bar("angle-identification", jobs.len() as u64);
-    let points: Vec<Point> = jobs
-        .par_iter()
-        .map(|&(subject, iq)| {
-            let (config, seed) = (context.config, context.seed);
-            let record = measure::sequence(config, subject.demodulator, iq, seed)?;
-            let steps = measure::steps(config, subject.demodulator, iq, seed)?;
-            bar.advance(1);
-            Ok(Point { models: Model::identify(&record)?, record, steps })
-        })
-        .collect::<Result<_, Error>>()?;
+    let points = context.in_parallel("angle-identification", &jobs, |_, &(subject, iq)| {
+        let (config, seed) = (context.config, context.seed);
+        let record = measure::sequence(config, subject.demodulator, iq, seed)?;
+        let steps = measure::steps(config, subject.demodulator, iq, seed)?;
+        Ok(Point { models: Model::identify(&record)?, record, steps })
+    })?;
     let all = || SUBJECTS.iter().zip(points.chunks(TABLE_6.len()));
 
     let mut outcome = Outcome::default();

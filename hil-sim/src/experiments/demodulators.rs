@@ -69,15 +69,9 @@ struct Tracked {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let bar = context.progress.bar("demodulators", SUBJECTS.len() as u64);
-    let found: Vec<Findings> = SUBJECTS
-        .par_iter()
-        .map(|subject| {
-            let findings = findings(subject, context.config, context.seed);
-            bar.advance(1);
-            findings
-        })
-        .collect::<Result<_, _>>()?;
+    let found = context.in_parallel("demodulators", &SUBJECTS, |_, subject| {
+        findings(subject, context.config, context.seed)
+    })?;
 
     let mut outcome = Outcome::default();
     let all = || SUBJECTS.iter().zip(&found);

@@ -1,7 +1,6 @@
 //! The current difference over the injection angle, Figure 19.
 
 use drive_core::Command;
-use rayon::prelude::*;
 
 use super::{Context, Experiment};
 use crate::config::{Config, Demodulator};
@@ -98,15 +97,9 @@ pub(super) type Curve = Vec<(f64, f64)>;
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(Variant, f64)> =
         VARIANTS.iter().flat_map(|&v| IQ_A.iter().map(move |&iq| (v, iq))).collect();
-    let bar = context.progress.bar("injection-map", jobs.len() as u64);
-    let curves: Vec<Curve> = jobs
-        .par_iter()
-        .map(|&(variant, iq)| {
-            let result = curve(context.config, context.seed, variant, iq);
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let curves = context.in_parallel("injection-map", &jobs, |_, &(variant, iq)| {
+        curve(context.config, context.seed, variant, iq)
+    })?;
 
     let mut outcome = Outcome::default();
     for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {

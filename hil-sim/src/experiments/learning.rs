@@ -76,5 +76,5 @@ pub fn reference_of(
             points.push((i_q, signal.mean() as f32));
         }
     }
-    ReferenceTable::new(&points).map_err(|error| Error::Refused(error.to_string()))
+    ReferenceTable::new(&points).map_err(Error::refused)
 }

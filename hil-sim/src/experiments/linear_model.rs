@@ -81,19 +81,10 @@ impl Linear {
         settings: &Settings,
         i_q: f64,
     ) -> Result<Self, Error> {
-        let refused = |e: &dyn std::fmt::Display| Error::Refused(e.to_string());
-        let built: Coefficients = settings.build().map_err(|e| refused(&e))?;
-        let plant = tuning::motor_plant(
-            &tuning::Motor {
-                r_s: machine.rs,
-                r_r: machine.rr,
-                l_m: machine.lm,
-                l_ls: machine.lls,
-                l_lr: machine.llr,
-            },
-            f64::from(PERIOD_S),
-        )
-        .map_err(|e| refused(&e))?;
+        let built: Coefficients = settings.build().map_err(Error::refused)?;
+        let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
+        let circuit = tuning::Motor { r_s, r_r, l_m, l_ls, l_lr };
+        let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
         let tracking = &settings.injection.synchronous;
         let schedule = GainSchedule::new(
             &tracking.reference,

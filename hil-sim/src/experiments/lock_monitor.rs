@@ -2,8 +2,6 @@
 
 mod trials;
 
-use rayon::prelude::*;
-
 use self::trials::{Forced, Healthy, KINDS, OVER_SPEED_S, OverSpeed, Start};
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -65,16 +63,9 @@ impl Work<'_> {
         count: u64,
         trial: impl Fn(u64, u64) -> Result<T, Error> + Sync,
     ) -> Result<Vec<T>, Error> {
-        let bar = self.context.progress.bar(name, count);
         let first = self.context.seed.wrapping_mul(1_000_003).wrapping_add(part << 40);
-        (0..count)
-            .into_par_iter()
-            .map(|n| {
-                let result = trial(n, first.wrapping_add(n));
-                bar.advance(1);
-                result
-            })
-            .collect()
+        let seeds: Vec<u64> = (0..count).map(|n| first.wrapping_add(n)).collect();
+        self.context.in_parallel(name, &seeds, |n, &seed| trial(n, seed))
     }
 
     fn forced(&self, outcome: &mut Outcome) -> Result<(), Error> {

@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 
 use super::steady::{Case, SteadyRun, steady_run};
 use super::torque::assumptions;
@@ -31,7 +30,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = context.config.extent.runs.unwrap_or(RUNS);
     let bound = context.config.load.speed_rpm.abs();
     let bound = if bound > 0.0 { bound } else { SPEED_RPM };
-    let bar = context.progress.bar("monte-carlo", runs.into());
     let cases: Vec<(Case, Config)> = (0..u64::from(runs))
         .map(|number| {
             // A generator of its own for every run: each can be repeated alone by its seed.
@@ -43,14 +41,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             (case, spread(context.config, &mut random))
         })
         .collect();
-    let results: Vec<SteadyRun> = cases
-        .par_iter()
-        .map(|(case, config)| {
-            let result = steady_run(config, *case, context.seconds.unwrap_or(2.0));
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let results = context.in_parallel("monte-carlo", &cases, |_, (case, config)| {
+        steady_run(config, *case, context.seconds.unwrap_or(2.0))
+    })?;
 
     let mut outcome = Outcome::default();
     let kept: Vec<(&Case, &SteadyRun)> =

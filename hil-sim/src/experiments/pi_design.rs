@@ -6,13 +6,12 @@ mod differences;
 use drive_core::filter::dissertation::LPF;
 use drive_core::math::complex::Complex;
 use drive_core::tuning::{
-    CurrentLoopDesign, DELAY, FirstOrder, Motor, Rule, TuningError, design_current_loop,
-    motor_plant, pi_response, rule_3_8,
+    CurrentLoopDesign, DELAY, FirstOrder, Rule, design_current_loop, motor_plant, pi_response,
+    rule_3_8,
 };
 
 use super::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use super::{Context, Experiment};
-use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -57,26 +56,18 @@ const IDENTIFIED: [Identified; 3] = [
     },
 ];
 
-fn refused(error: TuningError) -> Error {
-    Error::Refused(error.to_string())
-}
-
-fn motor(config: &Config) -> Motor {
-    let motor = config.believed_motor();
-    Motor { r_s: motor.rs, r_r: motor.rr, l_m: motor.lm, l_ls: motor.lls, l_lr: motor.llr }
-}
-
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let motor = motor(context.config);
-    let physical = motor_plant(&motor, PERIOD_S).map_err(refused)?;
+    let motor = context.config.believed_motor().circuit();
+    let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
     let rules = IDENTIFIED.map(|i| rule_3_8(i.plant, PERIOD_S).map(|rule| (i, rule)));
-    let rules = rules.into_iter().collect::<Result<Vec<_>, _>>().map_err(refused)?;
+    let rules = rules.into_iter().collect::<Result<Vec<_>, _>>().map_err(Error::refused)?;
     outcome.figures.push(w_plane(IDENTIFIED[0].plant, rules[0].1));
     outcome.tables.push(rule_table(&rules));
     let mut designs = Vec::new();
     for (identified, rule) in &rules {
-        let design = design_current_loop(identified.plant, physical, PERIOD_S).map_err(refused)?;
+        let design =
+            design_current_loop(identified.plant, physical, PERIOD_S).map_err(Error::refused)?;
         let key = identified.key;
         outcome.metrics.set(format!("{key}_kc_v_per_a"), rule.k_c);
         outcome.metrics.set(format!("{key}_zc"), rule.z_c);

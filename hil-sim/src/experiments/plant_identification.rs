@@ -2,7 +2,7 @@
 //! follow from them.
 
 use drive_core::filter::dissertation::{LPF, LpfState};
-use drive_core::tuning::{FirstOrder, Motor, design_current_loop, motor_plant, rule_3_8};
+use drive_core::tuning::{FirstOrder, design_current_loop, motor_plant, rule_3_8};
 use drive_core::{AlphaBeta, Command, Dq, Mode};
 
 use super::{Context, Experiment};
@@ -152,7 +152,7 @@ fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
 /// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and what is left of the current,
 /// A rms.
 #[derive(Clone, Copy)]
-struct Found {
+struct IdentifiedPlant {
     plant: FirstOrder,
     b: [f64; 2],
     delay: usize,
@@ -162,12 +162,17 @@ struct Found {
 
 /// With two coefficients of the voltage where the delay is no whole number of samples: the current's
 /// analog filter has 0.18.
-fn first_order(u: &[f64], y: &[f64], inputs: usize, delay: usize) -> Result<Found, Error> {
+fn first_order(
+    u: &[f64],
+    y: &[f64],
+    inputs: usize,
+    delay: usize,
+) -> Result<IdentifiedPlant, Error> {
     let orders = Orders { outputs: 1, inputs, delay };
     let Arx { a, b, condition, rms } =
         fit(u, y, orders).map_err(|e| Error::Refused(format!("least squares: {e}")))?;
     let b = [b[0], b.get(1).copied().unwrap_or(0.0)];
-    Ok(Found { plant: FirstOrder { k: b[0] + b[1], p: -a[0] }, b, delay, condition, rms })
+    Ok(IdentifiedPlant { plant: FirstOrder { k: b[0] + b[1], p: -a[0] }, b, delay, condition, rms })
 }
 
 fn bench(context: &Context<'_>) -> Result<Rig, Error> {
@@ -180,9 +185,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {
-    let m = config.believed_motor();
-    let motor = Motor { r_s: m.rs, r_r: m.rr, l_m: m.lm, l_ls: m.lls, l_lr: m.llr };
-    motor_plant(&motor, 1.0 / RATE_HZ).map_err(|e| Error::Refused(e.to_string()))
+    motor_plant(&config.believed_motor().circuit(), 1.0 / RATE_HZ).map_err(Error::refused)
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -240,10 +243,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 Cell::fixed(1e3 * one.rms, 1),
             ]);
         }
-        let refused = |e: drive_core::tuning::TuningError| Error::Refused(e.to_string());
-        let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(refused)?;
-        let theirs = rule_3_8(trial.printed, 1.0 / RATE_HZ).map_err(refused)?;
-        let design = design_current_loop(best.plant, motor, 1.0 / RATE_HZ).map_err(refused)?;
+        let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
+        let theirs = rule_3_8(trial.printed, 1.0 / RATE_HZ).map_err(Error::refused)?;
+        let design =
+            design_current_loop(best.plant, motor, 1.0 / RATE_HZ).map_err(Error::refused)?;
         designs.row([
             Cell::from(trial.name),
             Cell::fixed(rule.k_c, 2),
@@ -279,7 +282,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// The current beside what the plant makes of the same voltage, from one measured value on.
-fn figure(trial: &Trial, record: &Record, u: &[f64], found: &Found) -> Figure {
+fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) -> Figure {
     let axis = if trial.axis == Axis::D { "d" } else { "q" };
     let count = record.y.len().min(if trial.key == "steps" { usize::MAX } else { SHOWN });
     let mut modelled = Vec::with_capacity(count);

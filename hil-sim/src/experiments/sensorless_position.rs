@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Mode, State};
-use rayon::prelude::*;
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
@@ -13,7 +12,7 @@ use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
 use crate::rig::{Point, Rig, drive_settings, plant_settings};
-use crate::stats::Stats;
+use crate::stats::{Stats, StraightLine};
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -49,11 +48,7 @@ struct Held {
 impl Held {
     /// Slope of a straight line through the track, degrees per minute.
     fn drift(&self) -> f64 {
-        let n = self.track.len() as f64;
-        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| self.track.iter().map(of).sum::<f64>() / n;
-        let (t, x) = (mean(&|p| p.0), mean(&|p| p.1));
-        let slope = mean(&|p| (p.0 - t) * (p.1 - x)) / mean(&|p| (p.0 - t).powi(2));
-        60.0 * slope
+        60.0 * StraightLine::through(&self.track).slope
     }
 
     /// What is left beside the line, degrees rms.
@@ -120,16 +115,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let hold_s = context.seconds.unwrap_or(HOLD_S);
     let cases: Vec<(f64, (f64, bool))> =
         BELIEFS.iter().flat_map(|&b| LOADS_NM.iter().map(move |&l| (l, b))).collect();
-    let bar = context.progress.bar("sensorless-position", cases.len() as u64);
-    let held: Vec<Held> = cases
-        .par_iter()
-        .enumerate()
-        .map(|(n, &(load, belief))| {
-            let result = hold(config, seed.wrapping_add(n as u64), load, belief, hold_s);
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
+        hold(config, seed.wrapping_add(number), load, belief, hold_s)
+    })?;
 
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;

@@ -1,7 +1,5 @@
 //! The angle error over torque current and speed.
 
-use rayon::prelude::*;
-
 use super::steady::{Case, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -22,17 +20,10 @@ const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, -30.0, 150.0, -150.0, 300.0, 600.0];
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let grid: Vec<(f64, f64)> =
         SPEEDS_RPM.iter().flat_map(|&n| IQ_A.iter().map(move |&iq| (n, iq))).collect();
-    let bar = context.progress.bar("speed-torque-sweep", grid.len() as u64);
-    let runs: Vec<SteadyRun> = grid
-        .par_iter()
-        .enumerate()
-        .map(|(number, &(rpm, iq))| {
-            let case = Case { rpm, iq, seed: context.seed.wrapping_add(number as u64) };
-            let result = steady_run(context.config, case, context.seconds.unwrap_or(2.0));
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let runs = context.in_parallel("speed-torque-sweep", &grid, |number, &(rpm, iq)| {
+        let case = Case { rpm, iq, seed: context.seed.wrapping_add(number) };
+        steady_run(context.config, case, context.seconds.unwrap_or(2.0))
+    })?;
 
     let mut outcome = Outcome::default();
     let kept = || runs.iter().filter(|r| !r.lost);

@@ -1,7 +1,5 @@
 //! Torque over the torque current at standstill, and whether it or the angle drifts over a minute.
 
-use rayon::prelude::*;
-
 use super::steady::{Case, at_speed};
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -32,17 +30,9 @@ struct Held {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mean_s = context.seconds.map_or(MEAN_S, |s| s / MEANS as f64);
-    let bar = context.progress.bar("torque-drift", IQ_A.len() as u64);
-    let held: Vec<Held> = IQ_A
-        .par_iter()
-        .enumerate()
-        .map(|(n, &iq)| {
-            let case = Case { rpm: 0.0, iq, seed: context.seed.wrapping_add(n as u64) };
-            let held = hold(context, case, mean_s);
-            bar.advance(1);
-            held
-        })
-        .collect::<Result<_, _>>()?;
+    let held = context.in_parallel("torque-drift", &IQ_A, |number, &iq| {
+        hold(context, Case { rpm: 0.0, iq, seed: context.seed.wrapping_add(number) }, mean_s)
+    })?;
 
     let mut table = Table::new(
         "A minute at standstill",

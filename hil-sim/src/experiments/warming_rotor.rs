@@ -57,7 +57,6 @@ pub struct Moment {
 /// # Errors
 /// What the plant or the drive refuse, or how the drive stopped.
 pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error> {
-    let refused = |text: String| Error::Refused(text);
     let settings = drive_core::Settings { track_rotor: case.used, ..drive_settings(config) };
     let plant = plant_settings(config);
     let start = PlantSettings {
@@ -65,7 +64,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
         ..plant
     };
     let mut rig = Rig::new(&start, &settings, seed)?;
-    let mut online = Online::new(&settings).map_err(|e| refused(format!("{e:?}")))?;
+    let mut online = Online::new(&settings).map_err(|e| Error::Refused(format!("{e:?}")))?;
     rig.start(Mode::Torque)?;
     rig.command(&Command::Torque(case.iq_a as f32))?;
     let steps = 1 + (100.0 * case.speed_rpm.abs() / RAMP_RPM_PER_S) as u32;
@@ -86,7 +85,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
         let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
         let mut machine = plant.machine;
         machine.rr *= 1.0 + growth * share;
-        rig.plant.set_machine(&machine, &plant.saliency).map_err(|e| refused(e.to_string()))?;
+        rig.plant.set_machine(&machine, &plant.saliency).map_err(Error::refused)?;
 
         let mut angle_error = 0.0;
         for k in 0..block {

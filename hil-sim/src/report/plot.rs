@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{AsRangedCoord, DefaultFormatting, KeyPointHint, Ranged};
-use plotters::coord::types::RangedCoordf64;
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
@@ -85,7 +84,6 @@ fn draw(figure: &Figure) -> Result<String, Failure> {
             if panels[k].log_x {
                 draw_panel(&area, panels[k], x.log_scale(), y, labelled(k))?;
             } else {
-                let x = Axis::new(x, &panels[k].x_label, 10);
                 draw_panel(&area, panels[k], x, y, labelled(k))?;
             }
         }
@@ -138,7 +136,7 @@ fn draw_panel<X>(
 ) -> Result<(), Failure>
 where
     X: AsRangedCoord<Value = f64>,
-    X::CoordDescType: Ranged<ValueType = f64, FormatOption = DefaultFormatting>,
+    X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
     let mut chart = ChartBuilder::on(area)
         .margin_top(ABOVE)
@@ -146,12 +144,12 @@ where
         .margin_right(RIGHT)
         .set_label_area_size(LabelAreaPosition::Left, LEFT - GAP)
         .set_label_area_size(LabelAreaPosition::Bottom, if labelled { LABELS } else { GAP })
-        .build_cartesian_2d(x, Axis::new(y, &panel.y_label, 7))?;
+        .build_cartesian_2d(x, y)?;
     let unlabelled = |_: &f64| String::new();
     let mut mesh = chart.configure_mesh();
     mesh.label_style(font(12)).axis_desc_style(font(13)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
-    mesh.x_labels(10).y_desc(&panel.y_label).y_label_formatter(&number);
+    mesh.x_labels(10).y_labels(7).y_desc(&panel.y_label).y_label_formatter(&number);
     mesh.set_all_tick_mark_size(3 * SCALE);
     if labelled {
         mesh.x_desc(&panel.x_label).x_label_formatter(&number);
@@ -179,42 +177,6 @@ where
         }
     }
     Ok(())
-}
-
-/// A linear axis: plotters' own, but where the marks of a wide range of angles divide the turn.
-struct Axis(RangedCoordf64, Vec<f64>);
-
-impl Axis {
-    /// The axis with this label and at most `count` marks.
-    fn new(range: Range<f64>, label: &str, count: usize) -> Self {
-        let extent = range.end - range.start;
-        let fits = |step: &f64| extent / step < count as f64;
-        let marks = match [15.0, 30.0, 45.0, 90.0, 180.0].into_iter().find(fits) {
-            Some(step) if label.contains("(°") && extent > 90.0 => {
-                let (first, last) = ((range.start / step).ceil(), (range.end / step).floor());
-                (first as i32..=last as i32).map(|k| f64::from(k) * step).collect()
-            }
-            _ => RangedCoordf64::from(range.clone()).key_points(count),
-        };
-        Self(range.into(), marks)
-    }
-}
-
-impl Ranged for Axis {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.0.map(value, limit)
-    }
-
-    fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
-        self.1.clone()
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.0.range()
-    }
 }
 
 /// A label of an axis, with at most six decimals.
@@ -321,18 +283,6 @@ mod tests {
             assert!(texts.len() > 8, "{texts:?}");
             assert!(texts.contains(&"time (s)") && texts.contains(&"line"), "{texts:?}");
         }
-    }
-
-    #[test]
-    fn angles_are_divided_as_angles() {
-        let marks = |range, label, count| Axis::new(range, label, count).1;
-        assert_eq!(marks(-180.0..179.9, "angle (°)", 10)[..4], [-180.0, -135.0, -90.0, -45.0]);
-        assert_eq!(marks(-20.0..25.0, "angle (°)", 5), [-20.0, -10.0, 0.0, 10.0, 20.0]);
-        let fifths = marks(0.0..1.0, "time (s)", 6);
-        assert_eq!(
-            fifths.iter().map(number).collect::<Vec<_>>(),
-            ["0", "0.2", "0.4", "0.6", "0.8", "1"]
-        );
     }
 
     #[test]
