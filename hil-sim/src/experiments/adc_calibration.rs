@@ -32,18 +32,7 @@ const LAST_CODE: f64 = 4095.0;
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
-    let mut lines = Table::new(
-        "Calibration lines, I = slope n + intercept",
-        &[
-            "channel",
-            "",
-            "slope (A)",
-            "intercept (A)",
-            "largest residual (mA)",
-            "code 0 (A)",
-            "code 4095 (A)",
-        ],
-    );
+    let mut lines = Table::new("Calibration lines, I = slope n + intercept", &[]);
     let mut readings = Panel::new("converter code", "current (A)");
     let mut residuals = Panel::new("converter code", "residual (mA)");
     for (channel, (name, slope, intercept)) in PRINTED.into_iter().enumerate() {
@@ -54,14 +43,14 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             |line: Line| points.map(|(code, current)| (code, 1e3 * (line.at(code) - current)));
         let largest = |line: Line| residual(line).iter().map(|p| p.1.abs()).fold(0.0, f64::max);
         for (kind, line) in [("least squares", fitted), ("printed", printed)] {
-            lines.row([
-                Cell::from(name),
-                Cell::from(kind),
-                Cell::fixed(line.slope, 8),
-                Cell::fixed(line.intercept, 6),
-                Cell::fixed(largest(line), 2),
-                Cell::fixed(line.at(0.0), 4),
-                Cell::fixed(line.at(LAST_CODE), 4),
+            lines.record([
+                ("channel", Cell::from(name)),
+                ("", Cell::from(kind)),
+                ("slope (A)", Cell::fixed(line.slope, 8)),
+                ("intercept (A)", Cell::fixed(line.intercept, 6)),
+                ("largest residual (mA)", Cell::fixed(largest(line), 2)),
+                ("code 0 (A)", Cell::fixed(line.at(0.0), 4)),
+                ("code 4095 (A)", Cell::fixed(line.at(LAST_CODE), 4)),
             ]);
         }
         let ends = [0.0, LAST_CODE].map(|code| (code, fitted.at(code)));

@@ -231,18 +231,7 @@ fn gains(subject: &Subject, points: &[Point], config: &Config) -> Table {
 
 /// The controllers on the identified plants.
 fn controllers<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Table {
-    let heads = [
-        "plant",
-        "iq (A)",
-        "largest pole, printed k_s, z_s = 0.90",
-        "printed k_s, z_s = 0.99",
-        "designed for 1.5 A",
-        "k_s (rad per signal)",
-        "z_s",
-        "crossover (Hz)",
-        "poles of the design",
-    ];
-    let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &heads).note(
+    let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &[]).note(
         "Largest magnitude of the poles of (z-1)^2 (z-p1)(z-p2) + k_s k_phi (z - z_s); above 1 the loop \
          is unstable. Design: the fastest with its zero at a quarter of the crossover and a sensitivity peak of 2 at \
          most, on the plant at 1.5 A, as in the source; the printed k_s is in rad/A and says nothing for the synchronous signal.",
@@ -258,16 +247,25 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Tab
                 let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
                 upper.collect::<Vec<_>>().join(", ")
             });
-            table.row([
-                Cell::from(name),
-                Cell::fixed(*iq, 1),
-                or_dash(in_amperes.then(|| with(PRINTED_PII))),
-                or_dash(in_amperes.then(|| with(LIKELY_PII))),
-                or_dash(design.map(|(pii, _)| with(pii))),
-                or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
-                or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4))),
-                or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / std::f64::consts::TAU, 1))),
-                or_dash(poles.map(Cell::from)),
+            table.record([
+                ("plant", Cell::from(name)),
+                ("iq (A)", Cell::fixed(*iq, 1)),
+                (
+                    "largest pole, printed k_s, z_s = 0.90",
+                    or_dash(in_amperes.then(|| with(PRINTED_PII))),
+                ),
+                ("printed k_s, z_s = 0.99", or_dash(in_amperes.then(|| with(LIKELY_PII)))),
+                ("designed for 1.5 A", or_dash(design.map(|(pii, _)| with(pii)))),
+                (
+                    "k_s (rad per signal)",
+                    or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
+                ),
+                ("z_s", or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4)))),
+                (
+                    "crossover (Hz)",
+                    or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / std::f64::consts::TAU, 1))),
+                ),
+                ("poles of the design", or_dash(poles.map(Cell::from))),
             ]);
         }
     };

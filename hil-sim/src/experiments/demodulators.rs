@@ -184,36 +184,24 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table 
 }
 
 fn seen_table<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table {
-    let heads = [
-        "demodulation",
-        "iq (A)",
-        "unit",
-        "signal",
-        "slope (per rad)",
-        "noise, rms",
-        "noise as angle (°)",
-        "signal without saliency",
-        "as angle (°)",
-        "slope without saliency",
-    ];
-    let mut table = Table::new("What each sees at the right angle", &heads).note(
+    let mut table = Table::new("What each sees at the right angle", &[]).note(
         "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
          current stays. Without saliency: the same drive on a motor with a_psi = b1 = 0, where nothing \
          should be seen; as angle: what that would shift the angle by.",
     );
     for (subject, f) in all {
         for ((iq, s), i) in IQ_A.iter().zip(&f.seen).zip(&f.isotropic) {
-            table.row([
-                Cell::from(subject.name),
-                Cell::fixed(*iq, 1),
-                Cell::from(subject.unit()),
-                Cell::fixed(s.signal * 1e3, 2),
-                Cell::fixed(s.slope * 1e3, 1),
-                Cell::fixed(s.noise * 1e3, 3),
-                Cell::fixed(degrees(s.noise / s.slope), 2),
-                Cell::fixed(i.signal * 1e3, 2),
-                Cell::fixed(degrees(i.signal / s.slope), 1),
-                Cell::fixed(i.slope * 1e3, 1),
+            table.record([
+                ("demodulation", Cell::from(subject.name)),
+                ("iq (A)", Cell::fixed(*iq, 1)),
+                ("unit", Cell::from(subject.unit())),
+                ("signal", Cell::fixed(s.signal * 1e3, 2)),
+                ("slope (per rad)", Cell::fixed(s.slope * 1e3, 1)),
+                ("noise, rms", Cell::fixed(s.noise * 1e3, 3)),
+                ("noise as angle (°)", Cell::fixed(degrees(s.noise / s.slope), 2)),
+                ("signal without saliency", Cell::fixed(i.signal * 1e3, 2)),
+                ("as angle (°)", Cell::fixed(degrees(i.signal / s.slope), 1)),
+                ("slope without saliency", Cell::fixed(i.slope * 1e3, 1)),
             ]);
         }
     }

@@ -100,17 +100,7 @@ fn stop_band(lpf: &dyn Subject) -> Figure {
 }
 
 fn characteristics(subjects: &[Box<dyn Subject + Send>], outcome: &mut Outcome) -> Table {
-    let mut table = Table::new(
-        "Responses",
-        &[
-            "filter",
-            "form",
-            "gain at dc",
-            "gain at 600 Hz (dB)",
-            "group delay at dc (samples)",
-            "largest pole |z|",
-        ],
-    );
+    let mut table = Table::new("Responses", &[]);
     for subject in subjects {
         let w = omega_t(600.0);
         let [pole, pole_rounded] = subject.largest_poles();
@@ -135,13 +125,13 @@ fn characteristics(subjects: &[Box<dyn Subject + Send>], outcome: &mut Outcome) 
         ];
         for (form, dc, carrier, delay, pole) in rows {
             let dc = Cell::fixed(dc.re, 5);
-            table.row([
-                subject.name().into(),
-                form.into(),
-                dc,
-                Cell::fixed(carrier, 2),
-                delay,
-                pole,
+            table.record([
+                ("filter", subject.name().into()),
+                ("form", form.into()),
+                ("gain at dc", dc),
+                ("gain at 600 Hz (dB)", Cell::fixed(carrier, 2)),
+                ("group delay at dc (samples)", delay),
+                ("largest pole |z|", pole),
             ]);
         }
         let key = subject.name().to_lowercase();

@@ -38,32 +38,21 @@ pub(super) fn both(
 
 /// A table of entries beside the printed ones, and the share of them within a factor of two.
 pub(super) fn table(title: &str, entries: &[(Entry, f64)]) -> Table {
-    let heads = [
-        "model",
-        "signal",
-        "h (µs)",
-        "parameter",
-        "printed (%)",
-        "ours (%)",
-        "ratio",
-        "printed noise (%)",
-        "ratio",
-    ];
-    let mut table = Table::new(title, &heads);
+    let mut table = Table::new(title, &[]);
     for (entry, literal) in entries {
         let number = |value: Option<f64>| {
             value.map_or_else(|| Cell::from("-"), |value| Cell::significant(value, 3))
         };
-        table.row([
-            Cell::from(entry.model),
-            Cell::from(entry.signal),
-            Cell::fixed(entry.h_us, 0),
-            Cell::from(entry.parameter),
-            number(entry.printed_pct),
-            Cell::significant(entry.ours_pct, 3),
-            number(entry.ratio()),
-            Cell::significant(*literal, 3),
-            number(entry.printed_pct.map(|printed| literal / printed)),
+        table.record([
+            ("model", Cell::from(entry.model)),
+            ("signal", Cell::from(entry.signal)),
+            ("h (µs)", Cell::fixed(entry.h_us, 0)),
+            ("parameter", Cell::from(entry.parameter)),
+            ("printed (%)", number(entry.printed_pct)),
+            ("ours (%)", Cell::significant(entry.ours_pct, 3)),
+            ("ratio", number(entry.ratio())),
+            ("printed noise (%)", Cell::significant(*literal, 3)),
+            ("ratio", number(entry.printed_pct.map(|printed| literal / printed))),
         ]);
     }
     table

@@ -43,17 +43,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     for ((title, sg, ss), speed) in PRINTED.into_iter().zip(SPEEDS) {
         let machine = ss.at(speed);
-        let heads = [
-            "parameter",
-            "rbv, printed",
-            "C with Sg, printed",
-            "C with Ss, printed",
-            "simulated machine",
-            "C with Sg, ours",
-            "C with Ss, ours",
-            "S with Ss, ours",
-        ];
-        let mut table = Table::new(title, &heads);
+        let mut table = Table::new(title, &[]);
         let data = |signal| Trial::printed(machine, signal, H, LEVEL).run(context.seed, 0);
         let refused = |e: crate::identification::NotIdentifiable| Error::Refused(e.to_string());
         let regressions = Signal::ALL.map(|signal| data(signal).regression());
@@ -64,15 +54,15 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
             let value =
                 |x: Option<f64>| x.map_or_else(|| Cell::from("-"), |x| Cell::significant(x, 3));
-            table.row([
-                Cell::from(name),
-                value((k < 4).then(|| Parameters::RBV.array()[k])),
-                value(Some(sg.array()[k])),
-                value(Some(ss.array()[k])),
-                value(Some(machine.array()[k])),
-                value(c[0][k].ok()),
-                value(c[1][k].ok()),
-                value(s.ok().map(|s| s[k])),
+            table.record([
+                ("parameter", Cell::from(name)),
+                ("rbv, printed", value((k < 4).then(|| Parameters::RBV.array()[k]))),
+                ("C with Sg, printed", value(Some(sg.array()[k]))),
+                ("C with Ss, printed", value(Some(ss.array()[k]))),
+                ("simulated machine", value(Some(machine.array()[k]))),
+                ("C with Sg, ours", value(c[0][k].ok())),
+                ("C with Ss, ours", value(c[1][k].ok())),
+                ("S with Ss, ours", value(s.ok().map(|s| s[k]))),
             ]);
         }
         outcome.tables.push(table.note(

@@ -185,18 +185,7 @@ fn zero(curve: &Curve) -> f64 {
 /// The printed chain on the motor without saliency beside what leakage predicts, and the rectified
 /// chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
-    let heads = [
-        "iq (A)",
-        "leak predicts at -90° (mA)",
-        "as printed, isotropic, at -90° (mA)",
-        "leak predicts zero at (°)",
-        "zero found at (°)",
-        "rectified, saliency, at 90° (mA)",
-        "rectified, isotropic, at 90° (mA)",
-        "delay left in, saliency, at 90° (mA)",
-        "delay left in, isotropic, at 90° (mA)",
-    ];
-    let mut table = Table::new("What Figure 19 shows", &heads).note(
+    let mut table = Table::new("What Figure 19 shows", &[]).note(
         "The leak predicts delta_i = -sqrt2 * 0.01 * 0.944 * |i| * sin(phi2 - theta + gamma), gamma \
          = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
          (In the source the 0.944 of the low-pass, which makes the real currents larger than \
@@ -204,16 +193,16 @@ fn table(curves: &[Curve], id: f64) -> Table {
     );
     let n = IQ_A.len();
     for (k, iq) in IQ_A.iter().enumerate() {
-        table.row([
-            Cell::fixed(*iq, 1),
-            Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3),
-            Cell::fixed(at(&curves[n + k], -90.0), 3),
-            Cell::fixed(-(iq / id).atan().to_degrees(), 2),
-            Cell::fixed(zero(&curves[n + k]), 2),
-            Cell::fixed(at(&curves[3 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[4 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[5 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[6 * n + k], 90.0), 2),
+        table.record([
+            ("iq (A)", Cell::fixed(*iq, 1)),
+            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3)),
+            ("as printed, isotropic, at -90° (mA)", Cell::fixed(at(&curves[n + k], -90.0), 3)),
+            ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
+            ("zero found at (°)", Cell::fixed(zero(&curves[n + k]), 2)),
+            ("rectified, saliency, at 90° (mA)", Cell::fixed(at(&curves[3 * n + k], 90.0), 2)),
+            ("rectified, isotropic, at 90° (mA)", Cell::fixed(at(&curves[4 * n + k], 90.0), 2)),
+            ("delay left in, saliency, at 90° (mA)", Cell::fixed(at(&curves[5 * n + k], 90.0), 2)),
+            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(at(&curves[6 * n + k], 90.0), 2)),
         ]);
     }
     table

@@ -130,18 +130,7 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
 }
 
 fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
-    let mut table = Table::new(
-        "With the encoder: tau_r of the warm rotor, used by the drive",
-        &[
-            "speed (rpm)",
-            "i_q (A)",
-            "error (%), all dead time compensated",
-            "20 % of it left",
-            "50 % left",
-            "angle error (°), 50 % left",
-            "without tracking (°)",
-        ],
-    );
+    let mut table = Table::new("With the encoder: tau_r of the warm rotor, used by the drive", &[]);
     let (mut worst, mut angle, mut untracked) = ([0.0f64; 3], 0.0f64, 0.0f64);
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
         for (worst, ending) in worst.iter_mut().zip(row) {
@@ -149,14 +138,14 @@ fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Ta
         }
         angle = angle.max(row[2].angle.abs());
         untracked = untracked.max(row[3].angle.abs());
-        table.row([
-            Cell::fixed(point.0, 0),
-            Cell::fixed(point.1, 1),
-            number(row[0].tau_r, 1),
-            number(row[1].tau_r, 1),
-            number(row[2].tau_r, 1),
-            Cell::fixed(row[2].angle, 2),
-            Cell::fixed(row[3].angle, 2),
+        table.record([
+            ("speed (rpm)", Cell::fixed(point.0, 0)),
+            ("i_q (A)", Cell::fixed(point.1, 1)),
+            ("error (%), all dead time compensated", number(row[0].tau_r, 1)),
+            ("20 % of it left", number(row[1].tau_r, 1)),
+            ("50 % left", number(row[2].tau_r, 1)),
+            ("angle error (°), 50 % left", Cell::fixed(row[2].angle, 2)),
+            ("without tracking (°)", Cell::fixed(row[3].angle, 2)),
         ]);
     }
     for (share, worst) in RESIDUALS.iter().zip(worst) {
@@ -168,18 +157,8 @@ fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Ta
 }
 
 fn without(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
-    let mut table = Table::new(
-        "Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz",
-        &[
-            "speed (rpm)",
-            "i_q (A)",
-            "dead time left (%)",
-            "tau_r error (%)",
-            "speed error (rad/s)",
-            "there was an estimate (% of the time)",
-            "Model D's speed error (rad/s)",
-        ],
-    );
+    let mut table =
+        Table::new("Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz", &[]);
     let (mut tau, mut speed, mut still) = (0.0f64, 0.0f64, 0.0f64);
     for (point, rows) in SENSORLESS.iter().zip(endings.chunks_exact(4)) {
         for (n, ending) in rows.iter().enumerate() {
@@ -192,14 +171,14 @@ fn without(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
             } else {
                 still = still.max(ending.valid);
             }
-            table.row([
-                Cell::fixed(point.0, 0),
-                Cell::fixed(point.1, 1),
-                left,
-                number(ending.tau_r, 1),
-                number(ending.speed, 2),
-                Cell::fixed(ending.valid, 0),
-                number(ending.inverse_speed, 1),
+            table.record([
+                ("speed (rpm)", Cell::fixed(point.0, 0)),
+                ("i_q (A)", Cell::fixed(point.1, 1)),
+                ("dead time left (%)", left),
+                ("tau_r error (%)", number(ending.tau_r, 1)),
+                ("speed error (rad/s)", number(ending.speed, 2)),
+                ("there was an estimate (% of the time)", Cell::fixed(ending.valid, 0)),
+                ("Model D's speed error (rad/s)", number(ending.inverse_speed, 1)),
             ]);
         }
     }

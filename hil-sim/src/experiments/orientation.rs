@@ -32,25 +32,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (with, without) = results.split_at(SPEEDS_RPM.len());
 
     let mut outcome = Outcome::default();
-    let heads = [
-        "speed (rpm)",
-        "angle error, delays compensated (°)",
-        "delays left in (°)",
-        "torque, compensated (% of Eq. 2.7)",
-        "left in (%)",
-    ];
-    let mut table = Table::new("Field orientation over speed", &heads).note(format!(
+    let mut table = Table::new("Field orientation over speed", &[]).note(format!(
         "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m^2/L_r belongs; \
          the torque is compared with 3/2 P (L_m/L_r) psi i_q."
     ));
     let mut lines = [Vec::new(), Vec::new()];
     for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {
-        table.row([
-            Cell::fixed(rpm, 0),
-            Cell::fixed(a.0, 3),
-            Cell::fixed(b.0, 3),
-            Cell::fixed(a.1 * 100.0, 2),
-            Cell::fixed(b.1 * 100.0, 2),
+        table.record([
+            ("speed (rpm)", Cell::fixed(rpm, 0)),
+            ("angle error, delays compensated (°)", Cell::fixed(a.0, 3)),
+            ("delays left in (°)", Cell::fixed(b.0, 3)),
+            ("torque, compensated (% of Eq. 2.7)", Cell::fixed(a.1 * 100.0, 2)),
+            ("left in (%)", Cell::fixed(b.1 * 100.0, 2)),
         ]);
         lines[0].push((rpm, a.0));
         lines[1].push((rpm, b.0));

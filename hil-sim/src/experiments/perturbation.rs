@@ -177,26 +177,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
 
     let mut outcome = Outcome::default();
-    let heads = [
-        "step",
-        "peak, measured (°)",
-        "predicted (°)",
-        "fit, rms of the difference (°)",
-        "largest single error (°)",
-    ];
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
-    let mut table = Table::new(title, &heads).note(
+    let mut table = Table::new(title, &[]).note(
         "The mean before the step is taken away, but not from the largest single error, which has \
          noise and bias in it.",
     );
     let is_load = |m: &&Measured| matches!(m.case.disturbance, Disturbance::Load(_));
     for m in &results {
-        table.row([
-            Cell::from(m.case.name),
-            Cell::fixed(peak(&m.angle), 2),
-            Cell::fixed(peak(&m.predicted), 2),
-            Cell::fixed(m.fit(), 2),
-            Cell::fixed(m.largest, 2),
+        table.record([
+            ("step", Cell::from(m.case.name)),
+            ("peak, measured (°)", Cell::fixed(peak(&m.angle), 2)),
+            ("predicted (°)", Cell::fixed(peak(&m.predicted), 2)),
+            ("fit, rms of the difference (°)", Cell::fixed(m.fit(), 2)),
+            ("largest single error (°)", Cell::fixed(m.largest, 2)),
         ]);
     }
     outcome.tables.push(table);

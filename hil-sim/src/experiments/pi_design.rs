@@ -152,32 +152,22 @@ fn rule_table(rules: &[(Identified, Rule)]) -> Table {
 }
 
 fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
-    let heads = [
-        "identified plant",
-        "gain",
-        "kc (V/A)",
-        "crossover (Hz)",
-        "phase margin (°)",
-        "Ms",
-        "at (Hz)",
-        "gain margin",
-    ];
-    let mut table = Table::new("Margins on the motor, with LPF and one period of delay", &heads);
+    let mut table = Table::new("Margins on the motor, with LPF and one period of delay", &[]);
     for (name, design) in designs {
         let rows = [
             ("by the rule", design.rule_k_c, design.rule_margins),
             ("used", design.k_c, design.margins),
         ];
         for (label, k_c, margins) in rows {
-            table.row([
-                Cell::from(*name),
-                Cell::from(label),
-                Cell::fixed(k_c, 2),
-                Cell::fixed(margins.crossover_hz, 1),
-                Cell::fixed(margins.phase_margin_deg, 1),
-                Cell::fixed(margins.ms, 2),
-                Cell::fixed(margins.ms_hz, 0),
-                Cell::fixed(margins.gain_margin, 2),
+            table.record([
+                ("identified plant", Cell::from(*name)),
+                ("gain", Cell::from(label)),
+                ("kc (V/A)", Cell::fixed(k_c, 2)),
+                ("crossover (Hz)", Cell::fixed(margins.crossover_hz, 1)),
+                ("phase margin (°)", Cell::fixed(margins.phase_margin_deg, 1)),
+                ("Ms", Cell::fixed(margins.ms, 2)),
+                ("at (Hz)", Cell::fixed(margins.ms_hz, 0)),
+                ("gain margin", Cell::fixed(margins.gain_margin, 2)),
             ]);
         }
     }

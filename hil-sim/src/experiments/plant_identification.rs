@@ -193,31 +193,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut plants = Table::new(
         "Plants (b1 + b2 z^-1) z^-d / (z - p), k = b1 + b2, by least squares (appendix A)",
-        &[
-            "data",
-            "voltage",
-            "d",
-            "k (A/V)",
-            "printed",
-            "ratio",
-            "p",
-            "printed",
-            "condition",
-            "left (mA rms)",
-        ],
+        &[],
     );
-    let mut designs = Table::new(
-        "Controllers by the rule of section 3.8",
-        &[
-            "data",
-            "k_c (V/A)",
-            "from the printed plant",
-            "ratio",
-            "z_c",
-            "from the printed plant",
-            "k_c reduced to the margins (V/A)",
-        ],
-    );
+    let mut designs = Table::new("Controllers by the rule of section 3.8", &[]);
     for trial in &TRIALS {
         let mut rig = bench(context)?;
         let record = (trial.record)(&mut rig)?;
@@ -230,31 +208,31 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let best = found.iter().copied().reduce(|a, b| if b.rms < a.rms { b } else { a });
         let best = best.ok_or_else(|| Error::Internal("no delay was tried".to_owned()))?;
         for (how, one) in [("as printed", printed), ("filtered alike", best)] {
-            plants.row([
-                Cell::from(trial.name),
-                Cell::from(how),
-                Cell::fixed(one.delay as f64, 0),
-                Cell::significant(one.plant.k, 4),
-                Cell::significant(trial.printed.k, 4),
-                Cell::fixed(one.plant.k / trial.printed.k, 2),
-                Cell::fixed(one.plant.p, 4),
-                Cell::fixed(trial.printed.p, 4),
-                Cell::significant(one.condition, 2),
-                Cell::fixed(1e3 * one.rms, 1),
+            plants.record([
+                ("data", Cell::from(trial.name)),
+                ("voltage", Cell::from(how)),
+                ("d", Cell::fixed(one.delay as f64, 0)),
+                ("k (A/V)", Cell::significant(one.plant.k, 4)),
+                ("printed", Cell::significant(trial.printed.k, 4)),
+                ("ratio", Cell::fixed(one.plant.k / trial.printed.k, 2)),
+                ("p", Cell::fixed(one.plant.p, 4)),
+                ("printed", Cell::fixed(trial.printed.p, 4)),
+                ("condition", Cell::significant(one.condition, 2)),
+                ("left (mA rms)", Cell::fixed(1e3 * one.rms, 1)),
             ]);
         }
         let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
         let theirs = rule_3_8(trial.printed, 1.0 / RATE_HZ).map_err(Error::refused)?;
         let design =
             design_current_loop(best.plant, motor, 1.0 / RATE_HZ).map_err(Error::refused)?;
-        designs.row([
-            Cell::from(trial.name),
-            Cell::fixed(rule.k_c, 2),
-            Cell::fixed(theirs.k_c, 2),
-            Cell::fixed(rule.k_c / theirs.k_c, 2),
-            Cell::fixed(rule.z_c, 4),
-            Cell::fixed(theirs.z_c, 4),
-            Cell::fixed(design.k_c, 2),
+        designs.record([
+            ("data", Cell::from(trial.name)),
+            ("k_c (V/A)", Cell::fixed(rule.k_c, 2)),
+            ("from the printed plant", Cell::fixed(theirs.k_c, 2)),
+            ("ratio", Cell::fixed(rule.k_c / theirs.k_c, 2)),
+            ("z_c", Cell::fixed(rule.z_c, 4)),
+            ("from the printed plant", Cell::fixed(theirs.z_c, 4)),
+            ("k_c reduced to the margins (V/A)", Cell::fixed(design.k_c, 2)),
         ]);
         let key = trial.key;
         for (name, value) in [

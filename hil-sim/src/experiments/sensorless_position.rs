@@ -154,28 +154,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
     m.set("stopped_runs", held.iter().filter(|h| h.stopped).count() as f64);
 
-    let heads = [
-        "load (Nm)",
-        "r_r, true over believed",
-        "learned so",
-        "mean iq (A)",
-        "drift (°/min)",
-        "beside it (° rms)",
-        "angle error rms (°)",
-    ];
-    let mut table = Table::new("Drift of a position that is held", &heads).note(
+    let mut table = Table::new("Drift of a position that is held", &[]).note(
         "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \
          the load.",
     );
     for h in &held {
-        table.row([
-            Cell::fixed(h.load_nm, 1),
-            Cell::fixed(h.belief.0, 2),
-            Cell::from(if h.belief.1 { "yes" } else { "no" }),
-            Cell::fixed(h.iq, 2),
-            Cell::fixed(h.drift(), 1),
-            Cell::fixed(h.wander(), 2),
-            Cell::fixed(h.angle_error.rms(), 2),
+        table.record([
+            ("load (Nm)", Cell::fixed(h.load_nm, 1)),
+            ("r_r, true over believed", Cell::fixed(h.belief.0, 2)),
+            ("learned so", Cell::from(if h.belief.1 { "yes" } else { "no" })),
+            ("mean iq (A)", Cell::fixed(h.iq, 2)),
+            ("drift (°/min)", Cell::fixed(h.drift(), 1)),
+            ("beside it (° rms)", Cell::fixed(h.wander(), 2)),
+            ("angle error rms (°)", Cell::fixed(h.angle_error.rms(), 2)),
         ]);
     }
     outcome.tables.push(table);

@@ -29,6 +29,15 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
+    /// Adds a row of cells, each with the head of its column; the first row sets the heads.
+    pub fn record<'a>(&mut self, row: impl IntoIterator<Item = (&'a str, Cell)>) {
+        let (heads, cells): (Vec<_>, Vec<_>) = row.into_iter().unzip();
+        if self.rows.is_empty() {
+            self.columns = heads.into_iter().map(str::to_owned).collect();
+        }
+        self.rows.push(cells);
+    }
+
     /// With this note below it.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
