@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use rayon::prelude::*;
 
 use crate::board;
 use crate::config::{Config, KEYS};
@@ -104,14 +103,8 @@ fn keys() -> Table {
     table
 }
 
-fn execute(
-    experiment: &Experiment,
-    config: &Config,
-    seed: u64,
-    progress: &Progress,
-) -> Result<Outcome, Error> {
-    let seconds = config.extent.seconds;
-    (experiment.run)(&Context { config, seed, seconds, progress: progress.clone() })
+fn context(config: &Config, seed: u64) -> Context<'_> {
+    Context { config, seed, seconds: config.extent.seconds, progress: Progress::default() }
 }
 
 fn section<'a>(
@@ -133,7 +126,7 @@ fn section<'a>(
 fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<(), Error> {
     let experiment = experiments::find(name)?;
     let config = input.config()?;
-    let outcome = execute(experiment, &config, input.seed, &Progress::default())?;
+    let outcome = (experiment.run)(&context(&config, input.seed))?;
     let folder = out.or_else(|| (!json).then(|| OUT.into()));
     let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
     if let (Some(folder), Some(path)) = (&folder, &path) {
@@ -159,17 +152,9 @@ fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<()
 
 fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
-    let progress = Progress::default();
-    let bar = progress.bar("report", EXPERIMENTS.len() as u64);
-    let outcomes: Vec<Result<Outcome, Error>> = EXPERIMENTS
-        .par_iter()
-        .map(|experiment| {
-            let outcome = execute(experiment, &config, input.seed, &progress);
-            bar.advance(1);
-            outcome
-        })
-        .collect();
-    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let context = context(&config, input.seed);
+    let outcomes =
+        context.in_parallel("report", EXPERIMENTS, |_, experiment| (experiment.run)(&context))?;
     let sections: Vec<_> = EXPERIMENTS
         .iter()
         .zip(&outcomes)
@@ -177,7 +162,6 @@ fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
         .collect();
     let path = out.join("report.html");
     report::write_whole(&path, &report::page("Induction drive: all experiments", &sections)?)?;
-    drop(bar);
     say(&format!("Report: {}\n", path.display()))
 }
 

@@ -29,7 +29,7 @@ pub enum Error {
         key: String,
         /// The value that was given.
         value: String,
-        /// What is wrong with it.
+        /// The reason why it is refused.
         problem: &'static str,
         /// The values that are allowed, with their unit.
         allowed: String,
@@ -42,7 +42,7 @@ pub enum Error {
     ConfigFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         problem: String,
     },
     /// Each value is in its range, but a model, a filter or a design rule refuses their combination.
@@ -53,7 +53,7 @@ pub enum Error {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// A failure that no input should be able to cause.

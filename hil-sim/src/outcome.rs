@@ -1,4 +1,4 @@
-//! What an experiment returns: numbers, tables and figures, and how they become JSON.
+//! The outcome of an experiment: numbers, tables and figures, and their JSON form.
 
 mod figure;
 mod table;
@@ -8,7 +8,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 pub use figure::{Figure, Panel, Series, Style};
 pub use table::{Cell, Table};
 
-/// What came out of an experiment.
+/// The outcome of an experiment.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Numbers by name; a name ends in its unit, like `angle_error_rms_deg`.
@@ -23,7 +23,7 @@ pub struct Outcome {
     pub figures: Vec<Figure>,
     /// Texts to be read as they are, line by line, with their titles.
     pub texts: Vec<(String, String)>,
-    /// What the reader must know: differences from the source, assumptions, limits.
+    /// Remarks for the reader: differences from the source, assumptions, limits.
     pub remarks: Vec<String>,
 }
 
@@ -120,7 +120,7 @@ struct Json<'a> {
     table: Rows<'a>,
 }
 
-/// What JSON calls `table`.
+/// Content of `table` in JSON.
 #[derive(serde::Serialize)]
 #[serde(untagged)]
 enum Rows<'a> {
@@ -163,6 +163,9 @@ impl Serialize for AllSeries<'_> {
 impl Outcome {
     /// The one JSON object: `experiment`, `seed`, `metrics`, `series`, and where there are any
     /// `steps` and `table`. A number that is not finite becomes `null`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string`].
     pub fn to_json(&self, experiment: &str, seed: u64) -> serde_json::Result<String> {
         serde_json::to_string(&Json {
             experiment,

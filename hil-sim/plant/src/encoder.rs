@@ -44,6 +44,9 @@ pub struct Encoder {
 
 impl Encoder {
     /// The encoder with these settings.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(settings: &EncoderSettings) -> Result<Self, PlantError> {
         let lines = f64::from(settings.lines);
         check("encoder.lines", lines, 1.0..=100_000.0, "")?;

@@ -24,7 +24,7 @@ const CHANGES: usize = 8;
 /// rail), 0 not at all.
 type Conduction = [i8; 3];
 
-/// Goes on by `h` seconds; returns the terminal voltage integrated over them, V s.
+/// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
 pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
@@ -48,7 +48,7 @@ pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
         motor.state.electrical.i = without(motor.state.electrical.i, phase);
         rest -= done;
     }
-    // Rounding has us going round in circles: the currents are next to nothing.
+    // Rounding keeps the conduction changing: the currents are practically zero.
     motor.state.electrical.i = Complex::ZERO;
     let (state, v) = advanced(motor, [0; 3], vdc, rest);
     motor.state = state;

@@ -34,14 +34,14 @@ impl MotorModel {
         motor
     }
 
-    /// Takes over the speed that the load imposes. To be called when the load has changed.
+    /// Sets the speed that the load imposes, if it imposes one. To be called after a change of load.
     pub fn hold_speed(&mut self) {
         if let Some(speed) = self.mechanics.held_speed() {
             self.state.speed = speed;
         }
     }
 
-    /// Goes on by `h` seconds at the constant terminal voltage `v` (V).
+    /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
         self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
     }
@@ -58,7 +58,7 @@ impl MotorModel {
         self.stepped_from(rates(&self.state.electrical, w), h, rates)
     }
 
-    /// The same, where `first` is what `rates` gives at the present state.
+    /// As [`Self::stepped`]; `first` is the value of `rates` at the present state.
     #[inline]
     pub(crate) fn stepped_from(
         &self,

@@ -69,12 +69,15 @@ pub struct Inverter {
     pub(crate) propagation: f64,
     pub(crate) residual: f64,
     pub(crate) switched: bool,
-    /// What was applied in the period before.
+    /// Compare values of the period before.
     pub(crate) previous: Compare,
 }
 
 impl Inverter {
     /// The inverter with these settings, off.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
         let s = settings;
         check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
@@ -94,7 +97,10 @@ impl Inverter {
         Ok(inverter)
     }
 
-    /// Another dc-link voltage, V, from now on.
+    /// Changes the dc-link voltage, V.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
         self.vdc = vdc;

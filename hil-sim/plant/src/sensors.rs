@@ -170,6 +170,9 @@ pub struct Sensors {
 
 impl Sensors {
     /// The sensors with these settings, at zero current.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(s: &MeasurementSettings) -> Result<Self, PlantError> {
         check("measurement.noise_a", s.noise_a, 0.0..=10.0, "A")?;
         check("measurement.lsb_a", s.lsb_a, 0.000_14..=0.05, "A")?;
@@ -221,7 +224,7 @@ impl Sensors {
         self.from_new = 1.0 - mean;
     }
 
-    /// Makes a channel faulty, or sound again.
+    /// Sets the fault of a channel.
     pub fn set_fault(&mut self, channel: Channel, fault: CurrentFault) {
         self.channels[channel as usize].fault = fault;
     }
@@ -251,7 +254,7 @@ impl Sensors {
         self.heat_sink
     }
 
-    /// Another code of the heat-sink temperature.
+    /// Changes the code of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
         self.heat_sink = code;
     }

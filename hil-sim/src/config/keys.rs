@@ -1,6 +1,6 @@
 //! The one table of keys: name, type, default, allowed values, unit, meaning.
 //!
-//! The configuration types, their defaults, the checks, the error messages and what `keys` prints
+//! The configuration types, their defaults, the checks, the error messages and the output of `keys`
 //! all come from it. To add a key, add a line.
 
 use super::value::{Allowed, Field, Value, words};
@@ -16,7 +16,7 @@ words! {
 }
 
 words! {
-    /// What is made of the carrier current.
+    /// Demodulation of the carrier current.
     Demodulator {
         /// As printed: the difference of the two channels, filtered.
         Literal = "literal",
@@ -32,7 +32,7 @@ words! {
 }
 
 words! {
-    /// What the shaft is coupled to.
+    /// Load on the shaft.
     LoadMode {
         /// Shaft blocked.
         Locked = "locked",
@@ -52,11 +52,11 @@ pub struct Key {
     pub unit: &'static str,
     /// The values it can have.
     pub allowed: Allowed,
-    /// What it is.
+    /// Its meaning.
     pub doc: &'static str,
     /// Reads it.
     pub get: fn(&Config) -> Value,
-    /// Writes it, if the value is allowed; otherwise says what is wrong with the value.
+    /// Writes it; the error is the reason why the value is not allowed.
     pub set: fn(&mut Config, &Value) -> Result<(), &'static str>,
 }
 
@@ -96,7 +96,7 @@ macro_rules! keys {
             }
         )+
 
-        /// Everything that an experiment can be told.
+        /// The configuration of an experiment.
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
         pub struct Config {
             $(#[doc = $group_doc] pub $group: $type,)+
@@ -137,7 +137,7 @@ keys! {
         /// Viscous friction (assumed; not in the source).
         friction: f64 = 0.001, [0 .. 10], "Nm s/rad";
     }
-    /// What makes the motor differ from the textbook machine; all of it is assumed.
+    /// Differences of the motor from the textbook machine; all of them are assumed.
     "saliency." saliency: SaliencyConfig {
         /// Saliency fixed to the rotor flux, at nominal flux.
         a_psi: f64 = -0.035, [-0.25 .. 0.25], "";
@@ -179,7 +179,7 @@ keys! {
         /// Offset of channel b.
         offset_b: f64 = 0.0, [-5 .. 5], "A";
     }
-    /// The injected voltage and what is made of the current it causes.
+    /// The injected voltage and the demodulation of the current it causes.
     "injection." injection: InjectionConfig {
         /// Peak of the injected voltage.
         amplitude_v: f64 = 50.0, [0 .. 150], "V";
@@ -215,7 +215,7 @@ keys! {
     }
     /// The load.
     "load." load: LoadConfig {
-        /// What the shaft is coupled to.
+        /// Load on the shaft.
         mode: LoadMode = LoadMode::Locked, [LoadMode], "";
         /// Speed that the dynamometer holds, with load.mode = speed.
         speed_rpm: f64 = 0.0, [-6000 .. 6000], "rpm";
@@ -238,7 +238,7 @@ keys! {
         /// Phase margin that the speed loop is designed for.
         phase_margin_deg: f64 = 60.0, [45 .. 70], "deg";
     }
-    /// What the drive believes of the motor; what is not set follows `motor.*`.
+    /// The motor parameters that the drive is set to; unset ones follow `motor.*`.
     "drive.motor." drive_motor: BelievedMotorConfig {
         /// Stator resistance; follows motor.rs.
         rs: Option<f64> = None, [0.01 .. 1000], "ohm";
@@ -251,13 +251,13 @@ keys! {
         /// Magnetising inductance; follows motor.lm.
         lm: Option<f64> = None, [1e-4 .. 100], "H";
     }
-    /// What the drive does before the experiment.
+    /// Preparation of the drive before the experiment.
     "drive." drive: DriveConfig {
         /// In steady runs (monte-carlo, speed-torque-sweep): whether the drive learns first, with the
         /// shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
     }
-    /// What monte-carlo draws anew for every run beside the operating point.
+    /// Errors that monte-carlo draws for every run, beside the operating point.
     "spread." spread: SpreadConfig {
         /// Largest relative error of each parameter that the drive believes of its motor.
         motor: f64 = 0.0, [0 .. 0.5], "";

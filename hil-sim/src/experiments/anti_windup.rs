@@ -1,9 +1,9 @@
-//! What anti-windup is for, on the example of Appendix B.
+//! Effect of anti-windup in the example of Appendix B.
 
 use drive_core::current::pi::{Pi, PiState};
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
+use super::bode::largest_pole;
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -21,7 +21,7 @@ const Z_C: f64 = 0.1;
 const LIMIT: f64 = 0.15;
 const SAMPLES: usize = 200;
 
-/// A controller: from the error to the output it wants, given what it is limited to.
+/// A controller: from the error to the output before the limit.
 type Controller = Box<dyn FnMut(f64) -> f64>;
 
 /// Eq. B.1 in immediate form, which forgets that there is a limit.
@@ -90,10 +90,6 @@ impl Response {
 
 fn highest(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-}
-
-fn largest_pole<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
 }
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {

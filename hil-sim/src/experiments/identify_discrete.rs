@@ -69,7 +69,7 @@ pub(super) fn shares(entries: &[(Entry, f64)]) -> [f64; 2] {
     ]
 }
 
-/// What every table of this kind needs said.
+/// Note of every table of printed errors.
 pub(super) const NOTE: &str = "Mean absolute errors of seven measurements of 4000 samples (Eq. 45). The machine is inferred \
      from the tables themselves (identify-machine). \"Ours\" reads the printed ranges of the noise \
      as peak to peak, which was chosen because it comes nearer to these tables and contradicts the \

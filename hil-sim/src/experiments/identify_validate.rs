@@ -23,7 +23,7 @@ const H: f64 = 50e-6;
 /// Noise of a real converter: a tenth of that of section 5.
 const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
-/// Title, what Model C found with S_g, and with S_s, in the order of [`Parameters::NAMES`].
+/// Title, and the printed estimates of Model C with S_g and with S_s.
 const PRINTED: [(&str, Parameters, Parameters); 2] = [
     (
         "Table 6: 60 Hz, 366 rad/s",
@@ -71,12 +71,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
              far Model C gets back to the machine, at a tenth of the noise of section 5.",
         ));
         if speed == SPEEDS[0] {
-            // Figure 5 simulates with what S_s gave.
+            // Figure 5 uses the estimate with S_s.
             let estimated = model_c(&by_ss.delta, H).parameters().map_err(refused)?;
             figure_5(&machine, &estimated.at(speed), &mut outcome);
         }
     }
-    // What the noise as printed, ten times that of a real converter, does to tau_r of such a machine.
+    // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {
         let case = Case { speed: 375.0, signal, period: 0 };
         errors(Parameters::RBV, case, Noise::PRINTED, context.seed, 7).continuous[1][1].percent

@@ -182,7 +182,7 @@ fn zero(curve: &Curve) -> f64 {
         .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
 }
 
-/// The printed chain on the motor without saliency beside what leakage predicts, and the rectified
+/// The printed chain on the motor without saliency beside the predicted leakage, and the rectified
 /// chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
     let mut table = Table::new("What Figure 19 shows", &[]).note(

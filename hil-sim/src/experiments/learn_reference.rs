@@ -1,4 +1,4 @@
-//! The drive learns what its angle tracking compares with.
+//! The drive learns the reference of its angle tracking.
 
 use drive_core::identify::learning::Fitted;
 use drive_core::settings::table::STEP_A;

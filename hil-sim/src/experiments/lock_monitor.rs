@@ -2,7 +2,7 @@
 
 mod trials;
 
-use self::trials::{Forced, Healthy, KINDS, OVER_SPEED_S, OverSpeed, Start};
+use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -20,7 +20,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Trials of each forced offset; ten times as many runs are looked at for false alarms.
 const RUNS: u32 = 100;
 const HEALTHY_PER_RUN: u64 = 10;
-/// Forced offsets, degrees, and their names in the metrics.
+/// ForcedTrial offsets, degrees, and their names in the metrics.
 const OFFSETS: [(f64, &str); 5] =
     [(90.0, "p90"), (-90.0, "m90"), (120.0, "p120"), (-120.0, "m120"), (180.0, "180")];
 /// Speeds of the forced offsets, rpm.
@@ -32,7 +32,7 @@ const START_RPM: [f64; 11] = [0.0, 5.0, -5.0, 15.0, -15.0, 30.0, -50.0, 80.0, 15
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = u64::from(context.config.extent.runs.unwrap_or(RUNS));
-    let work = Work { context, runs };
+    let work = Trials { context, runs };
     let mut outcome = Outcome::default();
     work.forced(&mut outcome)?;
     work.healthy(&mut outcome)?;
@@ -49,12 +49,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// All that the parts share.
-struct Work<'a> {
+struct Trials<'a> {
     context: &'a Context<'a>,
     runs: u64,
 }
 
-impl Work<'_> {
+impl Trials<'_> {
     /// `count` trials on all cores, each with a seed of its own.
     fn all<T: Send>(
         &self,
@@ -87,7 +87,7 @@ impl Work<'_> {
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
         for (number, (degrees, name)) in OFFSETS.into_iter().enumerate() {
-            let trials: Vec<Forced> = self.all(
+            let trials: Vec<ForcedTrial> = self.all(
                 &format!("forced by {degrees}°"),
                 number as u64,
                 self.runs,
@@ -101,7 +101,7 @@ impl Work<'_> {
                 wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
             };
             let stopped = trials.iter().filter(|t| t.fault.is_some()).count();
-            let missed: Vec<&Forced> = trials.iter().filter(|t| !t.is_in_time()).collect();
+            let missed: Vec<&ForcedTrial> = trials.iter().filter(|t| !t.is_in_time()).collect();
             let count = |n: usize| Cell::fixed(n as f64, 0);
             table.row([
                 Cell::fixed(degrees, 0),
@@ -142,13 +142,13 @@ impl Work<'_> {
     }
 
     fn healthy(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let runs: Vec<Healthy> =
+        let runs: Vec<HealthyRun> =
             self.all("false alarms", 10, HEALTHY_PER_RUN * self.runs, |n, seed| {
                 let kind = KINDS[n as usize % KINDS.len()];
                 trials::healthy(self.context.config, seed, kind)
             })?;
-        let alarms: Vec<&Healthy> = runs.iter().filter(|r| r.fault.is_some()).collect();
-        let largest = |of: fn(&Healthy) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let alarms: Vec<&HealthyRun> = runs.iter().filter(|r| r.fault.is_some()).collect();
+        let largest = |of: fn(&HealthyRun) -> f64| runs.iter().map(of).fold(0.0, f64::max);
         let bound = upper_bound_95(alarms.len() as u64, runs.len() as u64);
         let m = &mut outcome.metrics;
         m.set("false_alarms", alarms.len() as f64);
@@ -194,10 +194,10 @@ impl Work<'_> {
 
     fn over_speed(&self, outcome: &mut Outcome) -> Result<(), Error> {
         let limit = self.context.config.injection.tracked_rpm + ESTIMATE_RPM;
-        let trials: Vec<OverSpeed> = self.all("over-speed", 11, self.runs, |_, seed| {
+        let trials: Vec<OverSpeedTrial> = self.all("over-speed", 11, self.runs, |_, seed| {
             trials::over_speed(self.context.config, seed, limit)
         })?;
-        let late: Vec<&OverSpeed> =
+        let late: Vec<&OverSpeedTrial> =
             trials.iter().filter(|t| t.fault.is_none() || t.late_s > OVER_SPEED_S).collect();
         let latest = trials.iter().map(|t| t.late_s).fold(0.0, f64::max);
         let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
@@ -239,7 +239,7 @@ impl Work<'_> {
                 })
             };
             let (starts, relocks) = (of_kind(false)?, of_kind(true)?);
-            let accepted = |all: &[Start]| all.iter().filter(|s| s.accepted).count();
+            let accepted = |all: &[StartTrial]| all.iter().filter(|s| s.accepted).count();
             let wrong = starts.iter().chain(&relocks).filter(|s| !s.is_honest()).count();
             if rpm == 0.0 {
                 refused_at_rest = 2 * each as usize - accepted(&starts) - accepted(&relocks);

@@ -51,7 +51,7 @@ impl Inverter {
         modulated.compare.map(f64::from)
     }
 
-    /// What the compare values give at the motor, V.
+    /// Mean voltage at the motor for these compare values, V.
     fn voltage(&self, compare: [f64; 3]) -> (f64, f64) {
         clarke(compare.map(|c| c / self.top * self.vdc))
     }

@@ -26,7 +26,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const PERIOD_S: f64 = 1.0 / RATE;
 
-/// An identified plant (A/V) and what the source prints for its controller.
+/// An identified plant (A/V) and the printed controller for it.
 struct Identified {
     name: &'static str,
     key: &'static str,

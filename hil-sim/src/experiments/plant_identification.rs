@@ -82,7 +82,7 @@ impl Record {
     }
 }
 
-/// What the source did, and what it prints.
+/// An excitation of the source, and the printed plant.
 struct Trial {
     name: &'static str,
     key: &'static str,
@@ -149,8 +149,8 @@ fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
     Ok(record.without_mean())
 }
 
-/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and what is left of the current,
-/// A rms.
+/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and the rms residual of the
+/// current, A.
 #[derive(Clone, Copy)]
 struct IdentifiedPlant {
     plant: FirstOrder,
@@ -259,7 +259,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// The current beside what the plant makes of the same voltage, from one measured value on.
+/// The measured current beside the response of the identified plant to the same voltage.
 fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) -> Figure {
     let axis = if trial.axis == Axis::D { "d" } else { "q" };
     let count = record.y.len().min(if trial.key == "steps" { usize::MAX } else { SHOWN });

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Mode, State};
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
@@ -11,7 +12,7 @@ use crate::config::{AngleSource, Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, drive_settings, plant_settings};
+use crate::rig::{Point, Rig, drive_settings, means_over, plant_settings};
 use crate::stats::{Stats, StraightLine};
 
 /// The aim that section 5.2 states.
@@ -34,7 +35,7 @@ const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
 /// A position held under a load.
-struct Held {
+struct HeldPosition {
     load_nm: f64,
     belief: (f64, bool),
     /// Time and mechanical degrees, ten a second.
@@ -45,13 +46,13 @@ struct Held {
     stopped: bool,
 }
 
-impl Held {
+impl HeldPosition {
     /// Slope of a straight line through the track, degrees per minute.
     fn drift(&self) -> f64 {
         60.0 * StraightLine::through(&self.track).slope
     }
 
-    /// What is left beside the line, degrees rms.
+    /// Deviation from that line, degrees rms.
     fn wander(&self) -> f64 {
         let slope = self.drift() / 60.0;
         Stats::of(self.track.iter().map(|(t, x)| x - slope * t)).deviation()
@@ -65,7 +66,7 @@ fn hold(
     load_nm: f64,
     belief: (f64, bool),
     seconds: f64,
-) -> Result<Held, Error> {
+) -> Result<HeldPosition, Error> {
     let mut config = config.clone();
     config.angle.source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
@@ -83,7 +84,7 @@ fn hold(
     rig.run(3.0, |_| {});
     let start = rig.time();
     let origin = rig.plant.mechanical_angle() / TAU;
-    let mut held = Held {
+    let mut held = HeldPosition {
         load_nm,
         belief,
         track: Vec::new(),
@@ -136,7 +137,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let drift = |belief| of(belief).map(|h| h.drift().abs()).fold(0.0, f64::max);
     m.set("drift_no_load_deg_per_min", held[0].drift());
     m.set("drift_max_deg_per_min", drift(BELIEFS[0]));
-    // Odd in the load: what the belief about the rotor is wrong by.
+    // Odd in the load: the error of the believed rotor resistance.
     let per_ampere = |belief| {
         let (mut xy, mut xx) = (0.0, 0.0);
         for h in of(belief) {
@@ -194,10 +195,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn step_figure(without: &[Point], with: &[Point]) -> Figure {
     let x = "time (s)";
     let panel = |label: &str, of: fn(&Point) -> f64| {
-        let line = |points: &[Point]| {
-            let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
-            points.chunks(10).map(|c| (c[0].t, mean(c))).collect::<Vec<_>>()
-        };
+        let line = |points: &[Point]| means_over(CARRIER_SAMPLES, points, of);
         Panel::new(x, label)
             .with(Series::line("without encoder", line(without)))
             .with(Series::line("with encoder", line(with)))
@@ -212,7 +210,7 @@ fn step_figure(without: &[Point], with: &[Point]) -> Figure {
         .panel(panel("flux angle error (° electrical)", |p| p.angle_error_deg))
 }
 
-fn drift_figure(held: &[Held]) -> Figure {
+fn drift_figure(held: &[HeldPosition]) -> Figure {
     let title = "Rotor position while the drive holds what it takes for zero";
     let mut figure = Figure::new("drift", title, "");
     for belief in BELIEFS {

@@ -1,6 +1,6 @@
 //! The angle error over torque current and speed.
 
-use super::steady::{Case, SteadyRun, steady_run};
+use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -21,7 +21,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let grid: Vec<(f64, f64)> =
         SPEEDS_RPM.iter().flat_map(|&n| IQ_A.iter().map(move |&iq| (n, iq))).collect();
     let runs = context.in_parallel("speed-torque-sweep", &grid, |number, &(rpm, iq)| {
-        let case = Case { rpm, iq, seed: context.seed.wrapping_add(number) };
+        let case = OperatingPoint { rpm, iq, seed: context.seed.wrapping_add(number) };
         steady_run(context.config, case, context.seconds.unwrap_or(2.0))
     })?;
 

@@ -22,7 +22,7 @@ pub struct Data {
 /// A solved least-squares problem.
 #[derive(Clone, Debug)]
 pub struct Solution<T: ComplexField> {
-    /// What minimises the squared error.
+    /// The estimate with the least squared error.
     pub theta: DVector<T>,
     /// Upper triangular factor of the regression: its squared error rises from the minimum by
     /// |R (theta - minimum)|².
@@ -33,8 +33,11 @@ pub struct Solution<T: ComplexField> {
     pub residual: f64,
 }
 
-/// Minimises |A theta - y|² by QR factorisation. Refuses a regression that is not finite, has too
-/// few rows or a condition number above [`CONDITION_LIMIT`].
+/// Minimises |A theta - y|² by QR factorisation.
+///
+/// # Errors
+/// When a number is not finite, there are fewer rows than columns, or the condition number exceeds
+/// [`CONDITION_LIMIT`].
 pub fn least_squares<T: ComplexField<RealField = f64>>(
     mut a: DMatrix<T>,
     mut y: DVector<T>,
@@ -107,6 +110,9 @@ impl Data {
 
     /// Model A (Eq. 22 to 24) with four complex unknowns. Same solution as the eight real unknowns
     /// of Eq. 24, to 1e-12.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn regression(&self) -> Result<Regression, NotIdentifiable> {
         let (y, rows): (Vec<_>, Vec<_>) = self.rows().unzip();
         let a = DMatrix::from_fn(rows.len(), 4, |row, column| rows[row][column]);
@@ -121,6 +127,9 @@ impl Data {
     }
 
     /// Model A with the eight real unknowns of Eq. 24, in that order.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn real_regression(&self) -> Result<[f64; 8], NotIdentifiable> {
         let (i, v) = (&self.i, &self.v);
         let count = self.i.len().min(self.v.len()).saturating_sub(2);
@@ -141,6 +150,9 @@ impl Data {
     }
 
     /// The regression of Model B (Eq. 31), in differences.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn first_order(&self) -> Result<FirstOrderTheta, NotIdentifiable> {
         let rows: Vec<_> = self.rows().collect();
         // Eq. 31 multiplies theta_2, theta_4 and theta_7 by -j times the signal.

@@ -9,7 +9,7 @@ use crate::plant::{
     SaliencySettings,
 };
 
-/// What the meters show. Voltages and currents of the two tests with alternating current are phase
+/// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
 /// values, rms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readings {
@@ -106,7 +106,7 @@ const PERIODS: u32 = 10;
 /// How often the supply is set anew until it gives the wanted current: the saliency bends the line.
 const ADJUSTMENTS: u32 = 4;
 
-/// What turns the rotor in the no-load test.
+/// Drive of the rotor in the no-load test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shaft {
     /// Another machine, at synchronous speed: no slip, as section 3.6.3 takes it.
@@ -119,7 +119,7 @@ pub enum Shaft {
 /// [`Readings::PRINTED`].
 ///
 /// # Errors
-/// What the plant refuses of the settings.
+/// [`PlantError`] when the plant refuses the settings.
 pub fn measure(
     machine: &MachineSettings,
     saliency: &SaliencySettings,

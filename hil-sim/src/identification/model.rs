@@ -3,7 +3,7 @@
 
 use super::Complex;
 
-/// What the terminals show of a symmetric machine: all that Eq. 9 needs.
+/// The parameters of a symmetric machine that its terminals determine, as Eq. 9 needs them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// Stator resistance, ohm.
@@ -133,7 +133,7 @@ impl Continuous {
     }
 }
 
-/// x(t+h) = F x(t) + H v(t) (Eq. 10). F - I is kept instead of F, so that what a short period
+/// x(t+h) = F x(t) + H v(t) (Eq. 10). F - I is kept instead of F, so that the part that a short period
 /// changes keeps its digits.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
@@ -289,7 +289,7 @@ pub struct FirstOrderTheta {
 }
 
 impl From<Delta> for FirstOrderTheta {
-    /// Reads Eq. 32 off the coefficients of Model A; what they hold of h_1b is left out.
+    /// Reads Eq. 32 off the coefficients of Model A; their part of h_1b is left out.
     fn from(delta: Delta) -> Self {
         let Delta { g1, g0, h1, u0 } = delta;
         Self {

@@ -34,8 +34,8 @@ pub fn schroeder(period: f64, t: f64) -> f64 {
 /// Six-step plus Schroeder voltage S_s: the same r(t) on either axis, its period two periods of the
 /// fundamental.
 ///
-/// The paper prints neither the phases nor the period nor how r(t) is laid on the axes; of what was
-/// tried, this comes nearest to its tables.
+/// The paper prints neither the phases nor the period nor how r(t) is laid on the axes; this choice
+/// comes nearest to its tables of those that were tried.
 pub fn six_step_and_schroeder(amplitude: f64, hz: f64, t: f64) -> Complex {
     let r = TONE_AMPLITUDE * amplitude * schroeder(2.0 / hz, t);
     six_step(amplitude, hz, t) + Complex::new(r, r)

@@ -1,4 +1,4 @@
-//! The mean errors of many simulated measurements (Eq. 45), beside what the paper prints.
+//! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
 use rayon::prelude::*;
 

@@ -7,7 +7,7 @@ use super::Step;
 /// A table.
 #[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Table {
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Heads of the columns, with units.
     pub columns: Vec<String>,

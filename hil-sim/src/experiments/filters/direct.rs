@@ -4,6 +4,8 @@
 use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
+use crate::experiments::bode::largest_pole;
+
 /// Table 7: numerator, denominator.
 #[rustfmt::skip] // a table
 pub const LPF: [[f64; 9]; 2] = [
@@ -63,20 +65,16 @@ pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex
 /// Largest magnitude of the poles of an 8th-order filter.
 pub fn largest_pole_8(filter: &[[f64; 9]; 2]) -> f64 {
     let [_, a1, a2, a3, a4, a5, a6, a7, a8] = filter[1];
-    magnitude(roots([a1, a2, a3, a4, a5, a6, a7, a8]))
+    largest_pole(roots([a1, a2, a3, a4, a5, a6, a7, a8]))
 }
 
 /// Largest magnitude of the poles of a 4th-order filter.
 pub fn largest_pole_4(filter: &[[f64; 5]; 2]) -> f64 {
     let [_, a1, a2, a3, a4] = filter[1];
-    magnitude(roots([a1, a2, a3, a4]))
+    largest_pole(roots([a1, a2, a3, a4]))
 }
 
-fn magnitude<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
-}
-
-/// The filter in `f64`, direct form I: what the others are measured against.
+/// The reference: the filter in `f64`, direct form I.
 pub fn reference<const N: usize>(filter: [[f64; N]; 2]) -> impl FnMut(f64) -> f64 {
     let ([b, a], mut x, mut y) = (filter, [0.0; N], [0.0; N]);
     move |input| {

@@ -6,7 +6,7 @@ use super::PERIOD_S;
 use crate::experiments::bode::RATE;
 use crate::outcome::{Cell, Table};
 
-/// What the source prints, and what its own parameters give.
+/// The printed values beside those that the printed parameters give.
 pub fn table(motor: &Motor, physical: FirstOrder) -> Table {
     let l_r = motor.l_m + motor.l_lr;
     let l_s = motor.l_m + motor.l_ls;
