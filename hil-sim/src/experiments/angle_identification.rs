@@ -126,21 +126,8 @@ fn poles_text(model: &Model) -> String {
 
 fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table {
     let gain = format!("static gain ({} / rad)", demodulation.unit);
-    let heads = [
-        "iq (A)",
-        "k_phi x 10^5",
-        "printed",
-        "ratio",
-        "poles",
-        "printed poles",
-        gain.as_str(),
-        "printed (mA/rad)",
-        "ratio of gains",
-        "fit (%)",
-        "fit of equation error (%)",
-    ];
     let title = format!("Eq. 3.43 for {}, beside Table 6", demodulation.name);
-    let mut table = Table::new(title, &heads).note(
+    let mut table = Table::new(title, &[]).note(
         "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
          least squares of Appendix A fits, which with noise on the output shifts poles and gain. Fit: \
          100 % less rms error over rms signal, of the simulated output.",
@@ -148,18 +135,18 @@ fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table 
     for (row, p) in points.iter().enumerate() {
         let [equation, model] = &p.models;
         let printed = Model::printed(row);
-        table.row([
-            Cell::fixed(TABLE_6[row].0, 1),
-            Cell::fixed(model.k * 1e5, 3),
-            Cell::fixed(printed.k * 1e5, 3),
-            Cell::fixed(model.k / printed.k, 2),
-            Cell::from(poles_text(model)),
-            Cell::from(poles_text(&printed)),
-            Cell::fixed(model.static_gain() * 1e3, 1),
-            Cell::fixed(printed.static_gain() * 1e3, 1),
-            Cell::fixed(model.static_gain() / printed.static_gain(), 2),
-            Cell::fixed(model.fit(&p.record).1, 1),
-            Cell::fixed(equation.fit(&p.record).1, 1),
+        table.record([
+            ("iq (A)", Cell::fixed(TABLE_6[row].0, 1)),
+            ("k_phi x 10^5", Cell::fixed(model.k * 1e5, 3)),
+            ("printed", Cell::fixed(printed.k * 1e5, 3)),
+            ("ratio", Cell::fixed(model.k / printed.k, 2)),
+            ("poles", Cell::from(poles_text(model))),
+            ("printed poles", Cell::from(poles_text(&printed))),
+            (&gain, Cell::fixed(model.static_gain() * 1e3, 1)),
+            ("printed (mA/rad)", Cell::fixed(printed.static_gain() * 1e3, 1)),
+            ("ratio of gains", Cell::fixed(model.static_gain() / printed.static_gain(), 2)),
+            ("fit (%)", Cell::fixed(model.fit(&p.record).1, 1)),
+            ("fit of equation error (%)", Cell::fixed(equation.fit(&p.record).1, 1)),
         ]);
     }
     table
@@ -168,17 +155,8 @@ fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table 
 /// The gains of the axis alone and of axis and current together, measured and predicted.
 fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
     let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit);
-    let heads = [
-        "iq (A)".to_owned(),
-        unit("axis alone, identified"),
-        unit("axis alone, step"),
-        unit("predicted"),
-        unit("with the current, step"),
-        unit("predicted"),
-        "axis alone over with the current".to_owned(),
-    ];
-    let mut table =
-        Table { columns: heads.to_vec(), ..Table::new("", &[]) }.note(match demodulation.demodulator {
+    let title = format!("Two plants: {}", demodulation.name);
+    let mut table = Table::new(title, &[]).note(match demodulation.demodulator {
             Demodulator::Literal => {
                 "Predicted: the leak of the fundamental, -sqrt2 0.01 0.944 |i| sin(x + gamma) with x the \
                  axis seen from the current's frame: slope sqrt2 0.00944 iq while the current is held; \
@@ -196,7 +174,6 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
                  of the chain, 0.945 2/pi 0.944. "
             }
         });
-    table.title = format!("Two plants: {}", demodulation.name);
     let (id, s) = (config.reference.id_a, &config.saliency);
     let inductance = config.motor.lls + config.motor.llr; // near sigma L_s
     let carrier = config.injection.amplitude_v / (std::f64::consts::TAU * 600.0 * inductance);
@@ -216,14 +193,15 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
             _ => [scale * (flux_part + current_part), scale * flux_part],
         };
         let (held, slow) = (p.held_gain(), p.slow_gain());
-        table.row([
-            Cell::fixed(*iq, 1),
-            Cell::fixed(p.models[1].static_gain() * 1e3, 1),
-            Cell::fixed(held * 1e3, 1),
-            Cell::fixed(predicted[0] * 1e3, 1),
-            Cell::fixed(slow * 1e3, 1),
-            Cell::fixed(predicted[1] * 1e3, 1),
-            if predicted[1] == 0.0 { "-".into() } else { Cell::fixed(held / slow, 2) },
+        let ratio = if predicted[1] == 0.0 { "-".into() } else { Cell::fixed(held / slow, 2) };
+        table.record([
+            ("iq (A)".to_owned(), Cell::fixed(*iq, 1)),
+            (unit("axis alone, identified"), Cell::fixed(p.models[1].static_gain() * 1e3, 1)),
+            (unit("axis alone, step"), Cell::fixed(held * 1e3, 1)),
+            (unit("predicted"), Cell::fixed(predicted[0] * 1e3, 1)),
+            (unit("with the current, step"), Cell::fixed(slow * 1e3, 1)),
+            (unit("predicted"), Cell::fixed(predicted[1] * 1e3, 1)),
+            ("axis alone over with the current".to_owned(), ratio),
         ]);
     }
     table

@@ -229,7 +229,7 @@ fn tracked_table<'a>(
     }
     let mut table = Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
         .note(format!(
-            "StepsRun: 1 A to 2 A, shaft locked. Speeds: a dynamometer holds them, iq = {RUN_IQ_A} A, one \
+            "Steps: 1 A to 2 A, shaft locked. Speeds: a dynamometer holds them, iq = {RUN_IQ_A} A, one \
              second. lost: beyond 45°, or stopped. constant: the printed 10 mA and the printed k_s, both \
              by the gain of the detector, and the printed z_s; Ha and Sul compare with zero. learned: a \
              table over iq instead. retuned: the same, k_s = 0.1 rad/A, z_s = 0.995; the synchronous \

@@ -61,7 +61,7 @@ pub struct LinearModel {
     apparent_angle: f64,
 }
 
-/// LinearResponse of the model, one value per control period.
+/// Response of the model, one value per control period.
 #[derive(Clone, Debug, Default)]
 pub struct LinearResponse {
     /// Angle error, electrical degrees.

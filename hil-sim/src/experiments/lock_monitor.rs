@@ -1,4 +1,4 @@
-//! Does the drive notice a lost or false lock, and only that?
+//! Trials of the lock monitor: lost and false locks, and false alarms.
 
 mod trials;
 
@@ -20,7 +20,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Trials of each forced offset; ten times as many runs are looked at for false alarms.
 const RUNS: u32 = 100;
 const HEALTHY_PER_RUN: u64 = 10;
-/// ForcedTrial offsets, degrees, and their names in the metrics.
+/// Forced offsets, degrees, and their names in the metrics.
 const OFFSETS: [(f64, &str); 5] =
     [(90.0, "p90"), (-90.0, "m90"), (120.0, "p120"), (-120.0, "m120"), (180.0, "180")];
 /// Speeds of the forced offsets, rpm.
@@ -69,21 +69,8 @@ impl Trials<'_> {
     }
 
     fn forced(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let heads = [
-            "forced by (°)",
-            "trials",
-            "stopped",
-            "recovered",
-            "median (s)",
-            "99 % (s)",
-            "longest (s)",
-            "not in time",
-        ];
-        let mut table = Table::new("Angle forced off: how long it stays wrong", &heads);
-        let mut late = Table::new(
-            "Not in time",
-            &["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"],
-        );
+        let mut table = Table::new("Angle forced off: how long it stays wrong", &[]);
+        let mut late = Table::new("Not in time", &[]);
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
         for (number, (degrees, name)) in OFFSETS.into_iter().enumerate() {
@@ -103,23 +90,23 @@ impl Trials<'_> {
             let stopped = trials.iter().filter(|t| t.fault.is_some()).count();
             let missed: Vec<&ForcedTrial> = trials.iter().filter(|t| !t.is_in_time()).collect();
             let count = |n: usize| Cell::fixed(n as f64, 0);
-            table.row([
-                Cell::fixed(degrees, 0),
-                count(trials.len()),
-                count(stopped),
-                count(trials.len() - stopped),
-                Cell::fixed(at(0.5), 3),
-                Cell::fixed(at(0.99), 3),
-                Cell::fixed(at(1.0), 3),
-                count(missed.len()),
+            table.record([
+                ("forced by (°)", Cell::fixed(degrees, 0)),
+                ("trials", count(trials.len())),
+                ("stopped", count(stopped)),
+                ("recovered", count(trials.len() - stopped)),
+                ("median (s)", Cell::fixed(at(0.5), 3)),
+                ("99 % (s)", Cell::fixed(at(0.99), 3)),
+                ("longest (s)", Cell::fixed(at(1.0), 3)),
+                ("not in time", count(missed.len())),
             ]);
             for t in &missed {
-                late.row([
-                    Cell::fixed(degrees, 0),
-                    Cell::from(t.case.seed.to_string()),
-                    Cell::fixed(t.case.iq, 3),
-                    Cell::fixed(t.case.rpm, 1),
-                    Cell::fixed(t.wrong_s, 3),
+                late.record([
+                    ("forced by (°)", Cell::fixed(degrees, 0)),
+                    ("seed", Cell::from(t.case.seed.to_string())),
+                    ("iq (A)", Cell::fixed(t.case.iq, 3)),
+                    ("speed (rpm)", Cell::fixed(t.case.rpm, 1)),
+                    ("wrong for (s)", Cell::fixed(t.wrong_s, 3)),
                 ]);
             }
             let m = &mut outcome.metrics;

@@ -58,7 +58,7 @@ const CASES: [StepCase; 8] = [
     current("3 A to -3 A, rotor 30 % warmer", 3.0, -3.0, 1.3),
 ];
 
-/// StepResponse and predicted response of a case.
+/// Measured and predicted response of a case.
 struct StepResponse {
     case: StepCase,
     /// Mean over the seeds, less the mean before the step.
@@ -72,7 +72,7 @@ struct StepResponse {
 }
 
 impl StepResponse {
-    /// StepResponse minus predicted, rms, degrees.
+    /// Measured minus predicted, rms, degrees.
     fn fit(&self) -> f64 {
         Stats::of(self.angle.iter().zip(&self.predicted).map(|(m, p)| m - p)).rms()
     }

@@ -37,15 +37,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("runs", runs.len() as f64);
     m.set("lost_runs", runs.iter().filter(|r| r.lost).count() as f64);
 
-    let heads: Vec<String> = std::iter::once("speed (rpm)".to_owned())
-        .chain(IQ_A.iter().map(|iq| format!("iq = {iq} A")))
-        .collect();
-    let mut table = Table {
-        title: "Angle error, mean ± rms about it (°)".into(),
-        ..Table::default()
-    }
-    .note("Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.");
-    table.columns = heads;
+    let mut table = Table::new("Angle error, mean ± rms about it (°)", &[]).note(
+        "Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.",
+    );
     for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
         let cell = |r: &SteadyRun| {
             if r.lost {
@@ -54,7 +48,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 Cell::from(format!("{:.1} ± {:.1}", r.error.mean(), r.error.deviation()))
             }
         };
-        table.row(std::iter::once(Cell::fixed(*rpm, 0)).chain(row.iter().map(cell)));
+        let cells = IQ_A.iter().zip(row).map(|(iq, run)| (format!("iq = {iq} A"), cell(run)));
+        table.record([("speed (rpm)".to_owned(), Cell::fixed(*rpm, 0))].into_iter().chain(cells));
     }
     outcome.tables.push(table);
 

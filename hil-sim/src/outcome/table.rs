@@ -30,10 +30,10 @@ impl Table {
     }
 
     /// Adds a row of cells, each with the head of its column; the first row sets the heads.
-    pub fn record<'a>(&mut self, row: impl IntoIterator<Item = (&'a str, Cell)>) {
+    pub fn record<H: Into<String>>(&mut self, row: impl IntoIterator<Item = (H, Cell)>) {
         let (heads, cells): (Vec<_>, Vec<_>) = row.into_iter().unzip();
         if self.rows.is_empty() {
-            self.columns = heads.into_iter().map(str::to_owned).collect();
+            self.columns = heads.into_iter().map(Into::into).collect();
         }
         self.rows.push(cells);
     }
