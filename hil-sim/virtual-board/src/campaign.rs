@@ -20,8 +20,9 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::chip::{Reset, TICKS_PER_PERIOD};
+use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
+use crate::periph::Reset;
 use class::{CLASSES, Class, Course};
 use judge::Seen;
 use scene::Scene;
@@ -155,7 +156,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
             scene.off(0)?;
             let slot = (turn % 2) as usize;
             let word = rng.random_range(0..64);
-            scene.board.chip().flash.tear(crate::board::settings_address(slot, word));
+            scene.board.chip().flash.tear(induction_drive::board::settings_address(slot, word));
             one_set_counts(scene)?;
             scene.board.reset(Reset::Power);
             after_power(scene, true)

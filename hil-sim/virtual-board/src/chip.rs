@@ -1,4 +1,4 @@
-//! FirmwareSettings around the core: time, registers, events.
+//! The chip around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
 //! its PLL.
@@ -7,8 +7,9 @@ mod bus;
 mod execution;
 
 pub use bus::Unknown;
-pub use execution::{Block, Watched};
+pub use execution::Watched;
 
+use crate::cost::Block;
 use crate::periph::adc::Adc;
 use crate::periph::analog::{Comparators, Dacs};
 use crate::periph::debug::Debug;
@@ -21,14 +22,13 @@ use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::syscfg::{Exti, Syscfg};
 use crate::periph::tim1::Tim1;
+use crate::periph::{NEVER, Reset};
 use crate::scs::{self, Scs};
 
 /// Ticks per second.
 pub const TICKS_PER_S: u64 = 170_000_000;
 /// Ticks of a PWM period, from one top of the counter to the next.
-pub const TICKS_PER_PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
-/// No event.
-pub const NEVER: u64 = u64::MAX;
+pub const TICKS_PER_PERIOD: u64 = 2 * induction_drive::board::PWM_TOP as u64;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
@@ -37,19 +37,6 @@ const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
 /// Exception number of the control interrupt, which is the converters'.
 pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
-
-/// Why the chip was reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reset {
-    /// Power came.
-    Power,
-    /// The reset pin.
-    Pin,
-    /// The firmware asked for it.
-    Software,
-    /// The independent watchdog.
-    Watchdog,
-}
 
 /// The chip but for its core and memories.
 #[derive(Clone, Debug)]
@@ -212,7 +199,7 @@ impl Chip {
     /// Whether the pins of the gates are the timer's.
     pub fn gates_connected(&self) -> bool {
         let [a, b, ..] = &self.gpio;
-        let timer = Some(u32::from(crate::board::PWM_AF));
+        let timer = Some(u32::from(induction_drive::board::PWM_AF));
         [7, 8, 9, 10].iter().all(|pin| a.alternate(*pin) == timer)
             && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
     }

@@ -5,8 +5,6 @@
 //! integer division as 6, and a floating-point result that the next instruction needs costs one
 //! more. An estimate: no board has confirmed it.
 
-use crate::chip::Block;
-
 /// More cycles for a branch that is taken: the pipeline fills again.
 pub const TAKEN: u32 = 2;
 /// Exception entry and exit, with the saving and the restoring of the floating-point registers.
@@ -15,6 +13,19 @@ pub const ENTRY: u32 = 12 + 18;
 pub const EXIT: u32 = 12 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
+
+/// Where a block of the control interrupt began, and its cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Address of its first instruction.
+    pub address: u32,
+    /// Bytes.
+    pub size: u32,
+    /// Cycles with its last branch not taken.
+    pub cycles: u32,
+    /// Whether that branch was taken.
+    pub taken: bool,
+}
 
 /// Cycles of blocks, with the branches that were taken.
 pub fn of(blocks: &[Block]) -> u32 {

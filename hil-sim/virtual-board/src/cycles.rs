@@ -12,7 +12,7 @@ use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
 
-use crate::bench::{Options, Worst};
+use crate::board::{Options, Worst};
 use crate::chip::Watched;
 use crate::cost::{self, BUS, TAKEN, instructions};
 use crate::image::Image;

@@ -16,7 +16,7 @@
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
 //!   take effect when they do, with the mean voltage of the period until then.
 
-pub mod bench;
+pub mod board;
 pub mod campaign;
 pub mod chip;
 pub mod cost;
@@ -32,10 +32,7 @@ pub mod scs;
 pub mod shadow;
 pub mod unicorn;
 
-// The firmware's own board, settings and console: one source for both sides.
-use induction_drive::{board, console, rotor_tracking};
-
-pub use bench::{Board, Failure, Options, Period};
+pub use board::{Board, Failure, Options, Period};
 pub use image::Image;
 pub use pair::Pair;
 pub use shadow::Shadow;

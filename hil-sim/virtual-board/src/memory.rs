@@ -7,7 +7,7 @@ pub enum Backing {
     Flash,
     /// Memory.
     Ram,
-    /// Read and written through [`crate::chip::Chip`].
+    /// Reads and writes go to the models of the peripherals.
     Registers,
 }
 

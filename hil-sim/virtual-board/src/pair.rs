@@ -4,7 +4,7 @@
 use anyhow::{Result, bail};
 use drive_core::State;
 
-use crate::bench::{Board, Options, Period};
+use crate::board::{Board, Options, Period};
 use crate::image::Image;
 use crate::shadow::Shadow;
 

@@ -6,10 +6,10 @@ use std::collections::VecDeque;
 use anyhow::{Result, bail};
 use drive_core::{Command, Drive, Settings, State};
 
-use crate::bench::Period;
-use crate::console::grammar::{self, Request};
-use crate::console::keys::FirmwareSettings;
-use crate::rotor_tracking::{Seen, Tracking};
+use crate::board::Period;
+use induction_drive::console::grammar::{self, Request};
+use induction_drive::console::keys::FirmwareSettings;
+use induction_drive::rotor_tracking::{Seen, Tracking};
 
 /// A drive with the settings of the board.
 pub struct Shadow {
@@ -33,7 +33,7 @@ impl Shadow {
     /// Its settings make no drive.
     pub fn new() -> Result<Self> {
         let settings = FirmwareSettings::of_the_board();
-        let dead_time_s = crate::board::dead_time(settings.drive.inverter.dead_time_s).1;
+        let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
         Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })

@@ -5,8 +5,8 @@ mod common;
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
-use virtual_board::chip::Reset;
 use virtual_board::cpu::Cpu;
+use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
 /// Periods that the firmware needs from reset to its greeting, at most.

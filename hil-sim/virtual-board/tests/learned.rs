@@ -3,7 +3,7 @@
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
-use virtual_board::chip::Reset;
+use virtual_board::periph::Reset;
 use virtual_board::{Counting, Image, Options, Pair};
 
 /// Longest that learning takes, periods: two minutes.

@@ -6,7 +6,7 @@ use hil_sim::Config;
 use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use virtual_board::bench::poison::Poison;
+use virtual_board::board::poison::Poison;
 use virtual_board::chip::CONTROL_INTERRUPT;
 use virtual_board::{Counting, Image, Options, Pair};
 

@@ -4,12 +4,12 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::scene::{Places, Source};
-use crate::bench::Board;
-use crate::board as numbers;
+use crate::board::Board;
 use crate::chip::TICKS_PER_S;
 use crate::cpu::{Cpu, Register};
 use drive_core::Sample;
 use hil_sim::plant::EncoderFault;
+use induction_drive::board as firmware_board;
 
 /// Does it, and says what exactly.
 pub type Inject = fn(&mut Board, &Places, &mut dyn Rng) -> String;
@@ -80,7 +80,7 @@ pub const CLASSES: &[Class] = &[
         sources: BOTH,
         course: Course::Regulating(|board, _, rng| {
             let which = rng.random();
-            let line = if which { numbers::CURRENT_A } else { numbers::CURRENT_B };
+            let line = if which { firmware_board::CURRENT_A } else { firmware_board::CURRENT_B };
             let zero = (-line.offset / line.gain).round() as u16;
             board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
             name(which).into()
@@ -93,7 +93,7 @@ pub const CLASSES: &[Class] = &[
         sources: BOTH,
         course: Course::Regulating(|board, _, rng| {
             let (which, high): (bool, bool) = (rng.random(), rng.random());
-            let code = if high { numbers::ADC_FULL_SCALE } else { 0 };
+            let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
             board.disturb = Some(Box::new(move |s| *current(which, s) = code));
             format!("{} at {code}", name(which))
         }),
@@ -107,7 +107,7 @@ pub const CLASSES: &[Class] = &[
             let which = rng.random();
             // 5 mA to 2 A rms.
             let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
-            let codes = amperes / f64::from(numbers::CURRENT_A.gain);
+            let codes = amperes / f64::from(firmware_board::CURRENT_A.gain);
             let mut noise = seeded(rng);
             board.disturb = Some(Box::new(move |s| {
                 let draw: f64 = StandardNormal.sample(&mut noise);
@@ -195,7 +195,7 @@ pub const CLASSES: &[Class] = &[
     },
     Class {
         name: "break pin",
-        bound_ms: numbers::BREAK_REACTION_NS as f64 * 1e-6,
+        bound_ms: firmware_board::BREAK_REACTION_NS as f64 * 1e-6,
         why: "the timer's filter; no software",
         sources: BOTH,
         course: Course::Regulating(|board, _, _| {
@@ -414,7 +414,7 @@ fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: fn(&mut Sample) -> &mut
         *code = match kind {
             0 => held,
             1 => 0,
-            2 => numbers::ADC_FULL_SCALE,
+            2 => firmware_board::ADC_FULL_SCALE,
             _ => (f64::from(*code) + noisy * draw).clamp(0.0, 4095.0) as u16,
         };
     }));

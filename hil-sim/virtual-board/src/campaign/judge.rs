@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use anyhow::{Result, bail, ensure};
 
 use super::scene::{Places, cause};
-use crate::bench::Board;
-use crate::chip::{Reset, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::board::Board;
+use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::periph::Reset;
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
@@ -40,7 +41,7 @@ pub struct Seen {
 /// Bad gate signals; what the board cannot go on with.
 pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) -> Result<Seen> {
     let began = board.chip().now;
-    let trip = f64::from(crate::board::settings().limits.trip_a);
+    let trip = f64::from(induction_drive::board::settings().limits.trip_a);
     let mut seen = Seen::default();
     board.went_off = None;
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;

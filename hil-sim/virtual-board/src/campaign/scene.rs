@@ -7,12 +7,13 @@ use hil_sim::plant::Load;
 use induction_drive::console::keys::FirmwareSettings;
 use induction_drive::store::{Failed, Flash, Loaded, Saved};
 
-use crate::bench::snapshot::Snapshot;
-use crate::bench::{Board, Options};
-use crate::chip::{Chip, Reset};
+use crate::board::snapshot::Snapshot;
+use crate::board::{Board, Options};
+use crate::chip::Chip;
 use crate::image::Image;
 use crate::memory::BANK_2;
 use crate::pair::Pair;
+use crate::periph::Reset;
 
 /// Current on the quadrature axis before the injection, A.
 const TORQUE: &str = "torque 1.5";
@@ -163,7 +164,7 @@ fn started(pair: &mut Pair) -> Result<Snapshot> {
     pair.order(TORQUE)?;
     pair.run(SETTLING, |_, _| {})?;
     // A control interrupt has just ended; half a period later nothing happens for a while.
-    pair.board.run_ticks(u64::from(crate::board::PWM_TOP) / 2)?;
+    pair.board.run_ticks(u64::from(induction_drive::board::PWM_TOP) / 2)?;
     pair.board.keep()
 }
 
@@ -173,7 +174,7 @@ struct Bank<'a>(&'a mut Chip);
 
 impl Flash for Bank<'_> {
     fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
-        let address = crate::board::settings_address(slot, word);
+        let address = induction_drive::board::settings_address(slot, word);
         let (low, torn) = self.0.flash.load(address);
         let (high, _) = self.0.flash.load(address + 4);
         (!torn).then_some(u64::from(low) | u64::from(high) << 32)
@@ -193,7 +194,10 @@ impl Flash for Bank<'_> {
 /// # Errors
 /// It holds none.
 pub fn pair_settings(board: &mut Board) -> Result<FirmwareSettings> {
-    ensure!(crate::board::settings_address(0, 0) >= BANK_2, "settings outside the second bank");
+    ensure!(
+        induction_drive::board::settings_address(0, 0) >= BANK_2,
+        "settings outside the second bank"
+    );
     let mut chip = board.chip().clone();
     match Saved::load(Bank(&mut chip), &FirmwareSettings::of_the_board()).1 {
         Loaded::Settings(settings) => Some(settings),

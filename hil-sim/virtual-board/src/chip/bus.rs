@@ -1,8 +1,8 @@
 //! The bus: reads and writes of registers, each to the model that has it.
 
-use super::{Chip, Reset};
+use super::Chip;
 use crate::memory;
-use crate::periph::Effect;
+use crate::periph::{Effect, Reset};
 use crate::scs;
 
 const TIM2: u32 = 0x4000_0000;

@@ -1,20 +1,8 @@
 //! What the core executes: the time it takes, and the blocks that are kept of it.
 
 use super::Chip;
+use crate::cost::{self, Block};
 use crate::scs;
-
-/// Where a block of the control interrupt began, and its cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// Address of its first instruction.
-    pub address: u32,
-    /// Bytes.
-    pub size: u32,
-    /// Cycles with its last branch not taken.
-    pub cycles: u32,
-    /// Whether that branch was taken.
-    pub taken: bool,
-}
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
 #[derive(Clone, Debug)]
@@ -56,7 +44,7 @@ impl Watched {
             self.present.push(Block { address, size, cycles, taken: false });
             return;
         }
-        let spent = crate::cost::of(&self.present);
+        let spent = cost::of(&self.present);
         if self.calls.iter().all(|call| *call < spent) {
             self.longest.clone_from(&self.present);
         }
@@ -101,7 +89,7 @@ impl Chip {
     pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
         let taken = self.last_block.is_some_and(|(_, end)| end != address);
         if taken {
-            self.now += u64::from(crate::cost::TAKEN);
+            self.now += u64::from(cost::TAKEN);
         }
         self.now += u64::from(cycles);
         self.last_block = Some((address, address + size));

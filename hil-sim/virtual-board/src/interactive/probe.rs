@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 
 use drive_core::settings::AngleSource;
 
-use crate::bench::Board;
+use crate::board::Board;
 use crate::image::Image;
 
 /// Where that lies.

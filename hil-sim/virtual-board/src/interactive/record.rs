@@ -7,7 +7,7 @@ use hil_sim::plant::Plant;
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 
 use super::probe::Belief;
-use crate::bench::Period;
+use crate::board::Period;
 
 /// A quantity that is recorded, in the order of `Means`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use super::pty::Pty;
 use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
-use crate::bench::{Board, Period};
+use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 
 /// Control periods between two looks at the world outside: 5 ms, less than anyone notices.

@@ -1,8 +1,7 @@
 //! ADC1 and ADC2 (RM0440, section 21): calibration, injected sequences started together by TIM1,
 //! analog watchdog 1 on single injected channels. Nothing else of them is modelled.
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[

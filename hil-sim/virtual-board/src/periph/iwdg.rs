@@ -1,7 +1,6 @@
 //! The independent watchdog (RM0440, section 42), with the typical 32 kHz.
 
-use super::Effect;
-use crate::chip::NEVER;
+use super::{Effect, NEVER};
 
 /// Ticks per cycle of its clock.
 const CLOCK: u64 = 170_000_000 / 32_000;

@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[

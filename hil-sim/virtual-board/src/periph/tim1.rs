@@ -3,8 +3,7 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[

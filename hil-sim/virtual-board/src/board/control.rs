@@ -3,8 +3,7 @@
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
-use crate::chip::Block;
-use crate::cost;
+use crate::cost::{self, Block};
 use crate::cpu::Cpu;
 
 /// One control interrupt, as seen from outside.

@@ -20,11 +20,12 @@ pub use failure::Failure;
 pub use motor::Disturbance;
 pub use options::Options;
 
-use crate::chip::{Chip, Reset, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
+use crate::periph::Reset;
 use crate::periph::tim1::GateLimits;
 use crate::unicorn::UnicornCpu;
 use control::Entered;

@@ -3,9 +3,10 @@
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
-use super::{Board, Compare, Reset, Sample};
+use super::{Board, Compare, Sample};
 use crate::chip::Chip;
 use crate::cpu::Cpu;
+use crate::periph::Reset;
 use crate::unicorn::Standing;
 
 /// FirmwareSettings of a board that moves.

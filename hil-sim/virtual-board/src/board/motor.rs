@@ -4,10 +4,10 @@ use anyhow::Result;
 use drive_core::{Compare, Sample};
 
 use super::{Board, Failure};
-use crate::board as numbers;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::periph::tim1::BadGates;
+use induction_drive::board as firmware_board;
 
 /// A change of what the converters see.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
@@ -66,10 +66,10 @@ impl Board {
         let s = self.sample;
         let chip = self.cpu.chip_mut();
         let pins = [
-            (0, numbers::ADC1_CHANNELS.0, s.current_a),
-            (0, numbers::ADC1_CHANNELS.1, s.dc_link),
-            (1, numbers::ADC2_CHANNELS.0, s.current_b),
-            (1, numbers::ADC2_CHANNELS.1, s.heat_sink),
+            (0, firmware_board::ADC1_CHANNELS.0, s.current_a),
+            (0, firmware_board::ADC1_CHANNELS.1, s.dc_link),
+            (1, firmware_board::ADC2_CHANNELS.0, s.current_b),
+            (1, firmware_board::ADC2_CHANNELS.1, s.heat_sink),
         ];
         for (converter, channel, code) in pins {
             chip.adc.inputs[converter][usize::from(channel)] = code;

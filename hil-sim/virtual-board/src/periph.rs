@@ -13,6 +13,22 @@ pub mod rcc;
 pub mod syscfg;
 pub mod tim1;
 
+/// Time of an event that does not come, ticks.
+pub const NEVER: u64 = u64::MAX;
+
+/// Cause of a reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Power-on.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// A request of the firmware.
+    Software,
+    /// The independent watchdog.
+    Watchdog,
+}
+
 /// What a write does beyond its register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
