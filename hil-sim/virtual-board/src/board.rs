@@ -11,15 +11,16 @@ pub mod snapshot;
 
 use std::collections::VecDeque;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use drive_core::{Compare, Sample};
 use hil_sim::plant::Plant;
 
-pub use control::{Period, Worst};
+pub use control::{LongestPath, Period};
 pub use failure::Failure;
 pub use motor::Disturbance;
 pub use options::Options;
 
+use crate::addresses::Addresses;
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::image::Image;
@@ -57,7 +58,7 @@ pub struct Board {
     stalled_until: u64,
     entered: Option<Entered>,
     periods: VecDeque<Period>,
-    order_flag: u32,
+    addresses: Addresses,
     /// Changes every sample, if there.
     pub disturb: Option<Disturbance>,
     /// Compares what control interrupts preempt before and after, if there.
@@ -69,9 +70,9 @@ pub struct Board {
     /// Resets since power-on, in order.
     pub resets: Vec<(u64, Reset)>,
     /// The longest control interrupt, when cycles are counted.
-    pub worst: Worst,
+    pub longest: LongestPath,
     /// The longest way to the compare values.
-    pub worst_to_compares: Worst,
+    pub longest_to_compares: LongestPath,
     /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
     pended: Option<u64>,
     /// Longest from there to its first instruction, ticks.
@@ -97,10 +98,7 @@ impl Board {
             }
             cpu.write(segment.address, &segment.bytes);
         }
-        let (size, offset) =
-            image.member("Mailbox<drive_core::drive::command::Command>", "full")?;
-        let order_flag =
-            image.variable("start_control", size).context("mailbox of orders")? + offset;
+        let addresses = Addresses::new(&image)?;
         let log = Log::new(&image)?;
         let mut board = Self {
             cpu,
@@ -119,14 +117,14 @@ impl Board {
             stalled_until: 0,
             entered: None,
             periods: VecDeque::new(),
-            order_flag,
+            addresses,
             disturb: None,
             poison: None,
             went_off: None,
             short_pulses: 0,
             resets: Vec::new(),
-            worst: Worst::default(),
-            worst_to_compares: Worst::default(),
+            longest: LongestPath::default(),
+            longest_to_compares: LongestPath::default(),
             pended: None,
             latest_start: 0,
             preempt_at: None,
@@ -145,6 +143,27 @@ impl Board {
     /// A word of memory.
     pub fn word(&self, address: u32) -> Option<u32> {
         self.cpu.word(address)
+    }
+
+    /// A byte of memory.
+    pub fn byte(&self, address: u32) -> Option<u8> {
+        let mut byte = [0];
+        self.read(address, &mut byte).then_some(byte[0])
+    }
+
+    /// Reads memory; `false` where there is none.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.cpu.read(address, bytes)
+    }
+
+    /// Addresses of the firmware's data.
+    pub fn addresses(&self) -> &Addresses {
+        &self.addresses
+    }
+
+    /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
+    pub fn flux_angle(&self) -> f64 {
+        f64::from(self.word(self.addresses.phi).unwrap_or(0)) / 2_f64.powi(32)
     }
 
     /// The chip.

@@ -133,11 +133,11 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
-            let what = inject(&mut scene.board, &scene.places, &mut rng);
+            let what = inject(&mut scene.board, &scene.regions, &mut rng);
             let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
-            let mut seen = judge::watch(&mut scene.board, &scene.places, ms, promised)
-                .with_context(|| what.clone())?;
+            let mut seen =
+                judge::watch(&mut scene.board, ms, promised).with_context(|| what.clone())?;
             if seen.off_ms.is_some() {
                 judge::reported(&mut scene.board, whole_start)
                     .with_context(|| format!("{what}; after the end"))?;

@@ -16,6 +16,7 @@
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
 //!   take effect when they do, with the mean voltage of the period until then.
 
+pub mod addresses;
 pub mod board;
 pub mod campaign;
 pub mod chip;

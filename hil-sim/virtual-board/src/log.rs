@@ -25,7 +25,7 @@ impl Log {
     pub fn new(image: &Image) -> Result<Self> {
         let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
         let table = table.context("the image has no defmt log")?;
-        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.0, bytes: Vec::new() })
+        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.address, bytes: Vec::new() })
     }
 
     /// Forgets the beginning of a frame.

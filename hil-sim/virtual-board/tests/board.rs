@@ -2,7 +2,7 @@
 
 mod common;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
 use virtual_board::cpu::Cpu;
@@ -121,19 +121,14 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
         [(true, "74 code of the control"), (false, "75 coefficients of the control")]
     {
         let mut pair = common::regulating(6)?;
-        let image = pair.board.image();
-        let (running, _) = image.symbol("control7RUNNING")?;
-        // The last word of the code, which is padding or never executed here; the direct current.
+        // The last word of the code, which is padding or never executed here; the direct current, by its value.
         let address = if code {
-            image.address("__eccm")? - 4
+            pair.board.image().symbol("__eccm")?.address - 4
         } else {
-            let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
-            running
-                + at("Running", "control")?
-                + at("Control", "drive")?
-                + at("Drive", "c")?
-                + at("Coefficients", "sequence")?
-                + at("SequenceSteps", "i_d")?
+            let region = pair.board.addresses().coefficients;
+            let i_d = Some(pair.shadow.settings().sequence.i_d.to_bits());
+            let mut words = (region.address..region.end()).step_by(4);
+            words.find(|at| pair.board.word(*at) == i_d).context("no direct current")?
         };
         let word = pair.board.word(address).unwrap_or(0) ^ 1 << 20;
         pair.board.cpu().write(address, &word.to_le_bytes());

@@ -34,7 +34,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     pair.until_state(State::Torque)?;
     let mut board = pair.board;
     board.logged()?;
-    board.poison = Some(Poison::new(board.image().address("_stack_start")?));
+    board.poison = Some(Poison::new(board.image().symbol("_stack_start")?.address));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let (mut periods, mut replies) = (0_u64, 0);
     while board.poison.as_ref().is_some_and(|poison| poison.intact < INTERRUPTS) {

@@ -64,7 +64,7 @@ fn both(
     rig.start(mode)?;
     let mut host = Vec::new();
     for (_, command, periods) in steps {
-        rig.command(*command)?;
+        rig.command(command)?;
         for _ in 0..*periods {
             // The truth at the sample, before the plant moves on.
             let before = rig.plant.clone();

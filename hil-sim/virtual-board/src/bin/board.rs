@@ -61,7 +61,7 @@ fn run(options: &Options) -> Result<()> {
         seconds: config.extent.seconds,
         paced: !options.fast,
     };
-    let mut session = Session::new(board, pty, outside)?;
+    let mut session = Session::new(board, pty, outside);
     let end = session.run(|line| say(&line.to_string()));
     let path = write(options, &config, &session)?;
     say(&format!("Report: {}", path.display()));

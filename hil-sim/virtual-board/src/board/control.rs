@@ -3,6 +3,7 @@
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
+use crate::addresses::Addresses;
 use crate::cost::{self, Block};
 use crate::cpu::Cpu;
 
@@ -35,7 +36,7 @@ pub(super) struct Entered {
 
 /// The longest way through the control interrupt.
 #[derive(Clone, Debug, Default)]
-pub struct Worst {
+pub struct LongestPath {
     /// Estimated cycles.
     pub cycles: u32,
     /// Accesses to registers.
@@ -45,9 +46,11 @@ pub struct Worst {
 }
 
 impl Board {
+    /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
-        let mut flag = [0];
-        self.cpu.read(self.order_flag, &mut flag) && flag[0] == 1
+        let Addresses { orders, order_waits, .. } = self.addresses;
+        let mailbox = self.word(orders);
+        mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }
 
     pub(super) fn begin_control(&mut self) {
@@ -93,13 +96,13 @@ impl Board {
         let (cycles, accesses) = way(&chip.blocks, chip.accesses);
         let cycles = cycles + cost::EXIT;
         let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
-        let note = |worst: &mut Worst, cycles, accesses, blocks: &[Block]| {
-            if cycles > worst.cycles && !blocks.is_empty() {
-                *worst = Worst { cycles, accesses, blocks: blocks.to_vec() };
+        let note = |longest: &mut LongestPath, cycles, accesses, blocks: &[Block]| {
+            if cycles > longest.cycles && !blocks.is_empty() {
+                *longest = LongestPath { cycles, accesses, blocks: blocks.to_vec() };
             }
         };
-        note(&mut self.worst, cycles, accesses, &chip.blocks);
-        note(&mut self.worst_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
+        note(&mut self.longest, cycles, accesses, &chip.blocks);
+        note(&mut self.longest_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };

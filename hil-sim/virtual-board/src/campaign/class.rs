@@ -3,16 +3,17 @@
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::scene::{Places, Source};
+use super::scene::{Regions, Source};
 use crate::board::Board;
 use crate::chip::TICKS_PER_S;
 use crate::cpu::{Cpu, Register};
+use crate::memory::Region;
 use drive_core::Sample;
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 
 /// Does it, and says what exactly.
-pub type Inject = fn(&mut Board, &Places, &mut dyn Rng) -> String;
+pub type Inject = fn(&mut Board, &Regions, &mut dyn Rng) -> String;
 
 /// What happens in a run of a class.
 #[derive(Clone, Copy)]
@@ -136,8 +137,8 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * CARRIER_MS + STEP_MS,
         why: "what is used once in a carrier period shows in the next one",
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
-            let (base, size) = places.control;
+        course: Course::Regulating(|board, regions, rng| {
+            let Region { address: base, size } = regions.state;
             // A word that holds a plausible number; angles and counts are another class.
             for _ in 0..1000 {
                 let address = base + 4 * rng.random_range(0..size / 4);
@@ -218,39 +219,39 @@ pub const CLASSES: &[Class] = &[
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.coefficients)),
+        course: Course::Regulating(|board, regions, rng| flip(board, rng, regions.coefficients)),
     },
     Class {
         name: "bit flip in the drive's state",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.control)),
+        course: Course::Regulating(|board, regions, rng| flip(board, rng, regions.state)),
     },
     Class {
         name: "bit flip in the control's code",
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.code)),
+        course: Course::Regulating(|board, regions, rng| flip(board, rng, regions.code)),
     },
     Class {
         name: "bit flip anywhere in the control's data",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.ccm_data)),
+        course: Course::Regulating(|board, regions, rng| flip(board, rng, regions.control)),
     },
     Class {
         name: "bit flip in RAM, stack included",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
+        course: Course::Regulating(|board, regions, rng| {
             let area = if rng.random() {
-                places.data
+                regions.data
             } else {
-                (places.stack.0 + places.stack.1 - 1024, 1024)
+                Region { address: regions.stack.end() - 1024, size: 1024 }
             };
             flip(board, rng, area)
         }),
@@ -335,9 +336,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "the next interrupt does not find room for its frame",
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
+        course: Course::Regulating(|board, regions, rng| {
             let room = 8 * rng.random_range(0..13);
-            board.cpu().set(Register::Sp, places.stack.0 + room);
+            board.cpu().set(Register::Sp, regions.stack.address + room);
             format!("room for {room} bytes")
         }),
     },
@@ -426,12 +427,11 @@ fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: fn(&mut Sample) -> &mut
     }
 }
 
-fn flip(board: &mut Board, rng: &mut dyn Rng, (base, size): (u32, u32)) -> String {
-    let address = base + rng.random_range(0..size);
+fn flip(board: &mut Board, rng: &mut dyn Rng, region: Region) -> String {
+    let offset = rng.random_range(0..region.size);
+    let address = region.address + offset;
     let bit = rng.random_range(0..8);
-    let mut byte = [0];
-    board.cpu().read(address, &mut byte);
-    byte[0] ^= 1 << bit;
-    board.cpu().write(address, &byte);
-    format!("bit {bit} of {address:#010x}, {:#x} from the beginning", address - base)
+    let byte = board.byte(address).unwrap_or(0) ^ 1 << bit;
+    board.cpu().write(address, &[byte]);
+    format!("bit {bit} of {address:#010x}, {offset:#x} from the beginning")
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use super::scene::{Places, cause};
+use super::scene::cause;
 use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::periph::Reset;
@@ -39,7 +39,7 @@ pub struct Seen {
 ///
 /// # Errors
 /// Bad gate signals; what the board cannot go on with.
-pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) -> Result<Seen> {
+pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Seen> {
     let began = board.chip().now;
     let trip = f64::from(induction_drive::board::settings().limits.trip_a);
     let mut seen = Seen::default();
@@ -59,7 +59,7 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) ->
             seen.off_ms = Some(since(at));
             break;
         }
-        let error = angle_error(board, places);
+        let error = angle_error(board);
         seen.angle_deg = seen.angle_deg.max(error);
         // Written so that not-a-number is wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
@@ -71,9 +71,8 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) ->
 }
 
 /// Between the flux and where the drive believes it, degrees.
-fn angle_error(board: &mut Board, places: &Places) -> f64 {
-    let turns = f64::from(board.word(places.phi).unwrap_or(0) as i32) / 2_f64.powi(32);
-    let error = (board.plant.rotor_flux_angle() / TAU - turns).rem_euclid(1.0);
+fn angle_error(board: &Board) -> f64 {
+    let error = (board.plant.rotor_flux_angle() / TAU - board.flux_angle()).rem_euclid(1.0);
     error.min(1.0 - error) * 360.0
 }
 

@@ -7,11 +7,12 @@ use hil_sim::plant::Load;
 use induction_drive::console::keys::FirmwareSettings;
 use induction_drive::store::{Failed, Flash, Loaded, Saved};
 
+use crate::addresses::Addresses;
 use crate::board::snapshot::Snapshot;
 use crate::board::{Board, Options};
 use crate::chip::Chip;
 use crate::image::Image;
-use crate::memory::BANK_2;
+use crate::memory::{BANK_2, Region};
 use crate::pair::Pair;
 use crate::periph::Reset;
 
@@ -38,47 +39,34 @@ pub enum Source {
     FastEncoder,
 }
 
-/// Places in memory.
+/// Regions of memory in which bits flip.
 #[derive(Clone, Copy, Debug)]
-pub struct Places {
-    /// The drive's coefficients: address, bytes.
-    pub coefficients: (u32, u32),
-    /// What moves while it regulates: address, bytes.
-    pub control: (u32, u32),
-    /// The estimated flux angle.
-    pub phi: u32,
-    /// Data in RAM, without the stack: address, bytes.
-    pub data: (u32, u32),
-    /// The control's code, in CCM: address, bytes.
-    pub code: (u32, u32),
-    /// The control's data, in CCM: address, bytes.
-    pub ccm_data: (u32, u32),
-    /// Lowest address and size of the stack.
-    pub stack: (u32, u32),
+pub struct Regions {
+    /// The drive's coefficients.
+    pub coefficients: Region,
+    /// What changes in the drive while it regulates.
+    pub state: Region,
+    /// All data of the control interrupt, in CCM.
+    pub control: Region,
+    /// The code of the control interrupt, in CCM.
+    pub code: Region,
+    /// Data in RAM, without the stack.
+    pub data: Region,
+    /// The stack.
+    pub stack: Region,
 }
 
-impl Places {
-    fn of(image: &Image) -> Result<Self> {
-        let running = image.symbol("control7RUNNING")?;
-        let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
-        let drive = running.0 + at("Running", "control")? + at("Control", "drive")?;
-        let size = |name: &str, member: &str| image.member(name, member).map(|found| found.0);
-        let end = |name: &str| image.address(name);
-        let (data, data_end) = (end("__sdata")?, end("__euninit")?);
-        let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
-        let (code, code_end) = (end("__sccm")?, end("__eccm")?);
-        Ok(Self {
-            coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
-            control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
-            phi: drive
-                + at("Drive", "control")?
-                + at("ControlState", "seen")?
-                + at("Observed", "phi")?,
-            data: (data, data_end - data),
-            code: (code, code_end - code),
-            ccm_data: running,
-            stack: (stack, stack_end - stack),
-        })
+impl Regions {
+    fn new(board: &Board) -> Result<Self> {
+        let Addresses { coefficients, state, control, .. } = *board.addresses();
+        let between = |first: &str, end: &str| {
+            let address = board.image().symbol(first)?.address;
+            anyhow::Ok(Region { address, size: board.image().symbol(end)?.address - address })
+        };
+        let code = between("__sccm", "__eccm")?;
+        let data = between("__sdata", "__euninit")?;
+        let stack = between("_stack_end", "_stack_start")?;
+        Ok(Self { coefficients, state, control, code, data, stack })
     }
 }
 
@@ -86,8 +74,8 @@ impl Places {
 pub struct Scene {
     /// The board.
     pub board: Board,
-    /// Places in its memory.
-    pub places: Places,
+    /// Where bits flip.
+    pub regions: Regions,
     /// Two sets of settings.
     pub settings: [FirmwareSettings; 2],
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
@@ -103,7 +91,6 @@ impl Scene {
     /// # Errors
     /// It does not start.
     pub fn new(image: Image) -> Result<Self> {
-        let places = Places::of(&image)?;
         let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
         pair.order("set wiring_checked yes")?;
         // Twice: both pages hold a set.
@@ -133,7 +120,8 @@ impl Scene {
         };
         let encoder = [with_encoder(SPEEDS[0])?, with_encoder(SPEEDS[1])?];
         let board = pair.board;
-        Ok(Self { board, places, settings: [old, new], off, injection, encoder })
+        let regions = Regions::new(&board)?;
+        Ok(Self { board, regions, settings: [old, new], off, injection, encoder })
     }
 
     /// Regulating torque.

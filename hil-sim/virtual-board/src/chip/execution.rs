@@ -2,13 +2,14 @@
 
 use super::Chip;
 use crate::cost::{self, Block};
+use crate::memory::Region;
 use crate::scs;
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
 #[derive(Clone, Debug)]
 pub struct Watched {
-    /// Where it begins and ends.
-    pub range: (u32, u32),
+    /// Where it lies in the flash.
+    pub function: Region,
     /// Estimated cycles of each call, interrupts not counted.
     pub calls: Vec<u32>,
     /// The blocks of the longest.
@@ -18,16 +19,15 @@ pub struct Watched {
 }
 
 impl Watched {
-    /// A function in the flash, at an address, with its size in bytes.
-    pub fn new((address, size): (u32, u32)) -> Self {
-        let range = (address, address + size);
-        Self { range, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
+    /// Counts the calls of a function in the flash.
+    pub fn new(function: Region) -> Self {
+        Self { function, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
     }
 
     /// Whether a block is its own.
     #[inline]
     pub fn has(&self, address: u32) -> bool {
-        (self.range.0..self.range.1).contains(&address)
+        (self.function.address..self.function.end()).contains(&address)
     }
 
     /// A block of the flash is about to be executed; `cycles` of one of its own.
@@ -35,7 +35,7 @@ impl Watched {
         if let Some(last) = self.present.last_mut() {
             last.taken = last.address + last.size != address;
         }
-        if address == self.range.0 {
+        if address == self.function.address {
             self.present.clear();
         } else if self.present.is_empty() {
             return;

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
-use super::probe::Probe;
 use super::pty::Pty;
+use super::readings::Readings;
 use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
@@ -56,7 +56,6 @@ pub struct Outside {
 pub struct Session {
     board: Board,
     pty: Pty,
-    probe: Probe,
     outside: Outside,
     typed: Assembler,
     said: Assembler,
@@ -72,15 +71,10 @@ pub struct Session {
 
 impl Session {
     /// A session with a board that has just been powered.
-    ///
-    /// # Errors
-    /// The image has no telemetry.
-    pub fn new(board: Board, pty: Pty, outside: Outside) -> Result<Self> {
-        let probe = Probe::new(board.image())?;
-        Ok(Self {
+    pub fn new(board: Board, pty: Pty, outside: Outside) -> Self {
+        Self {
             board,
             pty,
-            probe,
             outside,
             typed: Assembler::default(),
             said: Assembler::default(),
@@ -89,7 +83,7 @@ impl Session {
             lines: Vec::new(),
             record: Record::default(),
             behind_s: 0.0,
-        })
+        }
     }
 
     /// The board.
@@ -189,9 +183,9 @@ impl Session {
         let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
         self.board.run_ticks(end - now)?;
         while let Some(period) = self.board.next_period() {
-            let belief = self.probe.read(&self.board);
+            let readings = Readings::new(&self.board);
             let time = period.began as f64 / TICKS_PER_S as f64;
-            self.record.take(time, &self.board.plant, &period, &belief);
+            self.record.take(time, &self.board.plant, &period, &readings);
             self.last = Some(period);
         }
         Ok(())
