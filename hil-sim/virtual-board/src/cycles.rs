@@ -31,7 +31,7 @@ const BLOCKS: [(&str, &[&str]); 10] = [
     (
         "protection",
         &[
-            "Drive>::protect",
+            "Coefficients>::protect",
             "drive_core::protect::plausibility",
             "drive_core::protect::lock_monitor",
         ],
