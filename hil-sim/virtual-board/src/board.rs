@@ -28,7 +28,6 @@ use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
 use crate::periph::tim1::GateLimits;
-use crate::unicorn::UnicornCpu;
 use control::Entered;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
@@ -39,7 +38,7 @@ const IDLE_LIMIT: u32 = 100_000;
 
 /// The board.
 pub struct Board {
-    cpu: UnicornCpu,
+    cpu: Cpu,
     image: Image,
     log: Log,
     lines: Vec<String>,
@@ -89,8 +88,8 @@ impl Board {
     /// What is wrong with the image or the plant.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
-        let mut cpu = UnicornCpu::new(Chip::new(), options.counting)
-            .map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let mut cpu =
+            Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
             if segment.address < memory::FLASH || end > memory::BANK_2 {
@@ -136,7 +135,7 @@ impl Board {
     }
 
     /// The core.
-    pub fn cpu(&mut self) -> &mut UnicornCpu {
+    pub fn cpu(&mut self) -> &mut Cpu {
         &mut self.cpu
     }
 
@@ -254,13 +253,8 @@ impl Board {
     /// Lets happen what is due.
     fn events(&mut self) -> Result<()> {
         self.see_outputs();
-        loop {
-            let happened = self.cpu.chip_mut().catch_up();
-            if let Some(at) = happened.crest {
-                self.crest(at)?;
-            } else {
-                break;
-            }
+        while let Some(at) = self.cpu.chip_mut().catch_up() {
+            self.crest(at)?;
         }
         self.see_outputs();
         let chip = self.cpu.chip_mut();

@@ -9,6 +9,7 @@
 //! ten goes on until the console greets, as the design of the control takes seconds.
 
 mod class;
+mod faults;
 mod judge;
 mod scene;
 

@@ -12,17 +12,15 @@ pub use execution::Watched;
 use crate::cost::Block;
 use crate::periph::adc::Adc;
 use crate::periph::analog::{Comparators, Dacs};
-use crate::periph::debug::Debug;
 use crate::periph::encoder::EncoderTimer;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
-use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
-use crate::periph::syscfg::{Exti, Syscfg};
+use crate::periph::syscfg::Syscfg;
 use crate::periph::tim1::Tim1;
-use crate::periph::{NEVER, Reset};
+use crate::periph::{NEVER, Reset, Store, plain};
 use crate::scs::{self, Scs};
 
 /// Ticks per second.
@@ -75,7 +73,7 @@ pub struct Chip {
     /// Clocks.
     pub rcc: Rcc,
     /// Supply.
-    pub pwr: Pwr,
+    pub pwr: Store,
     /// Flash.
     pub flash: Flash,
     /// Ports A to G.
@@ -83,7 +81,7 @@ pub struct Chip {
     /// System configuration.
     pub syscfg: Syscfg,
     /// Interrupts of pins and comparators.
-    pub exti: Exti,
+    pub exti: Store,
     /// Timer of the power stage.
     pub tim1: Tim1,
     /// Timer of the encoder.
@@ -99,7 +97,7 @@ pub struct Chip {
     /// Watchdog.
     pub iwdg: Iwdg,
     /// Debug support.
-    pub debug: Debug,
+    pub debug: Store,
 }
 
 impl Chip {
@@ -123,11 +121,11 @@ impl Chip {
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
-            pwr: Pwr::default(),
+            pwr: Store::new(plain::PWR),
             flash: Flash::new(),
             gpio: std::array::from_fn(Gpio::new),
             syscfg: Syscfg::default(),
-            exti: Exti::default(),
+            exti: Store::new(plain::EXTI),
             tim1: Tim1::default(),
             tim2: EncoderTimer::default(),
             adc: Adc::default(),
@@ -135,7 +133,7 @@ impl Chip {
             dac: Dacs::default(),
             lpuart: Lpuart::default(),
             iwdg: Iwdg::default(),
-            debug: Debug::default(),
+            debug: Store::new(plain::DEBUG),
         }
     }
 
@@ -220,9 +218,9 @@ impl Chip {
         self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
     }
 
-    /// Lets happen what is due by now, up to the top of the PWM counter.
-    pub fn catch_up(&mut self) -> Happened {
-        let mut happened = Happened::default();
+    /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
+    /// reached, where the world outside moves on before anything later happens.
+    pub fn catch_up(&mut self) -> Option<u64> {
         let now = self.now;
         self.attention = false;
         while self.tim1.next_event() <= now {
@@ -231,8 +229,7 @@ impl Chip {
                 self.adc.trigger(at);
             }
             if event.crest {
-                happened.crest = Some(event.at);
-                return happened; // the world outside moves on first
+                return Some(event.at);
             }
         }
         if self.rcc.happen(now) {
@@ -248,7 +245,7 @@ impl Chip {
             self.scs.pend(scs::SYSTICK);
         }
         self.update_lines();
-        happened
+        None
     }
 }
 
@@ -256,11 +253,4 @@ impl Default for Chip {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// What [`Chip::catch_up`] has seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Happened {
-    /// The counter of TIM1 was at its top then; nothing that comes later has happened yet.
-    pub crest: Option<u64>,
 }

@@ -31,10 +31,9 @@ pub mod pair;
 pub mod periph;
 pub mod scs;
 pub mod shadow;
-pub mod unicorn;
 
 pub use board::{Board, Failure, Options, Period};
+pub use cpu::Counting;
 pub use image::Image;
 pub use pair::Pair;
 pub use shadow::Shadow;
-pub use unicorn::Counting;

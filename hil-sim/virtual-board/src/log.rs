@@ -37,13 +37,10 @@ impl Log {
     ///
     /// # Errors
     /// It cannot be decoded.
-    pub fn take(&mut self, cpu: &mut impl Cpu) -> Result<Vec<String>> {
+    pub fn take(&mut self, cpu: &mut Cpu) -> Result<Vec<String>> {
         let at = self.control_block + BUFFER;
-        let word = |cpu: &mut dyn FnMut(u32) -> Option<u32>, n: u32| cpu(at + 4 * n);
-        let mut read = |address| cpu.word(address);
-        let (Some(buffer), Some(size), Some(written), Some(mut next)) =
-            (word(&mut read, 1), word(&mut read, 2), word(&mut read, 3), word(&mut read, 4))
-        else {
+        let words = [1, 2, 3, 4].map(|n| cpu.word(at + 4 * n));
+        let [Some(buffer), Some(size), Some(written), Some(mut next)] = words else {
             return Ok(Vec::new());
         };
         if size == 0 || size > memory::RAM_SIZE || next >= size || written >= size {

@@ -2,13 +2,12 @@
 
 pub mod adc;
 pub mod analog;
-pub mod debug;
 pub mod encoder;
 pub mod flash;
 pub mod gpio;
 pub mod iwdg;
 pub mod lpuart;
-pub mod pwr;
+pub mod plain;
 pub mod rcc;
 pub mod syscfg;
 pub mod tim1;

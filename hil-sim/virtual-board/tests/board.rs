@@ -5,7 +5,6 @@ mod common;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
-use virtual_board::cpu::Cpu;
 use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 

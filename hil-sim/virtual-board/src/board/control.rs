@@ -5,7 +5,6 @@ use drive_core::{Compare, Hardware, Sample};
 use super::Board;
 use crate::addresses::Addresses;
 use crate::cost::{self, Block};
-use crate::cpu::Cpu;
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]

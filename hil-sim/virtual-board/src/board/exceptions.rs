@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::{Board, Failure};
 use crate::chip::CONTROL_INTERRUPT;
-use crate::cpu::{Cpu, Fault, Register, Stop};
+use crate::cpu::{Fault, Register, Stop};
 use crate::memory;
 use crate::scs;
 

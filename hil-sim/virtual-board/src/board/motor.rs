@@ -5,7 +5,6 @@ use drive_core::{Compare, Sample};
 
 use super::{Board, Failure};
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::cpu::Cpu;
 use crate::periph::tim1::BadGates;
 use induction_drive::board as firmware_board;
 

@@ -4,8 +4,8 @@ use hil_sim::config::Config;
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
 use crate::chip::TICKS_PER_S;
+use crate::cpu::Counting;
 use crate::periph::tim1::GateLimits;
-use crate::unicorn::Counting;
 use induction_drive::board as firmware_board;
 
 /// What a board is made with.

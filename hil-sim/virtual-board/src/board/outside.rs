@@ -4,7 +4,6 @@ use anyhow::Result;
 
 use super::Board;
 use crate::chip::CONTROL_INTERRUPT;
-use crate::cpu::Cpu;
 
 impl Board {
     /// Puts a line, without its end, on the wire to the console.

@@ -2,7 +2,7 @@
 //! registers, which are poisoned as the interrupt begins: what is not restored shows.
 
 use super::{Board, Failure};
-use crate::cpu::{Cpu, Register};
+use crate::cpu::Register;
 use crate::memory;
 
 /// What was before a control interrupt.

@@ -5,9 +5,8 @@ use hil_sim::plant::Plant;
 
 use super::{Board, Compare, Sample};
 use crate::chip::Chip;
-use crate::cpu::Cpu;
+use crate::cpu::Standing;
 use crate::periph::Reset;
-use crate::unicorn::Standing;
 
 /// FirmwareSettings of a board that moves.
 pub struct Snapshot {

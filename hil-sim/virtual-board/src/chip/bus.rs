@@ -143,7 +143,7 @@ impl Chip {
         let now = self.now;
         if address >= 0xe000_0000 {
             let effect = match address & !0xfff {
-                0xe004_2000 => return self.debug.write(offset, value),
+                0xe004_2000 => self.debug.write(offset, value)?,
                 _ => self.scs.write(address, value, now)?,
             };
             return self.follow(effect);

@@ -1,5 +1,4 @@
-//! System configuration and external interrupts (RM0440, sections 10 and 15), as registers: no pin
-//! raises an interrupt in this firmware.
+//! System configuration (RM0440, section 10).
 
 use super::{Effect, Plain, Store};
 
@@ -15,18 +14,6 @@ const SYSCFG: &[Plain] = &[
     (0x1c, 0, ALL),
     (0x20, 0, ALL),
     (0x24, 0, ALL),
-];
-const EXTI: &[Plain] = &[
-    (0x00, 0xff82_0000, ALL),
-    (0x04, 0, ALL),
-    (0x08, 0, ALL),
-    (0x0c, 0, ALL),
-    (0x14, 0, 0),
-    (0x20, 0xffff_ff87, ALL),
-    (0x24, 0, ALL),
-    (0x28, 0, ALL),
-    (0x2c, 0, ALL),
-    (0x34, 0, 0),
 ];
 
 /// System configuration.
@@ -62,28 +49,3 @@ impl Syscfg {
 }
 
 const CFGR2: u32 = 0x18;
-
-/// External interrupts.
-#[derive(Clone, Debug)]
-pub struct Exti(Store);
-
-impl Default for Exti {
-    fn default() -> Self {
-        Self(Store::new(EXTI))
-    }
-}
-
-impl Exti {
-    /// Reads a register.
-    pub fn read(&self, offset: u32) -> Option<u32> {
-        self.0.read(offset)
-    }
-
-    /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        match offset {
-            0x14 | 0x34 => Some(Effect::None),
-            _ => self.0.write(offset, value),
-        }
-    }
-}

@@ -3,6 +3,10 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
+mod gates;
+
+pub use gates::{BadGates, GateLimits};
+
 use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
@@ -55,37 +59,6 @@ const SBIF: u32 = 1 << 13;
 const MOE: u32 = 1 << 15;
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
-
-/// Longest and shortest that a leg's gates must respect, ticks: the dead time of the inverter, and the
-/// shortest pulse that its gate drives pass on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GateLimits {
-    /// Dead time between the switches of a leg.
-    pub dead_time: u32,
-    /// Shortest time that a switch is on.
-    pub pulse: u32,
-}
-
-/// Why a gate pattern is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BadGates {
-    /// The switches of leg `leg` may be on together: the dead time in ticks.
-    Short {
-        /// Leg, 0 is a.
-        leg: usize,
-        /// Dead time that is programmed.
-        dead_time: u32,
-    },
-    /// A switch of leg `leg` is on for too short a time.
-    Pulse {
-        /// Leg, 0 is a.
-        leg: usize,
-        /// Ticks.
-        ticks: u32,
-    },
-    /// A switch is on although nobody switched the outputs on, or with a wrong polarity.
-    NotComplementary,
-}
 
 /// What has happened at one end of the count, or between.
 #[derive(Clone, Copy, Debug, Default)]
@@ -184,51 +157,6 @@ impl Tim1 {
     /// Whether a break has been seen and not cleared.
     pub fn broken(&self) -> bool {
         self.status & (BIF | SBIF) != 0
-    }
-
-    /// Dead time, ticks.
-    pub fn dead_time(&self) -> u32 {
-        let code = self.store.get(BDTR) & 0xff;
-        // CKD: the dead time counts every clock, every second or every fourth.
-        let clocks = [1, 2, 4, 4][(self.store.get(CR1) >> 8 & 3) as usize];
-        clocks
-            * match code >> 5 {
-                0..=3 => code,
-                4 | 5 => 2 * (64 + (code & 0x3f)),
-                6 => 8 * (32 + (code & 0x1f)),
-                _ => 16 * (32 + (code & 0x1f)),
-            }
-    }
-
-    /// Looks at the gates of the period with the compare values in force.
-    ///
-    /// # Errors
-    /// What is wrong with them.
-    pub fn check_gates(&self, limits: GateLimits) -> Result<(), BadGates> {
-        if !self.outputs_on() {
-            return Ok(());
-        }
-        // Both outputs of three legs, active high, PWM mode 1: nothing else is known to be safe.
-        let modes =
-            [self.store.get(CCMR1) >> 4, self.store.get(CCMR1) >> 12, self.store.get(CCMR2) >> 4];
-        if self.store.get(CCER) & 0xfff != 0x555 || modes.iter().any(|mode| mode & 7 != 6) {
-            return Err(BadGates::NotComplementary);
-        }
-        let dead_time = self.dead_time();
-        for (leg, compare) in self.in_force().into_iter().enumerate() {
-            if dead_time < limits.dead_time {
-                return Err(BadGates::Short { leg, dead_time });
-            }
-            let compare = compare.min(self.top);
-            for on in [2 * compare, 2 * (self.top - compare)] {
-                let ticks = on.saturating_sub(dead_time);
-                // A whole period has no edges and so no dead time; a vanished pulse is none.
-                if on != 2 * self.top && ticks > 0 && ticks < limits.pulse {
-                    return Err(BadGates::Pulse { leg, ticks });
-                }
-            }
-        }
-        Ok(())
     }
 
     /// When the next event is.
