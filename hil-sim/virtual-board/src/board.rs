@@ -2,7 +2,6 @@
 
 mod control;
 mod exceptions;
-mod failure;
 mod motor;
 mod options;
 mod outside;
@@ -11,13 +10,13 @@ pub mod snapshot;
 
 use std::collections::VecDeque;
 
-use anyhow::{Result, anyhow};
-use drive_core::{Compare, Sample};
+use anyhow::{Result, anyhow, bail, ensure};
+use drive_core::Sample;
 use hil_sim::plant::Plant;
 
 pub use control::{LongestPath, Period};
-pub use failure::Failure;
 pub use motor::Disturbance;
+use motor::PowerStage;
 pub use options::Options;
 
 use crate::addresses::Addresses;
@@ -45,12 +44,8 @@ pub struct Board {
     since_log: u32,
     /// The motor with everything around it.
     pub plant: Plant,
+    stage: PowerStage,
     gates: GateLimits,
-    /// Up to where the plant has gone.
-    plant_at: u64,
-    applied: Compare,
-    outputs: bool,
-    sample: Sample,
     sleeping: bool,
     hung: bool,
     /// The core executes nothing before this.
@@ -92,9 +87,8 @@ impl Board {
             Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
-            if segment.address < memory::FLASH || end > memory::BANK_2 {
-                return Err(anyhow!("a segment at {:#x} is not in bank 1", segment.address));
-            }
+            let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;
+            ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
         let addresses = Addresses::new(&image)?;
@@ -107,10 +101,7 @@ impl Board {
             since_log: 0,
             plant,
             gates: options.gates,
-            plant_at: 0,
-            applied: Compare::OFF,
-            outputs: false,
-            sample: Sample::default(),
+            stage: PowerStage::default(),
             sleeping: false,
             hung: false,
             stalled_until: 0,
@@ -177,7 +168,7 @@ impl Board {
 
     /// What the converters see.
     pub fn sample(&self) -> Sample {
-        self.sample
+        self.stage.sample
     }
 
     /// Seconds since power-on.
@@ -237,7 +228,7 @@ impl Board {
             idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
             at = self.cpu.chip().now;
             if idle > IDLE_LIMIT {
-                return Err(Failure::Core("no time passes".into()).into());
+                bail!("no time passes");
             }
             self.events()?;
             if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
@@ -259,7 +250,7 @@ impl Board {
         self.see_outputs();
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
-            return Err(Failure::Unknown(unknown, self.image.location(unknown.at)).into());
+            bail!("{unknown} at {}", self.image.location(unknown.at));
         }
         if chip.flash.power_lost {
             chip.reset = Some(Reset::Power);

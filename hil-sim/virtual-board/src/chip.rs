@@ -18,8 +18,7 @@ use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
 use crate::periph::rcc::Rcc;
-use crate::periph::syscfg::Syscfg;
-use crate::periph::tim1::Tim1;
+use crate::periph::tim1::{Event, Tim1};
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::scs::{self, Scs};
 
@@ -79,7 +78,7 @@ pub struct Chip {
     /// Ports A to G.
     pub gpio: [Gpio; 7],
     /// System configuration.
-    pub syscfg: Syscfg,
+    pub syscfg: Store,
     /// Interrupts of pins and comparators.
     pub exti: Store,
     /// Timer of the power stage.
@@ -124,7 +123,7 @@ impl Chip {
             pwr: Store::new(plain::PWR),
             flash: Flash::new(),
             gpio: std::array::from_fn(Gpio::new),
-            syscfg: Syscfg::default(),
+            syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
             tim1: Tim1::default(),
             tim2: EncoderTimer::default(),
@@ -165,7 +164,7 @@ impl Chip {
 
     /// The core locks up: to the break of TIM1, if the firmware wants that.
     pub fn lock_up(&mut self) {
-        if self.syscfg.lock_up_breaks() {
+        if self.syscfg.get(plain::CFGR2) & plain::CLL != 0 {
             self.tim1.system_break();
         }
     }
@@ -224,12 +223,10 @@ impl Chip {
         let now = self.now;
         self.attention = false;
         while self.tim1.next_event() <= now {
-            let event = self.tim1.happen();
-            if let Some(at) = event.trigger {
-                self.adc.trigger(at);
-            }
-            if event.crest {
-                return Some(event.at);
+            match self.tim1.happen() {
+                Event::Trigger(at) => self.adc.trigger(at),
+                Event::Crest(at) => return Some(at),
+                Event::Valley => {}
             }
         }
         if self.rcc.happen(now) {

@@ -10,8 +10,9 @@ mod frame;
 use std::cell::Cell;
 use std::rc::Rc;
 
+pub use unicorn_engine::RegisterARM as Register;
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
-use unicorn_engine::{Context, RegisterARM as R, Unicorn};
+use unicorn_engine::{Context, Unicorn};
 
 use crate::chip::Chip;
 use crate::cost::Costs;
@@ -22,25 +23,6 @@ use frame::BASIC;
 const CORTEX_M4: i32 = 9;
 /// Program counters from here on are EXC_RETURN.
 const EXC_RETURN: u32 = 0xffff_ffe0;
-/// Registers that exception entry and return, and tests, handle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Register {
-    /// R0 to R12.
-    R(u8),
-    /// Stack pointer in use: the main one, the firmware has no other.
-    Sp,
-    /// Link register.
-    Lr,
-    /// Program counter.
-    Pc,
-    /// Program status, all parts.
-    Xpsr,
-    /// Exception mask.
-    Primask,
-    /// Priority mask.
-    Basepri,
-}
-
 /// Why the core stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
@@ -79,8 +61,8 @@ pub struct Cpu {
     trapped: Rc<Cell<bool>>,
 }
 
-/// Registers and memories of a core that stands still.
-pub struct Standing {
+/// Registers and memories of a stopped core.
+pub struct CoreState {
     registers: Context,
     memories: Vec<(u32, Vec<u8>)>,
 }
@@ -198,7 +180,7 @@ impl Cpu {
     ///
     /// # Errors
     /// The emulator's.
-    pub fn keep(&self) -> Result<Standing, uc_error> {
+    pub fn keep(&self) -> Result<CoreState, uc_error> {
         let registers = self.uc.context_init()?;
         let memories = [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)]
             .into_iter()
@@ -208,14 +190,14 @@ impl Cpu {
                 Ok((base, bytes))
             })
             .collect::<Result<_, uc_error>>()?;
-        Ok(Standing { registers, memories })
+        Ok(CoreState { registers, memories })
     }
 
     /// Goes back to what was kept.
     ///
     /// # Errors
     /// The emulator's.
-    pub fn go_back(&mut self, to: &Standing) -> Result<(), uc_error> {
+    pub fn go_back(&mut self, to: &CoreState) -> Result<(), uc_error> {
         let mut now = vec![0; PIECE];
         for (base, bytes) in &to.memories {
             for (n, piece) in bytes.chunks(PIECE).enumerate() {
@@ -244,9 +226,9 @@ impl Cpu {
         self.faulted.set(None);
         self.trapped.set(false);
         self.chip_mut().first = true;
-        let pc = self.get(Register::Pc);
+        let pc = self.get(Register::PC);
         let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
-        let pc = self.get(Register::Pc);
+        let pc = self.get(Register::PC);
         if pc >= EXC_RETURN {
             return Stop::Return(pc | 1);
         }
@@ -260,12 +242,12 @@ impl Cpu {
 
     /// A register.
     pub fn get(&self, register: Register) -> u32 {
-        self.uc.reg_read(number(register)).unwrap_or(0) as u32
+        self.uc.reg_read(register).unwrap_or(0) as u32
     }
 
     /// Sets a register.
     pub fn set(&mut self, register: Register, value: u32) {
-        self.uc.reg_write(number(register), u64::from(value)).ok();
+        self.uc.reg_write(register, u64::from(value)).ok();
     }
 
     /// Reads memory, not registers; `false` where there is none.
@@ -293,13 +275,19 @@ impl Cpu {
         for register in BASIC.into_iter().take(6) {
             self.uc.reg_write(register, 0).ok();
         }
-        for register in [R::CONTROL, R::PRIMASK, R::BASEPRI, R::FAULTMASK, R::FPSCR] {
+        for register in [
+            Register::CONTROL,
+            Register::PRIMASK,
+            Register::BASEPRI,
+            Register::FAULTMASK,
+            Register::FPSCR,
+        ] {
             self.uc.reg_write(register, 0).ok();
         }
         self.set_exception(1 << 24);
         let (sp, pc) = (self.word(vectors), self.word(vectors + 4));
-        self.set(Register::Sp, sp.unwrap_or(0));
-        self.set(Register::Pc, pc.unwrap_or(0) & !1);
+        self.set(Register::SP, sp.unwrap_or(0));
+        self.set(Register::PC, pc.unwrap_or(0) & !1);
     }
 }
 
@@ -326,32 +314,5 @@ fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u3
             uc.mem_read(u64::from(address), &mut code).ok();
             costs.learn(address, &code)
         }
-    }
-}
-
-fn number(register: Register) -> R {
-    const GENERAL: [R; 13] = [
-        R::R0,
-        R::R1,
-        R::R2,
-        R::R3,
-        R::R4,
-        R::R5,
-        R::R6,
-        R::R7,
-        R::R8,
-        R::R9,
-        R::R10,
-        R::R11,
-        R::R12,
-    ];
-    match register {
-        Register::R(n) => GENERAL[usize::from(n.min(12))],
-        Register::Sp => R::SP,
-        Register::Lr => R::LR,
-        Register::Pc => R::PC,
-        Register::Xpsr => R::XPSR,
-        Register::Primask => R::PRIMASK,
-        Register::Basepri => R::BASEPRI,
     }
 }

@@ -32,7 +32,7 @@ pub mod periph;
 pub mod scs;
 pub mod shadow;
 
-pub use board::{Board, Failure, Options, Period};
+pub use board::{Board, Options, Period};
 pub use cpu::Counting;
 pub use image::Image;
 pub use pair::Pair;

@@ -9,7 +9,6 @@ pub mod iwdg;
 pub mod lpuart;
 pub mod plain;
 pub mod rcc;
-pub mod syscfg;
 pub mod tim1;
 
 /// Time of an event that does not come, ticks.

@@ -15,7 +15,7 @@ impl Board {
     /// Puts bytes on the wire to the console.
     pub fn send(&mut self, bytes: &[u8]) {
         let chip = self.chip();
-        chip.lpuart.wire.to_chip.extend(bytes.iter().map(|byte| Some(*byte)));
+        chip.lpuart.wire.to_chip.extend(bytes);
         chip.lpuart.wake(chip.now);
     }
 

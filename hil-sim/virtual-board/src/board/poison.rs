@@ -1,7 +1,9 @@
 //! Is what a control interrupt preempts the same after it? Registers, stack, and the floating-point
 //! registers, which are poisoned as the interrupt begins: what is not restored shows.
 
-use super::{Board, Failure};
+use anyhow::{Result, bail};
+
+use super::Board;
 use crate::cpu::Register;
 use crate::memory;
 
@@ -40,7 +42,7 @@ impl Board {
     /// Before a control interrupt.
     pub(super) fn remember(&mut self) {
         let Some(poison) = &self.poison else { return };
-        let sp = self.cpu.get(Register::Sp);
+        let sp = self.cpu.get(Register::SP);
         let stack = self.stack_above(sp, poison.top);
         let before = Before { registers: self.cpu.registers(), sp, stack };
         if let Some(poison) = &mut self.poison {
@@ -56,16 +58,16 @@ impl Board {
     }
 
     /// After it.
-    pub(super) fn compare_with_before(&mut self) -> Result<(), Failure> {
+    pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
         let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };
         let after = self.cpu.registers();
         if after != before.registers || self.stack_above(before.sp, top) != before.stack {
-            let at = self.image.location(self.cpu.get(Register::Pc));
-            return Err(Failure::Core(format!(
+            let at = self.image.location(self.cpu.get(Register::PC));
+            bail!(
                 "a control interrupt changed what it preempted at {at}: {:x?} became {after:x?}",
                 before.registers
-            )));
+            );
         }
         if let Some(poison) = &mut self.poison {
             poison.intact += 1;

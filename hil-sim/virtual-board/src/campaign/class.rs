@@ -1,9 +1,8 @@
 //! The classes of faults: what is done, and how long the drive may be wrong with the outputs on.
 
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 
-use super::faults::{current, flip, losing, name, seeded, slow_sensor};
+use super::faults::{current, flip, losing, name, noise, slow_sensor};
 use super::scene::{Regions, Source};
 use crate::board::Board;
 use crate::chip::TICKS_PER_S;
@@ -109,12 +108,8 @@ pub const CLASSES: &[Class] = &[
             // 5 mA to 2 A rms.
             let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
             let codes = amperes / f64::from(firmware_board::CURRENT_A.gain);
-            let mut noise = seeded(rng);
-            board.disturb = Some(Box::new(move |s| {
-                let draw: f64 = StandardNormal.sample(&mut noise);
-                let code = current(which, s);
-                *code = (f64::from(*code) + codes * draw).clamp(0.0, 4095.0) as u16;
-            }));
+            let mut noise = noise(rng, codes);
+            board.disturb = Some(Box::new(move |s| noise(current(which, s))));
             format!("{}, {:.1} mA", name(which), 1e3 * amperes)
         }),
     },
@@ -338,7 +333,7 @@ pub const CLASSES: &[Class] = &[
         sources: BOTH,
         course: Course::Regulating(|board, regions, rng| {
             let room = 8 * rng.random_range(0..13);
-            board.cpu().set(Register::Sp, regions.stack.address + room);
+            board.cpu().set(Register::SP, regions.stack.address + room);
             format!("room for {room} bytes")
         }),
     },

@@ -2,8 +2,9 @@
 
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
-use rand::{Rng, RngExt};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::board::Board;
 use crate::memory::Region;
@@ -25,9 +26,14 @@ pub fn losing(board: &mut Board, share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// A generator for noise.
-pub fn seeded(rng: &mut dyn Rng) -> rand_xoshiro::Xoshiro256PlusPlus {
-    rand::SeedableRng::seed_from_u64(rng.random())
+/// Gaussian noise of an rms value in codes, added to a code.
+pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(rng.random());
+    move |code| {
+        let draw: f64 = StandardNormal.sample(&mut generator);
+        let full_scale = f64::from(firmware_board::ADC_FULL_SCALE);
+        *code = (f64::from(*code) + rms * draw).clamp(0.0, full_scale) as u16;
+    }
 }
 
 /// The sensor of the dc link or of the heat sink sticks, opens, saturates or has noise.
@@ -37,24 +43,23 @@ pub fn slow_sensor(
     of: fn(&mut Sample) -> &mut u16,
 ) -> String {
     let held = *of(&mut board.sample());
-    let noisy = 2_f64.powf(rng.random_range(0.0..10.0));
-    let mut noise = seeded(rng);
+    let rms = 2_f64.powf(rng.random_range(0.0..10.0));
+    let mut noise = noise(rng, rms);
     let kind = rng.random_range(0..4_usize);
     board.disturb = Some(Box::new(move |s| {
         let code = of(s);
-        let draw: f64 = StandardNormal.sample(&mut noise);
-        *code = match kind {
-            0 => held,
-            1 => 0,
-            2 => firmware_board::ADC_FULL_SCALE,
-            _ => (f64::from(*code) + noisy * draw).clamp(0.0, 4095.0) as u16,
-        };
+        match kind {
+            0 => *code = held,
+            1 => *code = 0,
+            2 => *code = firmware_board::ADC_FULL_SCALE,
+            _ => noise(code),
+        }
     }));
     match kind {
         0 => format!("stuck at {held}"),
         1 => "open".into(),
         2 => "saturated".into(),
-        _ => format!("{noisy:.0} codes of noise"),
+        _ => format!("{rms:.0} codes of noise"),
     }
 }
 

@@ -1,8 +1,10 @@
 //! The bus: reads and writes of registers, each to the model that has it.
 
+use std::fmt;
+
 use super::Chip;
 use crate::memory;
-use crate::periph::{Effect, Reset};
+use crate::periph::{Effect, Reset, plain};
 use crate::scs;
 
 const TIM2: u32 = 0x4000_0000;
@@ -31,6 +33,16 @@ pub struct Unknown {
     pub written: Option<u32>,
     /// Last known place of the core: the instruction, in CCM the block.
     pub at: u32,
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "unknown register {:#010x} ", self.address)?;
+        match self.written {
+            Some(value) => write!(f, "written with {value:#x}"),
+            None => f.write_str("read"),
+        }
+    }
 }
 
 impl Chip {
@@ -105,7 +117,7 @@ impl Chip {
         if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let (value, torn) = self.flash.load(address);
             if torn {
-                if self.syscfg.flash_error_breaks() {
+                if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
                     self.tim1.system_break();
                 }
                 self.scs.pend(scs::NMI);

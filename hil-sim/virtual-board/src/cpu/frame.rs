@@ -1,8 +1,6 @@
 //! Exception entry and return: the stack frames (ARMv7-M, B1.5), and the registers that they hold.
 
-use unicorn_engine::RegisterARM as R;
-
-use super::{Cpu, Register};
+use super::{Cpu, Register as R};
 
 /// Bit of EXC_RETURN: a frame without floating-point registers.
 const BASIC_FRAME: u32 = 1 << 4;
@@ -12,14 +10,15 @@ const FPCA: u64 = 1 << 2;
 pub(super) const BASIC: [R; 8] = [R::R0, R::R1, R::R2, R::R3, R::R12, R::LR, R::PC, R::XPSR];
 const FLOAT: [R; 9] = [R::D0, R::D1, R::D2, R::D3, R::D4, R::D5, R::D6, R::D7, R::FPSCR];
 
-/// S16 to S31, which functions keep.
+/// R4 to R11, and S16 to S31, which functions keep.
+const KEPT: [R; 8] = [R::R4, R::R5, R::R6, R::R7, R::R8, R::R9, R::R10, R::R11];
 const KEPT_FLOAT: [R; 8] = [R::D8, R::D9, R::D10, R::D11, R::D12, R::D13, R::D14, R::D15];
 
 impl Cpu {
     /// Pushes the frame of an exception and goes to its `handler`; `false` if the stack is not in memory.
     pub fn enter(&mut self, exception: u16, handler: u32) -> bool {
         let float = self.control() & FPCA != 0;
-        let before = self.get(Register::Sp);
+        let before = self.get(R::SP);
         let sp = before.wrapping_sub(if float { 0x68 } else { 0x20 }) & !7;
         let mut frame = [0; 0x68];
         let basic = self.uc.reg_read_batch(&BASIC, 8).unwrap_or_default();
@@ -43,16 +42,16 @@ impl Cpu {
         let from_handler = xpsr & 0x1ff != 0;
         let exc_return =
             0xffff_ffe1 | if from_handler { 0 } else { 8 } | if float { 0 } else { BASIC_FRAME };
-        self.set(Register::Sp, sp);
-        self.set(Register::Lr, exc_return);
+        self.set(R::SP, sp);
+        self.set(R::LR, exc_return);
         self.set_exception(1 << 24 | u32::from(exception));
-        self.set(Register::Pc, handler);
+        self.set(R::PC, handler);
         stacked
     }
 
     /// Pops the frame of an exception; `false` if the stack is not in memory.
     pub fn leave(&mut self, exc_return: u32) -> bool {
-        let sp = self.get(Register::Sp);
+        let sp = self.get(R::SP);
         let float = exc_return & BASIC_FRAME == 0;
         let mut frame = [0; 0x68];
         let size = if float { 0x68 } else { 0x20 };
@@ -78,22 +77,24 @@ impl Cpu {
             .wrapping_add(size as u32)
             .wrapping_add(xpsr >> 9 & 1)
             .wrapping_add(3 * (xpsr >> 9 & 1));
-        self.set(Register::Sp, sp);
-        self.set(Register::Pc, basic[6] as u32);
+        self.set(R::SP, sp);
+        self.set(R::PC, basic[6] as u32);
         true
     }
 
-    /// What an interrupt must leave as it is: R0 to PC, status, masks, CONTROL, S16 to S31, and where
+    /// The registers that an interrupt must leave as they are: R0 to PC, status, masks, CONTROL, S16 to S31, and where
     /// floating point is used S0 to S15 and FPSCR.
     pub fn registers(&self) -> Vec<u64> {
-        let mut values: Vec<u64> = (0..13).map(|n| u64::from(self.get(Register::R(n)))).collect();
-        let read = |register| self.uc.reg_read(register).unwrap_or(0);
-        values.extend([R::SP, R::LR, R::PC, R::PRIMASK, R::BASEPRI, R::CONTROL].map(read));
+        let read = |register: &R| self.uc.reg_read(*register).unwrap_or(0);
+        let special = [R::SP, R::PRIMASK, R::BASEPRI, R::CONTROL];
+        // All but XPSR, which is the last.
+        let basic = &BASIC[..BASIC.len() - 1];
+        let whole = basic.iter().chain(&KEPT).chain(&KEPT_FLOAT).chain(&special);
+        let mut values: Vec<u64> = whole.map(read).collect();
         // Flags and exception number: the emulator says Thumb only while it runs.
-        values.push(read(R::XPSR) & 0xf80f_01ff);
-        values.extend(KEPT_FLOAT.map(read));
+        values.push(read(&R::XPSR) & 0xf80f_01ff);
         if self.uses_float() {
-            values.extend(FLOAT.map(read));
+            values.extend(FLOAT.iter().map(read));
         }
         values
     }
@@ -103,7 +104,7 @@ impl Cpu {
         self.control() & FPCA != 0
     }
 
-    /// Fills S0 to S15 with what is no number.
+    /// Fills S0 to S15 with not-a-numbers.
     pub fn spoil_float(&mut self) {
         for register in FLOAT.into_iter().take(8) {
             self.uc.reg_write(register, 0x7fa0_dead_7fa0_dead).ok();

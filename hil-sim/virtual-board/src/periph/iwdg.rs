@@ -53,13 +53,8 @@ impl Iwdg {
             0x04 => self.prescaler,
             0x08 => self.reload,
             // Both values on their way.
-            0x0c => {
-                if now < self.busy_until {
-                    3
-                } else {
-                    0
-                }
-            }
+            0x0c if now < self.busy_until => 3,
+            0x0c => 0,
             0x10 => self.window,
             _ => return None,
         })

@@ -40,8 +40,8 @@ const BITS: u64 = 10;
 /// What travels between the port and the console.
 #[derive(Clone, Debug, Default)]
 pub struct Wire {
-    /// To the chip; `None` is a byte damaged on its way.
-    pub to_chip: VecDeque<Option<u8>>,
+    /// To the chip.
+    pub to_chip: VecDeque<u8>,
     /// From the chip.
     pub from_chip: Vec<u8>,
 }
@@ -107,8 +107,8 @@ impl Lpuart {
                 if self.status & RXNE != 0 {
                     self.status |= ORE;
                 } else {
-                    self.status |= RXNE | if byte.is_none() { FE } else { 0 };
-                    self.received = byte.unwrap_or(0xff);
+                    self.status |= RXNE;
+                    self.received = byte;
                 }
             }
             self.wake(now);

@@ -34,3 +34,22 @@ pub const EXTI: &[Plain] = &[
     (0x2c, 0, ALL),
     (0x34, 0, 0),
 ];
+/// System configuration (RM0440, section 10).
+pub const SYSCFG: &[Plain] = &[
+    (0x00, 0, ALL),
+    (0x04, 0x7c00_0001, ALL),
+    (0x08, 0, ALL),
+    (0x0c, 0, ALL),
+    (0x10, 0, ALL),
+    (0x14, 0, ALL),
+    (CFGR2, 0, ALL),
+    (0x1c, 0, ALL),
+    (0x20, 0, ALL),
+    (0x24, 0, ALL),
+];
+/// Of the system configuration: errors that go to the breaks of the timers.
+pub const CFGR2: u32 = 0x18;
+/// CFGR2: a lock-up of the core.
+pub const CLL: u32 = 1;
+/// CFGR2: an error of the flash that its check code cannot correct.
+pub const ECCL: u32 = 1 << 3;

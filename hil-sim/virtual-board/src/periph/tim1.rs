@@ -60,15 +60,15 @@ const MOE: u32 = 1 << 15;
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
 
-/// What has happened at one end of the count, or between.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Event {
-    /// The converters are triggered at this time.
-    pub trigger: Option<u64>,
-    /// When it was.
-    pub at: u64,
+/// An event and its time.
+#[derive(Clone, Copy, Debug)]
+pub enum Event {
+    /// The converters are triggered.
+    Trigger(u64),
     /// The counter is at its top.
-    pub crest: bool,
+    Crest(u64),
+    /// The counter is at 0.
+    Valley,
 }
 
 /// The timer.
@@ -144,11 +144,6 @@ impl Tim1 {
         std::array::from_fn(|leg| self.store.get(CCR1 + 4 * leg as u32))
     }
 
-    /// Where the counter turns round.
-    pub fn top(&self) -> u32 {
-        self.top
-    }
-
     /// Whether the outputs are on.
     pub fn outputs_on(&self) -> bool {
         self.store.get(BDTR) & MOE != 0
@@ -167,8 +162,7 @@ impl Tim1 {
     /// Lets the next event happen.
     pub fn happen(&mut self) -> Event {
         if self.trigger_at <= self.next_end {
-            let at = std::mem::replace(&mut self.trigger_at, NEVER);
-            return Event { trigger: Some(at), at, crest: false };
+            return Event::Trigger(std::mem::replace(&mut self.trigger_at, NEVER));
         }
         let crest = self.at_top_next;
         self.at_top_next = !crest;
@@ -182,10 +176,11 @@ impl Tim1 {
             self.repetitions -= 1;
         }
         self.next_end = end + u64::from(self.top);
-        if !crest {
-            self.plan_trigger();
+        if crest {
+            return Event::Crest(end);
         }
-        Event { trigger: None, at: end, crest }
+        self.plan_trigger();
+        Event::Valley
     }
 
     /// OC4REF rises on the way up where the counter reaches its compare value.
