@@ -27,7 +27,7 @@ use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
 use crate::periph::tim1::GateLimits;
-use control::Entered;
+use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
@@ -50,7 +50,7 @@ pub struct Board {
     hung: bool,
     /// The core executes nothing before this.
     stalled_until: u64,
-    entered: Option<Entered>,
+    entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
     addresses: Addresses,
     /// Changes every sample, if there.
@@ -119,7 +119,7 @@ impl Board {
             latest_start: 0,
             preempt_at: None,
         };
-        board.see();
+        board.show_sample();
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.reset(memory::FLASH);
         Ok(board)
@@ -197,7 +197,7 @@ impl Board {
         self.hung = false;
         self.stalled_until = 0;
         self.entered = None;
-        self.see_outputs();
+        self.follow_outputs();
         self.cpu.reset(memory::FLASH);
     }
 
@@ -243,11 +243,11 @@ impl Board {
 
     /// Lets happen what is due.
     fn events(&mut self) -> Result<()> {
-        self.see_outputs();
+        self.follow_outputs();
         while let Some(at) = self.cpu.chip_mut().catch_up() {
             self.crest(at)?;
         }
-        self.see_outputs();
+        self.follow_outputs();
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
             bail!("{unknown} at {}", self.image.location(unknown.at));

@@ -53,9 +53,9 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
         Task::Campaign { elf, count, seed, class } => {
-            let choice = campaign::Choice { count, seed, class };
+            let selection = campaign::Selection { count, seed, class };
             println!("{}", campaign::bounds());
-            println!("{}", campaign::run(|| Image::open(&elf), &choice)?);
+            println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }
         Task::Cycles { elf, functions } => {
             let rows = cycles::measure(|| Image::open(&elf))?;

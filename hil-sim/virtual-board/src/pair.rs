@@ -28,7 +28,9 @@ impl Pair {
     /// It does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
-        pair.until("the greeting", LONGEST_ANSWER, |pair, _| pair.board.heard().ends_with('\n'))?;
+        pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
+            pair.board.take_console().ends_with('\n')
+        })?;
         Ok(pair)
     }
 
@@ -64,7 +66,7 @@ impl Pair {
                 return Ok(());
             }
         }
-        let log = self.board.logged()?;
+        let log = self.board.take_log()?;
         bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
     }
 
@@ -73,12 +75,12 @@ impl Pair {
     /// # Errors
     /// As [`Pair::until`].
     pub fn say(&mut self, line: &str) -> Result<String> {
-        self.board.heard();
+        self.board.take_console();
         self.board.type_line(line);
         self.shadow.type_line(line)?;
         let mut answer = String::new();
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
-            answer += &pair.board.heard();
+            answer += &pair.board.take_console();
             answer.ends_with('\n')
         })?;
         Ok(answer.trim_end().to_owned())

@@ -98,7 +98,7 @@ impl Shadow {
     }
 
     /// All that is set, and what was learned.
-    pub fn everything(&self) -> &FirmwareSettings {
+    pub fn firmware_settings(&self) -> &FirmwareSettings {
         &self.settings
     }
 

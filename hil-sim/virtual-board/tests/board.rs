@@ -23,8 +23,12 @@ fn started(seed: u64) -> Result<Board> {
 #[test]
 fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
     let mut board = started(1)?;
-    assert!(board.heard().contains("last run: reset by power-on"), "{}", board.heard());
-    let log = board.logged()?;
+    assert!(
+        board.take_console().contains("last run: reset by power-on"),
+        "{}",
+        board.take_console()
+    );
+    let log = board.take_log()?;
     assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
     assert!(log.iter().any(|line| line.contains("off: codes")), "{log:#?}");
     assert!(!log.iter().any(|line| line.starts_with("ERROR")), "{log:#?}");
@@ -52,9 +56,9 @@ fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
     }
     println!("off after {:.2} ms, peak current {peak:.2} A", (pair.board.time() - began) * 1e3);
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Watchdog));
-    pair.board.heard();
+    pair.board.take_console();
     pair.board.run_periods(START)?;
-    assert!(pair.board.heard().contains("last run: reset by watchdog"));
+    assert!(pair.board.take_console().contains("last run: reset by watchdog"));
     Ok(())
 }
 
@@ -78,14 +82,14 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
 #[test]
 fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     let mut pair = common::regulating(4)?;
-    pair.board.heard();
+    pair.board.take_console();
     pair.board.set_crystal(false);
     pair.board.run_ticks(2000)?;
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.board.run_periods(2 * START)?;
-    let heard = pair.board.heard();
+    let heard = pair.board.take_console();
     assert!(heard.contains("clock or flash failure"), "{heard}");
-    let log = pair.board.logged()?;
+    let log = pair.board.take_log()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
     Ok(())
 }
@@ -97,16 +101,16 @@ fn without_the_control_interrupt_it_stays_off() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 5))?;
     board.chip().adc.lose_triggers = [u32::MAX; 2];
     board.run_periods(START)?;
-    let heard = board.heard();
+    let heard = board.take_console();
     assert!(heard.contains("last run: reset by power-on"), "{heard}");
-    let log = board.logged()?;
+    let log = board.take_log()?;
     assert!(
         log.iter().any(|line| line.contains("not started") && line.contains("Interrupt")),
         "{log:#?}"
     );
     board.type_line("start");
     board.run_periods(2 * START)?;
-    let heard = board.heard();
+    let heard = board.take_console();
     assert!(heard.contains("error: the control does not run"), "{heard}");
     assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty(), "{:?}", board.resets);
     Ok(())
@@ -137,9 +141,9 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
             assert!(pair.board.time() - began < 20e-3, "still on");
         }
         println!("{reason}: off after {:.1} ms", (pair.board.time() - began) * 1e3);
-        pair.board.heard();
+        pair.board.take_console();
         pair.board.run_periods(START)?;
-        let heard = pair.board.heard();
+        let heard = pair.board.take_console();
         assert!(heard.contains("reset by software") && heard.contains(reason), "{heard}");
     }
     Ok(())

@@ -32,7 +32,10 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
     })?;
     all.sort_unstable();
     let (taken, median) = (taken.context(line.to_owned())?, all[all.len() / 2]);
-    println!("{line:<16} {taken:>6} cycles, others {median:>6}: {}", pair.board.heard().trim_end());
+    println!(
+        "{line:<16} {taken:>6} cycles, others {median:>6}: {}",
+        pair.board.take_console().trim_end()
+    );
     Ok((taken, median))
 }
 

@@ -33,7 +33,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
     let mut board = pair.board;
-    board.logged()?;
+    board.take_log()?;
     board.poison = Some(Poison::new(board.image().symbol("_stack_start")?.address));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let (mut periods, mut replies) = (0_u64, 0);
@@ -50,11 +50,11 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
             }
         }
     }
-    let heard = board.heard();
+    let heard = board.take_console();
     let lines = heard.lines().count();
     assert!(heard.lines().all(|line| !line.starts_with("error")), "{heard}");
     assert!(lines + 5 > replies, "{lines} answers to {replies} lines");
-    let log = board.logged()?;
+    let log = board.take_log()?;
     assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
     // Ten lines a second.
     assert!(log.len() as u64 >= periods / 600, "{} lines in {periods} periods", log.len());

@@ -52,7 +52,7 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     for _ in 0..6 {
         pair.board.type_line("trace 500 1");
         pair.run(6000, |_, _| {})?;
-        let lines = pair.board.heard().lines().count();
+        let lines = pair.board.take_console().lines().count();
         assert!(lines > 100, "{lines} lines of a trace in a second");
     }
     // Any line cuts the trace short.

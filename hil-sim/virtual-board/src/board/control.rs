@@ -25,7 +25,7 @@ pub struct Period {
 
 /// What is known of a control interrupt while it runs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Entered {
+pub(super) struct RunningInterrupt {
     began: u64,
     sample: Sample,
     ended: bool,
@@ -80,7 +80,8 @@ impl Board {
         if let Some(at) = self.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
-        self.entered = Some(Entered { began, sample, ended: ended[0], had_order, accesses });
+        self.entered =
+            Some(RunningInterrupt { began, sample, ended: ended[0], had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {

@@ -26,7 +26,7 @@ pub(super) struct PowerStage {
 
 impl Board {
     /// The outputs as they are now hold from now on.
-    pub(super) fn see_outputs(&mut self) {
+    pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip();
         let (on, now) = (chip.tim1.outputs_on(), chip.now);
         if on != self.stage.outputs {
@@ -63,7 +63,7 @@ impl Board {
         if let Some(disturb) = &mut self.disturb {
             disturb(&mut self.stage.sample);
         }
-        self.see();
+        self.show_sample();
         let chip = self.cpu.chip_mut();
         let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
         self.stage.applied = Compare { a, b, c, enabled: true };
@@ -77,7 +77,7 @@ impl Board {
     }
 
     /// Shows the sample to converters, comparators and encoder.
-    pub(super) fn see(&mut self) {
+    pub(super) fn show_sample(&mut self) {
         let s = self.stage.sample;
         let chip = self.cpu.chip_mut();
         let pins = [

@@ -20,7 +20,7 @@ impl Board {
     }
 
     /// What the console has said since the last call.
-    pub fn heard(&mut self) -> String {
+    pub fn take_console(&mut self) -> String {
         let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
         String::from_utf8_lossy(&bytes).into_owned()
     }
@@ -29,7 +29,7 @@ impl Board {
     ///
     /// # Errors
     /// The log cannot be decoded.
-    pub fn logged(&mut self) -> Result<Vec<String>> {
+    pub fn take_log(&mut self) -> Result<Vec<String>> {
         self.drain_log()?;
         Ok(std::mem::take(&mut self.lines))
     }

@@ -8,7 +8,7 @@ use crate::cpu::Register;
 use crate::memory;
 
 /// What was before a control interrupt.
-struct Before {
+struct Preempted {
     registers: Vec<u64>,
     sp: u32,
     stack: Vec<u8>,
@@ -18,7 +18,7 @@ struct Before {
 #[derive(Default)]
 pub struct Poison {
     top: u32,
-    before: Option<Before>,
+    before: Option<Preempted>,
     /// Control interrupts that left everything as it was.
     pub intact: u64,
     /// Of these, in code that uses floating point.
@@ -39,12 +39,12 @@ impl Board {
         stack
     }
 
-    /// Before a control interrupt.
+    /// Preempted a control interrupt.
     pub(super) fn remember(&mut self) {
         let Some(poison) = &self.poison else { return };
         let sp = self.cpu.get(Register::SP);
         let stack = self.stack_above(sp, poison.top);
-        let before = Before { registers: self.cpu.registers(), sp, stack };
+        let before = Preempted { registers: self.cpu.registers(), sp, stack };
         if let Some(poison) = &mut self.poison {
             poison.before = Some(before);
         }

@@ -26,8 +26,8 @@ impl Board {
     /// The core cannot be kept; the log cannot be decoded.
     pub fn keep(&mut self) -> Result<Snapshot> {
         // The log so far belongs to the time before.
-        self.logged()?;
-        self.heard();
+        self.take_log()?;
+        self.take_console();
         Ok(Snapshot {
             core: self.cpu.keep().map_err(|e| anyhow!("emulator: {e:?}"))?,
             chip: self.cpu.chip().clone(),

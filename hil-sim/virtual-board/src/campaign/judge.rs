@@ -20,9 +20,9 @@ const FAULT_REPORTED: u64 = 60;
 /// Periods from a reset to the greeting, at most.
 const START: u64 = 30_000;
 
-/// What was seen of a run.
+/// The outcome of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct Outcome {
     /// What was done.
     pub what: String,
     /// From the fault to the outputs off, ms.
@@ -39,10 +39,10 @@ pub struct Seen {
 ///
 /// # Errors
 /// Bad gate signals; what the board cannot go on with.
-pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Seen> {
+pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
     let trip = f64::from(induction_drive::board::settings().limits.trip_a);
-    let mut seen = Seen::default();
+    let mut outcome = Outcome::default();
     board.went_off = None;
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
     let mut next = began;
@@ -54,20 +54,20 @@ pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Seen> {
         while board.next_period().is_some() {}
         let current =
             board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
-        seen.peak_a = seen.peak_a.max(current);
+        outcome.peak_a = outcome.peak_a.max(current);
         if let Some(at) = board.went_off {
-            seen.off_ms = Some(since(at));
+            outcome.off_ms = Some(since(at));
             break;
         }
         let error = angle_error(board);
-        seen.angle_deg = seen.angle_deg.max(error);
+        outcome.angle_deg = outcome.angle_deg.max(error);
         // Written so that not-a-number is wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
         if !(straight && current < trip) {
-            seen.wrong_ms = since(next);
+            outcome.wrong_ms = since(next);
         }
     }
-    Ok(seen)
+    Ok(outcome)
 }
 
 /// Between the flux and where the drive believes it, degrees.
@@ -83,7 +83,7 @@ fn angle_error(board: &Board) -> f64 {
 pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     board.run_periods(FAULT_REPORTED)?;
     if board.resets.is_empty() {
-        let log = board.logged()?;
+        let log = board.take_log()?;
         let told = log.iter().any(|line| line.contains("fault ") || line.contains("WARN"));
         if told || !board.resets.is_empty() {
             return Ok(());
@@ -92,9 +92,9 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     }
     board.run_periods(REPORTED)?;
     let Some((_, reset)) = board.resets.first().copied() else {
-        bail!("outputs off without a reason in the log: {:?}", board.logged()?)
+        bail!("outputs off without a reason in the log: {:?}", board.take_log()?)
     };
-    let log = board.logged()?;
+    let log = board.take_log()?;
     ensure!(
         log.iter().any(|l| l.contains(cause(reset))),
         "no {:?} in the log {log:?}",
@@ -120,7 +120,7 @@ pub fn greeting(board: &mut Board) -> Result<String> {
     for _ in 0..START / 100 {
         board.run_periods(100)?;
         while board.next_period().is_some() {}
-        heard += &board.heard();
+        heard += &board.take_console();
         ensure!(board.resets.len() == resets, "reset while it starts: {:?}", board.resets);
         if heard.contains("last run: ") && heard.ends_with('\n') {
             board.run_periods(200)?;

@@ -97,7 +97,7 @@ impl Scene {
         for _ in 0..2 {
             pair.order("save")?;
         }
-        let old = pair_settings(&mut pair.board)?;
+        let old = saved_settings(&mut pair.board)?;
         pair.order(&format!("set {} {}", CHANGE.0, CHANGE.1))?;
         let mut new = old;
         new.command.timeout_s = CHANGE.1;
@@ -181,7 +181,7 @@ impl Flash for Bank<'_> {
 ///
 /// # Errors
 /// It holds none.
-pub fn pair_settings(board: &mut Board) -> Result<FirmwareSettings> {
+pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     ensure!(
         induction_drive::board::settings_address(0, 0) >= BANK_2,
         "settings outside the second bank"

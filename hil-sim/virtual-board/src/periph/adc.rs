@@ -47,9 +47,9 @@ const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
 /// A conversion after it, likewise.
 const CONVERSION: u64 = 25;
 
-/// One converter.
+/// Converter converter.
 #[derive(Clone, Debug)]
-struct One {
+struct Converter {
     store: Store,
     status: u32,
     control: u32,
@@ -59,7 +59,7 @@ struct One {
     data: [u16; 4],
 }
 
-impl Default for One {
+impl Default for Converter {
     fn default() -> Self {
         Self {
             store: Store::new(KNOWN),
@@ -78,7 +78,7 @@ pub type Inputs = [u16; 19];
 /// Both converters.
 #[derive(Clone, Debug, Default)]
 pub struct Adc {
-    converters: [One; 2],
+    converters: [Converter; 2],
     common: u32,
     /// Codes at their pins.
     pub inputs: [Inputs; 2],
@@ -181,7 +181,7 @@ impl Adc {
     }
 }
 
-impl One {
+impl Converter {
     fn channel(&self, rank: u32) -> u32 {
         // JSQ1 begins at bit 9, the others follow, six bits apart.
         self.store.get(JSQR) >> (9 + 6 * rank) & 0x1f

@@ -223,18 +223,18 @@ impl Tim1 {
     /// Outputs of the comparators, from now on.
     pub fn set_comparators(&mut self, outputs: [bool; 7]) {
         self.comparators = outputs;
-        self.look_at_break();
+        self.update_break();
     }
 
     /// Level of the break pin, from now on.
     pub fn set_fault_pin(&mut self, high: bool) {
         self.fault_pin_high = high;
-        self.look_at_break();
+        self.update_break();
     }
 
     /// The break request: the enabled sources, each with its own polarity, go through one OR gate, and BKP
     /// is the polarity behind it (section 28.3.16, overview of the break circuit).
-    fn look_at_break(&mut self) {
+    fn update_break(&mut self) {
         let (af1, bdtr) = (self.store.get(AF1), self.store.get(BDTR));
         let bit = |n: usize| af1 >> n & 1 != 0;
         let pin = bit(0) && self.fault_pin_high != bit(9);
@@ -242,11 +242,11 @@ impl Tim1 {
         let comparator =
             (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
         if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
-            self.pull();
+            self.latch_break();
         }
     }
 
-    fn pull(&mut self) {
+    fn latch_break(&mut self) {
         if self.store.get(BDTR) & BKE != 0 {
             self.status |= BIF;
             self.clear_moe();
@@ -275,7 +275,7 @@ impl Tim1 {
         match offset {
             SR => {
                 self.status &= value;
-                self.look_at_break();
+                self.update_break();
                 return Some(Effect::Look);
             }
             EGR => {
@@ -287,13 +287,13 @@ impl Tim1 {
                     }
                 }
                 if value & 1 << 7 != 0 {
-                    self.pull();
+                    self.latch_break();
                 }
                 return Some(Effect::Look);
             }
             BDTR => {
                 self.store.write(BDTR, self.locked(old, value));
-                self.look_at_break();
+                self.update_break();
                 return Some(Effect::None);
             }
             // Locked with levels 2 and 3.
