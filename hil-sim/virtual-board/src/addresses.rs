@@ -18,7 +18,7 @@ pub struct Addresses {
     pub control: Region,
     /// The drive's coefficients.
     pub coefficients: Region,
-    /// What changes in the drive while it regulates.
+    /// The state of the drive that changes while it regulates.
     pub state: Region,
     /// A pointer to the mailbox of orders.
     pub orders: u32,

@@ -53,9 +53,9 @@ pub struct Board {
     entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
     addresses: Addresses,
-    /// Changes every sample, if there.
+    /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
-    /// Compares what control interrupts preempt before and after, if there.
+    /// The check that control interrupts leave the preempted code intact, if wanted.
     pub poison: Option<poison::Poison>,
     /// When the outputs went off last, ticks.
     pub went_off: Option<u64>,
@@ -80,7 +80,7 @@ impl Board {
     /// A board that has just been powered, with this image in its flash.
     ///
     /// # Errors
-    /// What is wrong with the image or the plant.
+    /// A fault of the image or of the plant's settings.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
         let mut cpu =
@@ -166,7 +166,7 @@ impl Board {
         &self.image
     }
 
-    /// What the converters see.
+    /// The last sample.
     pub fn sample(&self) -> Sample {
         self.stage.sample
     }
@@ -189,7 +189,7 @@ impl Board {
         self.resets.push((now, cause));
         if cause == Reset::Power {
             for (base, size) in [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)] {
-                // Not what it was, and not zeros.
+                // Neither the old contents nor zeros.
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }
         }
@@ -204,7 +204,7 @@ impl Board {
     /// Goes on for a number of PWM periods.
     ///
     /// # Errors
-    /// What the board cannot go on with.
+    /// The access, the gate signals or the fault that the model cannot go on with.
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(TICKS_PER_PERIOD)?;
@@ -220,7 +220,7 @@ impl Board {
     /// Goes on for a number of ticks of 170 MHz.
     ///
     /// # Errors
-    /// What the board cannot go on with.
+    /// The access, the gate signals or the fault that the model cannot go on with.
     pub fn run_ticks(&mut self, ticks: u64) -> Result<()> {
         let end = self.cpu.chip().now + ticks;
         let (mut at, mut idle) = (self.cpu.chip().now, 0);
@@ -241,7 +241,7 @@ impl Board {
         Ok(())
     }
 
-    /// Lets happen what is due.
+    /// Lets due events happen.
     fn events(&mut self) -> Result<()> {
         self.follow_outputs();
         while let Some(at) = self.cpu.chip_mut().catch_up() {

@@ -1,9 +1,9 @@
 //! A campaign of faults: thousands of them, each from a running board, each with a seed of its own.
 //!
-//! What counts: at every instant later than the bound of its class after the fault, outputs are off, or
-//! control is correct (angle error at most 15 degrees, phase currents below the trip). A bit that
-//! flips where nothing depends on it is such a case. Whatever happens, a gate pattern that could
-//! short a leg fails, as do more than one reset and an end without a reason in the log.
+//! The criterion: at every instant later than the bound of its class after the fault, outputs are off, or
+//! control is correct (angle error at most 15 degrees, phase currents below the trip); control stays correct, for
+//! example, when a bit flips that nothing depends on. In all classes a gate pattern that could short a leg is a
+//! failure, and so are more than one reset and an end without a reason in the log.
 //!
 //! The reason is looked for in the log, which tells it first thing after a reset; one run in
 //! ten goes on until the console greets, as the design of the control takes seconds.
@@ -28,11 +28,11 @@ use class::{CLASSES, Class, Procedure};
 use judge::Outcome;
 use scene::Scene;
 
-/// One run in so many starts wholly after its reset.
+/// One run in this number goes on after its reset until the console greets.
 const WHOLE_STARTS: u64 = 10;
-/// Longest that is looked at after the bound, ms.
+/// Time of observation after the bound, ms.
 const AFTER_MS: f64 = 150.0;
-/// A fault comes up to so many ticks after the board was gone back to: 20 ms.
+/// Latest fault after the snapshot, ticks: 20 ms.
 const LATEST: u64 = 20 * 170_000;
 /// Longest time of `save`, periods.
 const SAVE: u64 = 1200;
@@ -62,7 +62,7 @@ pub struct Selection {
 /// A campaign of faults; `open` opens the image. Gives the table.
 ///
 /// # Errors
-/// The table with what failed; no class has that name.
+/// The table with the failures; no class has that name.
 pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
     let Selection { count, seed, ref class } = *selection;
     let classes = CLASSES.len() as u64;
@@ -180,7 +180,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
 /// and it starts with it. Gives how many operations there are.
 ///
 /// # Errors
-/// What went wrong, and where.
+/// The slot and the operation of the first failure.
 pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
     let mut scene = Scene::new(image)?;
     scene.board.forgive();
@@ -202,7 +202,7 @@ fn lose_power(scene: &mut Scene, slot: usize, operation: u64) -> Result<()> {
     let flash = &mut scene.board.chip().flash;
     flash.power_loss_at = Some(flash.operations + 1 + operation);
     scene.board.type_line("save");
-    // Not further than the reset: what starts after it takes as long as on a chip.
+    // Not further than the reset: a start takes as long as on a chip.
     for _ in 0..SAVE / 10 {
         scene.board.run_periods(10)?;
         if !scene.board.resets.is_empty() {
@@ -221,7 +221,7 @@ fn operations(scene: &mut Scene, slot: usize) -> Result<u64> {
     let heard = scene.board.take_console();
     ensure!(heard == "ok\n" || heard == "ok\r\n", "save: {heard:?}");
     let wanted = scene.settings[1 - slot % 2];
-    ensure!(scene::saved_settings(&mut scene.board)? == wanted, "not what was saved");
+    ensure!(scene::saved_settings(&mut scene.board)? == wanted, "not the settings that were saved");
     Ok(scene.board.chip().flash.operations - before)
 }
 

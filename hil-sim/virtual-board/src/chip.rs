@@ -46,7 +46,7 @@ pub struct Chip {
     pub first: bool,
     /// Something to be done before the core goes on.
     pub attention: bool,
-    /// The first access nobody knows.
+    /// The first access that the model does not know.
     pub unknown: Option<Unknown>,
     /// A reset that is due.
     pub reset: Option<Reset>,

@@ -1,4 +1,4 @@
-//! What instructions cost on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
+//! Cycles of instructions on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
 //! DDI0439).
 //!
 //! A static count of a block: an instruction that its IT condition skips counts as executed, an
@@ -14,7 +14,7 @@ pub const EXIT: u32 = 12 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
 
-/// Where a block of the control interrupt began, and its cycles.
+/// An executed block of instructions and its cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
     /// Address of its first instruction.
@@ -93,7 +93,7 @@ pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
     })
 }
 
-/// What of the last instruction matters for the next.
+/// The properties of the last instruction that matter for the next.
 #[derive(Clone, Copy, Debug, Default)]
 struct Previous {
     memory: bool,

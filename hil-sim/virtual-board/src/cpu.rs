@@ -23,7 +23,7 @@ use frame::BASIC;
 const CORTEX_M4: i32 = 9;
 /// Program counters from here on are EXC_RETURN.
 const EXC_RETURN: u32 = 0xffff_ffe0;
-/// Why the core stopped.
+/// The reason for which the core stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// It waits for an interrupt.
@@ -36,7 +36,7 @@ pub enum Stop {
     Fault(Fault),
 }
 
-/// What the bus or the decoder refused.
+/// An access that the bus refused, or a word that is no instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Access to this address.
@@ -45,10 +45,10 @@ pub enum Fault {
     Instruction,
 }
 
-/// What is counted, at the price of speed.
+/// Counting, at the price of speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counting {
-    /// Cycles of what runs in CCM. Without, nothing is called while it runs, and it takes no time.
+    /// Cycles of the code in CCM. Without, it takes no time.
     pub cycles: bool,
     /// The core can be stopped at every instruction in the flash, not only where a block begins.
     pub every_instruction: bool,
@@ -67,8 +67,7 @@ pub struct CoreState {
     memories: Vec<(u32, Vec<u8>)>,
 }
 
-/// Pieces that are compared, so that what is the same is not written again: written code is translated
-/// anew.
+/// Size of the pieces, bytes, that are compared before they are written: written code is translated anew.
 const PIECE: usize = 256;
 /// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
 const EXCEPTION_EXIT: [u32; 2] = [8, 3];
@@ -179,7 +178,7 @@ impl Cpu {
     /// Keeps registers and memories; the flash of the code is not changed by anything.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn keep(&self) -> Result<CoreState, uc_error> {
         let registers = self.uc.context_init()?;
         let memories = [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)]
@@ -193,10 +192,10 @@ impl Cpu {
         Ok(CoreState { registers, memories })
     }
 
-    /// Goes back to what was kept.
+    /// Goes back to a state that was kept.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn go_back(&mut self, to: &CoreState) -> Result<(), uc_error> {
         let mut now = vec![0; PIECE];
         for (base, bytes) in &to.memories {
@@ -291,8 +290,8 @@ impl Cpu {
     }
 }
 
-/// Stops the core where the chip wants attention: before what begins here, which is met again, and then
-/// counted, when the core goes on.
+/// Stops the core where the chip wants attention: before the block that begins here, which is met again, and
+/// then counted, when the core goes on.
 #[inline]
 fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
     let chip = uc.get_data_mut();
@@ -304,7 +303,7 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
     stops
 }
 
-/// What a block costs.
+/// Cycles of a block.
 #[inline]
 fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
     match costs.known(address, size) {

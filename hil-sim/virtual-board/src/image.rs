@@ -80,7 +80,7 @@ impl Image {
     /// Understands the contents of an ELF file.
     ///
     /// # Errors
-    /// It is no ELF for this chip.
+    /// The file is no ELF for this chip.
     pub fn parse(bytes: Vec<u8>) -> Result<Self> {
         let segments = segments(&bytes)?;
         let file = object::File::parse(&*bytes)?;
@@ -104,7 +104,7 @@ impl Image {
         &self.bytes
     }
 
-    /// What lies in the flash.
+    /// Contents of the flash.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }

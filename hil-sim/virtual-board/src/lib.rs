@@ -1,14 +1,14 @@
 //! Runs the flashed ELF on an emulated Cortex-M4F with modelled STM32G474 registers, and closes the loop
 //! with the simulated inverter, motor and sensors of `hil-sim`.
 //!
-//! The emulator is Unicorn, behind [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
+//! The emulator is Unicorn, inside [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
 //! shipped links it, and its binaries are never distributed.
 //!
-//! # What is modelled, and what is not
+//! # Extent of the model
 //! * Registers that the firmware uses ([`periph`], [`scs`]); an access to any other fails the run with the
 //!   address and the place in the source.
-//! * Time: an instruction in the flash takes one cycle (no wait states), what runs in CCM as
-//!   [`cost`] says. Exceptions are taken between instructions in the flash and at the end of the
+//! * Time: an instruction in the flash takes one cycle (no wait states), one in CCM as many as
+//!   [`cost`] counts. Exceptions are taken between instructions in the flash and at the end of the
 //!   control interrupt's blocks; entry and exit take no time.
 //! * Exceptions with priorities, nesting and masks; one stack; no MPU, no traps for unaligned accesses and
 //!   divisions by zero. Bus faults are taken at once and become hard faults, as in the firmware.

@@ -33,10 +33,10 @@ impl Log {
         self.bytes.clear();
     }
 
-    /// What the firmware has logged since the last call.
+    /// The firmware's log since the last call.
     ///
     /// # Errors
-    /// It cannot be decoded.
+    /// The log cannot be decoded.
     pub fn take(&mut self, cpu: &mut Cpu) -> Result<Vec<String>> {
         let at = self.control_block + BUFFER;
         let words = [1, 2, 3, 4].map(|n| cpu.word(at + 4 * n));

@@ -16,7 +16,7 @@ impl Region {
     }
 }
 
-/// What lies behind an address.
+/// The kind of memory behind an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backing {
     /// Read and executed; written by its controller only.
@@ -34,7 +34,7 @@ pub struct Mapping {
     pub base: u32,
     /// Bytes.
     pub size: u32,
-    /// What is there.
+    /// Its kind.
     pub backing: Backing,
 }
 
@@ -42,8 +42,8 @@ pub struct Mapping {
 pub const FLASH: u32 = 0x0800_0000;
 /// Flash in both banks, bytes.
 pub const FLASH_SIZE: u32 = 512 * 1024;
-/// The second bank. It goes through the model of the flash, so that what is half written there can
-/// be told from data. No code lies in it.
+/// The second bank. It goes through the model of the flash, so that half-written words can be told
+/// from data. No code lies in it.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
 /// First address of SRAM1 and SRAM2.
 pub const RAM: u32 = 0x2000_0000;

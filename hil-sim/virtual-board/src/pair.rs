@@ -1,5 +1,5 @@
-//! A board beside its shadow: what the one does is checked against the other, and the shadow knows what
-//! state the drive is in.
+//! A board beside its shadow: the compare values of both are compared, and the shadow knows the state of the
+//! drive.
 
 use anyhow::{Result, bail};
 use drive_core::State;
@@ -25,7 +25,7 @@ impl Pair {
     /// A board that has started and waits for orders.
     ///
     /// # Errors
-    /// It does not start.
+    /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
         pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
@@ -37,7 +37,7 @@ impl Pair {
     /// Goes on for some periods; `look` is called after each control interrupt.
     ///
     /// # Errors
-    /// What the board cannot go on with; compare values that differ.
+    /// A failure of the board; compare values that differ.
     pub fn run(&mut self, periods: u64, mut look: impl FnMut(&Self, &Period)) -> Result<()> {
         for _ in 0..periods {
             self.board.run_periods(1)?;
@@ -52,7 +52,7 @@ impl Pair {
     /// Goes on until something is so, for `periods` at most.
     ///
     /// # Errors
-    /// As [`Pair::run`]; it never is.
+    /// As [`Pair::run`]; it does not happen in time.
     pub fn until(
         &mut self,
         what: &str,

@@ -27,7 +27,7 @@ pub enum Reset {
     Watchdog,
 }
 
-/// What a write does beyond its register.
+/// The effect of a write beyond its register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Nothing.
@@ -40,10 +40,10 @@ pub enum Effect {
     Nmi,
 }
 
-/// A register that holds what is written: offset, value after reset, bits that can be written.
+/// A register without behaviour: offset, value after reset, bits that can be written.
 pub type Plain = (u32, u32, u32);
 
-/// Registers that hold what is written.
+/// Registers without behaviour.
 #[derive(Clone, Debug)]
 pub struct Store {
     known: &'static [Plain],

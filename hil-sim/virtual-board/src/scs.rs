@@ -54,7 +54,7 @@ pub struct Scs {
     grouping: u32,
     /// Reasons of faults.
     pub cfsr: u32,
-    /// Likewise.
+    /// Reasons of hard faults.
     pub hfsr: u32,
     /// Address of a bus fault.
     pub bfar: u32,

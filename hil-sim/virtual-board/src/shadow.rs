@@ -49,7 +49,7 @@ impl Shadow {
     /// A line that was typed at the console of the board.
     ///
     /// # Errors
-    /// It is not one that gives an order.
+    /// The line gives no order.
     pub fn type_line(&mut self, line: &str) -> Result<()> {
         let order = match grammar::parse(line) {
             Ok(Request::Start(mode)) => {
@@ -97,7 +97,7 @@ impl Shadow {
         Ok(())
     }
 
-    /// All that is set, and what was learned.
+    /// All settings, with the learned table.
     pub fn firmware_settings(&self) -> &FirmwareSettings {
         &self.settings
     }
@@ -132,7 +132,7 @@ impl Shadow {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);
             let order = tracked.or_else(|| self.orders.pop_front());
-            let Some(order) = order else { bail!("an order nobody gave") };
+            let Some(order) = order else { bail!("an order that was not given") };
             let answer = self.drive.command(&order);
             if let (Ok(_), Command::Configure(_)) = (answer, order) {
                 self.tracking = Tracking::new(&self.settings.drive);

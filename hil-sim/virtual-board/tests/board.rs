@@ -1,4 +1,4 @@
-//! The image on the board: how it starts, what it says, and what stops it.
+//! The image on the board: its start, its messages, and its ends.
 
 mod common;
 

@@ -1,4 +1,4 @@
-//! What the drive learns on its motor outlasts the power.
+//! The table that the drive learns on its motor outlasts the power.
 
 use anyhow::Result;
 use drive_core::State;

@@ -1,4 +1,4 @@
-//! What an order from the console costs the control interrupt that takes it.
+//! Cycles of the control interrupts that take orders from the console.
 
 mod common;
 

@@ -17,13 +17,13 @@ const APART: u64 = 3000;
 
 /// Latest start of the control interrupt here, ticks: 1 us. The firmware may be late by 10 us
 /// (`board::LATEST_START_US`); here an instruction in the flash takes a cycle, on the chip up to five, and
-/// twice the time is left for what is not modelled.
+/// twice the time is left for effects that are not modelled.
 const LATEST_START: u64 = CYCLES_PER_US as u64;
 
 /// Main loop and serial interrupt are preempted before any instruction, by the interrupts of the
 /// converters and by others that are asked for at random, a hundred thousand in all, while the drive
 /// regulates and the console talks. Registers and stack are compared after each, with the
-/// floating-point registers poisoned inside; the log is whole. None of them waits for what it preempts.
+/// floating-point registers poisoned inside; the log is whole. None of them waits for the code it preempts.
 #[test]
 fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log_intact()
 -> Result<()> {

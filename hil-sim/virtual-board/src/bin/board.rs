@@ -38,7 +38,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<()> {
-    // What can be wrong, before anything is begun.
+    // Everything that can be refused, before the session begins.
     let config = options.config()?;
     let script = options.script.as_deref().map(Script::open).transpose()?;
     let image = image(options.elf.as_deref())?;

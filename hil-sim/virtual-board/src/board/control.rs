@@ -1,4 +1,4 @@
-//! The control interrupt, as seen from outside: what it was given, what it wrote, what it cost.
+//! The control interrupt, as seen from outside: its inputs, its outputs and its cycles.
 
 use drive_core::{Compare, Hardware, Sample};
 
@@ -11,7 +11,7 @@ use crate::cost::{self, Block};
 pub struct Period {
     /// When it began, ticks.
     pub began: u64,
-    /// What the converters and the encoder gave it.
+    /// Its input from the converters and the encoder.
     pub sample: Sample,
     /// Compare values it wrote, and whether the outputs were on after it.
     pub compare: Compare,
@@ -23,7 +23,7 @@ pub struct Period {
     pub to_compares: u32,
 }
 
-/// What is known of a control interrupt while it runs.
+/// The control interrupt that runs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RunningInterrupt {
     began: u64,
@@ -33,14 +33,14 @@ pub(super) struct RunningInterrupt {
     accesses: u64,
 }
 
-/// The longest way through the control interrupt.
+/// The longest path through the control interrupt.
 #[derive(Clone, Debug, Default)]
 pub struct LongestPath {
     /// Estimated cycles.
     pub cycles: u32,
     /// Accesses to registers.
     pub accesses: u32,
-    /// What was executed.
+    /// The blocks executed.
     pub blocks: Vec<Block>,
 }
 

@@ -83,7 +83,7 @@ impl Board {
         if chip.attention || chip.reset.is_some() {
             return Ok(());
         }
-        // A mask that is going to be taken away lets in what waits: look at every instruction.
+        // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
         if chip.scs.waits() {
             chip.deadline = chip.now + 1;
         }

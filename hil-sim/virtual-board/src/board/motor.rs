@@ -8,7 +8,7 @@ use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::periph::tim1::BadGates;
 use induction_drive::board as firmware_board;
 
-/// A change of what the converters see.
+/// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
 /// The power stage between the chip and the motor.
@@ -25,7 +25,7 @@ pub(super) struct PowerStage {
 }
 
 impl Board {
-    /// The outputs as they are now hold from now on.
+    /// Lets the motor see the outputs as they are from now on.
     pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip();
         let (on, now) = (chip.tim1.outputs_on(), chip.now);
@@ -48,7 +48,7 @@ impl Board {
             Compare::OFF
         };
         while self.stage.at < to {
-            // The plant's steps are fractions of what it is given: a period at most.
+            // The plant divides the time that it is given into steps: a period at most.
             let ticks = (to - self.stage.at).min(TICKS_PER_PERIOD);
             self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
             self.stage.at += ticks;

@@ -1,4 +1,4 @@
-//! What a board is made with.
+//! Options of a board.
 
 use hil_sim::config::Config;
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
@@ -8,15 +8,15 @@ use crate::cpu::Counting;
 use crate::periph::tim1::GateLimits;
 use induction_drive::board as firmware_board;
 
-/// What a board is made with.
+/// Options of a board.
 pub struct Options {
     /// The motor and everything around it; see [`Options::plant`].
     pub plant: PlantSettings,
     /// Seed of the sensors' noise.
     pub seed: u64,
-    /// What is counted.
+    /// Counting of cycles and instructions.
     pub counting: Counting,
-    /// What the gates must respect.
+    /// Limits of the gate signals.
     pub gates: GateLimits,
 }
 
@@ -39,9 +39,9 @@ impl Options {
     pub fn new(config: &Config, seed: u64) -> Self {
         let us = firmware_board::CYCLES_PER_US;
         let gates = GateLimits {
-            // What the firmware asks for; the timer makes it a little longer.
+            // As the firmware asks for; the timer makes it a little longer.
             dead_time: (f64::from(firmware_board::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
-            // A microsecond, less what rounding to counts takes.
+            // A microsecond, less the rounding to counts.
             pulse: us - 2,
         };
         Self {

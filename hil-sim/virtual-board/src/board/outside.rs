@@ -1,4 +1,4 @@
-//! What reaches a board from outside, faults among it, and what it says.
+//! Inputs of a board from outside, faults among them, and its console and log.
 
 use anyhow::Result;
 
@@ -19,13 +19,13 @@ impl Board {
         chip.lpuart.wake(chip.now);
     }
 
-    /// What the console has said since the last call.
+    /// The output of the console since the last call.
     pub fn take_console(&mut self) -> String {
         let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// What was logged since the last call.
+    /// The log since the last call.
     ///
     /// # Errors
     /// The log cannot be decoded.
@@ -60,9 +60,9 @@ impl Board {
         self.stalled_until = self.cpu.chip().now + ticks;
     }
 
-    /// From now on what the model does not know is what the chip makes of it: reserved registers read as 0,
-    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in
-    /// which the firmware is damaged on purpose.
+    /// From now on accesses that the model does not know behave as on the chip: reserved registers read as 0,
+    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in which the
+    /// firmware is damaged on purpose.
     pub fn forgive(&mut self) {
         self.cpu.chip_mut().forgiving = true;
     }
@@ -72,9 +72,9 @@ impl Board {
         self.preempt_at = Some(self.cpu.chip().instructions + instructions);
     }
 
-    /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
+    /// Makes an exception pending: it preempts by its priority and the masks.
     pub fn pend(&mut self, exception: u16) {
-        // One that runs already is not waited for by anything but itself.
+        // A control interrupt that runs already delays only itself.
         if exception == CONTROL_INTERRUPT && self.entered.is_none() {
             self.pended = Some(self.cpu.chip().now);
         }

@@ -1,5 +1,5 @@
-//! Is what a control interrupt preempts the same after it? Registers, stack, and the floating-point
-//! registers, which are poisoned as the interrupt begins: what is not restored shows.
+//! A check that control interrupts leave the preempted code intact: registers, stack, and the floating-point
+//! registers, which are poisoned as the interrupt begins, so that a register that is not restored shows.
 
 use anyhow::{Result, bail};
 
@@ -7,7 +7,7 @@ use super::Board;
 use crate::cpu::Register;
 use crate::memory;
 
-/// What was before a control interrupt.
+/// The state of the core before a control interrupt.
 struct Preempted {
     registers: Vec<u64>,
     sp: u32,
@@ -39,7 +39,7 @@ impl Board {
         stack
     }
 
-    /// Preempted a control interrupt.
+    /// Remembers the state before a control interrupt.
     pub(super) fn remember(&mut self) {
         let Some(poison) = &self.poison else { return };
         let sp = self.cpu.get(Register::SP);
@@ -50,14 +50,17 @@ impl Board {
         }
     }
 
-    /// As it begins.
+    /// Poisons the floating-point registers as it begins.
     pub(super) fn spoil(&mut self) {
         if self.poison.is_some() {
             self.cpu.spoil_float();
         }
     }
 
-    /// After it.
+    /// Compares the state after a control interrupt with that before it.
+    ///
+    /// # Errors
+    /// The state differs.
     pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
         let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };
@@ -65,7 +68,7 @@ impl Board {
         if after != before.registers || self.stack_above(before.sp, top) != before.stack {
             let at = self.image.location(self.cpu.get(Register::PC));
             bail!(
-                "a control interrupt changed what it preempted at {at}: {:x?} became {after:x?}",
+                "a control interrupt changed the code it preempted at {at}: {:x?} became {after:x?}",
                 before.registers
             );
         }

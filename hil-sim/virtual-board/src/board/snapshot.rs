@@ -38,7 +38,7 @@ impl Board {
         })
     }
 
-    /// Goes back to what was kept of this board.
+    /// Goes back to a snapshot of this board.
     ///
     /// # Errors
     /// The core cannot go back.

@@ -1,4 +1,4 @@
-//! The classes of faults: what is done, and how long the drive may be wrong with the outputs on.
+//! The classes of faults: each with its injection, and the longest time of wrong control with the outputs on.
 
 use rand::{Rng, RngExt};
 
@@ -11,13 +11,13 @@ use crate::memory::Region;
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 
-/// Does it, and says what exactly.
+/// Injects a fault, and describes it.
 pub type Inject = fn(&mut Board, &Regions, &mut dyn Rng) -> String;
 
-/// What happens in a run of a class.
+/// The procedure of a run.
 #[derive(Clone, Copy)]
 pub enum Procedure {
-    /// The drive regulates, and this is done to it.
+    /// A fault is injected while the drive regulates.
     Regulating(Inject),
     /// The power goes in one of the operations of `save`.
     Saving,
@@ -27,18 +27,18 @@ pub enum Procedure {
     Reset,
 }
 
-/// A class.
+/// A class of faults.
 pub struct Class {
     /// Its name.
     pub name: &'static str,
     /// Longest that outputs may be on with wrong control, ms. Infinite: for the angle nothing is promised, and
     /// only the currents are judged.
     pub bound_ms: f64,
-    /// Why that long.
+    /// The reason for that bound.
     pub why: &'static str,
-    /// Which angle sources it is tried with.
+    /// The angle sources that it is tried with.
     pub sources: &'static [Source],
-    /// What is done.
+    /// The procedure of its runs.
     pub procedure: Procedure,
 }
 
@@ -48,7 +48,7 @@ const ENCODER: &[Source] = &[Source::Encoder];
 /// From the first lost count of 5 % of them to the fault: 210 ms measured.
 const LOST_COUNTS_MS: f64 = 300.0;
 
-/// A PWM period, ms, and what the software needs to see a sample and switch off.
+/// A PWM period, and the time in which the software sees a sample and switches off, ms.
 const PERIOD_MS: f64 = 1.0 / 6.0;
 const STEP_MS: f64 = 2.0 * PERIOD_MS;
 
@@ -134,7 +134,7 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "not-a-number in the drive's state",
         bound_ms: 2.0 * CARRIER_MS + STEP_MS,
-        why: "what is used once in a carrier period shows in the next one",
+        why: "quantities that are used once in a carrier period show in the next one",
         sources: BOTH,
         procedure: Procedure::Regulating(|board, regions, rng| {
             let Region { address: base, size } = regions.state;
@@ -153,7 +153,7 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "dc-link step",
         bound_ms: STEP_MS,
-        why: "limits: the sample after it, and the step that sees it",
+        why: "voltage limits: the sample after it, and the step that sees it",
         sources: BOTH,
         procedure: Procedure::Regulating(|board, _, rng| {
             let volts = rng.random_range(100.0..600.0);
@@ -301,7 +301,7 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "console garbage and floods",
         bound_ms: 0.0,
-        why: "nothing of it may be seen",
+        why: "control is correct throughout",
         sources: BOTH,
         procedure: Procedure::Regulating(|board, _, rng| {
             let mut bytes = vec![0; rng.random_range(1..3000)];
@@ -376,7 +376,7 @@ pub const CLASSES: &[Class] = &[
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;
 /// Noise that turns the angle.
 const NOISE_MS: f64 = 100.0;
-const NOISE: &str = "the mean over 67 ms passes what is allowed; less than that turns the angle by less than 15 degrees";
+const NOISE: &str = "the mean over 67 ms passes the limit; noise below the limit turns the angle by less than 15 degrees";
 /// A sensor across the injection axis sees no carrier, and cannot be judged: a quarter of half a turn of
 /// the flux, which is 60 ms with the shaft locked.
 const SILENT_MS: f64 = 70.0;

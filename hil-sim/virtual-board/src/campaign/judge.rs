@@ -1,4 +1,4 @@
-//! What a run is judged by: at every instant after the bound, outputs off or control correct.
+//! The criterion of a run: at every instant after the bound, outputs are off or control is correct.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use crate::periph::Reset;
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
-/// Resets of which the first was the fault's; more is a loop.
+/// Resets from which on they count as a loop: the fault itself may cause the first.
 const MOST_RESETS: usize = 2;
 /// Periods from a reset until it has been reported in the log.
 const REPORTED: u64 = 400;
@@ -23,7 +23,7 @@ const START: u64 = 30_000;
 /// The outcome of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// What was done.
+    /// Description of the fault.
     pub what: String,
     /// From the fault to the outputs off, ms.
     pub off_ms: Option<f64>,
@@ -38,7 +38,7 @@ pub struct Outcome {
 /// Watches for `ms` after the fault, or until the outputs are off. The angle counts, or the currents alone.
 ///
 /// # Errors
-/// Bad gate signals; what the board cannot go on with.
+/// Bad gate signals; another failure of the model.
 pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
     let trip = f64::from(induction_drive::board::settings().limits.trip_a);
@@ -61,7 +61,7 @@ pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> 
         }
         let error = angle_error(board);
         outcome.angle_deg = outcome.angle_deg.max(error);
-        // Written so that not-a-number is wrong.
+        // A not-a-number counts as wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
         if !(straight && current < trip) {
             outcome.wrong_ms = since(next);
@@ -79,7 +79,7 @@ fn angle_error(board: &Board) -> f64 {
 /// After the outputs have gone off: the reason is in the log, and there is no loop of resets.
 ///
 /// # Errors
-/// What is missing.
+/// No reason in the log, or a loop of resets.
 pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     board.run_periods(FAULT_REPORTED)?;
     if board.resets.is_empty() {
@@ -110,10 +110,10 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     Ok(())
 }
 
-/// Runs until the firmware has said who it is, and a bit.
+/// Runs until the firmware has greeted, and 200 periods more.
 ///
 /// # Errors
-/// It never does, or is reset again.
+/// No greeting comes, or another reset.
 pub fn greeting(board: &mut Board) -> Result<String> {
     let resets = board.resets.len();
     let mut heard = String::new();

@@ -1,4 +1,4 @@
-//! Where every injection begins: a board that has started, gone back to each time.
+//! The beginning of every injection: snapshots of a board that has started.
 
 use anyhow::{Context, Result, ensure};
 use drive_core::State;
@@ -25,10 +25,10 @@ const SPEEDS: [f64; 2] = [31.4, 94.2];
 const SETTLING: u64 = 1200;
 /// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
-/// What is changed and not saved yet.
+/// A setting that is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
-/// Which angle the drive goes by.
+/// The source of the flux angle, and the speed of the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The injection, with the shaft locked.
@@ -44,7 +44,7 @@ pub enum Source {
 pub struct Regions {
     /// The drive's coefficients.
     pub coefficients: Region,
-    /// What changes in the drive while it regulates.
+    /// The drive's state.
     pub state: Region,
     /// All data of the control interrupt, in CCM.
     pub control: Region,
@@ -70,11 +70,11 @@ impl Regions {
     }
 }
 
-/// A board, and what it can go back to.
+/// A board and its snapshots.
 pub struct Scene {
     /// The board.
     pub board: Board,
-    /// Where bits flip.
+    /// Regions of its memory.
     pub regions: Regions,
     /// Two sets of settings.
     pub settings: [FirmwareSettings; 2],
@@ -89,7 +89,7 @@ impl Scene {
     /// Starts a board, once with each angle source.
     ///
     /// # Errors
-    /// It does not start.
+    /// The board does not start.
     pub fn new(image: Image) -> Result<Self> {
         let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
         pair.order("set wiring_checked yes")?;
@@ -127,7 +127,7 @@ impl Scene {
     /// Regulating torque.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn regulating(&mut self, source: Source) -> Result<()> {
         match source {
             Source::Injection => self.board.go_back(&self.injection),
@@ -140,7 +140,7 @@ impl Scene {
     /// other.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn off(&mut self, slot: usize) -> Result<()> {
         self.board.go_back(&self.off[slot % 2])
     }
@@ -180,7 +180,7 @@ impl Flash for Bank<'_> {
 /// The settings that the flash holds.
 ///
 /// # Errors
-/// It holds none.
+/// The flash holds none.
 pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     ensure!(
         induction_drive::board::settings_address(0, 0) >= BANK_2,
@@ -194,7 +194,7 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     .context("no whole settings in the flash")
 }
 
-/// How the log names what reset the chip.
+/// The name of a cause of reset in the log.
 pub const fn cause(reset: Reset) -> &'static str {
     match reset {
         Reset::Power => "reset by power-on",

@@ -29,7 +29,7 @@ const DAC3: u32 = 0x5000_1000;
 pub struct Unknown {
     /// Where.
     pub address: u32,
-    /// What was to be written, if it was a write.
+    /// The value to be written, of a write.
     pub written: Option<u32>,
     /// Last known place of the core: the instruction, in CCM the block.
     pub at: u32,
@@ -96,7 +96,7 @@ impl Chip {
         0
     }
 
-    /// What a read gives, without what a read does.
+    /// The value of a register, without the side effects of a read.
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 => Some(0),

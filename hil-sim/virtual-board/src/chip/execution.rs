@@ -1,4 +1,4 @@
-//! What the core executes: the time it takes, and the blocks that are kept of it.
+//! The execution of code: its time, and the blocks that are kept.
 
 use super::Chip;
 use crate::cost::{self, Block};

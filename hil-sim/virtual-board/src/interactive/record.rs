@@ -62,10 +62,10 @@ impl Bucket {
 
 /// Most buckets: more than a plot has pixels, and few enough for a page and for a long session.
 const BUCKETS: usize = 30_000;
-/// A flux below this has hardly an angle, Wb: under half of what the drive magnetises to.
+/// A flux below this has hardly an angle, Wb: under half of the drive's flux.
 const FLUX_WB: f64 = 0.05;
 
-/// What was recorded.
+/// The record of a session.
 #[derive(Clone, Debug)]
 pub struct Record {
     buckets: Vec<Bucket>,
@@ -155,8 +155,8 @@ impl Record {
         (self.error_squares / self.judged.max(1) as f64).sqrt()
     }
 
-    /// Curve of a quantity over time, s; what the drive reports is not a number while the outputs are
-    /// off.
+    /// Curve of a quantity over time, s; quantities that the drive reports are not-a-numbers while the outputs
+    /// are off.
     pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
         self.points(|bucket| {
             let on = bucket.sums[Quantity::Outputs as usize];
@@ -165,8 +165,8 @@ impl Record {
         })
     }
 
-    /// True minus estimated rotor-flux angle over time, electrical degrees; not a number where it is not
-    /// judged.
+    /// True minus estimated rotor-flux angle over time, electrical degrees; a not-a-number where it is
+    /// not judged.
     pub fn error_deg(&self) -> Vec<(f64, f64)> {
         self.points(|bucket| match bucket.error {
             [0.0, 0.0] => f64::NAN,

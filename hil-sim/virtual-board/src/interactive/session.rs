@@ -38,7 +38,7 @@ pub enum End {
     Failed(anyhow::Error),
 }
 
-/// What talks to the board besides the pseudo-terminal.
+/// Inputs of a session besides the pseudo-terminal.
 pub struct Inputs {
     /// Lines typed at the terminal.
     pub terminal: Receiver<String>,
@@ -128,7 +128,7 @@ impl Session {
         end
     }
 
-    /// Takes what has come, goes on for a slice, and gives what there is; why the session ends, if it does.
+    /// Takes the inputs, goes on for a slice and shows the outputs; the reason of the end, if the session ends.
     fn slice(&mut self) -> Result<Option<End>> {
         let now = self.board.time();
         if self.inputs.stop.load(Ordering::Relaxed) {
@@ -143,7 +143,7 @@ impl Session {
             match self.inputs.terminal.try_recv() {
                 Ok(line) if is_quit(&line) => return Ok(Some(End::Quit)),
                 Ok(line) => self.send_line(&line),
-                // Nobody types any more: others still may.
+                // Without the terminal, script and pseudo-terminal go on.
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
@@ -191,7 +191,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes what console and log have said, and tells of resets.
+    /// Takes the output of console and log, and notes resets.
     fn hear(&mut self) -> Result<()> {
         for text in self.board.take_log()? {
             self.add(Source::Log, text);

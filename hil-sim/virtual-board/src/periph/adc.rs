@@ -44,7 +44,7 @@ const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 /// Sampling times, halves of a converter clock.
 const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
-/// A conversion after it, likewise.
+/// A conversion after it, halves of a converter clock.
 const CONVERSION: u64 = 25;
 
 /// Converter converter.
@@ -72,7 +72,7 @@ impl Default for Converter {
     }
 }
 
-/// What the pins show: codes by channel, 0 to 18.
+/// Codes at the pins by channel, 0 to 18.
 pub type Inputs = [u16; 19];
 
 /// Both converters.
@@ -225,8 +225,8 @@ impl Converter {
         Some(())
     }
 
-    /// The control register: a calibration and the start-up take no time. What the manual forbids is
-    /// not known: calibration without regulator or while enabled, enabling without regulator.
+    /// The control register: a calibration and the start-up take no time. `None` is
+    /// forbidden by the manual: calibration without regulator or while enabled, enabling without regulator.
     fn order(&mut self, value: u32) -> Option<()> {
         let ready = self.control & VREGEN != 0 && self.control & DEEPPWD == 0;
         if value & ADCAL != 0 && (!ready || self.control & ADEN != 0) {

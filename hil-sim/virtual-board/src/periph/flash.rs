@@ -61,7 +61,7 @@ pub struct Flash {
     torn: Vec<bool>,
     /// Operations since the beginning: double words programmed, pages erased.
     pub operations: u64,
-    /// The power goes in this operation, counted from 1; what it was to write is torn.
+    /// The power goes in this operation, counted from 1; its double word or page is torn.
     pub power_loss_at: Option<u64>,
     /// The power has gone.
     pub power_lost: bool,

@@ -47,7 +47,7 @@ impl Gpio {
         Self(store)
     }
 
-    /// The alternate function of a pin, if that is what it is set to.
+    /// The alternate function of a pin, if it is set to one.
     pub fn alternate(&self, pin: u32) -> Option<u32> {
         let mode = self.0.get(MODER) >> (2 * pin) & 3;
         (mode == 2).then(|| self.0.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15)

@@ -37,7 +37,7 @@ const FIFOEN: u32 = 1 << 29;
 /// Start bit, eight data bits, stop bit.
 const BITS: u64 = 10;
 
-/// What travels between the port and the console.
+/// Bytes between the port and the console.
 #[derive(Clone, Debug, Default)]
 pub struct Wire {
     /// To the chip.
@@ -142,7 +142,7 @@ impl Lpuart {
         cr1 & UE != 0 && self.status & (asked | errors) != 0
     }
 
-    /// Reads a register, with what that does.
+    /// Reads a register, with its side effects.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
             ISR => Some(

@@ -11,7 +11,7 @@ pub struct GateLimits {
     pub pulse: u32,
 }
 
-/// Why a gate pattern is refused.
+/// A violation of the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BadGates {
     /// The switches of leg `leg` may be on together: the dead time in ticks.
@@ -28,7 +28,7 @@ pub enum BadGates {
         /// Ticks.
         ticks: u32,
     },
-    /// A switch is on although nobody switched the outputs on, or with a wrong polarity.
+    /// The outputs of a leg are not complementary in PWM mode 1, active high.
     NotComplementary,
 }
 
