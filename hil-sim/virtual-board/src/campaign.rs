@@ -24,7 +24,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
 use crate::periph::Reset;
-use class::{CLASSES, Class, Procedure};
+use class::{CLASSES, Class, Run};
 use judge::Outcome;
 use scene::Scene;
 
@@ -129,8 +129,8 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let source = class.sources[(turn % class.sources.len() as u64) as usize];
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
-    match class.procedure {
-        Procedure::Regulating(inject) => {
+    match class.run {
+        Run::Regulating(inject) => {
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
@@ -146,14 +146,14 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             outcome.what = what;
             Ok(outcome)
         }
-        Procedure::Saving => {
+        Run::Saving => {
             // Each in turn, in one slot and the other.
             let slot = (turn % 2) as usize;
             let operations = operations(scene, slot)?;
             lose_power(scene, slot, turn / 2 % operations)?;
             after_power(scene, whole_start)
         }
-        Procedure::DamagedPage => {
+        Run::DamagedPage => {
             scene.off(0)?;
             let slot = (turn % 2) as usize;
             let word = rng.random_range(0..64);
@@ -162,7 +162,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             scene.board.reset(Reset::Power);
             after_power(scene, true)
         }
-        Procedure::Reset => {
+        Run::Reset => {
             scene.regulating(source)?;
             scene.board.run_ticks(rng.random_range(0..LATEST))?;
             scene.board.went_off = None;

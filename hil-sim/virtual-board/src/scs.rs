@@ -92,7 +92,7 @@ impl Default for Scs {
     }
 }
 
-/// Registers that hold what is written: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
+/// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
 const PLAIN: &[Plain] = &[
     (0xe000_ed14, 0x200, u32::MAX),
     (0xe000_ed24, 0, u32::MAX),

@@ -16,7 +16,7 @@ pub type Inject = fn(&mut Board, &Regions, &mut dyn Rng) -> String;
 
 /// The procedure of a run.
 #[derive(Clone, Copy)]
-pub enum Procedure {
+pub enum Run {
     /// A fault is injected while the drive regulates.
     Regulating(Inject),
     /// The power goes in one of the operations of `save`.
@@ -39,7 +39,7 @@ pub struct Class {
     /// The angle sources that it is tried with.
     pub sources: &'static [Source],
     /// The procedure of its runs.
-    pub procedure: Procedure,
+    pub run: Run,
 }
 
 const BOTH: &[Source] = &[Source::Injection, Source::Encoder];
@@ -59,14 +59,14 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "control is correct throughout",
         sources: BOTH,
-        procedure: Procedure::Regulating(|_, _, _| String::new()),
+        run: Run::Regulating(|_, _, _| String::new()),
     },
     Class {
         name: "current sensor stuck",
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let (which, now) = (rng.random(), board.sample());
             let value = *current(which, &mut { now });
             board.disturb = Some(Box::new(move |s| *current(which, s) = value));
@@ -78,7 +78,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random();
             let line = if which { firmware_board::CURRENT_A } else { firmware_board::CURRENT_B };
             let zero = (-line.offset / line.gain).round() as u16;
@@ -91,7 +91,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let (which, high): (bool, bool) = (rng.random(), rng.random());
             let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
             board.disturb = Some(Box::new(move |s| *current(which, s) = code));
@@ -103,7 +103,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: NOISE_MS,
         why: NOISE,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random();
             // 5 mA to 2 A rms.
             let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
@@ -118,25 +118,21 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
-            slow_sensor(board, rng, |s| &mut s.dc_link)
-        }),
+        run: Run::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.dc_link)),
     },
     Class {
         name: "heat-sink sensor stuck, open, saturated, noisy",
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
-            slow_sensor(board, rng, |s| &mut s.heat_sink)
-        }),
+        run: Run::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.heat_sink)),
     },
     Class {
         name: "not-a-number in the drive's state",
         bound_ms: 2.0 * CARRIER_MS + STEP_MS,
         why: "quantities that are used once in a carrier period show in the next one",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| {
+        run: Run::Regulating(|board, regions, rng| {
             let Region { address: base, size } = regions.state;
             // A word that holds a plausible number; angles and counts are another class.
             for _ in 0..1000 {
@@ -155,7 +151,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "voltage limits: the sample after it, and the step that sees it",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let volts = rng.random_range(100.0..600.0);
             board.plant.set_dc_link(volts).ok();
             format!("to {volts:.0} V")
@@ -166,7 +162,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 5.0,
         why: "1.4 degrees of a turn that did not come: 0.8 ms at 300 rpm, 2.4 ms at 100 rpm; and the step",
         sources: ENCODER,
-        procedure: Procedure::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.plant.set_encoder_fault(EncoderFault::Stuck);
             String::new()
         }),
@@ -176,18 +172,14 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "as a slip that is wrong by as much: control is correct throughout",
         sources: ENCODER,
-        procedure: Procedure::Regulating(|board, _, rng| {
-            losing(board, rng.random_range(0.0..0.02))
-        }),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.0..0.02))),
     },
     Class {
         name: "encoder loses 5 to 90 % of its counts at 900 rpm",
         bound_ms: LOST_COUNTS_MS,
         why: "the back-emf of the flux that is turned away, once it is there: with the rotor time constant",
         sources: &[Source::FastEncoder],
-        procedure: Procedure::Regulating(|board, _, rng| {
-            losing(board, rng.random_range(0.05..0.9))
-        }),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.05..0.9))),
     },
     Class {
         name: "encoder loses 2 to 90 % of its counts at 300 rpm",
@@ -195,16 +187,14 @@ pub const CLASSES: &[Class] = &[
         why: "15 degrees leave 4.7 V unexplained of a back-emf of 6.7 V, a motor 30 % warmer 4.2 V at the right \
               angle: only the currents are judged",
         sources: ENCODER,
-        procedure: Procedure::Regulating(|board, _, rng| {
-            losing(board, rng.random_range(0.02..0.9))
-        }),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.02..0.9))),
     },
     Class {
         name: "break pin",
         bound_ms: firmware_board::BREAK_REACTION_NS as f64 * 1e-6,
         why: "the timer's filter; no software",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.set_fault_pin(false);
             String::new()
         }),
@@ -214,7 +204,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.01,
         why: "the clock security system; no software",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.set_crystal(false);
             String::new()
         }),
@@ -224,37 +214,35 @@ pub const CLASSES: &[Class] = &[
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| {
-            flip(board, rng, regions.coefficients)
-        }),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.coefficients)),
     },
     Class {
         name: "bit flip in the drive's state",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| flip(board, rng, regions.state)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.state)),
     },
     Class {
         name: "bit flip in the control's code",
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| flip(board, rng, regions.code)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.code)),
     },
     Class {
         name: "bit flip anywhere in the control's data",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| flip(board, rng, regions.control)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.control)),
     },
     Class {
         name: "bit flip in RAM, stack included",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| {
+        run: Run::Regulating(|board, regions, rng| {
             let area = if rng.random() {
                 regions.data
             } else {
@@ -268,7 +256,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "five updates at most, each seen in its own period",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let count = rng.random_range(1..6);
             board.chip().tim1.drop_update = count;
             format!("{count} of them")
@@ -279,7 +267,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "seen in its own period",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.chip().tim1.extra_update();
             String::new()
         }),
@@ -289,7 +277,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: WATCHDOG_MS,
         why: "one converter: its own period; both: no interrupt, the watchdog is not fed",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random_range(0..3_usize);
             // For good, or for a while: up to longer than the watchdog waits.
             let count =
@@ -303,7 +291,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "control is correct throughout",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let mut bytes = vec![0; rng.random_range(1..3000)];
             let text = rng.random::<bool>();
             for byte in &mut bytes {
@@ -322,7 +310,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: OVERRUN_MS + 2.0 * STEP_MS,
         why: "the core stands still for up to 2 ms; then the first interrupt sees that it is late",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let ms = rng.random_range(0.005..OVERRUN_MS);
             board.stall((ms * 1e-3 * TICKS_PER_S as f64) as u64);
             format!("{ms:.3} ms")
@@ -333,7 +321,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: WATCHDOG_MS,
         why: "the watchdog, 4.2 to 4.9 ms after it was last fed",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.hang();
             String::new()
         }),
@@ -343,7 +331,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "the next interrupt does not find room for its frame",
         sources: BOTH,
-        procedure: Procedure::Regulating(|board, regions, rng| {
+        run: Run::Regulating(|board, regions, rng| {
             let room = 8 * rng.random_range(0..13);
             board.cpu().set(Register::SP, regions.stack.address + room);
             format!("room for {room} bytes")
@@ -354,21 +342,21 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "outputs are off; the other page holds",
         sources: &[Source::Injection],
-        procedure: Procedure::DamagedPage,
+        run: Run::DamagedPage,
     },
     Class {
         name: "power lost in an operation of save",
         bound_ms: 0.0,
         why: "outputs are off; the old or the new set holds",
         sources: &[Source::Injection],
-        procedure: Procedure::Saving,
+        run: Run::Saving,
     },
     Class {
         name: "reset pin at any time",
         bound_ms: 0.001,
         why: "the reset of the timer; no software",
         sources: BOTH,
-        procedure: Procedure::Reset,
+        run: Run::Reset,
     },
 ];
 

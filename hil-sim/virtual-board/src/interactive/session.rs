@@ -15,7 +15,7 @@ use super::transcript::{Assembler, Line, Source};
 use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 
-/// Control periods between two looks at the world inputs: 5 ms, less than anyone notices.
+/// Control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;
 /// The board is looked at this long before a control interrupt, ticks: the one before has ended, and the
 /// motor stands where it was sampled for that.

@@ -47,7 +47,7 @@ const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
 /// A conversion after it, halves of a converter clock.
 const CONVERSION: u64 = 25;
 
-/// Converter converter.
+/// A converter.
 #[derive(Clone, Debug)]
 struct Converter {
     store: Store,
