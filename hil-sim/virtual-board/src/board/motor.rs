@@ -1,28 +1,40 @@
 //! The motor beside the chip: it moves with the time, gets the voltages, and is sampled.
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use drive_core::{Compare, Sample};
 
-use super::{Board, Failure};
-use crate::board as numbers;
+use super::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::cpu::Cpu;
 use crate::periph::tim1::BadGates;
+use induction_drive::board as firmware_board;
 
-/// A change of what the converters see.
+/// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
+/// The power stage between the chip and the motor.
+#[derive(Clone, Copy, Default)]
+pub(super) struct PowerStage {
+    /// Time up to which the motor has moved, ticks.
+    pub at: u64,
+    /// Compare values of this period.
+    pub applied: Compare,
+    /// Whether the outputs are on.
+    pub outputs: bool,
+    /// The last sample.
+    pub sample: Sample,
+}
+
 impl Board {
-    /// The outputs as they are now hold from now on.
-    pub(super) fn see_outputs(&mut self) {
+    /// Lets the motor see the outputs as they are from now on.
+    pub(super) fn follow_outputs(&mut self) {
         let chip = self.cpu.chip();
         let (on, now) = (chip.tim1.outputs_on(), chip.now);
-        if on != self.outputs {
+        if on != self.stage.outputs {
             if on && !chip.gates_connected() {
                 return; // the pins are not the timer's
             }
             self.advance_plant(now);
-            self.outputs = on;
+            self.stage.outputs = on;
             if !on {
                 self.went_off = Some(now);
             }
@@ -30,13 +42,16 @@ impl Board {
     }
 
     pub(super) fn advance_plant(&mut self, to: u64) {
-        let compare =
-            if self.outputs { Compare { enabled: true, ..self.applied } } else { Compare::OFF };
-        while self.plant_at < to {
-            // The plant's steps are fractions of what it is given: a period at most.
-            let ticks = (to - self.plant_at).min(TICKS_PER_PERIOD);
+        let compare = if self.stage.outputs {
+            Compare { enabled: true, ..self.stage.applied }
+        } else {
+            Compare::OFF
+        };
+        while self.stage.at < to {
+            // The plant divides the time that it is given into steps: a period at most.
+            let ticks = (to - self.stage.at).min(TICKS_PER_PERIOD);
             self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
-            self.plant_at += ticks;
+            self.stage.at += ticks;
         }
     }
 
@@ -44,32 +59,32 @@ impl Board {
     /// compare values taken over are in force.
     pub(super) fn crest(&mut self, at: u64) -> Result<()> {
         self.advance_plant(at);
-        self.sample = self.plant.sample();
+        self.stage.sample = self.plant.sample();
         if let Some(disturb) = &mut self.disturb {
-            disturb(&mut self.sample);
+            disturb(&mut self.stage.sample);
         }
-        self.see();
+        self.show_sample();
         let chip = self.cpu.chip_mut();
         let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
-        self.applied = Compare { a, b, c, enabled: true };
-        if self.outputs {
+        self.stage.applied = Compare { a, b, c, enabled: true };
+        if self.stage.outputs {
             match chip.tim1.check_gates(self.gates) {
                 Err(BadGates::Pulse { .. }) if chip.forgiving => self.short_pulses += 1,
-                checked => checked.map_err(Failure::Gates)?,
+                checked => checked.map_err(|bad| anyhow!("bad gate signals: {bad:?}"))?,
             }
         }
         Ok(())
     }
 
     /// Shows the sample to converters, comparators and encoder.
-    pub(super) fn see(&mut self) {
-        let s = self.sample;
+    pub(super) fn show_sample(&mut self) {
+        let s = self.stage.sample;
         let chip = self.cpu.chip_mut();
         let pins = [
-            (0, numbers::ADC1_CHANNELS.0, s.current_a),
-            (0, numbers::ADC1_CHANNELS.1, s.dc_link),
-            (1, numbers::ADC2_CHANNELS.0, s.current_b),
-            (1, numbers::ADC2_CHANNELS.1, s.heat_sink),
+            (0, firmware_board::ADC1_CHANNELS.0, s.current_a),
+            (0, firmware_board::ADC1_CHANNELS.1, s.dc_link),
+            (1, firmware_board::ADC2_CHANNELS.0, s.current_b),
+            (1, firmware_board::ADC2_CHANNELS.1, s.heat_sink),
         ];
         for (converter, channel, code) in pins {
             chip.adc.inputs[converter][usize::from(channel)] = code;

@@ -1,10 +1,9 @@
-//! What reaches a board from outside, faults among it, and what it says.
+//! Inputs of a board from outside, faults among them, and its console and log.
 
 use anyhow::Result;
 
 use super::Board;
 use crate::chip::CONTROL_INTERRUPT;
-use crate::cpu::Cpu;
 
 impl Board {
     /// Puts a line, without its end, on the wire to the console.
@@ -16,21 +15,21 @@ impl Board {
     /// Puts bytes on the wire to the console.
     pub fn send(&mut self, bytes: &[u8]) {
         let chip = self.chip();
-        chip.lpuart.wire.to_chip.extend(bytes.iter().map(|byte| Some(*byte)));
+        chip.lpuart.wire.to_chip.extend(bytes);
         chip.lpuart.wake(chip.now);
     }
 
-    /// What the console has said since the last call.
-    pub fn heard(&mut self) -> String {
+    /// The output of the console since the last call.
+    pub fn take_console(&mut self) -> String {
         let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// What was logged since the last call.
+    /// The log since the last call.
     ///
     /// # Errors
     /// The log cannot be decoded.
-    pub fn logged(&mut self) -> Result<Vec<String>> {
+    pub fn take_log(&mut self) -> Result<Vec<String>> {
         self.drain_log()?;
         Ok(std::mem::take(&mut self.lines))
     }
@@ -61,9 +60,9 @@ impl Board {
         self.stalled_until = self.cpu.chip().now + ticks;
     }
 
-    /// From now on what the model does not know is what the chip makes of it: reserved registers read as 0,
-    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in
-    /// which the firmware is damaged on purpose.
+    /// From now on accesses that the model does not know behave as on the chip: reserved registers read as 0,
+    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in which the
+    /// firmware is damaged on purpose.
     pub fn forgive(&mut self) {
         self.cpu.chip_mut().forgiving = true;
     }
@@ -73,9 +72,9 @@ impl Board {
         self.preempt_at = Some(self.cpu.chip().instructions + instructions);
     }
 
-    /// Makes an exception pending: it preempts what runs, as its priority and the masks say.
+    /// Makes an exception pending: it preempts by its priority and the masks.
     pub fn pend(&mut self, exception: u16) {
-        // One that runs already is not waited for by anything but itself.
+        // A control interrupt that runs already delays only itself.
         if exception == CONTROL_INTERRUPT && self.entered.is_none() {
             self.pended = Some(self.cpu.chip().now);
         }

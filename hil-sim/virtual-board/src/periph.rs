@@ -2,18 +2,32 @@
 
 pub mod adc;
 pub mod analog;
-pub mod debug;
 pub mod encoder;
 pub mod flash;
 pub mod gpio;
 pub mod iwdg;
 pub mod lpuart;
-pub mod pwr;
+pub mod plain;
 pub mod rcc;
-pub mod syscfg;
 pub mod tim1;
 
-/// What a write does beyond its register.
+/// Time of an event that does not come, ticks.
+pub const NEVER: u64 = u64::MAX;
+
+/// Cause of a reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Power-on.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// A request of the firmware.
+    Software,
+    /// The independent watchdog.
+    Watchdog,
+}
+
+/// The effect of a write beyond its register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
     /// Nothing.
@@ -26,10 +40,10 @@ pub enum Effect {
     Nmi,
 }
 
-/// A register that holds what is written: offset, value after reset, bits that can be written.
+/// A register without behaviour: offset, value after reset, bits that can be written.
 pub type Plain = (u32, u32, u32);
 
-/// Registers that hold what is written.
+/// Registers without behaviour.
 #[derive(Clone, Debug)]
 pub struct Store {
     known: &'static [Plain],

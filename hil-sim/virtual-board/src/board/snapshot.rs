@@ -1,22 +1,20 @@
-//! A board that can be gone back to: starting one takes seconds, going back less than a millisecond.
+//! Snapshots of a board: a start takes seconds, going back to a snapshot less than a millisecond.
 
 use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
-use super::{Board, Compare, Reset, Sample};
+use super::Board;
+use super::motor::PowerStage;
 use crate::chip::Chip;
-use crate::cpu::Cpu;
-use crate::unicorn::Standing;
+use crate::cpu::CoreState;
+use crate::periph::Reset;
 
-/// FirmwareSettings of a board that moves.
+/// Everything that changes on a board.
 pub struct Snapshot {
-    standing: Standing,
+    core: CoreState,
     chip: Chip,
     plant: Plant,
-    plant_at: u64,
-    applied: Compare,
-    outputs: bool,
-    sample: Sample,
+    stage: PowerStage,
     sleeping: bool,
     resets: Vec<(u64, Reset)>,
 }
@@ -27,36 +25,30 @@ impl Board {
     /// # Errors
     /// The core cannot be kept; the log cannot be decoded.
     pub fn keep(&mut self) -> Result<Snapshot> {
-        // What is in the log is taken, so that none of it is seen twice.
-        self.logged()?;
-        self.heard();
+        // The log so far belongs to the time before.
+        self.take_log()?;
+        self.take_console();
         Ok(Snapshot {
-            standing: self.cpu.keep().map_err(|e| anyhow!("emulator: {e:?}"))?,
+            core: self.cpu.keep().map_err(|e| anyhow!("emulator: {e:?}"))?,
             chip: self.cpu.chip().clone(),
             plant: self.plant.clone(),
-            plant_at: self.plant_at,
-            applied: self.applied,
-            outputs: self.outputs,
-            sample: self.sample,
+            stage: self.stage,
             sleeping: self.sleeping,
             resets: self.resets.clone(),
         })
     }
 
-    /// Goes back to what was kept of this board.
+    /// Goes back to a snapshot of this board.
     ///
     /// # Errors
     /// The core cannot go back.
     pub fn go_back(&mut self, to: &Snapshot) -> Result<()> {
-        self.cpu.go_back(&to.standing).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        self.cpu.go_back(&to.core).map_err(|e| anyhow!("emulator: {e:?}"))?;
         let forgiving = self.cpu.chip().forgiving;
         *self.cpu.chip_mut() = to.chip.clone();
         self.cpu.chip_mut().forgiving = forgiving;
         self.plant = to.plant.clone();
-        self.plant_at = to.plant_at;
-        self.applied = to.applied;
-        self.outputs = to.outputs;
-        self.sample = to.sample;
+        self.stage = to.stage;
         self.sleeping = to.sleeping;
         self.resets = to.resets.clone();
         self.hung = false;

@@ -1,18 +1,17 @@
-//! The control interrupt, as seen from outside: what it was given, what it wrote, what it cost.
+//! The control interrupt, as seen from outside: its inputs, its outputs and its cycles.
 
 use drive_core::{Compare, Hardware, Sample};
 
 use super::Board;
-use crate::chip::Block;
-use crate::cost;
-use crate::cpu::Cpu;
+use crate::addresses::Addresses;
+use crate::cost::{self, Block};
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Period {
     /// When it began, ticks.
     pub began: u64,
-    /// What the converters and the encoder gave it.
+    /// Its input from the converters and the encoder.
     pub sample: Sample,
     /// Compare values it wrote, and whether the outputs were on after it.
     pub compare: Compare,
@@ -24,9 +23,9 @@ pub struct Period {
     pub to_compares: u32,
 }
 
-/// What is known of a control interrupt while it runs.
+/// The control interrupt that runs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Entered {
+pub(super) struct RunningInterrupt {
     began: u64,
     sample: Sample,
     ended: bool,
@@ -34,21 +33,23 @@ pub(super) struct Entered {
     accesses: u64,
 }
 
-/// The longest way through the control interrupt.
+/// The longest path through the control interrupt.
 #[derive(Clone, Debug, Default)]
-pub struct Worst {
+pub struct LongestPath {
     /// Estimated cycles.
     pub cycles: u32,
     /// Accesses to registers.
     pub accesses: u32,
-    /// What was executed.
+    /// The blocks executed.
     pub blocks: Vec<Block>,
 }
 
 impl Board {
+    /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
-        let mut flag = [0];
-        self.cpu.read(self.order_flag, &mut flag) && flag[0] == 1
+        let Addresses { orders, order_waits, .. } = self.addresses;
+        let mailbox = self.word(orders);
+        mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }
 
     pub(super) fn begin_control(&mut self) {
@@ -79,7 +80,8 @@ impl Board {
         if let Some(at) = self.pended.take() {
             self.latest_start = self.latest_start.max(began - at);
         }
-        self.entered = Some(Entered { began, sample, ended: ended[0], had_order, accesses });
+        self.entered =
+            Some(RunningInterrupt { began, sample, ended: ended[0], had_order, accesses });
     }
 
     pub(super) fn end_control(&mut self) {
@@ -94,13 +96,13 @@ impl Board {
         let (cycles, accesses) = way(&chip.blocks, chip.accesses);
         let cycles = cycles + cost::EXIT;
         let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
-        let note = |worst: &mut Worst, cycles, accesses, blocks: &[Block]| {
-            if cycles > worst.cycles && !blocks.is_empty() {
-                *worst = Worst { cycles, accesses, blocks: blocks.to_vec() };
+        let note = |longest: &mut LongestPath, cycles, accesses, blocks: &[Block]| {
+            if cycles > longest.cycles && !blocks.is_empty() {
+                *longest = LongestPath { cycles, accesses, blocks: blocks.to_vec() };
             }
         };
-        note(&mut self.worst, cycles, accesses, &chip.blocks);
-        note(&mut self.worst_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
+        note(&mut self.longest, cycles, accesses, &chip.blocks);
+        note(&mut self.longest_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
         if entered.ended {
             let [a, b, c] = chip.tim1.written().map(|value| value as u16);
             let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };

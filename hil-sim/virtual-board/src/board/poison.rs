@@ -1,12 +1,14 @@
-//! Is what a control interrupt preempts the same after it? Registers, stack, and the floating-point
-//! registers, which are poisoned as the interrupt begins: what is not restored shows.
+//! A check that control interrupts leave the preempted code intact: registers, stack, and the floating-point
+//! registers, which are poisoned as the interrupt begins, so that a register that is not restored shows.
 
-use super::{Board, Failure};
-use crate::cpu::{Cpu, Register};
+use anyhow::{Result, bail};
+
+use super::Board;
+use crate::cpu::Register;
 use crate::memory;
 
-/// What was before a control interrupt.
-struct Before {
+/// The state of the core before a control interrupt.
+struct Preempted {
     registers: Vec<u64>,
     sp: u32,
     stack: Vec<u8>,
@@ -16,7 +18,7 @@ struct Before {
 #[derive(Default)]
 pub struct Poison {
     top: u32,
-    before: Option<Before>,
+    before: Option<Preempted>,
     /// Control interrupts that left everything as it was.
     pub intact: u64,
     /// Of these, in code that uses floating point.
@@ -37,35 +39,38 @@ impl Board {
         stack
     }
 
-    /// Before a control interrupt.
+    /// Remembers the state before a control interrupt.
     pub(super) fn remember(&mut self) {
         let Some(poison) = &self.poison else { return };
-        let sp = self.cpu.get(Register::Sp);
+        let sp = self.cpu.get(Register::SP);
         let stack = self.stack_above(sp, poison.top);
-        let before = Before { registers: self.cpu.registers(), sp, stack };
+        let before = Preempted { registers: self.cpu.registers(), sp, stack };
         if let Some(poison) = &mut self.poison {
             poison.before = Some(before);
         }
     }
 
-    /// As it begins.
+    /// Poisons the floating-point registers as it begins.
     pub(super) fn spoil(&mut self) {
         if self.poison.is_some() {
             self.cpu.spoil_float();
         }
     }
 
-    /// After it.
-    pub(super) fn compare_with_before(&mut self) -> Result<(), Failure> {
+    /// Compares the state after a control interrupt with that before it.
+    ///
+    /// # Errors
+    /// The state differs.
+    pub(super) fn compare_with_before(&mut self) -> Result<()> {
         let Some(poison) = &mut self.poison else { return Ok(()) };
         let (top, Some(before)) = (poison.top, poison.before.take()) else { return Ok(()) };
         let after = self.cpu.registers();
         if after != before.registers || self.stack_above(before.sp, top) != before.stack {
-            let at = self.image.location(self.cpu.get(Register::Pc));
-            return Err(Failure::Core(format!(
-                "a control interrupt changed what it preempted at {at}: {:x?} became {after:x?}",
+            let at = self.image.location(self.cpu.get(Register::PC));
+            bail!(
+                "a control interrupt changed the code it preempted at {at}: {:x?} became {after:x?}",
                 before.registers
-            )));
+            );
         }
         if let Some(poison) = &mut self.poison {
             poison.intact += 1;

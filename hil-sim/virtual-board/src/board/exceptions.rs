@@ -1,10 +1,10 @@
 //! Lets the core run or sleep, and takes it into exceptions and back.
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 
-use super::{Board, Failure};
+use super::Board;
 use crate::chip::CONTROL_INTERRUPT;
-use crate::cpu::{Cpu, Fault, Register, Stop};
+use crate::cpu::{Fault, Register, Stop};
 use crate::memory;
 use crate::scs;
 
@@ -17,7 +17,7 @@ impl Board {
     }
 
     fn masks(&self) -> (u32, u32) {
-        (self.cpu.get(Register::Primask), self.cpu.get(Register::Basepri))
+        (self.cpu.get(Register::PRIMASK), self.cpu.get(Register::BASEPRI))
     }
 
     fn enter(&mut self, exception: u16) -> Result<()> {
@@ -26,7 +26,7 @@ impl Board {
             self.begin_control();
         }
         let vector = self.cpu.chip().scs.vector(exception);
-        let handler = self.cpu.word(vector).ok_or_else(|| Failure::Core("no vector".into()))?;
+        let handler = self.cpu.word(vector).context("no vector")?;
         self.cpu.chip_mut().scs.begin(exception);
         if exception == CONTROL_INTERRUPT {
             self.remember();
@@ -43,7 +43,7 @@ impl Board {
     }
 
     fn hard_fault(&mut self, cfsr: u32, address: Option<u32>) -> Result<()> {
-        let pc = self.cpu.get(Register::Pc);
+        let pc = self.cpu.get(Register::PC);
         let chip = self.cpu.chip_mut();
         if chip.scs.running() < 0 && chip.forgiving {
             // Locked up, until a reset.
@@ -53,9 +53,7 @@ impl Board {
         }
         if chip.scs.running() < 0 {
             let place = self.image.location(pc);
-            return Err(
-                Failure::Core(format!("lock-up: a fault in a fault handler at {place}")).into()
-            );
+            bail!("lock-up: a fault in a fault handler at {place}");
         }
         chip.scs.cfsr |= cfsr;
         chip.scs.hfsr |= 1 << 30;
@@ -85,7 +83,7 @@ impl Board {
         if chip.attention || chip.reset.is_some() {
             return Ok(());
         }
-        // A mask that is going to be taken away lets in what waits: look at every instruction.
+        // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
         if chip.scs.waits() {
             chip.deadline = chip.now + 1;
         }
@@ -105,7 +103,7 @@ impl Board {
             Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
             Stop::Fault(Fault::Access(address)) => {
                 let place = self.image.location(self.cpu.chip().at);
-                return Err(Failure::Core(format!("access to {address:#010x} at {place}")).into());
+                bail!("access to {address:#010x} at {place}");
             }
         }
         Ok(())

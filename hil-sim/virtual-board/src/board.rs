@@ -2,7 +2,6 @@
 
 mod control;
 mod exceptions;
-mod failure;
 mod motor;
 mod options;
 mod outside;
@@ -11,23 +10,24 @@ pub mod snapshot;
 
 use std::collections::VecDeque;
 
-use anyhow::{Context, Result, anyhow};
-use drive_core::{Compare, Sample};
+use anyhow::{Result, anyhow, bail, ensure};
+use drive_core::Sample;
 use hil_sim::plant::Plant;
 
-pub use control::{Period, Worst};
-pub use failure::Failure;
+pub use control::{LongestPath, Period};
 pub use motor::Disturbance;
+use motor::PowerStage;
 pub use options::Options;
 
-use crate::chip::{Chip, Reset, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::addresses::Addresses;
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
+use crate::periph::Reset;
 use crate::periph::tim1::GateLimits;
-use crate::unicorn::UnicornCpu;
-use control::Entered;
+use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
 const PERIODS_PER_LOG: u32 = 100;
@@ -37,29 +37,25 @@ const IDLE_LIMIT: u32 = 100_000;
 
 /// The board.
 pub struct Board {
-    cpu: UnicornCpu,
+    cpu: Cpu,
     image: Image,
     log: Log,
     lines: Vec<String>,
     since_log: u32,
     /// The motor with everything around it.
     pub plant: Plant,
+    stage: PowerStage,
     gates: GateLimits,
-    /// Up to where the plant has gone.
-    plant_at: u64,
-    applied: Compare,
-    outputs: bool,
-    sample: Sample,
     sleeping: bool,
     hung: bool,
     /// The core executes nothing before this.
     stalled_until: u64,
-    entered: Option<Entered>,
+    entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
-    order_flag: u32,
-    /// Changes every sample, if there.
+    addresses: Addresses,
+    /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
-    /// Compares what control interrupts preempt before and after, if there.
+    /// The check that control interrupts leave the preempted code intact, if wanted.
     pub poison: Option<poison::Poison>,
     /// When the outputs went off last, ticks.
     pub went_off: Option<u64>,
@@ -68,9 +64,9 @@ pub struct Board {
     /// Resets since power-on, in order.
     pub resets: Vec<(u64, Reset)>,
     /// The longest control interrupt, when cycles are counted.
-    pub worst: Worst,
+    pub longest: LongestPath,
     /// The longest way to the compare values.
-    pub worst_to_compares: Worst,
+    pub longest_to_compares: LongestPath,
     /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
     pended: Option<u64>,
     /// Longest from there to its first instruction, ticks.
@@ -84,22 +80,18 @@ impl Board {
     /// A board that has just been powered, with this image in its flash.
     ///
     /// # Errors
-    /// What is wrong with the image or the plant.
+    /// A fault of the image or of the plant's settings.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
-        let mut cpu = UnicornCpu::new(Chip::new(), options.counting)
-            .map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let mut cpu =
+            Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
-            if segment.address < memory::FLASH || end > memory::BANK_2 {
-                return Err(anyhow!("a segment at {:#x} is not in bank 1", segment.address));
-            }
+            let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;
+            ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
-        let (size, offset) =
-            image.member("Mailbox<drive_core::drive::command::Command>", "full")?;
-        let order_flag =
-            image.variable("start_control", size).context("mailbox of orders")? + offset;
+        let addresses = Addresses::new(&image)?;
         let log = Log::new(&image)?;
         let mut board = Self {
             cpu,
@@ -109,41 +101,59 @@ impl Board {
             since_log: 0,
             plant,
             gates: options.gates,
-            plant_at: 0,
-            applied: Compare::OFF,
-            outputs: false,
-            sample: Sample::default(),
+            stage: PowerStage::default(),
             sleeping: false,
             hung: false,
             stalled_until: 0,
             entered: None,
             periods: VecDeque::new(),
-            order_flag,
+            addresses,
             disturb: None,
             poison: None,
             went_off: None,
             short_pulses: 0,
             resets: Vec::new(),
-            worst: Worst::default(),
-            worst_to_compares: Worst::default(),
+            longest: LongestPath::default(),
+            longest_to_compares: LongestPath::default(),
             pended: None,
             latest_start: 0,
             preempt_at: None,
         };
-        board.see();
+        board.show_sample();
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.reset(memory::FLASH);
         Ok(board)
     }
 
     /// The core.
-    pub fn cpu(&mut self) -> &mut UnicornCpu {
+    pub fn cpu(&mut self) -> &mut Cpu {
         &mut self.cpu
     }
 
     /// A word of memory.
     pub fn word(&self, address: u32) -> Option<u32> {
         self.cpu.word(address)
+    }
+
+    /// A byte of memory.
+    pub fn byte(&self, address: u32) -> Option<u8> {
+        let mut byte = [0];
+        self.read(address, &mut byte).then_some(byte[0])
+    }
+
+    /// Reads memory; `false` where there is none.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.cpu.read(address, bytes)
+    }
+
+    /// Addresses of the firmware's data.
+    pub fn addresses(&self) -> &Addresses {
+        &self.addresses
+    }
+
+    /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
+    pub fn flux_angle(&self) -> f64 {
+        f64::from(self.word(self.addresses.phi).unwrap_or(0)) / 2_f64.powi(32)
     }
 
     /// The chip.
@@ -156,9 +166,9 @@ impl Board {
         &self.image
     }
 
-    /// What the converters see.
+    /// The last sample.
     pub fn sample(&self) -> Sample {
-        self.sample
+        self.stage.sample
     }
 
     /// Seconds since power-on.
@@ -179,7 +189,7 @@ impl Board {
         self.resets.push((now, cause));
         if cause == Reset::Power {
             for (base, size) in [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)] {
-                // Not what it was, and not zeros.
+                // Neither the old contents nor zeros.
                 self.cpu.write(base, &vec![0xa5; size as usize]);
             }
         }
@@ -187,14 +197,14 @@ impl Board {
         self.hung = false;
         self.stalled_until = 0;
         self.entered = None;
-        self.see_outputs();
+        self.follow_outputs();
         self.cpu.reset(memory::FLASH);
     }
 
     /// Goes on for a number of PWM periods.
     ///
     /// # Errors
-    /// What the board cannot go on with.
+    /// The access, the gate signals or the fault that the model cannot go on with.
     pub fn run_periods(&mut self, periods: u64) -> Result<()> {
         for _ in 0..periods {
             self.run_ticks(TICKS_PER_PERIOD)?;
@@ -210,7 +220,7 @@ impl Board {
     /// Goes on for a number of ticks of 170 MHz.
     ///
     /// # Errors
-    /// What the board cannot go on with.
+    /// The access, the gate signals or the fault that the model cannot go on with.
     pub fn run_ticks(&mut self, ticks: u64) -> Result<()> {
         let end = self.cpu.chip().now + ticks;
         let (mut at, mut idle) = (self.cpu.chip().now, 0);
@@ -218,7 +228,7 @@ impl Board {
             idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
             at = self.cpu.chip().now;
             if idle > IDLE_LIMIT {
-                return Err(Failure::Core("no time passes".into()).into());
+                bail!("no time passes");
             }
             self.events()?;
             if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
@@ -231,21 +241,16 @@ impl Board {
         Ok(())
     }
 
-    /// Lets happen what is due.
+    /// Lets due events happen.
     fn events(&mut self) -> Result<()> {
-        self.see_outputs();
-        loop {
-            let happened = self.cpu.chip_mut().catch_up();
-            if let Some(at) = happened.crest {
-                self.crest(at)?;
-            } else {
-                break;
-            }
+        self.follow_outputs();
+        while let Some(at) = self.cpu.chip_mut().catch_up() {
+            self.crest(at)?;
         }
-        self.see_outputs();
+        self.follow_outputs();
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
-            return Err(Failure::Unknown(unknown, self.image.location(unknown.at)).into());
+            bail!("{unknown} at {}", self.image.location(unknown.at));
         }
         if chip.flash.power_lost {
             chip.reset = Some(Reset::Power);
