@@ -1,7 +1,7 @@
-//! Settings in SI units, and the [`Coefficients`] the control step works with.
+//! Settings in SI units.
 //!
-//! [`Settings::build`] turns one into the other, outside the interrupt: it checks every value
-//! against its range and runs the design rules. [`Settings::default`] is the drive of the
+//! [`Settings::build`] makes [`Coefficients`](crate::Coefficients) of them, outside the interrupt: it checks every
+//! value against its range and runs the design rules. [`Settings::default`] is the drive of the
 //! dissertation.
 
 mod check;
@@ -61,7 +61,7 @@ impl Motor {
         self.l_ls + self.l_m * (self.l_lr / self.l_r())
     }
 
-    /// (L_m / L_r) L_m, H: what couples the rotor flux to the stator.
+    /// Coupling of the rotor flux to the stator, (L_m / L_r) L_m, H.
     pub fn coupled_inductance(&self) -> f32 {
         self.l_m / self.l_r() * self.l_m
     }
@@ -159,7 +159,7 @@ impl Default for Scales {
     }
 }
 
-/// Where the flux angle comes from.
+/// The source of the flux angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AngleSource {
     /// Encoder and slip, Eq. 2.10.
@@ -169,7 +169,7 @@ pub enum AngleSource {
     Injection,
 }
 
-/// What the current controllers are designed for.
+/// The plant that the current controllers are designed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CurrentPlant {
     /// First-order plants k / (z - p) identified on the motor with the filters in place
@@ -272,12 +272,12 @@ impl Default for SynchronousTracking {
     }
 }
 
-/// The injection and what tracks the angle with it.
+/// The injection and the tracking of the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InjectionSettings {
     /// Amplitude of the injected voltage, V peak; 0 for none.
     pub amplitude_v: f32,
-    /// What is made of the carrier current.
+    /// Demodulation of the carrier current.
     pub demodulator: DemodulatorKind,
     /// Settings of the chain of the dissertation.
     pub printed: PrintedChain,
@@ -333,7 +333,7 @@ impl Default for Limits {
     }
 }
 
-/// What happens between `start` and regulation, and at `stop`.
+/// The sequence between `start` and regulation, and at `stop`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sequence {
     /// Time for the offset calibration, s.
@@ -344,7 +344,7 @@ pub struct Sequence {
     pub magnetise_s: f32,
     /// Current on the direct axis, A peak.
     pub i_d: f32,
-    /// How fast the torque current goes to zero at a stop, A/s.
+    /// Slope of the torque current at a stop, A/s.
     pub stop_a_per_s: f32,
 }
 
@@ -382,7 +382,7 @@ impl Default for SpeedSettings {
     }
 }
 
-/// Everything that can be set.
+/// All settings of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
     /// The motor.
@@ -391,9 +391,9 @@ pub struct Settings {
     pub inverter: Inverter,
     /// Scales of converters and encoder.
     pub scales: Scales,
-    /// Where the flux angle comes from.
+    /// The source of the flux angle.
     pub angle_source: AngleSource,
-    /// What the current controllers are designed for.
+    /// The plant that the current controllers are designed for.
     pub current_plant: CurrentPlant,
     /// Leave the delays of the current measurement and of the demodulation uncompensated, as the
     /// dissertation does, to show what they cost: with the encoder 4.7° at 1440 rpm, with the
@@ -411,14 +411,14 @@ pub struct Settings {
     pub speed: SpeedSettings,
 }
 
-/// Why settings were refused.
+/// The reason why settings were refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingsError {
     /// A value outside its range.
     Range {
-        /// Which.
+        /// Name of the setting.
         name: &'static str,
-        /// What it was.
+        /// The value.
         value: f32,
         /// Smallest allowed.
         min: f32,
