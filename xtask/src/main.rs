@@ -5,6 +5,7 @@ mod control;
 mod elf;
 mod fuzz;
 mod image;
+mod lines;
 mod map;
 mod paths;
 mod run;
@@ -56,6 +57,8 @@ enum Task {
     },
     /// Prints the use of each memory by the image; fails above the limits
     Size,
+    /// Counts lines of code, documentation, comments and tests; fails above the limits
+    Lines,
 }
 
 /// Faults of a whole campaign; `test` injects a twentieth.
@@ -83,6 +86,7 @@ fn run(task: Task) -> Result<()> {
         }
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report(&image::build()?),
+        Task::Lines => lines::report(),
     }
 }
 
