@@ -7,7 +7,9 @@ mod fuzz;
 mod image;
 mod lines;
 mod map;
+mod modules;
 mod paths;
+mod rooms;
 mod run;
 mod sections;
 mod size;
@@ -59,6 +61,8 @@ enum Task {
     Size,
     /// Counts lines of code, documentation, comments and tests; fails above the limits
     Lines,
+    /// Fails if modules of a crate refer to each other in a circle
+    Rooms,
 }
 
 /// Faults of a whole campaign; `test` injects a twentieth.
@@ -87,6 +91,7 @@ fn run(task: Task) -> Result<()> {
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report(&image::build()?),
         Task::Lines => lines::report(),
+        Task::Rooms => rooms::check(),
     }
 }
 
@@ -96,6 +101,7 @@ fn test() -> Result<()> {
     toolchain::ensure_format_and_lints()?;
     toolchain::ensure_c_compiler()?;
     run::step("format", &mut run::cargo("fmt --all --check"))?;
+    run::timed("rooms", rooms::check)?;
     run::step("lints", &mut run::cargo("clippy --workspace --all-targets -- -D warnings"))?;
     // The virtual board needs the image.
     run::step("host tests", &mut run::cargo("test --workspace --exclude virtual-board"))?;
