@@ -16,6 +16,7 @@ mod size;
 mod sources;
 mod stack;
 mod toolchain;
+mod tools;
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -63,6 +64,15 @@ enum Task {
     Lines,
     /// Fails if modules of a crate refer to each other in a circle
     Rooms,
+    /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught.
+    /// Gets cargo-mutants from crates.io
+    Mutants {
+        /// Share of the places, K/N with K from 0
+        #[arg(default_value = "7/45")]
+        shard: String,
+    },
+    /// Builds the pages in docs/. Gets mdbook from crates.io
+    Book,
 }
 
 /// Faults of a whole campaign; `test` injects a twentieth.
@@ -92,6 +102,8 @@ fn run(task: Task) -> Result<()> {
         Task::Size => size::report(&image::build()?),
         Task::Lines => lines::report(),
         Task::Rooms => rooms::check(),
+        Task::Mutants { shard } => tools::mutants(&shard),
+        Task::Book => tools::book(),
     }
 }
 
