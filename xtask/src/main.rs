@@ -9,6 +9,7 @@ mod lines;
 mod map;
 mod modules;
 mod paths;
+mod prove;
 mod rooms;
 mod run;
 mod sections;
@@ -73,6 +74,14 @@ enum Task {
     },
     /// Builds the pages in docs/. Gets mdbook from crates.io
     Book,
+    /// Long proofs in shards, which a later call continues. Lists them, or does one
+    Prove {
+        /// Name of the proof
+        name: Option<String>,
+        /// Part of its shards, K/N with K from 1
+        #[arg(default_value = "1/1")]
+        part: String,
+    },
 }
 
 /// Faults of a whole campaign; `test` injects a twentieth.
@@ -104,6 +113,8 @@ fn run(task: Task) -> Result<()> {
         Task::Rooms => rooms::check(),
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book(),
+        Task::Prove { name: None, .. } => prove::list(),
+        Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }
 }
 
