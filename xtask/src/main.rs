@@ -1,6 +1,7 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
 
 mod board;
+mod budget;
 mod control;
 mod elf;
 mod fuzz;
@@ -142,6 +143,7 @@ fn test() -> Result<()> {
     board::campaign(&elf, CAMPAIGN / 20, 1, "")?;
     board::cycles(&elf)?;
 
+    budget::report(&run::times());
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());
     Ok(())
 }
