@@ -24,8 +24,8 @@ mod flash;
 pub use flash::{SETTINGS_SLOT_BYTES, settings_address, settings_page};
 
 use drive_core::Settings;
-use drive_core::current::sensing::Line;
 use drive_core::io::PERIOD_S;
+use drive_core::settings::Line;
 use drive_core::settings::{Inverter, Scales};
 
 // Clock ---------------------------------------------------------------------------------------

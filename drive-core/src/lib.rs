@@ -41,7 +41,7 @@ pub mod protect;
 pub mod settings;
 pub mod tuning;
 
-pub use drive::{Accepted, Coefficients, Command, Drive, Mode, Refused, State, Telemetry};
+pub use drive::{Accepted, Coefficients, Command, Drive, Layout, Mode, Refused, State, Telemetry};
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};
 pub use math::angle::{Angle, UnitVector};

@@ -26,6 +26,9 @@ pub struct Sender<'a, T>(&'a Mailbox<T>);
 pub struct Receiver<'a, T>(&'a Mailbox<T>);
 
 impl<T> Mailbox<T> {
+    /// Offset in a mailbox, bytes, of a byte that is 1 while there is a message.
+    pub const FULL: usize = core::mem::offset_of!(Self, full);
+
     /// An empty mailbox. `unread` only initialises the storage; it is never received.
     pub const fn new(unread: T) -> Self {
         Self { full: AtomicBool::new(false), message: UnsafeCell::new(unread) }

@@ -4,6 +4,8 @@
 //! counter of TIM1 was at its top, and must have written the compare values before the next top, one period
 //! later. It never logs, formats, waits, or takes a lock.
 
+mod addresses;
+
 use core::cell::UnsafeCell;
 use core::mem::{MaybeUninit, offset_of};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};

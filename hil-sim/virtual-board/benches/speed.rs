@@ -9,7 +9,7 @@ use hil_sim::Config;
 use rustix::time::{ClockId, clock_gettime};
 use virtual_board::{Counting, Image, Options, Pair};
 
-/// What this process has used of the processor: what else the machine does is not in it.
+/// Processor time of this process: other programs do not count.
 fn processor_time() -> Duration {
     Duration::try_from(clock_gettime(ClockId::ProcessCPUTime)).expect("is not negative")
 }

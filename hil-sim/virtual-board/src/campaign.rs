@@ -1,14 +1,15 @@
 //! A campaign of faults: thousands of them, each from a running board, each with a seed of its own.
 //!
-//! What counts: at every instant later than the bound of its class after the fault, outputs are off, or
-//! control is correct (angle error at most 15 degrees, phase currents below the trip). A bit that
-//! flips where nothing depends on it is such a case. Whatever happens, a gate pattern that could
-//! short a leg fails, as do more than one reset and an end without a reason in the log.
+//! The criterion: at every instant later than the bound of its class after the fault, outputs are off, or
+//! control is correct (angle error at most 15 degrees, phase currents below the trip); control stays correct, for
+//! example, when a bit flips that nothing depends on. In all classes a gate pattern that could short a leg is a
+//! failure, and so are more than one reset and an end without a reason in the log.
 //!
 //! The reason is looked for in the log, which tells it first thing after a reset; one run in
 //! ten goes on until the console greets, as the design of the control takes seconds.
 
 mod class;
+mod faults;
 mod judge;
 mod scene;
 
@@ -20,24 +21,25 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::chip::{Reset, TICKS_PER_PERIOD};
+use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
-use class::{CLASSES, Class, Course};
-use judge::Seen;
+use crate::periph::Reset;
+use class::{CLASSES, Class, Run};
+use judge::Outcome;
 use scene::Scene;
 
-/// One run in so many starts wholly after its reset.
+/// One run in this number goes on after its reset until the console greets.
 const WHOLE_STARTS: u64 = 10;
-/// Longest that is looked at after the bound, ms.
+/// Time of observation after the bound, ms.
 const AFTER_MS: f64 = 150.0;
-/// A fault comes up to so many ticks after the board was gone back to: 20 ms.
+/// Latest fault after the snapshot, ticks: 20 ms.
 const LATEST: u64 = 20 * 170_000;
 /// Longest time of `save`, periods.
 const SAVE: u64 = 1200;
 
-/// What was found of a class.
+/// Results of a class.
 #[derive(Clone, Debug, Default)]
-struct Found {
+struct Tally {
     runs: u32,
     off: u32,
     worst_off_ms: f64,
@@ -46,10 +48,10 @@ struct Found {
     failures: Vec<(u64, String)>,
 }
 
-/// Which faults.
+/// The faults of a campaign.
 #[derive(Clone, Debug)]
-pub struct Choice {
-    /// How many.
+pub struct Selection {
+    /// Their number.
     pub count: u64,
     /// Seed of the first; each has the next one that is chosen.
     pub seed: u64,
@@ -60,9 +62,9 @@ pub struct Choice {
 /// A campaign of faults; `open` opens the image. Gives the table.
 ///
 /// # Errors
-/// The table with what failed; no class has that name.
-pub fn run(open: impl Fn() -> Result<Image> + Sync, choice: &Choice) -> Result<String> {
-    let Choice { count, seed, ref class } = *choice;
+/// The table with the failures; no class has that name.
+pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
+    let Selection { count, seed, ref class } = *selection;
     let classes = CLASSES.len() as u64;
     let is_chosen = |seed: &u64| CLASSES[(seed % classes) as usize].name.contains(class);
     ensure!(
@@ -71,7 +73,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, choice: &Choice) -> Result<S
         CLASSES.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
     );
     let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
-    let found: Mutex<BTreeMap<usize, Found>> = Mutex::default();
+    let tallies: Mutex<BTreeMap<usize, Tally>> = Mutex::default();
     let work = || -> Result<()> {
         let mut scene = Scene::new(open()?)?;
         scene.board.forgive();
@@ -80,12 +82,12 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, choice: &Choice) -> Result<S
             let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
             let Some(seed) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
-            let seen = one(&mut scene, &CLASSES[which], seed / classes, seed);
-            if let Err(why) = &seen {
+            let outcome = one(&mut scene, &CLASSES[which], seed / classes, seed);
+            if let Err(why) = &outcome {
                 eprintln!("{}, seed {}: {why:#}", CLASSES[which].name, seed);
             }
-            let mut found = found.lock().map_err(|_| anyhow!("another worker has failed"))?;
-            add(found.entry(which).or_default(), &CLASSES[which], seed, seen);
+            let mut tallies = tallies.lock().map_err(|_| anyhow!("another worker has failed"))?;
+            add(tallies.entry(which).or_default(), &CLASSES[which], seed, outcome);
         }
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
@@ -93,74 +95,74 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, choice: &Choice) -> Result<S
         let all: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
         all.into_iter().try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
     })?;
-    let found = found.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
-    let table = table(&found);
-    let failed: usize = found.values().map(|f| f.failures.len()).sum();
+    let tallies = tallies.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
+    let table = table(&tallies);
+    let failed: usize = tallies.values().map(|f| f.failures.len()).sum();
     if failed > 0 {
         bail!("{failed} of {count} failed\n{table}");
     }
     Ok(table)
 }
 
-fn add(found: &mut Found, class: &Class, seed: u64, seen: Result<Seen>) {
-    found.runs += 1;
-    let seen = match seen {
-        Ok(seen) => seen,
-        Err(why) => return found.failures.push((seed, format!("{why:#}"))),
+fn add(tally: &mut Tally, class: &Class, seed: u64, outcome: Result<Outcome>) {
+    tally.runs += 1;
+    let outcome = match outcome {
+        Ok(outcome) => outcome,
+        Err(why) => return tally.failures.push((seed, format!("{why:#}"))),
     };
-    if let Some(ms) = seen.off_ms {
-        found.off += 1;
-        found.worst_off_ms = found.worst_off_ms.max(ms);
+    if let Some(ms) = outcome.off_ms {
+        tally.off += 1;
+        tally.worst_off_ms = tally.worst_off_ms.max(ms);
     }
-    found.worst_wrong_ms = found.worst_wrong_ms.max(seen.wrong_ms);
-    found.peak_a = found.peak_a.max(seen.peak_a);
+    tally.worst_wrong_ms = tally.worst_wrong_ms.max(outcome.wrong_ms);
+    tally.peak_a = tally.peak_a.max(outcome.peak_a);
     // Over-current is judged in every class.
     let bound = if class.bound_ms.is_finite() { class.bound_ms } else { 0.0 };
-    if seen.wrong_ms > bound {
-        let why = format!("wrong for {:.2} ms: {seen:?}", seen.wrong_ms);
-        found.failures.push((seed, why));
+    if outcome.wrong_ms > bound {
+        let why = format!("wrong for {:.2} ms: {outcome:?}", outcome.wrong_ms);
+        tally.failures.push((seed, why));
     }
 }
 
 /// One fault.
-fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
+fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let source = class.sources[(turn % class.sources.len() as u64) as usize];
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
-    match class.course {
-        Course::Regulating(inject) => {
+    match class.run {
+        Run::Regulating(inject) => {
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
-            let what = inject(&mut scene.board, &scene.places, &mut rng);
+            let what = inject(&mut scene.board, &scene.regions, &mut rng);
             let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
-            let mut seen = judge::watch(&mut scene.board, &scene.places, ms, promised)
-                .with_context(|| what.clone())?;
-            if seen.off_ms.is_some() {
+            let mut outcome =
+                judge::watch(&mut scene.board, ms, promised).with_context(|| what.clone())?;
+            if outcome.off_ms.is_some() {
                 judge::reported(&mut scene.board, whole_start)
                     .with_context(|| format!("{what}; after the end"))?;
             }
-            seen.what = what;
-            Ok(seen)
+            outcome.what = what;
+            Ok(outcome)
         }
-        Course::Saving => {
+        Run::Saving => {
             // Each in turn, in one slot and the other.
             let slot = (turn % 2) as usize;
             let operations = operations(scene, slot)?;
             lose_power(scene, slot, turn / 2 % operations)?;
             after_power(scene, whole_start)
         }
-        Course::DamagedPage => {
+        Run::DamagedPage => {
             scene.off(0)?;
             let slot = (turn % 2) as usize;
             let word = rng.random_range(0..64);
-            scene.board.chip().flash.tear(crate::board::settings_address(slot, word));
+            scene.board.chip().flash.tear(induction_drive::board::settings_address(slot, word));
             one_set_counts(scene)?;
             scene.board.reset(Reset::Power);
             after_power(scene, true)
         }
-        Course::Reset => {
+        Run::Reset => {
             scene.regulating(source)?;
             scene.board.run_ticks(rng.random_range(0..LATEST))?;
             scene.board.went_off = None;
@@ -178,7 +180,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Seen> {
 /// and it starts with it. Gives how many operations there are.
 ///
 /// # Errors
-/// What went wrong, and where.
+/// The slot and the operation of the first failure.
 pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
     let mut scene = Scene::new(image)?;
     scene.board.forgive();
@@ -200,7 +202,7 @@ fn lose_power(scene: &mut Scene, slot: usize, operation: u64) -> Result<()> {
     let flash = &mut scene.board.chip().flash;
     flash.power_loss_at = Some(flash.operations + 1 + operation);
     scene.board.type_line("save");
-    // Not further than the reset: what starts after it takes as long as on a chip.
+    // Not further than the reset: a start takes as long as on a chip.
     for _ in 0..SAVE / 10 {
         scene.board.run_periods(10)?;
         if !scene.board.resets.is_empty() {
@@ -216,41 +218,41 @@ fn operations(scene: &mut Scene, slot: usize) -> Result<u64> {
     let before = scene.board.chip().flash.operations;
     scene.board.type_line("save");
     scene.board.run_periods(SAVE)?;
-    let heard = scene.board.heard();
+    let heard = scene.board.take_console();
     ensure!(heard == "ok\n" || heard == "ok\r\n", "save: {heard:?}");
     let wanted = scene.settings[1 - slot % 2];
-    ensure!(scene::pair_settings(&mut scene.board)? == wanted, "not what was saved");
+    ensure!(scene::saved_settings(&mut scene.board)? == wanted, "not the settings that were saved");
     Ok(scene.board.chip().flash.operations - before)
 }
 
 /// The settings in the flash are the old ones or the new ones.
 fn one_set_counts(scene: &mut Scene) -> Result<()> {
-    let settings = scene::pair_settings(&mut scene.board)?;
+    let settings = scene::saved_settings(&mut scene.board)?;
     ensure!(scene.settings.contains(&settings), "neither the old settings nor the new ones");
     Ok(())
 }
 
 /// It starts, with one of the sets, and says why it was reset.
-fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Seen> {
+fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     let board = &mut scene.board;
     let reset = board.resets.last().map(|reset| reset.1).context("no reset")?;
     board.run_periods(100)?;
-    let log = board.logged()?;
+    let log = board.take_log()?;
     let cause = scene::cause(reset);
     ensure!(log.iter().any(|line| line.contains(cause)), "no {cause:?} in the log {log:?}");
     if whole_start {
         let greeting = judge::greeting(board)?;
         ensure!(!greeting.contains("not used"), "{greeting}");
     }
-    Ok(Seen { off_ms: Some(0.0), ..Seen::default() })
+    Ok(Outcome { off_ms: Some(0.0), ..Outcome::default() })
 }
 
-fn table(found: &BTreeMap<usize, Found>) -> String {
+fn table(tallies: &BTreeMap<usize, Tally>) -> String {
     let mut text = String::from(
         "class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed\n\
          ---|---|---|---|---|---|---|---|---\n",
     );
-    for (which, f) in found {
+    for (which, f) in tallies {
         let class = &CLASSES[*which];
         let _ = writeln!(
             text,
@@ -266,7 +268,7 @@ fn table(found: &BTreeMap<usize, Found>) -> String {
             f.failures.len(),
         );
     }
-    for (which, f) in found.iter().filter(|(_, f)| !f.failures.is_empty()) {
+    for (which, f) in tallies.iter().filter(|(_, f)| !f.failures.is_empty()) {
         for (seed, why) in &f.failures {
             let _ = writeln!(text, "{}, seed {seed}: {why}", CLASSES[*which].name);
         }

@@ -1,4 +1,4 @@
-//! FirmwareSettings around the core: time, registers, events.
+//! The chip around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
 //! its PLL.
@@ -7,28 +7,25 @@ mod bus;
 mod execution;
 
 pub use bus::Unknown;
-pub use execution::{Block, Watched};
+pub use execution::Watched;
 
+use crate::cost::Block;
 use crate::periph::adc::Adc;
 use crate::periph::analog::{Comparators, Dacs};
-use crate::periph::debug::Debug;
 use crate::periph::encoder::EncoderTimer;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
-use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
-use crate::periph::syscfg::{Exti, Syscfg};
-use crate::periph::tim1::Tim1;
+use crate::periph::tim1::{Event, Tim1};
+use crate::periph::{NEVER, Reset, Store, plain};
 use crate::scs::{self, Scs};
 
 /// Ticks per second.
 pub const TICKS_PER_S: u64 = 170_000_000;
 /// Ticks of a PWM period, from one top of the counter to the next.
-pub const TICKS_PER_PERIOD: u64 = 2 * crate::board::PWM_TOP as u64;
-/// No event.
-pub const NEVER: u64 = u64::MAX;
+pub const TICKS_PER_PERIOD: u64 = 2 * induction_drive::board::PWM_TOP as u64;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
@@ -37,19 +34,6 @@ const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
 /// Exception number of the control interrupt, which is the converters'.
 pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
-
-/// Why the chip was reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reset {
-    /// Power came.
-    Power,
-    /// The reset pin.
-    Pin,
-    /// The firmware asked for it.
-    Software,
-    /// The independent watchdog.
-    Watchdog,
-}
 
 /// The chip but for its core and memories.
 #[derive(Clone, Debug)]
@@ -62,7 +46,7 @@ pub struct Chip {
     pub first: bool,
     /// Something to be done before the core goes on.
     pub attention: bool,
-    /// The first access nobody knows.
+    /// The first access that the model does not know.
     pub unknown: Option<Unknown>,
     /// A reset that is due.
     pub reset: Option<Reset>,
@@ -88,15 +72,15 @@ pub struct Chip {
     /// Clocks.
     pub rcc: Rcc,
     /// Supply.
-    pub pwr: Pwr,
+    pub pwr: Store,
     /// Flash.
     pub flash: Flash,
     /// Ports A to G.
     pub gpio: [Gpio; 7],
     /// System configuration.
-    pub syscfg: Syscfg,
+    pub syscfg: Store,
     /// Interrupts of pins and comparators.
-    pub exti: Exti,
+    pub exti: Store,
     /// Timer of the power stage.
     pub tim1: Tim1,
     /// Timer of the encoder.
@@ -112,7 +96,7 @@ pub struct Chip {
     /// Watchdog.
     pub iwdg: Iwdg,
     /// Debug support.
-    pub debug: Debug,
+    pub debug: Store,
 }
 
 impl Chip {
@@ -136,11 +120,11 @@ impl Chip {
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
-            pwr: Pwr::default(),
+            pwr: Store::new(plain::PWR),
             flash: Flash::new(),
             gpio: std::array::from_fn(Gpio::new),
-            syscfg: Syscfg::default(),
-            exti: Exti::default(),
+            syscfg: Store::new(plain::SYSCFG),
+            exti: Store::new(plain::EXTI),
             tim1: Tim1::default(),
             tim2: EncoderTimer::default(),
             adc: Adc::default(),
@@ -148,7 +132,7 @@ impl Chip {
             dac: Dacs::default(),
             lpuart: Lpuart::default(),
             iwdg: Iwdg::default(),
-            debug: Debug::default(),
+            debug: Store::new(plain::DEBUG),
         }
     }
 
@@ -180,7 +164,7 @@ impl Chip {
 
     /// The core locks up: to the break of TIM1, if the firmware wants that.
     pub fn lock_up(&mut self) {
-        if self.syscfg.lock_up_breaks() {
+        if self.syscfg.get(plain::CFGR2) & plain::CLL != 0 {
             self.tim1.system_break();
         }
     }
@@ -212,7 +196,7 @@ impl Chip {
     /// Whether the pins of the gates are the timer's.
     pub fn gates_connected(&self) -> bool {
         let [a, b, ..] = &self.gpio;
-        let timer = Some(u32::from(crate::board::PWM_AF));
+        let timer = Some(u32::from(induction_drive::board::PWM_AF));
         [7, 8, 9, 10].iter().all(|pin| a.alternate(*pin) == timer)
             && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
     }
@@ -233,19 +217,16 @@ impl Chip {
         self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
     }
 
-    /// Lets happen what is due by now, up to the top of the PWM counter.
-    pub fn catch_up(&mut self) -> Happened {
-        let mut happened = Happened::default();
+    /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
+    /// reached, where the world outside moves on before anything later happens.
+    pub fn catch_up(&mut self) -> Option<u64> {
         let now = self.now;
         self.attention = false;
         while self.tim1.next_event() <= now {
-            let event = self.tim1.happen();
-            if let Some(at) = event.trigger {
-                self.adc.trigger(at);
-            }
-            if event.crest {
-                happened.crest = Some(event.at);
-                return happened; // the world outside moves on first
+            match self.tim1.happen() {
+                Event::Trigger(at) => self.adc.trigger(at),
+                Event::Crest(at) => return Some(at),
+                Event::Valley => {}
             }
         }
         if self.rcc.happen(now) {
@@ -261,7 +242,7 @@ impl Chip {
             self.scs.pend(scs::SYSTICK);
         }
         self.update_lines();
-        happened
+        None
     }
 }
 
@@ -269,11 +250,4 @@ impl Default for Chip {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// What [`Chip::catch_up`] has seen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Happened {
-    /// The counter of TIM1 was at its top then; nothing that comes later has happened yet.
-    pub crest: Option<u64>,
 }

@@ -1,11 +1,9 @@
-//! What instructions cost on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
+//! Cycles of instructions on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
 //! DDI0439).
 //!
 //! A static count of a block: an instruction that its IT condition skips counts as executed, an
 //! integer division as 6, and a floating-point result that the next instruction needs costs one
 //! more. An estimate: no board has confirmed it.
-
-use crate::chip::Block;
 
 /// More cycles for a branch that is taken: the pipeline fills again.
 pub const TAKEN: u32 = 2;
@@ -15,6 +13,19 @@ pub const ENTRY: u32 = 12 + 18;
 pub const EXIT: u32 = 12 + 17;
 /// More cycles for an access to a peripheral register: its bus.
 pub const BUS: u32 = 3;
+
+/// An executed block of instructions and its cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Address of its first instruction.
+    pub address: u32,
+    /// Bytes.
+    pub size: u32,
+    /// Cycles with its last branch not taken.
+    pub cycles: u32,
+    /// Whether that branch was taken.
+    pub taken: bool,
+}
 
 /// Cycles of blocks, with the branches that were taken.
 pub fn of(blocks: &[Block]) -> u32 {
@@ -65,7 +76,7 @@ pub struct Instruction {
 /// The instructions of a block.
 pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
     let mut at = 0;
-    let mut before = Before::default();
+    let mut before = Previous::default();
     std::iter::from_fn(move || {
         let half = |at: usize| Some(u16::from_le_bytes([*code.get(at)?, *code.get(at + 1)?]));
         let first = half(at)?;
@@ -82,37 +93,37 @@ pub fn instructions(code: &[u8]) -> impl Iterator<Item = Instruction> + '_ {
     })
 }
 
-/// What of the last instruction matters for the next.
+/// The properties of the last instruction that matter for the next.
 #[derive(Clone, Copy, Debug, Default)]
-struct Before {
+struct Previous {
     memory: bool,
     /// Single-precision register that it computed.
     result: Option<u16>,
 }
 
 /// A load takes one cycle when it follows a load or a store.
-fn load(before: &mut Before) -> u32 {
+fn load(before: &mut Previous) -> u32 {
     let cycles = if before.memory { 1 } else { 2 };
-    *before = Before { memory: true, result: None };
+    *before = Previous { memory: true, result: None };
     cycles
 }
 
-fn store(before: &mut Before) -> u32 {
-    *before = Before { memory: true, result: None };
+fn store(before: &mut Previous) -> u32 {
+    *before = Previous { memory: true, result: None };
     1
 }
 
-fn many(registers: u32, before: &mut Before) -> u32 {
-    *before = Before::default();
+fn many(registers: u32, before: &mut Previous) -> u32 {
+    *before = Previous::default();
     1 + registers
 }
 
-fn plain(cycles: u32, before: &mut Before) -> u32 {
-    *before = Before::default();
+fn plain(cycles: u32, before: &mut Previous) -> u32 {
+    *before = Previous::default();
     cycles
 }
 
-fn short(w: u16, before: &mut Before) -> u32 {
+fn short(w: u16, before: &mut Previous) -> u32 {
     let low = u32::from(w & 0xff);
     match w >> 8 {
         0x48..=0x4f => load(before),
@@ -128,7 +139,7 @@ fn short(w: u16, before: &mut Before) -> u32 {
     }
 }
 
-fn long(w: u16, v: u16, before: &mut Before) -> u32 {
+fn long(w: u16, v: u16, before: &mut Previous) -> u32 {
     let is_load = w & 0x10 != 0;
     match w >> 8 {
         0xe8 | 0xe9 if w & 0x40 == 0 => many(u32::from(v).count_ones(), before),
@@ -147,7 +158,7 @@ fn long(w: u16, v: u16, before: &mut Before) -> u32 {
     }
 }
 
-fn float(w: u16, v: u16, before: &mut Before) -> u32 {
+fn float(w: u16, v: u16, before: &mut Previous) -> u32 {
     let double = v >> 8 & 1 != 0;
     let vd = (v >> 12 & 15) << 1 | w >> 6 & 1;
     let vn = (w & 15) << 1 | v >> 7 & 1;
@@ -188,6 +199,6 @@ fn float(w: u16, v: u16, before: &mut Before) -> u32 {
     };
     let cycles = cycles + waits(sources);
     let compares = operation == 0xb && (more == 4 || more == 5);
-    *before = Before { memory: false, result: (!compares).then_some(vd) };
+    *before = Previous { memory: false, result: (!compares).then_some(vd) };
     cycles
 }

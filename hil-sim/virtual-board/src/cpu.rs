@@ -1,27 +1,29 @@
-//! What the board needs of an emulated core, so that the emulator can be replaced.
+//! The core: Unicorn 2.1.3 as a Cortex-M4F, with the chip around it.
+//!
+//! Properties of the emulator: the mode is THUMB without MCLASS and the model is set to Cortex-M4 (with MCLASS
+//! it would be an M33). The translator knows of handler mode only after a write to the flags that follows the
+//! write to IPSR. Hooks stop the core before the instruction they are called for. The model of a register must
+//! not stop the core: it would do its access again.
+
+mod frame;
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+pub use unicorn_engine::RegisterARM as Register;
+use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
+use unicorn_engine::{Context, Unicorn};
 
 use crate::chip::Chip;
+use crate::cost::Costs;
+use crate::memory::{self, Backing};
+use frame::BASIC;
 
-/// Registers that exception entry and return, and tests, handle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Register {
-    /// R0 to R12.
-    R(u8),
-    /// Stack pointer in use: the main one, the firmware has no other.
-    Sp,
-    /// Link register.
-    Lr,
-    /// Program counter.
-    Pc,
-    /// Program status, all parts.
-    Xpsr,
-    /// Exception mask.
-    Primask,
-    /// Priority mask.
-    Basepri,
-}
-
-/// Why the core stopped.
+/// Index of the Cortex-M4 among the emulator's 32-bit models.
+const CORTEX_M4: i32 = 9;
+/// Program counters from here on are EXC_RETURN.
+const EXC_RETURN: u32 = 0xffff_ffe0;
+/// The reason for which the core stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// It waits for an interrupt.
@@ -34,7 +36,7 @@ pub enum Stop {
     Fault(Fault),
 }
 
-/// What the bus or the decoder refused.
+/// An access that the bus refused, or a word that is no instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Access to this address.
@@ -43,32 +45,273 @@ pub enum Fault {
     Instruction,
 }
 
-/// An Arm Cortex-M4F with the chip around it.
-pub trait Cpu {
+/// Counting, at the price of speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counting {
+    /// Cycles of the code in CCM. Without, it takes no time.
+    pub cycles: bool,
+    /// The core can be stopped at every instruction in the flash, not only where a block begins.
+    pub every_instruction: bool,
+}
+
+/// The emulated core.
+pub struct Cpu {
+    uc: Unicorn<'static, Chip>,
+    faulted: Rc<Cell<Option<u32>>>,
+    trapped: Rc<Cell<bool>>,
+}
+
+/// Registers and memories of a stopped core.
+pub struct CoreState {
+    registers: Context,
+    memories: Vec<(u32, Vec<u8>)>,
+}
+
+/// Size of the pieces, bytes, that are compared before they are written: written code is translated anew.
+const PIECE: usize = 256;
+/// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
+const EXCEPTION_EXIT: [u32; 2] = [8, 3];
+
+impl Cpu {
+    /// A core with this chip around it and the memory of the STM32G474RE.
+    pub fn new(chip: Chip, counting: Counting) -> Result<Self, uc_error> {
+        let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, chip)?;
+        uc.ctl_set_cpu_model(CORTEX_M4)?;
+        for region in memory::MAP {
+            let (base, size) = (u64::from(region.base), region.size as usize);
+            match region.backing {
+                Backing::Flash => uc.mem_map(base, size, Permission::READ | Permission::EXEC)?,
+                Backing::Ram => uc.mem_map(base, size, Permission::ALL)?,
+                Backing::Registers => {
+                    uc.mmio_map(
+                        base,
+                        size,
+                        Some(move |uc: &mut Unicorn<Chip>, offset: u64, size: usize| {
+                            let address = (base + offset) as u32;
+                            u64::from(uc.get_data_mut().read(address, size as u8))
+                        }),
+                        Some(
+                            move |uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
+                                let address = (base + offset) as u32;
+                                uc.get_data_mut().write(address, size as u8, value as u32);
+                            },
+                        ),
+                    )?;
+                }
+            }
+        }
+        // CCM appears twice.
+        uc.mmio_map(
+            u64::from(memory::CCM_ALIAS),
+            memory::CCM_SIZE as usize,
+            Some(|uc: &mut Unicorn<Chip>, offset: u64, size: usize| {
+                let mut bytes = [0; 8];
+                uc.mem_read(u64::from(memory::CCM) + offset, &mut bytes[..size]).ok();
+                u64::from_le_bytes(bytes)
+            }),
+            Some(|uc: &mut Unicorn<Chip>, offset: u64, size: usize, value: u64| {
+                let bytes = value.to_le_bytes();
+                uc.mem_write(u64::from(memory::CCM) + offset, &bytes[..size]).ok();
+            }),
+        )?;
+
+        // Main loop and slow interrupts run from the flash: a cycle per instruction.
+        let flash = (u64::from(memory::FLASH), u64::from(memory::BANK_2 - 1));
+        if counting.every_instruction {
+            uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
+                if !stopped(uc, address) {
+                    uc.get_data_mut().instructions(1);
+                }
+            })?;
+        } else {
+            let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
+            let mut costs = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |i| i.cycles);
+            uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
+                if stopped(uc, address) {
+                    return;
+                }
+                let instructions = cost_of(&mut lengths, uc, address as u32, size);
+                let watched = uc.get_data().watched.as_ref();
+                if let Some(watched) = watched {
+                    let own = watched.has(address as u32);
+                    let cycles =
+                        if own { cost_of(&mut costs, uc, address as u32, size) } else { 0 };
+                    uc.get_data_mut().watch(address as u32, size, cycles);
+                }
+                uc.get_data_mut().instructions(u64::from(instructions));
+            })?;
+        }
+        if counting.cycles {
+            let mut costs =
+                Costs::new(memory::CCM, memory::CCM_SIZE, |instruction| instruction.cycles);
+            let ccm = (u64::from(memory::CCM), u64::from(memory::CCM + memory::CCM_SIZE - 1));
+            uc.add_block_hook(ccm.0, ccm.1, move |uc, address, size| {
+                if !stopped(uc, address) {
+                    let cycles = cost_of(&mut costs, uc, address as u32, size);
+                    uc.get_data_mut().block(address as u32, size, cycles);
+                }
+            })?;
+        }
+        // No code of the firmware is in RAM: who executes there is lost, but time goes on.
+        let ram = (u64::from(memory::RAM), u64::from(memory::RAM + memory::RAM_SIZE - 1));
+        uc.add_block_hook(ram.0, ram.1, |uc, address, size| {
+            if !stopped(uc, address) {
+                uc.get_data_mut().instructions(u64::from(size / 2).max(1));
+            }
+        })?;
+        let trapped = Rc::new(Cell::new(false));
+        let trap = Rc::clone(&trapped);
+        uc.add_intr_hook(move |uc, number| {
+            // Undefined instructions, calls of a supervisor, breakpoints.
+            trap.set(!EXCEPTION_EXIT.contains(&number));
+            uc.emu_stop().ok();
+        })?;
+        let faulted = Rc::new(Cell::new(None));
+        let note = Rc::clone(&faulted);
+        uc.add_mem_hook(HookType::MEM_INVALID, 0, u64::MAX, move |_, _, address, _, _| {
+            note.set(Some(address as u32));
+            false
+        })?;
+        Ok(Self { uc, faulted, trapped })
+    }
+
+    /// Keeps registers and memories; the flash of the code is not changed by anything.
+    ///
+    /// # Errors
+    /// An error of the emulator.
+    pub fn keep(&self) -> Result<CoreState, uc_error> {
+        let registers = self.uc.context_init()?;
+        let memories = [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)]
+            .into_iter()
+            .map(|(base, size)| {
+                let mut bytes = vec![0; size as usize];
+                self.uc.mem_read(u64::from(base), &mut bytes)?;
+                Ok((base, bytes))
+            })
+            .collect::<Result<_, uc_error>>()?;
+        Ok(CoreState { registers, memories })
+    }
+
+    /// Goes back to a state that was kept.
+    ///
+    /// # Errors
+    /// An error of the emulator.
+    pub fn go_back(&mut self, to: &CoreState) -> Result<(), uc_error> {
+        let mut now = vec![0; PIECE];
+        for (base, bytes) in &to.memories {
+            for (n, piece) in bytes.chunks(PIECE).enumerate() {
+                let address = base + (n * PIECE) as u32;
+                self.uc.mem_read(u64::from(address), &mut now[..piece.len()])?;
+                if now != piece {
+                    self.write(address, piece);
+                }
+            }
+        }
+        self.uc.context_restore(&to.registers)
+    }
+
     /// The chip.
-    fn chip(&self) -> &Chip;
+    pub fn chip(&self) -> &Chip {
+        self.uc.get_data()
+    }
+
     /// The chip, to change it.
-    fn chip_mut(&mut self) -> &mut Chip;
-    /// Runs from `Pc` until something stops it.
-    fn run(&mut self) -> Stop;
+    pub fn chip_mut(&mut self) -> &mut Chip {
+        self.uc.get_data_mut()
+    }
+
+    /// Runs from the program counter until something stops it.
+    pub fn run(&mut self) -> Stop {
+        self.faulted.set(None);
+        self.trapped.set(false);
+        self.chip_mut().first = true;
+        let pc = self.get(Register::PC);
+        let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
+        let pc = self.get(Register::PC);
+        if pc >= EXC_RETURN {
+            return Stop::Return(pc | 1);
+        }
+        match result {
+            Ok(()) if self.trapped.get() => Stop::Fault(Fault::Instruction),
+            Ok(()) if self.chip().wants_attention() => Stop::Asked,
+            Ok(()) => Stop::Wait,
+            Err(_) => Stop::Fault(self.faulted.get().map_or(Fault::Instruction, Fault::Access)),
+        }
+    }
+
     /// A register.
-    fn get(&self, register: Register) -> u32;
+    pub fn get(&self, register: Register) -> u32 {
+        self.uc.reg_read(register).unwrap_or(0) as u32
+    }
+
     /// Sets a register.
-    fn set(&mut self, register: Register, value: u32);
-    /// Pushes the frame of an exception and goes to its `handler`; `false` if the stack is not there.
-    fn enter(&mut self, exception: u16, handler: u32) -> bool;
-    /// Pops the frame of an exception; `false` if the stack is not there.
-    fn leave(&mut self, exc_return: u32) -> bool;
+    pub fn set(&mut self, register: Register, value: u32) {
+        self.uc.reg_write(register, u64::from(value)).ok();
+    }
+
     /// Reads memory, not registers; `false` where there is none.
-    fn read(&self, address: u32, bytes: &mut [u8]) -> bool;
-    /// Writes memory, flash included.
-    fn write(&mut self, address: u32, bytes: &[u8]) -> bool;
-    /// Registers as after a reset, stack pointer and program counter from the vector table.
-    fn reset(&mut self, vectors: u32);
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.uc.mem_read(u64::from(address), bytes).is_ok()
+    }
 
     /// A word of memory.
-    fn word(&self, address: u32) -> Option<u32> {
+    pub fn word(&self, address: u32) -> Option<u32> {
         let mut bytes = [0; 4];
         self.read(address, &mut bytes).then(|| u32::from_le_bytes(bytes))
+    }
+
+    /// Writes memory, flash included; `false` where there is none.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> bool {
+        let done = self.uc.mem_write(u64::from(address), bytes).is_ok();
+        // Code may have been written.
+        let end = u64::from(address) + bytes.len() as u64;
+        self.uc.ctl_remove_cache(u64::from(address), end).ok();
+        done
+    }
+
+    /// Sets the registers as after a reset, stack pointer and program counter from the vector table.
+    pub fn reset(&mut self, vectors: u32) {
+        for register in BASIC.into_iter().take(6) {
+            self.uc.reg_write(register, 0).ok();
+        }
+        for register in [
+            Register::CONTROL,
+            Register::PRIMASK,
+            Register::BASEPRI,
+            Register::FAULTMASK,
+            Register::FPSCR,
+        ] {
+            self.uc.reg_write(register, 0).ok();
+        }
+        self.set_exception(1 << 24);
+        let (sp, pc) = (self.word(vectors), self.word(vectors + 4));
+        self.set(Register::SP, sp.unwrap_or(0));
+        self.set(Register::PC, pc.unwrap_or(0) & !1);
+    }
+}
+
+/// Stops the core where the chip wants attention: before the block that begins here, which is met again, and
+/// then counted, when the core goes on.
+#[inline]
+fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
+    let chip = uc.get_data_mut();
+    chip.at = address as u32;
+    let stops = chip.stops_here();
+    if stops {
+        uc.emu_stop().ok();
+    }
+    stops
+}
+
+/// Cycles of a block.
+#[inline]
+fn cost_of(costs: &mut Costs, uc: &Unicorn<Chip>, address: u32, size: u32) -> u32 {
+    match costs.known(address, size) {
+        Some(cost) => cost,
+        None => {
+            let mut code = vec![0; size as usize];
+            uc.mem_read(u64::from(address), &mut code).ok();
+            costs.learn(address, &code)
+        }
     }
 }

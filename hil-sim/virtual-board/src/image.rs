@@ -1,13 +1,14 @@
-//! The ELF: what is loaded where, names and source lines of addresses, places of variables.
+//! The ELF: segments of the flash, symbols, functions and source lines of addresses.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use gimli::{EndianArcSlice, Reader as _, RunTimeEndian};
-use object::{Object, ObjectSection, ObjectSymbol};
+use gimli::{EndianArcSlice, RunTimeEndian};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+
+use crate::memory::Region;
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 
@@ -26,12 +27,17 @@ pub struct Segment {
     pub bytes: Vec<u8>,
 }
 
+struct Symbol {
+    region: Region,
+    name: String,
+    is_code: bool,
+}
+
 /// An image.
 pub struct Image {
     bytes: Vec<u8>,
-    dwarf: gimli::Dwarf<Slice>,
     segments: Vec<Segment>,
-    symbols: BTreeMap<u32, (u32, String)>,
+    symbols: Vec<Symbol>,
     lines: addr2line::Context<Slice>,
 }
 
@@ -74,22 +80,13 @@ impl Image {
     /// Understands the contents of an ELF file.
     ///
     /// # Errors
-    /// It is no ELF for this chip.
+    /// The file is no ELF for this chip.
     pub fn parse(bytes: Vec<u8>) -> Result<Self> {
         let segments = segments(&bytes)?;
         let file = object::File::parse(&*bytes)?;
-        let mut symbols = BTreeMap::new();
-        for symbol in file.symbols() {
-            let name = symbol.name().unwrap_or_default();
-            if !name.is_empty() && !name.starts_with('$') {
-                let place = (symbol.size() as u32, name.to_owned());
-                // Of several names for one address the one with a size.
-                let entry = symbols.entry(symbol.address() as u32 & !1).or_insert(place.clone());
-                if entry.0 == 0 {
-                    *entry = place;
-                }
-            }
-        }
+        let mut symbols: Vec<_> = file.symbols().filter_map(|symbol| named(&symbol)).collect();
+        // Of several symbols at one address the largest comes last.
+        symbols.sort_unstable_by_key(|symbol| (symbol.region.address, symbol.region.size));
         let endian = RunTimeEndian::Little;
         let section = |id: gimli::SectionId| -> Result<Slice> {
             let data = match file.section_by_name(id.name()) {
@@ -99,7 +96,7 @@ impl Image {
             Ok(EndianArcSlice::new(data.into(), endian))
         };
         let lines = addr2line::Context::from_dwarf(gimli::Dwarf::load(section)?)?;
-        Ok(Self { dwarf: gimli::Dwarf::load(section)?, segments, symbols, lines, bytes })
+        Ok(Self { segments, symbols, lines, bytes })
     }
 
     /// The file.
@@ -107,79 +104,42 @@ impl Image {
         &self.bytes
     }
 
-    /// What lies in the flash.
+    /// Contents of the flash.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// Address and size of the only symbol whose name contains `part`.
+    /// Address and size of the symbol with exactly this name, demangled and without angle brackets.
     ///
     /// # Errors
     /// There is none, or more than one.
-    pub fn symbol(&self, part: &str) -> Result<(u32, u32)> {
-        let mut found = self.symbols.iter().filter(|(_, (_, name))| name.contains(part));
+    pub fn symbol(&self, name: &str) -> Result<Region> {
+        let mut found = self.symbols.iter().filter(|symbol| symbol.name == name);
         match (found.next(), found.next()) {
-            (Some((address, (size, _))), None) => Ok((*address, *size)),
-            (None, _) => bail!("the image has no symbol with {part:?}"),
-            (Some((_, a)), Some((_, b))) => bail!("{part:?} is in {} and in {}", a.1, b.1),
+            (Some(symbol), None) => Ok(symbol.region),
+            (None, _) => bail!("the image has no symbol {name}"),
+            (Some(_), Some(_)) => bail!("the image has several symbols {name}"),
         }
     }
 
-    /// Address of the symbol with exactly this name.
+    /// Words of a constant in the flash.
     ///
     /// # Errors
-    /// There is none.
-    pub fn address(&self, name: &str) -> Result<u32> {
-        let file = object::File::parse(&*self.bytes)?;
-        let symbol = file.symbol_by_name(name);
-        Ok(symbol.with_context(|| format!("the image has no symbol {name}"))?.address() as u32)
+    /// There is no such symbol, or it is not in the flash.
+    pub fn contents(&self, name: &str) -> Result<Vec<u32>> {
+        let Region { address, size } = self.symbol(name)?;
+        let bytes = self.segments.iter().find_map(|segment| {
+            let at = address.checked_sub(segment.address)? as usize;
+            segment.bytes.get(at..at + size as usize)
+        });
+        let words = bytes.with_context(|| format!("{name} is not in the flash"))?.chunks_exact(4);
+        Ok(words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect())
     }
 
-    /// Size of the structure named `name`, and where in it its `member` is.
-    ///
-    /// # Errors
-    /// The debug information has no such structure or member.
-    pub fn member(&self, name: &str, member: &str) -> Result<(u32, u32)> {
-        let mut units = self.dwarf.units();
-        while let Some(header) = units.next()? {
-            let unit = self.dwarf.unit(header)?;
-            let named = |entry: &gimli::DebuggingInformationEntry<Slice>, name: &str| -> bool {
-                let value = entry.attr_value(gimli::DW_AT_name);
-                let text = value.and_then(|value| self.dwarf.attr_string(&unit, value).ok());
-                text.is_some_and(|text| text.to_string_lossy().is_ok_and(|text| text == name))
-            };
-            let number = |entry: &gimli::DebuggingInformationEntry<Slice>, which| {
-                entry.attr_value(which).and_then(|value| value.udata_value())
-            };
-            let mut size = None;
-            let mut entries = unit.entries();
-            while let Some(entry) = entries.next_dfs()? {
-                if entry.tag() == gimli::DW_TAG_structure_type {
-                    let found = named(entry, name);
-                    size = if found { number(entry, gimli::DW_AT_byte_size) } else { None };
-                } else if let Some(size) = size
-                    && entry.tag() == gimli::DW_TAG_member
-                    && named(entry, member)
-                    && let Some(offset) = number(entry, gimli::DW_AT_data_member_location)
-                {
-                    return Ok((size as u32, offset as u32));
-                }
-            }
-        }
-        bail!("the image knows no {member} in {name}")
-    }
-
-    /// Address of the variable whose name contains `part` and which has just room for `size` bytes and
-    /// a flag.
-    ///
-    /// # Errors
-    /// There is none.
-    pub fn variable(&self, part: &str, size: u32) -> Result<u32> {
-        let fits = |(_, (found, name)): &(&u32, &(u32, String))| {
-            name.contains(part) && (size..size + 16).contains(found)
-        };
-        let found = self.symbols.iter().find(fits);
-        found.map(|found| *found.0).with_context(|| format!("no variable {part} of {size} bytes"))
+    /// Every second address of the code: an instruction begins at each or at the one before.
+    pub fn code(&self) -> impl Iterator<Item = u32> {
+        let functions = self.symbols.iter().filter(|symbol| symbol.is_code);
+        functions.flat_map(|f| (f.region.address..f.region.end()).step_by(2))
     }
 
     /// The functions at an address of code, inlined ones first.
@@ -204,17 +164,27 @@ impl Image {
     /// Where an address of code is, for people.
     pub fn location(&self, address: u32) -> String {
         let mut text = format!("{address:#010x}");
-        let below = self.symbols.range(..=address).next_back();
-        if let Some((begin, (size, name))) = below
-            && (address < begin + size || *size == 0)
+        let above = self.symbols.partition_point(|symbol| symbol.region.address <= address);
+        if let Some(Symbol { region, name, .. }) = self.symbols[..above].last()
+            && (address < region.end() || region.size == 0)
         {
-            let _ = write!(text, " {name}+{:#x}", address - begin);
+            let _ = write!(text, " {name}+{:#x}", address - region.address);
         }
         for frame in self.frames(address) {
             let _ = write!(text, "\n    {} at {}", frame.function, frame.place);
         }
         text
     }
+}
+
+/// A symbol with a name that is not the assembler's own.
+fn named<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Symbol> {
+    let mangled = symbol.name().ok().filter(|name| !name.is_empty() && !name.starts_with('$'))?;
+    let name = addr2line::demangle_auto(Cow::Borrowed(mangled), Some(gimli::DW_LANG_Rust));
+    // The lowest bit of a function's address says Thumb.
+    let region = Region { address: symbol.address() as u32 & !1, size: symbol.size() as u32 };
+    let is_code = symbol.kind() == SymbolKind::Text;
+    Some(Symbol { region, name: name.replace(['<', '>'], ""), is_code })
 }
 
 fn segments(bytes: &[u8]) -> Result<Vec<Segment>> {

@@ -2,8 +2,8 @@
 //! page with plots at the end.
 
 pub mod page;
-pub mod probe;
 pub mod pty;
+pub mod readings;
 pub mod record;
 pub mod script;
 pub mod session;

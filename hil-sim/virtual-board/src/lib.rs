@@ -1,14 +1,14 @@
 //! Runs the flashed ELF on an emulated Cortex-M4F with modelled STM32G474 registers, and closes the loop
 //! with the simulated inverter, motor and sensors of `hil-sim`.
 //!
-//! The emulator is Unicorn, behind [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
+//! The emulator is Unicorn, inside [`cpu::Cpu`]. It is GPL-2.0: this crate reads the ELF, nothing that is
 //! shipped links it, and its binaries are never distributed.
 //!
-//! # What is modelled, and what is not
+//! # Extent of the model
 //! * Registers that the firmware uses ([`periph`], [`scs`]); an access to any other fails the run with the
 //!   address and the place in the source.
-//! * Time: an instruction in the flash takes one cycle (no wait states), what runs in CCM as
-//!   [`cost`] says. Exceptions are taken between instructions in the flash and at the end of the
+//! * Time: an instruction in the flash takes one cycle (no wait states), one in CCM as many as
+//!   [`cost`] counts. Exceptions are taken between instructions in the flash and at the end of the
 //!   control interrupt's blocks; entry and exit take no time.
 //! * Exceptions with priorities, nesting and masks; one stack; no MPU, no traps for unaligned accesses and
 //!   divisions by zero. Bus faults are taken at once and become hard faults, as in the firmware.
@@ -16,7 +16,8 @@
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
 //!   take effect when they do, with the mean voltage of the period until then.
 
-pub mod bench;
+pub mod addresses;
+pub mod board;
 pub mod campaign;
 pub mod chip;
 pub mod cost;
@@ -30,13 +31,9 @@ pub mod pair;
 pub mod periph;
 pub mod scs;
 pub mod shadow;
-pub mod unicorn;
 
-// The firmware's own board, settings and console: one source for both sides.
-use induction_drive::{board, console, rotor_tracking};
-
-pub use bench::{Board, Failure, Options, Period};
+pub use board::{Board, Options, Period};
+pub use cpu::Counting;
 pub use image::Image;
 pub use pair::Pair;
 pub use shadow::Shadow;
-pub use unicorn::Counting;

@@ -25,7 +25,7 @@ impl Log {
     pub fn new(image: &Image) -> Result<Self> {
         let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
         let table = table.context("the image has no defmt log")?;
-        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.0, bytes: Vec::new() })
+        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.address, bytes: Vec::new() })
     }
 
     /// Forgets the beginning of a frame.
@@ -33,17 +33,14 @@ impl Log {
         self.bytes.clear();
     }
 
-    /// What the firmware has logged since the last call.
+    /// The firmware's log since the last call.
     ///
     /// # Errors
-    /// It cannot be decoded.
-    pub fn take(&mut self, cpu: &mut impl Cpu) -> Result<Vec<String>> {
+    /// The log cannot be decoded.
+    pub fn take(&mut self, cpu: &mut Cpu) -> Result<Vec<String>> {
         let at = self.control_block + BUFFER;
-        let word = |cpu: &mut dyn FnMut(u32) -> Option<u32>, n: u32| cpu(at + 4 * n);
-        let mut read = |address| cpu.word(address);
-        let (Some(buffer), Some(size), Some(written), Some(mut next)) =
-            (word(&mut read, 1), word(&mut read, 2), word(&mut read, 3), word(&mut read, 4))
-        else {
+        let words = [1, 2, 3, 4].map(|n| cpu.word(at + 4 * n));
+        let [Some(buffer), Some(size), Some(written), Some(mut next)] = words else {
             return Ok(Vec::new());
         };
         if size == 0 || size > memory::RAM_SIZE || next >= size || written >= size {

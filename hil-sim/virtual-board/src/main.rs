@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Parser, Subcommand};
 use virtual_board::{Image, campaign, cycles};
 
@@ -16,27 +16,24 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Faults, thousands of them: outputs off in time, or control correct.
+    /// Injects faults; after each, outputs go off in time or control is correct.
     Campaign {
         /// The ELF.
         elf: PathBuf,
-        /// How many.
+        /// Number of faults.
         #[arg(default_value_t = 2000)]
         count: u64,
-        /// Seed of the first; each has the next one.
+        /// Seed of the first fault; each has the next one.
         #[arg(default_value_t = 1)]
         seed: u64,
         /// Only the classes whose name contains this.
         #[arg(long, default_value = "")]
         class: String,
     },
-    /// Counts what the control interrupt costs.
+    /// Counts the cycles of the control interrupt; fails above its limits.
     Cycles {
         /// The ELF.
         elf: PathBuf,
-        /// A table of before: fails if a line is over 5 % above it.
-        #[arg(long)]
-        against: Option<PathBuf>,
         /// Shows the functions of the blocks as well.
         #[arg(long)]
         functions: bool,
@@ -56,21 +53,17 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
         Task::Campaign { elf, count, seed, class } => {
-            let choice = campaign::Choice { count, seed, class };
+            let selection = campaign::Selection { count, seed, class };
             println!("{}", campaign::bounds());
-            println!("{}", campaign::run(|| Image::open(&elf), &choice)?);
+            println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }
-        Task::Cycles { elf, against, functions } => {
-            let lines = cycles::measure(|| Image::open(&elf))?;
-            print!("{}", cycles::table(&lines));
+        Task::Cycles { elf, functions } => {
+            let rows = cycles::measure(|| Image::open(&elf))?;
+            print!("{}", cycles::table(&rows));
             if functions {
-                lines.iter().for_each(|line| print!("\n{}", cycles::functions(line)));
+                rows.iter().for_each(|row| print!("\n{}", cycles::functions(row)));
             }
-            if let Some(path) = against {
-                let before = std::fs::read_to_string(&path);
-                let before = before.with_context(|| path.display().to_string())?;
-                cycles::compare(&lines, &before).with_context(|| path.display().to_string())?;
-            }
+            cycles::check(&rows)?;
         }
     }
     Ok(())

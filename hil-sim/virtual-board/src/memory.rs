@@ -1,24 +1,40 @@
 //! The memory map of the STM32G474RE (RM0440, section 2.2), as far as it is modelled.
 
-/// What lies behind an address.
+/// A piece of memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Region {
+    /// First address.
+    pub address: u32,
+    /// Size, bytes.
+    pub size: u32,
+}
+
+impl Region {
+    /// The first address behind it.
+    pub fn end(self) -> u32 {
+        self.address + self.size
+    }
+}
+
+/// The kind of memory behind an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backing {
     /// Read and executed; written by its controller only.
     Flash,
-    /// Memory.
+    /// Read, written and executed.
     Ram,
-    /// Read and written through [`crate::chip::Chip`].
+    /// Reads and writes go to the models of the peripherals.
     Registers,
 }
 
-/// A region.
+/// A region of the memory map.
 #[derive(Clone, Copy, Debug)]
-pub struct Region {
+pub struct Mapping {
     /// First address.
     pub base: u32,
     /// Bytes.
     pub size: u32,
-    /// What is there.
+    /// Its kind.
     pub backing: Backing,
 }
 
@@ -26,8 +42,8 @@ pub struct Region {
 pub const FLASH: u32 = 0x0800_0000;
 /// Flash in both banks, bytes.
 pub const FLASH_SIZE: u32 = 512 * 1024;
-/// The second bank. It goes through the model of the flash, so that what is half written there can
-/// be told from data. No code lies in it.
+/// The second bank. It goes through the model of the flash, so that half-written words can be told
+/// from data. No code lies in it.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
 /// First address of SRAM1 and SRAM2.
 pub const RAM: u32 = 0x2000_0000;
@@ -45,16 +61,16 @@ pub const BIT_BAND: u32 = 0x4200_0000;
 pub const PERIPHERALS: u32 = 0x4000_0000;
 
 /// All regions but the alias of CCM.
-pub const MAP: [Region; 9] = [
-    Region { base: FLASH, size: FLASH_SIZE / 2, backing: Backing::Flash },
-    Region { base: BANK_2, size: FLASH_SIZE / 2, backing: Backing::Registers },
-    Region { base: RAM, size: RAM_SIZE, backing: Backing::Ram },
-    Region { base: CCM, size: CCM_SIZE, backing: Backing::Ram },
-    Region { base: PERIPHERALS, size: 0x3_0000, backing: Backing::Registers },
-    Region { base: BIT_BAND, size: 0x60_0000, backing: Backing::Registers },
-    Region { base: 0x4800_0000, size: 0x2000, backing: Backing::Registers },
-    Region { base: 0x5000_0000, size: 0x6_1000, backing: Backing::Registers },
-    Region { base: 0xe000_0000, size: 0x10_0000, backing: Backing::Registers },
+pub const MAP: [Mapping; 9] = [
+    Mapping { base: FLASH, size: FLASH_SIZE / 2, backing: Backing::Flash },
+    Mapping { base: BANK_2, size: FLASH_SIZE / 2, backing: Backing::Registers },
+    Mapping { base: RAM, size: RAM_SIZE, backing: Backing::Ram },
+    Mapping { base: CCM, size: CCM_SIZE, backing: Backing::Ram },
+    Mapping { base: PERIPHERALS, size: 0x3_0000, backing: Backing::Registers },
+    Mapping { base: BIT_BAND, size: 0x60_0000, backing: Backing::Registers },
+    Mapping { base: 0x4800_0000, size: 0x2000, backing: Backing::Registers },
+    Mapping { base: 0x5000_0000, size: 0x6_1000, backing: Backing::Registers },
+    Mapping { base: 0xe000_0000, size: 0x10_0000, backing: Backing::Registers },
 ];
 
 /// Whether the chip has nothing at an address, so that an access is a fault of the processor. (Not:

@@ -1,10 +1,10 @@
-//! A board beside its shadow: what the one does is checked against the other, and the shadow knows what
-//! state the drive is in.
+//! A board beside its shadow: the compare values of both are compared, and the shadow knows the state of the
+//! drive.
 
 use anyhow::{Result, bail};
 use drive_core::State;
 
-use crate::bench::{Board, Options, Period};
+use crate::board::{Board, Options, Period};
 use crate::image::Image;
 use crate::shadow::Shadow;
 
@@ -25,17 +25,19 @@ impl Pair {
     /// A board that has started and waits for orders.
     ///
     /// # Errors
-    /// It does not start.
+    /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
-        pair.until("the greeting", LONGEST_ANSWER, |pair, _| pair.board.heard().ends_with('\n'))?;
+        pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
+            pair.board.take_console().ends_with('\n')
+        })?;
         Ok(pair)
     }
 
     /// Goes on for some periods; `look` is called after each control interrupt.
     ///
     /// # Errors
-    /// What the board cannot go on with; compare values that differ.
+    /// A failure of the board; compare values that differ.
     pub fn run(&mut self, periods: u64, mut look: impl FnMut(&Self, &Period)) -> Result<()> {
         for _ in 0..periods {
             self.board.run_periods(1)?;
@@ -50,7 +52,7 @@ impl Pair {
     /// Goes on until something is so, for `periods` at most.
     ///
     /// # Errors
-    /// As [`Pair::run`]; it never is.
+    /// As [`Pair::run`]; it does not happen in time.
     pub fn until(
         &mut self,
         what: &str,
@@ -64,7 +66,7 @@ impl Pair {
                 return Ok(());
             }
         }
-        let log = self.board.logged()?;
+        let log = self.board.take_log()?;
         bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
     }
 
@@ -73,12 +75,12 @@ impl Pair {
     /// # Errors
     /// As [`Pair::until`].
     pub fn say(&mut self, line: &str) -> Result<String> {
-        self.board.heard();
+        self.board.take_console();
         self.board.type_line(line);
         self.shadow.type_line(line)?;
         let mut answer = String::new();
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
-            answer += &pair.board.heard();
+            answer += &pair.board.take_console();
             answer.ends_with('\n')
         })?;
         Ok(answer.trim_end().to_owned())

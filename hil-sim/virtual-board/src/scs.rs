@@ -1,6 +1,6 @@
 //! The core's own registers: NVIC, SCB, SysTick, cycle counter (ARMv7-M, chapter B3; Cortex-M4 TRM).
 
-use crate::periph::Effect;
+use crate::periph::{Effect, Plain, Store};
 
 /// Exception numbers.
 pub const NMI: u16 = 2;
@@ -54,11 +54,11 @@ pub struct Scs {
     grouping: u32,
     /// Reasons of faults.
     pub cfsr: u32,
-    /// Likewise.
+    /// Reasons of hard faults.
     pub hfsr: u32,
     /// Address of a bus fault.
     pub bfar: u32,
-    plain: [u32; 8],
+    plain: Store,
     demcr: u32,
     dwt_control: u32,
     /// The cycle counter is this less than time.
@@ -82,7 +82,7 @@ impl Default for Scs {
             cfsr: 0,
             hfsr: 0,
             bfar: 0,
-            plain: [0x200, 0, 0, 0, 0, 0, 0, 0xc000_0000],
+            plain: Store::new(PLAIN),
             demcr: 0,
             dwt_control: 0,
             cycles_from: 0,
@@ -92,17 +92,16 @@ impl Default for Scs {
     }
 }
 
-/// Indices of registers that only hold what is written: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR,
-/// FPCAR, FPCCR.
-const PLAIN: [u32; 8] = [
-    0xe000_ed14,
-    0xe000_ed24,
-    0xe000_ed88,
-    0xe000_ed10,
-    0xe000_ed34,
-    0xe000_ed3c,
-    0xe000_ef38,
-    0xe000_ef34,
+/// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
+const PLAIN: &[Plain] = &[
+    (0xe000_ed14, 0x200, u32::MAX),
+    (0xe000_ed24, 0, u32::MAX),
+    (0xe000_ed88, 0, u32::MAX),
+    (0xe000_ed10, 0, u32::MAX),
+    (0xe000_ed34, 0, u32::MAX),
+    (0xe000_ed3c, 0, u32::MAX),
+    (0xe000_ef38, 0, u32::MAX),
+    (0xe000_ef34, 0xc000_0000, u32::MAX),
 ];
 
 impl Scs {
@@ -213,9 +212,6 @@ impl Scs {
             let first = 16 + 8 * (address - from) as usize;
             (0..32).fold(0, |word, n| word | u32::from(flags.get(first + n) == Some(&true)) << n)
         };
-        if let Some(place) = PLAIN.iter().position(|known| *known == address) {
-            return Some(self.plain[place]);
-        }
         Some(match address {
             0xe000_e010 => self.systick.control,
             0xe000_e014 => self.systick.reload,
@@ -249,7 +245,7 @@ impl Scs {
             0xe000_edfc => self.demcr,
             0xe000_1000 => 0x4000_0000 | self.dwt_control,
             0xe000_1004 => self.cycles(now),
-            _ => return None,
+            _ => return self.plain.read(address),
         })
     }
 
@@ -261,10 +257,6 @@ impl Scs {
 
     /// Writes a register; `None` if it is not known.
     pub fn write(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
-        if let Some(place) = PLAIN.iter().position(|known| *known == address) {
-            self.plain[place] = value;
-            return Some(Effect::None);
-        }
         let set = |flags: &mut [bool; EXCEPTIONS], from: u32, to: bool| {
             let first = 16 + 8 * (address - from) as usize;
             for n in (0..32).filter(|n| value & 1 << n != 0) {
@@ -332,7 +324,7 @@ impl Scs {
                 self.cycles_from = now.wrapping_sub(u64::from(value));
                 return Some(Effect::None);
             }
-            _ => return None,
+            _ => return self.plain.write(address, value),
         }
         self.any_pending = self.pending.contains(&true);
         Some(Effect::Look)

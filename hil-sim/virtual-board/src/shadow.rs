@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 use anyhow::{Result, bail};
 use drive_core::{Command, Drive, Settings, State};
 
-use crate::bench::Period;
-use crate::console::grammar::{self, Request};
-use crate::rotor_tracking::{Observation, Tracking};
+use crate::board::Period;
+use induction_drive::console::grammar::{self, Request};
+use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
 
 /// A drive with the settings of the board.
@@ -33,7 +33,7 @@ impl Shadow {
     /// Its settings make no drive.
     pub fn new() -> Result<Self> {
         let settings = FirmwareSettings::of_the_board();
-        let dead_time_s = crate::board::dead_time(settings.drive.inverter.dead_time_s).1;
+        let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
         Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
@@ -49,7 +49,7 @@ impl Shadow {
     /// A line that was typed at the console of the board.
     ///
     /// # Errors
-    /// It is not one that gives an order.
+    /// The line gives no order.
     pub fn type_line(&mut self, line: &str) -> Result<()> {
         let order = match grammar::parse(line) {
             Ok(Request::Start(mode)) => {
@@ -94,8 +94,8 @@ impl Shadow {
         Ok(())
     }
 
-    /// All that is set, and what was learned.
-    pub fn everything(&self) -> &FirmwareSettings {
+    /// All settings, with the learned table.
+    pub fn firmware_settings(&self) -> &FirmwareSettings {
         &self.settings
     }
 
@@ -129,7 +129,7 @@ impl Shadow {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
             let tracked = self.tau_r.take().map(Command::RotorTimeConstant);
             let order = tracked.or_else(|| self.orders.pop_front());
-            let Some(order) = order else { bail!("an order nobody gave") };
+            let Some(order) = order else { bail!("an order that was not given") };
             let answer = self.drive.command(&order);
             if let (Ok(_), Command::Configure(_)) = (answer, order) {
                 self.tracking = Tracking::new(&self.settings.drive);

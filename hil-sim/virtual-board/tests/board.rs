@@ -1,12 +1,11 @@
-//! The image on the board: how it starts, what it says, and what stops it.
+//! The image on the board: its start, its messages, and its ends.
 
 mod common;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
-use virtual_board::chip::Reset;
-use virtual_board::cpu::Cpu;
+use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
 /// Periods that the firmware needs from reset to its greeting, at most.
@@ -24,8 +23,12 @@ fn started(seed: u64) -> Result<Board> {
 #[test]
 fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
     let mut board = started(1)?;
-    assert!(board.heard().contains("last run: reset by power-on"), "{}", board.heard());
-    let log = board.logged()?;
+    assert!(
+        board.take_console().contains("last run: reset by power-on"),
+        "{}",
+        board.take_console()
+    );
+    let log = board.take_log()?;
     assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
     assert!(log.iter().any(|line| line.contains("off: codes")), "{log:#?}");
     assert!(!log.iter().any(|line| line.starts_with("ERROR")), "{log:#?}");
@@ -53,9 +56,9 @@ fn a_hanging_core_is_off_within_six_milliseconds() -> Result<()> {
     }
     println!("off after {:.2} ms, peak current {peak:.2} A", (pair.board.time() - began) * 1e3);
     assert_eq!(pair.board.resets.last().map(|r| r.1), Some(Reset::Watchdog));
-    pair.board.heard();
+    pair.board.take_console();
     pair.board.run_periods(START)?;
-    assert!(pair.board.heard().contains("last run: reset by watchdog"));
+    assert!(pair.board.take_console().contains("last run: reset by watchdog"));
     Ok(())
 }
 
@@ -79,14 +82,14 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
 #[test]
 fn a_dead_crystal_switches_off_and_restarts() -> Result<()> {
     let mut pair = common::regulating(4)?;
-    pair.board.heard();
+    pair.board.take_console();
     pair.board.set_crystal(false);
     pair.board.run_ticks(2000)?;
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.board.run_periods(2 * START)?;
-    let heard = pair.board.heard();
+    let heard = pair.board.take_console();
     assert!(heard.contains("clock or flash failure"), "{heard}");
-    let log = pair.board.logged()?;
+    let log = pair.board.take_log()?;
     assert!(log.iter().any(|line| line.contains("internal oscillator")), "{log:#?}");
     Ok(())
 }
@@ -98,16 +101,16 @@ fn without_the_control_interrupt_it_stays_off() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 5))?;
     board.chip().adc.lose_triggers = [u32::MAX; 2];
     board.run_periods(START)?;
-    let heard = board.heard();
+    let heard = board.take_console();
     assert!(heard.contains("last run: reset by power-on"), "{heard}");
-    let log = board.logged()?;
+    let log = board.take_log()?;
     assert!(
         log.iter().any(|line| line.contains("not started") && line.contains("Interrupt")),
         "{log:#?}"
     );
     board.type_line("start");
     board.run_periods(2 * START)?;
-    let heard = board.heard();
+    let heard = board.take_console();
     assert!(heard.contains("error: the control does not run"), "{heard}");
     assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty(), "{:?}", board.resets);
     Ok(())
@@ -121,19 +124,14 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
         [(true, "74 code of the control"), (false, "75 coefficients of the control")]
     {
         let mut pair = common::regulating(6)?;
-        let image = pair.board.image();
-        let (running, _) = image.symbol("control7RUNNING")?;
-        // The last word of the code, which is padding or never executed here; the direct current.
+        // The last word of the code, which is padding or never executed here; the direct current, by its value.
         let address = if code {
-            image.address("__eccm")? - 4
+            pair.board.image().symbol("__eccm")?.address - 4
         } else {
-            let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
-            running
-                + at("Running", "control")?
-                + at("Control", "drive")?
-                + at("Drive", "c")?
-                + at("Coefficients", "sequence")?
-                + at("SequenceSteps", "i_d")?
+            let region = pair.board.addresses().coefficients;
+            let i_d = Some(pair.shadow.settings().sequence.i_d.to_bits());
+            let mut words = (region.address..region.end()).step_by(4);
+            words.find(|at| pair.board.word(*at) == i_d).context("no direct current")?
         };
         let word = pair.board.word(address).unwrap_or(0) ^ 1 << 20;
         pair.board.cpu().write(address, &word.to_le_bytes());
@@ -143,9 +141,9 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
             assert!(pair.board.time() - began < 20e-3, "still on");
         }
         println!("{reason}: off after {:.1} ms", (pair.board.time() - began) * 1e3);
-        pair.board.heard();
+        pair.board.take_console();
         pair.board.run_periods(START)?;
-        let heard = pair.board.heard();
+        let heard = pair.board.take_console();
         assert!(heard.contains("reset by software") && heard.contains(reason), "{heard}");
     }
     Ok(())

@@ -1,6 +1,9 @@
-//! Cycles of single instructions.
+//! Cycles of single instructions, and the limits of the control interrupt.
+
+use std::collections::BTreeMap;
 
 use virtual_board::cost::instructions;
+use virtual_board::cycles::{Row, check};
 
 fn cycles(code: &[u16]) -> Vec<u32> {
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
@@ -25,4 +28,17 @@ fn the_table_of_the_manual() {
     );
     // vpush {s16-s19}; ldrd r0,r1,[r2]; bl
     assert_eq!(cycles(&[0xed2d, 0x8a04, 0xe9d2, 0x0100, 0xf000, 0xf800]), [5, 3, 1]);
+}
+
+#[test]
+fn an_interrupt_above_a_limit_is_refused_by_its_figure() {
+    let refused = |cycles, whole| {
+        let (blocks, functions) = (BTreeMap::new(), BTreeMap::new());
+        let row = Row { name: "x", instructions: 0, cycles, median: 0, whole, blocks, functions };
+        check(&[row]).err().map(|why| why.to_string())
+    };
+    // 15 % of the 28 333 cycles of a period, and 2500 to the compare values.
+    assert_eq!(refused(2500, 4250), None);
+    assert!(refused(2500, 4251).is_some_and(|why| why.contains("4251 cycles, 4250 allowed")));
+    assert!(refused(2501, 4250).is_some_and(|why| why.contains("2501") && why.contains("2500")));
 }

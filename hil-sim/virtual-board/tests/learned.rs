@@ -1,9 +1,9 @@
-//! What the drive learns on its motor outlasts the power.
+//! The table that the drive learns on its motor outlasts the power.
 
 use anyhow::Result;
 use drive_core::State;
 use hil_sim::Config;
-use virtual_board::chip::Reset;
+use virtual_board::periph::Reset;
 use virtual_board::{Counting, Image, Options, Pair};
 
 /// Longest that learning takes, periods: two minutes.
@@ -15,7 +15,7 @@ const LISTED: u64 = 30_000;
 fn list(pair: &mut Pair, line: &str) -> Result<Vec<String>> {
     let mut text = pair.say(line)? + "\r\n";
     pair.until("the end of the list", LISTED, |pair, _| {
-        text += &pair.board.heard();
+        text += &pair.board.take_console();
         text.lines().last().is_some_and(|line| line.starts_with("ok")) && text.ends_with('\n')
     })?;
     Ok(text.lines().map(str::to_owned).collect())
@@ -23,10 +23,10 @@ fn list(pair: &mut Pair, line: &str) -> Result<Vec<String>> {
 
 /// The power goes and comes back.
 fn power_cycle(pair: &mut Pair) -> Result<()> {
-    let settings = *pair.shadow.everything();
+    let settings = *pair.shadow.firmware_settings();
     pair.board.reset(Reset::Power);
     pair.shadow.restart(settings)?;
-    pair.until("the greeting", LISTED, |pair, _| pair.board.heard().ends_with('\n'))
+    pair.until("the greeting", LISTED, |pair, _| pair.board.take_console().ends_with('\n'))
 }
 
 /// Sensors whose gains differ by 1 % are learned, saved, and corrected after the power was off: board and
@@ -58,7 +58,7 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     pair.order("save")?;
 
     power_cycle(&mut pair)?;
-    assert!(pair.shadow.everything().learned.is_some());
+    assert!(pair.shadow.firmware_settings().learned.is_some());
     assert_eq!(list(&mut pair, "learned")?, learned);
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;

@@ -1,4 +1,4 @@
-//! What an order from the console costs the control interrupt that takes it.
+//! Cycles of the control interrupts that take orders from the console.
 
 mod common;
 
@@ -32,7 +32,10 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
     })?;
     all.sort_unstable();
     let (taken, median) = (taken.context(line.to_owned())?, all[all.len() / 2]);
-    println!("{line:<16} {taken:>6} cycles, others {median:>6}: {}", pair.board.heard().trim_end());
+    println!(
+        "{line:<16} {taken:>6} cycles, others {median:>6}: {}",
+        pair.board.take_console().trim_end()
+    );
     Ok((taken, median))
 }
 

@@ -6,7 +6,7 @@ use hil_sim::Config;
 use induction_drive::board::CYCLES_PER_US;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use virtual_board::bench::poison::Poison;
+use virtual_board::board::poison::Poison;
 use virtual_board::chip::CONTROL_INTERRUPT;
 use virtual_board::{Counting, Image, Options, Pair};
 
@@ -17,13 +17,13 @@ const APART: u64 = 3000;
 
 /// Latest start of the control interrupt here, ticks: 1 us. The firmware may be late by 10 us
 /// (`board::LATEST_START_US`); here an instruction in the flash takes a cycle, on the chip up to five, and
-/// twice the time is left for what is not modelled.
+/// twice the time is left for effects that are not modelled.
 const LATEST_START: u64 = CYCLES_PER_US as u64;
 
 /// Main loop and serial interrupt are preempted before any instruction, by the interrupts of the
 /// converters and by others that are asked for at random, a hundred thousand in all, while the drive
 /// regulates and the console talks. Registers and stack are compared after each, with the
-/// floating-point registers poisoned inside; the log is whole. None of them waits for what it preempts.
+/// floating-point registers poisoned inside; the log is whole. None of them waits for the code it preempts.
 #[test]
 fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log_intact()
 -> Result<()> {
@@ -33,8 +33,8 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
     let mut board = pair.board;
-    board.logged()?;
-    board.poison = Some(Poison::new(board.image().address("_stack_start")?));
+    board.take_log()?;
+    board.poison = Some(Poison::new(board.image().symbol("_stack_start")?.address));
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
     let (mut periods, mut replies) = (0_u64, 0);
     while board.poison.as_ref().is_some_and(|poison| poison.intact < INTERRUPTS) {
@@ -50,11 +50,11 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
             }
         }
     }
-    let heard = board.heard();
+    let heard = board.take_console();
     let lines = heard.lines().count();
     assert!(heard.lines().all(|line| !line.starts_with("error")), "{heard}");
     assert!(lines + 5 > replies, "{lines} answers to {replies} lines");
-    let log = board.logged()?;
+    let log = board.take_log()?;
     assert!(log.iter().all(|line| !line.contains("malformed")), "{log:#?}");
     // Ten lines a second.
     assert!(log.len() as u64 >= periods / 600, "{} lines in {periods} periods", log.len());

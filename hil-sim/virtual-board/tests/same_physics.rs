@@ -16,7 +16,7 @@ use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 use hil_sim::stats::Stats;
 use virtual_board::Options;
 
-/// What is judged, one per period.
+/// The quantities compared, one set per period.
 #[derive(Clone, Copy)]
 struct Point {
     error_deg: f64,
@@ -64,7 +64,7 @@ fn both(
     rig.start(mode)?;
     let mut host = Vec::new();
     for (_, command, periods) in steps {
-        rig.command(*command)?;
+        rig.command(command)?;
         for _ in 0..*periods {
             // The truth at the sample, before the plant moves on.
             let before = rig.plant.clone();
@@ -80,7 +80,7 @@ fn mean(points: &[Point], of: impl Fn(&Point) -> f64) -> Stats {
 }
 
 /// Sensors without noise: with it the mean angle error of half a second differs by 0.6 degrees rms from
-/// one seed to the next, which would hide what is compared here.
+/// one seed to the next, which would hide the difference.
 fn quiet() -> Config {
     let mut config = Config::default();
     config.measurement.noise_a = 0.0;

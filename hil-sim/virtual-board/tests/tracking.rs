@@ -28,8 +28,8 @@ fn status(pair: &mut Pair) -> Result<(f64, bool)> {
 
 /// The motor's rotor has 30 % more resistance than the drive believes, as if it were 75 degrees warmer.
 /// With the encoder and 2 A the time constant that the drive uses comes to the motor's, and so does the
-/// flux angle. All the while the host follows to the bit: what the image identifies, it identifies
-/// too, or the orders would differ, and then the compare values. The console prints traces meanwhile: were
+/// flux angle. All the while the host follows to the bit: it identifies the same values as the image,
+/// or the orders would differ, and then the compare values. The console prints traces meanwhile: were
 /// the main loop too slow, a period would be lost, which the host's ring does not lose.
 #[test]
 fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
@@ -52,7 +52,7 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     for _ in 0..6 {
         pair.board.type_line("trace 500 1");
         pair.run(6000, |_, _| {})?;
-        let lines = pair.board.heard().lines().count();
+        let lines = pair.board.take_console().lines().count();
         assert!(lines > 100, "{lines} lines of a trace in a second");
     }
     // Any line cuts the trace short.
@@ -67,7 +67,7 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     assert!(found && (used / truth - 1.0).abs() < 0.06, "{used} ms for {truth} ms");
     assert!(before.abs() > 5.0 && after.abs() < 1.4, "{before} and {after} degrees");
 
-    // A torque of nothing shows nothing of the rotor: it is said, and what is used stays.
+    // Without torque the rotor does not show: the status says so, and the time constant in use stays.
     pair.order("torque 0")?;
     pair.run(18_000, |_, _| {})?;
     let (kept, found) = status(&mut pair)?;

@@ -1,10 +1,11 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
+use num_complex::Complex64;
 
 use super::measure::Record;
 use crate::error::Error;
+use crate::experiments::bode::largest_pole;
 use crate::identification::arx::{Orders, fit};
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
@@ -25,7 +26,7 @@ pub struct Pii {
     pub z_s: f64,
 }
 
-/// What section 3.11 uses.
+/// As used in section 3.11.
 pub const PRINTED_PII: Pii = Pii { k_s: 0.132_546, z_s: 0.90 };
 
 /// Table 6: i_q in A, k_phi, real and imaginary part of the poles.
@@ -102,7 +103,7 @@ impl Model {
     }
 
     /// Both poles, the one with the larger imaginary part (or the larger one) first.
-    pub fn poles(&self) -> Option<[Complex; 2]> {
+    pub fn poles(&self) -> Option<[Complex64; 2]> {
         roots(self.a).map(|[p, q]| if (p.im, p.re) < (q.im, q.re) { [q, p] } else { [p, q] })
     }
 
@@ -112,15 +113,15 @@ impl Model {
     }
 
     /// Frequency response at rad/sample.
-    pub fn response(&self, omega_t: f64) -> Complex {
-        let z = Complex::new(omega_t.cos(), omega_t.sin());
-        let [a1, a2] = self.a.map(|a| Complex::new(a, 0.0));
-        Complex::new(self.k, 0.0) / (z * z + a1 * z + a2)
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let [a1, a2] = self.a.map(|a| Complex64::new(a, 0.0));
+        Complex64::new(self.k, 0.0) / (z * z + a1 * z + a2)
     }
 
     /// Poles of the loop of this plant and a controller:
     /// (z - 1)^2 (z^2 + a1 z + a2) + k_s k (z - z_s).
-    pub fn closed_loop(&self, pii: Pii) -> Option<[Complex; 4]> {
+    pub fn closed_loop(&self, pii: Pii) -> Option<[Complex64; 4]> {
         let [a1, a2] = self.a;
         let gain = pii.k_s * self.k;
         roots([a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s])
@@ -133,24 +134,24 @@ impl Model {
         let sign = self.static_gain().signum();
         let candidates = (0..200).map(|n| 0.3 * 0.97_f64.powi(n)).map(|crossover| {
             let open = self.open_loop(Pii { k_s: 1.0, z_s: 1.0 - crossover / LEAD }, crossover);
-            (Pii { k_s: sign / open.abs(), z_s: 1.0 - crossover / LEAD }, crossover)
+            (Pii { k_s: sign / open.norm(), z_s: 1.0 - crossover / LEAD }, crossover)
         });
         let fits = |pii: Pii| {
-            largest(self.closed_loop(pii)) < 1.0
+            largest_pole(self.closed_loop(pii)) < 1.0
                 && (1..300).all(|n| {
                     let w = std::f64::consts::PI * 0.97_f64.powi(n);
-                    (Complex::ONE + self.open_loop(pii, w)).abs() > 1.0 / MS
+                    (Complex64::ONE + self.open_loop(pii, w)).norm() > 1.0 / MS
                 })
         };
         candidates.into_iter().find(|&(pii, _)| fits(pii))
     }
 
     /// Controller and plant at rad/sample.
-    fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex {
-        let z = Complex::new(omega_t.cos(), omega_t.sin());
-        let integrator = z - Complex::ONE;
-        let controller = (z - Complex::new(pii.z_s, 0.0)) / (integrator * integrator);
-        controller * Complex::new(pii.k_s, 0.0) * self.response(omega_t)
+    fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let integrator = z - Complex64::ONE;
+        let controller = (z - Complex64::new(pii.z_s, 0.0)) / (integrator * integrator);
+        controller * Complex64::new(pii.k_s, 0.0) * self.response(omega_t)
     }
 }
 
@@ -158,11 +159,6 @@ impl Model {
 const LEAD: f64 = 4.0;
 /// Largest sensitivity peak of the design.
 const MS: f64 = 2.0;
-
-/// Largest magnitude.
-pub fn largest(poles: Option<[Complex; 4]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
-}
 
 #[cfg(test)]
 mod tests {
@@ -182,11 +178,11 @@ mod tests {
             assert!(model.fit(&record).1 > 99.99);
         }
         let (pii, crossover) = plant.design().unwrap();
-        assert!(largest(plant.closed_loop(pii)) < 0.9999);
-        assert!((plant.open_loop(pii, crossover).abs() - 1.0).abs() < 1e-9);
+        assert!(largest_pole(plant.closed_loop(pii)) < 0.9999);
+        assert!((plant.open_loop(pii, crossover).norm() - 1.0).abs() < 1e-9);
         // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
         let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
-        assert!(largest(plant.closed_loop(more)) < 1.0);
+        assert!(largest_pole(plant.closed_loop(more)) < 1.0);
     }
 
     #[test]
@@ -194,7 +190,7 @@ mod tests {
         // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
         let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
         for (row, expected) in expected.into_iter().enumerate() {
-            let found = largest(Model::printed(row).closed_loop(PRINTED_PII));
+            let found = largest_pole(Model::printed(row).closed_loop(PRINTED_PII));
             assert!((found - expected).abs() < 2e-5, "{row}: {found}");
         }
     }

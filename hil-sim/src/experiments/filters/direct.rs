@@ -1,57 +1,50 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 #![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
+use num_complex::Complex64;
+
+use crate::experiments::bode::largest_pole;
 
 /// Table 7: numerator, denominator.
+#[rustfmt::skip] // a table
 pub const LPF: [[f64; 9]; 2] = [
     [
-        0.738615833587383,
-        -4.971982137583815,
-        15.501482170609810,
-        -28.984106346506920,
-        35.439076902595630,
-        -28.984106346506920,
-        15.501482170609810,
-        -4.971982137583815,
-        0.738615833587383,
+        0.738615833587383, -4.971982137583815, 15.501482170609810,
+        -28.984106346506920, 35.439076902595630, -28.984106346506920,
+        15.501482170609810, -4.971982137583815, 0.738615833587383,
     ],
     [
-        1.0,
-        -6.311293551201974,
-        18.463310785092791,
-        -32.436104849347807,
-        37.322148071647149,
-        -28.775658178634401,
-        14.536417936493200,
-        -4.413169859261352,
-        0.621866049065974,
+        1.0, -6.311293551201974, 18.463310785092791,
+        -32.436104849347807, 37.322148071647149, -28.775658178634401,
+        14.536417936493200, -4.413169859261352, 0.621866049065974,
     ],
 ];
 
 /// Table 8: numerator, denominator.
+#[rustfmt::skip] // a table
 pub const BPF: [[f64; 5]; 2] = [
     [
-        0.02218769906303914,
-        -0.02791079414758331,
-        0.01263993354917355,
-        -0.02791079414758331,
-        0.02218769906303914,
+        0.02218769906303914, -0.02791079414758331, 0.01263993354917355,
+        -0.02791079414758331, 0.02218769906303914,
     ],
-    [1.0, -2.99899648142248898, 3.95706806169825098, -2.58302254497039918, 0.74432231301657747],
+    [
+        1.0, -2.99899648142248898, 3.95706806169825098,
+        -2.58302254497039918, 0.74432231301657747,
+    ],
 ];
 
 /// Table 8: numerator, denominator.
+#[rustfmt::skip] // a table
 pub const PP: [[f64; 5]; 2] = [
     [
-        0.00107990678715093,
-        -0.00373680819442586,
-        0.00535736614345009,
-        -0.00373680819442586,
-        0.00107990678715093,
+        0.00107990678715093, -0.00373680819442586, 0.00535736614345009,
+        -0.00373680819442586, 0.00107990678715093,
     ],
-    [1.0, -3.86437365668928701, 5.61267070060141027, -3.63099960015131895, 0.88274870085761437],
+    [
+        1.0, -3.86437365668928701, 5.61267070060141027,
+        -3.63099960015131895, 0.88274870085761437,
+    ],
 ];
 
 /// Each coefficient rounded to `f32`.
@@ -60,11 +53,11 @@ pub fn rounded<const N: usize>(filter: &[[f64; N]; 2]) -> [[f64; N]; 2] {
 }
 
 /// Frequency response, Eq. C.2.
-pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex {
-    let delay = Complex::unit(-omega_t);
+pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex64 {
+    let delay = Complex64::cis(-omega_t);
     let value = |part: &[f64; N]| {
-        let zero = Complex::new(0.0, 0.0);
-        part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex::new(c, 0.0))
+        let zero = Complex64::new(0.0, 0.0);
+        part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex64::new(c, 0.0))
     };
     value(&filter[0]) / value(&filter[1])
 }
@@ -72,20 +65,16 @@ pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex
 /// Largest magnitude of the poles of an 8th-order filter.
 pub fn largest_pole_8(filter: &[[f64; 9]; 2]) -> f64 {
     let [_, a1, a2, a3, a4, a5, a6, a7, a8] = filter[1];
-    magnitude(roots([a1, a2, a3, a4, a5, a6, a7, a8]))
+    largest_pole(roots([a1, a2, a3, a4, a5, a6, a7, a8]))
 }
 
 /// Largest magnitude of the poles of a 4th-order filter.
 pub fn largest_pole_4(filter: &[[f64; 5]; 2]) -> f64 {
     let [_, a1, a2, a3, a4] = filter[1];
-    magnitude(roots([a1, a2, a3, a4]))
+    largest_pole(roots([a1, a2, a3, a4]))
 }
 
-fn magnitude<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
-}
-
-/// The filter in `f64`, direct form I: what the others are measured against.
+/// The reference: the filter in `f64`, direct form I.
 pub fn reference<const N: usize>(filter: [[f64; N]; 2]) -> impl FnMut(f64) -> f64 {
     let ([b, a], mut x, mut y) = (filter, [0.0; N], [0.0; N]);
     move |input| {

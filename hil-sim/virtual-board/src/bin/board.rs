@@ -16,7 +16,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use virtual_board::interactive::page;
 use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::Script;
-use virtual_board::interactive::session::{End, Outside, Session};
+use virtual_board::interactive::session::{End, Inputs, Session};
 use virtual_board::{Board, Image};
 
 /// Runs the firmware's image on an emulated board, with a simulated motor and a serial port.
@@ -38,7 +38,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<()> {
-    // What can be wrong, before anything is begun.
+    // Everything that can be refused, before the session begins.
     let config = options.config()?;
     let script = options.script.as_deref().map(Script::open).transpose()?;
     let image = image(options.elf.as_deref())?;
@@ -54,14 +54,14 @@ fn run(options: &Options) -> Result<()> {
         "type `screen {} 115200` elsewhere, or commands here; quit ends",
         pty.path().display()
     ));
-    let outside = Outside {
+    let inputs = Inputs {
         terminal: typed_lines(),
         stop,
         script,
         seconds: config.extent.seconds,
         paced: !options.fast,
     };
-    let mut session = Session::new(board, pty, outside)?;
+    let mut session = Session::new(board, pty, inputs);
     let end = session.run(|line| say(&line.to_string()));
     let path = write(options, &config, &session)?;
     say(&format!("Report: {}", path.display()));

@@ -1,23 +1,23 @@
-//! The classes of faults: what is done, and how long the drive may be wrong with the outputs on.
+//! The classes of faults: each with its injection, and the longest time of wrong control with the outputs on.
 
 use rand::{Rng, RngExt};
-use rand_distr::{Distribution, StandardNormal};
 
-use super::scene::{Places, Source};
-use crate::bench::Board;
-use crate::board as numbers;
+use super::faults::{current, flip, losing, name, noise, slow_sensor};
+use super::scene::{Regions, Source};
+use crate::board::Board;
 use crate::chip::TICKS_PER_S;
-use crate::cpu::{Cpu, Register};
-use drive_core::Sample;
+use crate::cpu::Register;
+use crate::memory::Region;
 use hil_sim::plant::EncoderFault;
+use induction_drive::board as firmware_board;
 
-/// Does it, and says what exactly.
-pub type Inject = fn(&mut Board, &Places, &mut dyn Rng) -> String;
+/// Injects a fault, and describes it.
+pub type Inject = fn(&mut Board, &Regions, &mut dyn Rng) -> String;
 
-/// What happens in a run of a class.
+/// The procedure of a run.
 #[derive(Clone, Copy)]
-pub enum Course {
-    /// The drive regulates, and this is done to it.
+pub enum Run {
+    /// A fault is injected while the drive regulates.
     Regulating(Inject),
     /// The power goes in one of the operations of `save`.
     Saving,
@@ -27,19 +27,19 @@ pub enum Course {
     Reset,
 }
 
-/// A class.
+/// A class of faults.
 pub struct Class {
     /// Its name.
     pub name: &'static str,
     /// Longest that outputs may be on with wrong control, ms. Infinite: for the angle nothing is promised, and
     /// only the currents are judged.
     pub bound_ms: f64,
-    /// Why that long.
+    /// The reason for that bound.
     pub why: &'static str,
-    /// Which angle sources it is tried with.
+    /// The angle sources that it is tried with.
     pub sources: &'static [Source],
-    /// What is done.
-    pub course: Course,
+    /// The procedure of its runs.
+    pub run: Run,
 }
 
 const BOTH: &[Source] = &[Source::Injection, Source::Encoder];
@@ -48,7 +48,7 @@ const ENCODER: &[Source] = &[Source::Encoder];
 /// From the first lost count of 5 % of them to the fault: 210 ms measured.
 const LOST_COUNTS_MS: f64 = 300.0;
 
-/// A PWM period, ms, and what the software needs to see a sample and switch off.
+/// A PWM period, and the time in which the software sees a sample and switches off, ms.
 const PERIOD_MS: f64 = 1.0 / 6.0;
 const STEP_MS: f64 = 2.0 * PERIOD_MS;
 
@@ -59,14 +59,14 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "control is correct throughout",
         sources: BOTH,
-        course: Course::Regulating(|_, _, _| String::new()),
+        run: Run::Regulating(|_, _, _| String::new()),
     },
     Class {
         name: "current sensor stuck",
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let (which, now) = (rng.random(), board.sample());
             let value = *current(which, &mut { now });
             board.disturb = Some(Box::new(move |s| *current(which, s) = value));
@@ -78,9 +78,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random();
-            let line = if which { numbers::CURRENT_A } else { numbers::CURRENT_B };
+            let line = if which { firmware_board::CURRENT_A } else { firmware_board::CURRENT_B };
             let zero = (-line.offset / line.gain).round() as u16;
             board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
             name(which).into()
@@ -91,9 +91,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let (which, high): (bool, bool) = (rng.random(), rng.random());
-            let code = if high { numbers::ADC_FULL_SCALE } else { 0 };
+            let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
             board.disturb = Some(Box::new(move |s| *current(which, s) = code));
             format!("{} at {code}", name(which))
         }),
@@ -103,17 +103,13 @@ pub const CLASSES: &[Class] = &[
         bound_ms: NOISE_MS,
         why: NOISE,
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random();
             // 5 mA to 2 A rms.
             let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
-            let codes = amperes / f64::from(numbers::CURRENT_A.gain);
-            let mut noise = seeded(rng);
-            board.disturb = Some(Box::new(move |s| {
-                let draw: f64 = StandardNormal.sample(&mut noise);
-                let code = current(which, s);
-                *code = (f64::from(*code) + codes * draw).clamp(0.0, 4095.0) as u16;
-            }));
+            let codes = amperes / f64::from(firmware_board::CURRENT_A.gain);
+            let mut noise = noise(rng, codes);
+            board.disturb = Some(Box::new(move |s| noise(current(which, s))));
             format!("{}, {:.1} mA", name(which), 1e3 * amperes)
         }),
     },
@@ -122,22 +118,22 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.dc_link)),
+        run: Run::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.dc_link)),
     },
     Class {
         name: "heat-sink sensor stuck, open, saturated, noisy",
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.heat_sink)),
+        run: Run::Regulating(|board, _, rng| slow_sensor(board, rng, |s| &mut s.heat_sink)),
     },
     Class {
         name: "not-a-number in the drive's state",
         bound_ms: 2.0 * CARRIER_MS + STEP_MS,
-        why: "what is used once in a carrier period shows in the next one",
+        why: "quantities that are used once in a carrier period show in the next one",
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
-            let (base, size) = places.control;
+        run: Run::Regulating(|board, regions, rng| {
+            let Region { address: base, size } = regions.state;
             // A word that holds a plausible number; angles and counts are another class.
             for _ in 0..1000 {
                 let address = base + 4 * rng.random_range(0..size / 4);
@@ -153,9 +149,9 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "dc-link step",
         bound_ms: STEP_MS,
-        why: "limits: the sample after it, and the step that sees it",
+        why: "voltage limits: the sample after it, and the step that sees it",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let volts = rng.random_range(100.0..600.0);
             board.plant.set_dc_link(volts).ok();
             format!("to {volts:.0} V")
@@ -166,7 +162,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 5.0,
         why: "1.4 degrees of a turn that did not come: 0.8 ms at 300 rpm, 2.4 ms at 100 rpm; and the step",
         sources: ENCODER,
-        course: Course::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.plant.set_encoder_fault(EncoderFault::Stuck);
             String::new()
         }),
@@ -176,14 +172,14 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "as a slip that is wrong by as much: control is correct throughout",
         sources: ENCODER,
-        course: Course::Regulating(|board, _, rng| losing(board, rng.random_range(0.0..0.02))),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.0..0.02))),
     },
     Class {
         name: "encoder loses 5 to 90 % of its counts at 900 rpm",
         bound_ms: LOST_COUNTS_MS,
         why: "the back-emf of the flux that is turned away, once it is there: with the rotor time constant",
         sources: &[Source::FastEncoder],
-        course: Course::Regulating(|board, _, rng| losing(board, rng.random_range(0.05..0.9))),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.05..0.9))),
     },
     Class {
         name: "encoder loses 2 to 90 % of its counts at 300 rpm",
@@ -191,14 +187,14 @@ pub const CLASSES: &[Class] = &[
         why: "15 degrees leave 4.7 V unexplained of a back-emf of 6.7 V, a motor 30 % warmer 4.2 V at the right \
               angle: only the currents are judged",
         sources: ENCODER,
-        course: Course::Regulating(|board, _, rng| losing(board, rng.random_range(0.02..0.9))),
+        run: Run::Regulating(|board, _, rng| losing(board, rng.random_range(0.02..0.9))),
     },
     Class {
         name: "break pin",
-        bound_ms: numbers::BREAK_REACTION_NS as f64 * 1e-6,
+        bound_ms: firmware_board::BREAK_REACTION_NS as f64 * 1e-6,
         why: "the timer's filter; no software",
         sources: BOTH,
-        course: Course::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.set_fault_pin(false);
             String::new()
         }),
@@ -208,7 +204,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.01,
         why: "the clock security system; no software",
         sources: BOTH,
-        course: Course::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.set_crystal(false);
             String::new()
         }),
@@ -218,39 +214,39 @@ pub const CLASSES: &[Class] = &[
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.coefficients)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.coefficients)),
     },
     Class {
         name: "bit flip in the drive's state",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.control)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.state)),
     },
     Class {
         name: "bit flip in the control's code",
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.code)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.code)),
     },
     Class {
         name: "bit flip anywhere in the control's data",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| flip(board, rng, places.ccm_data)),
+        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.control)),
     },
     Class {
         name: "bit flip in RAM, stack included",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
+        run: Run::Regulating(|board, regions, rng| {
             let area = if rng.random() {
-                places.data
+                regions.data
             } else {
-                (places.stack.0 + places.stack.1 - 1024, 1024)
+                Region { address: regions.stack.end() - 1024, size: 1024 }
             };
             flip(board, rng, area)
         }),
@@ -260,7 +256,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "five updates at most, each seen in its own period",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let count = rng.random_range(1..6);
             board.chip().tim1.drop_update = count;
             format!("{count} of them")
@@ -271,7 +267,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "seen in its own period",
         sources: BOTH,
-        course: Course::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.chip().tim1.extra_update();
             String::new()
         }),
@@ -281,7 +277,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: WATCHDOG_MS,
         why: "one converter: its own period; both: no interrupt, the watchdog is not fed",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let which = rng.random_range(0..3_usize);
             // For good, or for a while: up to longer than the watchdog waits.
             let count =
@@ -293,9 +289,9 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "console garbage and floods",
         bound_ms: 0.0,
-        why: "nothing of it may be seen",
+        why: "control is correct throughout",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let mut bytes = vec![0; rng.random_range(1..3000)];
             let text = rng.random::<bool>();
             for byte in &mut bytes {
@@ -314,7 +310,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: OVERRUN_MS + 2.0 * STEP_MS,
         why: "the core stands still for up to 2 ms; then the first interrupt sees that it is late",
         sources: BOTH,
-        course: Course::Regulating(|board, _, rng| {
+        run: Run::Regulating(|board, _, rng| {
             let ms = rng.random_range(0.005..OVERRUN_MS);
             board.stall((ms * 1e-3 * TICKS_PER_S as f64) as u64);
             format!("{ms:.3} ms")
@@ -325,7 +321,7 @@ pub const CLASSES: &[Class] = &[
         bound_ms: WATCHDOG_MS,
         why: "the watchdog, 4.2 to 4.9 ms after it was last fed",
         sources: BOTH,
-        course: Course::Regulating(|board, _, _| {
+        run: Run::Regulating(|board, _, _| {
             board.hang();
             String::new()
         }),
@@ -335,9 +331,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "the next interrupt does not find room for its frame",
         sources: BOTH,
-        course: Course::Regulating(|board, places, rng| {
+        run: Run::Regulating(|board, regions, rng| {
             let room = 8 * rng.random_range(0..13);
-            board.cpu().set(Register::Sp, places.stack.0 + room);
+            board.cpu().set(Register::SP, regions.stack.address + room);
             format!("room for {room} bytes")
         }),
     },
@@ -346,21 +342,21 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 0.0,
         why: "outputs are off; the other page holds",
         sources: &[Source::Injection],
-        course: Course::DamagedPage,
+        run: Run::DamagedPage,
     },
     Class {
         name: "power lost in an operation of save",
         bound_ms: 0.0,
         why: "outputs are off; the old or the new set holds",
         sources: &[Source::Injection],
-        course: Course::Saving,
+        run: Run::Saving,
     },
     Class {
         name: "reset pin at any time",
         bound_ms: 0.001,
         why: "the reset of the timer; no software",
         sources: BOTH,
-        course: Course::Reset,
+        run: Run::Reset,
     },
 ];
 
@@ -368,7 +364,7 @@ pub const CLASSES: &[Class] = &[
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;
 /// Noise that turns the angle.
 const NOISE_MS: f64 = 100.0;
-const NOISE: &str = "the mean over 67 ms passes what is allowed; less than that turns the angle by less than 15 degrees";
+const NOISE: &str = "the mean over 67 ms passes the limit; noise below the limit turns the angle by less than 15 degrees";
 /// A sensor across the injection axis sees no carrier, and cannot be judged: a quarter of half a turn of
 /// the flux, which is 60 ms with the shaft locked.
 const SILENT_MS: f64 = 70.0;
@@ -384,54 +380,3 @@ const CHECK: &str =
     "the main loop has looked at all of it after 14 ms, later if the console is busy";
 const WATCHDOG_MS: f64 = 6.0;
 const OVERRUN_MS: f64 = 2.0;
-
-fn current(a: bool, sample: &mut Sample) -> &mut u16 {
-    if a { &mut sample.current_a } else { &mut sample.current_b }
-}
-
-fn name(a: bool) -> &'static str {
-    if a { "sensor a" } else { "sensor b" }
-}
-
-fn losing(board: &mut Board, share: f64) -> String {
-    board.plant.set_encoder_fault(EncoderFault::Losing(share));
-    format!("{:.1} %", 100.0 * share)
-}
-
-fn seeded(rng: &mut dyn Rng) -> rand_xoshiro::Xoshiro256PlusPlus {
-    rand::SeedableRng::seed_from_u64(rng.random())
-}
-
-/// One of dc link and heat sink: stuck, open, saturated or noisy.
-fn slow_sensor(board: &mut Board, rng: &mut dyn Rng, of: fn(&mut Sample) -> &mut u16) -> String {
-    let held = *of(&mut board.sample());
-    let noisy = 2_f64.powf(rng.random_range(0.0..10.0));
-    let mut noise = seeded(rng);
-    let kind = rng.random_range(0..4_usize);
-    board.disturb = Some(Box::new(move |s| {
-        let code = of(s);
-        let draw: f64 = StandardNormal.sample(&mut noise);
-        *code = match kind {
-            0 => held,
-            1 => 0,
-            2 => numbers::ADC_FULL_SCALE,
-            _ => (f64::from(*code) + noisy * draw).clamp(0.0, 4095.0) as u16,
-        };
-    }));
-    match kind {
-        0 => format!("stuck at {held}"),
-        1 => "open".into(),
-        2 => "saturated".into(),
-        _ => format!("{noisy:.0} codes of noise"),
-    }
-}
-
-fn flip(board: &mut Board, rng: &mut dyn Rng, (base, size): (u32, u32)) -> String {
-    let address = base + rng.random_range(0..size);
-    let bit = rng.random_range(0..8);
-    let mut byte = [0];
-    board.cpu().read(address, &mut byte);
-    byte[0] ^= 1 << bit;
-    board.cpu().write(address, &byte);
-    format!("bit {bit} of {address:#010x}, {:#x} from the beginning", address - base)
-}

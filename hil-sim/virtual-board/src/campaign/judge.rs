@@ -1,16 +1,17 @@
-//! What a run is judged by: at every instant after the bound, outputs off or control correct.
+//! The criterion of a run: at every instant after the bound, outputs are off or control is correct.
 
 use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use super::scene::{Places, cause};
-use crate::bench::Board;
-use crate::chip::{Reset, TICKS_PER_PERIOD, TICKS_PER_S};
+use super::scene::cause;
+use crate::board::Board;
+use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::periph::Reset;
 
 /// Largest angle error of a correct control, electrical degrees.
 const ANGLE_DEG: f64 = 15.0;
-/// Resets of which the first was the fault's; more is a loop.
+/// Resets from which on they count as a loop: the fault itself may cause the first.
 const MOST_RESETS: usize = 2;
 /// Periods from a reset until it has been reported in the log.
 const REPORTED: u64 = 400;
@@ -19,10 +20,10 @@ const FAULT_REPORTED: u64 = 60;
 /// Periods from a reset to the greeting, at most.
 const START: u64 = 30_000;
 
-/// What was seen of a run.
+/// The outcome of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// What was done.
+pub struct Outcome {
+    /// Description of the fault.
     pub what: String,
     /// From the fault to the outputs off, ms.
     pub off_ms: Option<f64>,
@@ -37,11 +38,11 @@ pub struct Seen {
 /// Watches for `ms` after the fault, or until the outputs are off. The angle counts, or the currents alone.
 ///
 /// # Errors
-/// Bad gate signals; what the board cannot go on with.
-pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) -> Result<Seen> {
+/// Bad gate signals; another failure of the model.
+pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
-    let trip = f64::from(crate::board::settings().limits.trip_a);
-    let mut seen = Seen::default();
+    let trip = f64::from(induction_drive::board::settings().limits.trip_a);
+    let mut outcome = Outcome::default();
     board.went_off = None;
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
     let mut next = began;
@@ -53,37 +54,36 @@ pub fn watch(board: &mut Board, places: &Places, ms: f64, angle_counts: bool) ->
         while board.next_period().is_some() {}
         let current =
             board.plant.phase_currents().into_iter().fold(0.0, |m: f64, i| m.max(i.abs()));
-        seen.peak_a = seen.peak_a.max(current);
+        outcome.peak_a = outcome.peak_a.max(current);
         if let Some(at) = board.went_off {
-            seen.off_ms = Some(since(at));
+            outcome.off_ms = Some(since(at));
             break;
         }
-        let error = angle_error(board, places);
-        seen.angle_deg = seen.angle_deg.max(error);
-        // Written so that not-a-number is wrong.
+        let error = angle_error(board);
+        outcome.angle_deg = outcome.angle_deg.max(error);
+        // A not-a-number counts as wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
         if !(straight && current < trip) {
-            seen.wrong_ms = since(next);
+            outcome.wrong_ms = since(next);
         }
     }
-    Ok(seen)
+    Ok(outcome)
 }
 
 /// Between the flux and where the drive believes it, degrees.
-fn angle_error(board: &mut Board, places: &Places) -> f64 {
-    let turns = f64::from(board.word(places.phi).unwrap_or(0) as i32) / 2_f64.powi(32);
-    let error = (board.plant.rotor_flux_angle() / TAU - turns).rem_euclid(1.0);
+fn angle_error(board: &Board) -> f64 {
+    let error = (board.plant.rotor_flux_angle() / TAU - board.flux_angle()).rem_euclid(1.0);
     error.min(1.0 - error) * 360.0
 }
 
 /// After the outputs have gone off: the reason is in the log, and there is no loop of resets.
 ///
 /// # Errors
-/// What is missing.
+/// No reason in the log, or a loop of resets.
 pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     board.run_periods(FAULT_REPORTED)?;
     if board.resets.is_empty() {
-        let log = board.logged()?;
+        let log = board.take_log()?;
         let told = log.iter().any(|line| line.contains("fault ") || line.contains("WARN"));
         if told || !board.resets.is_empty() {
             return Ok(());
@@ -92,9 +92,9 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     }
     board.run_periods(REPORTED)?;
     let Some((_, reset)) = board.resets.first().copied() else {
-        bail!("outputs off without a reason in the log: {:?}", board.logged()?)
+        bail!("outputs off without a reason in the log: {:?}", board.take_log()?)
     };
-    let log = board.logged()?;
+    let log = board.take_log()?;
     ensure!(
         log.iter().any(|l| l.contains(cause(reset))),
         "no {:?} in the log {log:?}",
@@ -110,17 +110,17 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
     Ok(())
 }
 
-/// Runs until the firmware has said who it is, and a bit.
+/// Runs until the firmware has greeted, and 200 periods more.
 ///
 /// # Errors
-/// It never does, or is reset again.
+/// No greeting comes, or another reset.
 pub fn greeting(board: &mut Board) -> Result<String> {
     let resets = board.resets.len();
     let mut heard = String::new();
     for _ in 0..START / 100 {
         board.run_periods(100)?;
         while board.next_period().is_some() {}
-        heard += &board.heard();
+        heard += &board.take_console();
         ensure!(board.resets.len() == resets, "reset while it starts: {:?}", board.resets);
         if heard.contains("last run: ") && heard.ends_with('\n') {
             board.run_periods(200)?;

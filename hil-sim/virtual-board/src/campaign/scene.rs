@@ -1,4 +1,4 @@
-//! Where every injection begins: a board that has started, gone back to each time.
+//! The beginning of every injection: snapshots of a board that has started.
 
 use anyhow::{Context, Result, ensure};
 use drive_core::State;
@@ -7,12 +7,14 @@ use hil_sim::plant::Load;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Loaded, Saved};
 
-use crate::bench::snapshot::Snapshot;
-use crate::bench::{Board, Options};
-use crate::chip::{Chip, Reset};
+use crate::addresses::Addresses;
+use crate::board::snapshot::Snapshot;
+use crate::board::{Board, Options};
+use crate::chip::Chip;
 use crate::image::Image;
-use crate::memory::BANK_2;
+use crate::memory::{BANK_2, Region};
 use crate::pair::Pair;
+use crate::periph::Reset;
 
 /// Current on the quadrature axis before the injection, A.
 const TORQUE: &str = "torque 1.5";
@@ -23,10 +25,10 @@ const SPEEDS: [f64; 2] = [31.4, 94.2];
 const SETTLING: u64 = 1200;
 /// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
-/// What is changed and not saved yet.
+/// A setting that is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
-/// Which angle the drive goes by.
+/// The source of the flux angle, and the speed of the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The injection, with the shaft locked.
@@ -37,56 +39,43 @@ pub enum Source {
     FastEncoder,
 }
 
-/// Places in memory.
+/// Regions of memory in which bits flip.
 #[derive(Clone, Copy, Debug)]
-pub struct Places {
-    /// The drive's coefficients: address, bytes.
-    pub coefficients: (u32, u32),
-    /// What moves while it regulates: address, bytes.
-    pub control: (u32, u32),
-    /// The estimated flux angle.
-    pub phi: u32,
-    /// Data in RAM, without the stack: address, bytes.
-    pub data: (u32, u32),
-    /// The control's code, in CCM: address, bytes.
-    pub code: (u32, u32),
-    /// The control's data, in CCM: address, bytes.
-    pub ccm_data: (u32, u32),
-    /// Lowest address and size of the stack.
-    pub stack: (u32, u32),
+pub struct Regions {
+    /// The drive's coefficients.
+    pub coefficients: Region,
+    /// The drive's state.
+    pub state: Region,
+    /// All data of the control interrupt, in CCM.
+    pub control: Region,
+    /// The code of the control interrupt, in CCM.
+    pub code: Region,
+    /// Data in RAM, without the stack.
+    pub data: Region,
+    /// The stack.
+    pub stack: Region,
 }
 
-impl Places {
-    fn of(image: &Image) -> Result<Self> {
-        let running = image.symbol("control7RUNNING")?;
-        let at = |name: &str, member: &str| image.member(name, member).map(|found| found.1);
-        let drive = running.0 + at("Running", "control")? + at("Control", "drive")?;
-        let size = |name: &str, member: &str| image.member(name, member).map(|found| found.0);
-        let end = |name: &str| image.address(name);
-        let (data, data_end) = (end("__sdata")?, end("__euninit")?);
-        let (stack, stack_end) = (end("_stack_end")?, end("_stack_start")?);
-        let (code, code_end) = (end("__sccm")?, end("__eccm")?);
-        Ok(Self {
-            coefficients: (drive + at("Drive", "c")?, size("Coefficients", "sensing")?),
-            control: (drive + at("Drive", "control")?, size("ControlState", "low_pass")?),
-            phi: drive
-                + at("Drive", "control")?
-                + at("ControlState", "seen")?
-                + at("Observed", "phi")?,
-            data: (data, data_end - data),
-            code: (code, code_end - code),
-            ccm_data: running,
-            stack: (stack, stack_end - stack),
-        })
+impl Regions {
+    fn new(board: &Board) -> Result<Self> {
+        let Addresses { coefficients, state, control, .. } = *board.addresses();
+        let between = |first: &str, end: &str| {
+            let address = board.image().symbol(first)?.address;
+            anyhow::Ok(Region { address, size: board.image().symbol(end)?.address - address })
+        };
+        let code = between("__sccm", "__eccm")?;
+        let data = between("__sdata", "__euninit")?;
+        let stack = between("_stack_end", "_stack_start")?;
+        Ok(Self { coefficients, state, control, code, data, stack })
     }
 }
 
-/// A board, and what it can go back to.
+/// A board and its snapshots.
 pub struct Scene {
     /// The board.
     pub board: Board,
-    /// Places in its memory.
-    pub places: Places,
+    /// Regions of its memory.
+    pub regions: Regions,
     /// Two sets of settings.
     pub settings: [FirmwareSettings; 2],
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
@@ -100,16 +89,15 @@ impl Scene {
     /// Starts a board, once with each angle source.
     ///
     /// # Errors
-    /// It does not start.
+    /// The board does not start.
     pub fn new(image: Image) -> Result<Self> {
-        let places = Places::of(&image)?;
         let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
         pair.order("set wiring_checked yes")?;
         // Twice: both pages hold a set.
         for _ in 0..2 {
             pair.order("save")?;
         }
-        let old = pair_settings(&mut pair.board)?;
+        let old = saved_settings(&mut pair.board)?;
         pair.order(&format!("set {} {}", CHANGE.0, CHANGE.1))?;
         let mut new = old;
         new.command.timeout_s = CHANGE.1;
@@ -132,13 +120,14 @@ impl Scene {
         };
         let encoder = [with_encoder(SPEEDS[0])?, with_encoder(SPEEDS[1])?];
         let board = pair.board;
-        Ok(Self { board, places, settings: [old, new], off, injection, encoder })
+        let regions = Regions::new(&board)?;
+        Ok(Self { board, regions, settings: [old, new], off, injection, encoder })
     }
 
     /// Regulating torque.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn regulating(&mut self, source: Source) -> Result<()> {
         match source {
             Source::Injection => self.board.go_back(&self.injection),
@@ -151,7 +140,7 @@ impl Scene {
     /// other.
     ///
     /// # Errors
-    /// The emulator's.
+    /// An error of the emulator.
     pub fn off(&mut self, slot: usize) -> Result<()> {
         self.board.go_back(&self.off[slot % 2])
     }
@@ -163,7 +152,7 @@ fn started(pair: &mut Pair) -> Result<Snapshot> {
     pair.order(TORQUE)?;
     pair.run(SETTLING, |_, _| {})?;
     // A control interrupt has just ended; half a period later nothing happens for a while.
-    pair.board.run_ticks(u64::from(crate::board::PWM_TOP) / 2)?;
+    pair.board.run_ticks(u64::from(induction_drive::board::PWM_TOP) / 2)?;
     pair.board.keep()
 }
 
@@ -173,7 +162,7 @@ struct Bank<'a>(&'a mut Chip);
 
 impl Flash for Bank<'_> {
     fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
-        let address = crate::board::settings_address(slot, word);
+        let address = induction_drive::board::settings_address(slot, word);
         let (low, torn) = self.0.flash.load(address);
         let (high, _) = self.0.flash.load(address + 4);
         (!torn).then_some(u64::from(low) | u64::from(high) << 32)
@@ -191,9 +180,12 @@ impl Flash for Bank<'_> {
 /// The settings that the flash holds.
 ///
 /// # Errors
-/// It holds none.
-pub fn pair_settings(board: &mut Board) -> Result<FirmwareSettings> {
-    ensure!(crate::board::settings_address(0, 0) >= BANK_2, "settings outside the second bank");
+/// The flash holds none.
+pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
+    ensure!(
+        induction_drive::board::settings_address(0, 0) >= BANK_2,
+        "settings outside the second bank"
+    );
     let mut chip = board.chip().clone();
     match Saved::load(Bank(&mut chip), &FirmwareSettings::of_the_board()).1 {
         Loaded::Settings(settings) => Some(settings),
@@ -202,7 +194,7 @@ pub fn pair_settings(board: &mut Board) -> Result<FirmwareSettings> {
     .context("no whole settings in the flash")
 }
 
-/// How the log names what reset the chip.
+/// The name of a cause of reset in the log.
 pub const fn cause(reset: Reset) -> &'static str {
     match reset {
         Reset::Power => "reset by power-on",

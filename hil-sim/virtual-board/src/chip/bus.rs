@@ -1,8 +1,10 @@
 //! The bus: reads and writes of registers, each to the model that has it.
 
-use super::{Chip, Reset};
+use std::fmt;
+
+use super::Chip;
 use crate::memory;
-use crate::periph::Effect;
+use crate::periph::{Effect, Reset, plain};
 use crate::scs;
 
 const TIM2: u32 = 0x4000_0000;
@@ -27,10 +29,20 @@ const DAC3: u32 = 0x5000_1000;
 pub struct Unknown {
     /// Where.
     pub address: u32,
-    /// What was to be written, if it was a write.
+    /// The value to be written, of a write.
     pub written: Option<u32>,
     /// Last known place of the core: the instruction, in CCM the block.
     pub at: u32,
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "unknown register {:#010x} ", self.address)?;
+        match self.written {
+            Some(value) => write!(f, "written with {value:#x}"),
+            None => f.write_str("read"),
+        }
+    }
 }
 
 impl Chip {
@@ -84,7 +96,7 @@ impl Chip {
         0
     }
 
-    /// What a read gives, without what a read does.
+    /// The value of a register, without the side effects of a read.
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
             IWDG | LPUART1 => Some(0),
@@ -105,7 +117,7 @@ impl Chip {
         if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let (value, torn) = self.flash.load(address);
             if torn {
-                if self.syscfg.flash_error_breaks() {
+                if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
                     self.tim1.system_break();
                 }
                 self.scs.pend(scs::NMI);
@@ -143,7 +155,7 @@ impl Chip {
         let now = self.now;
         if address >= 0xe000_0000 {
             let effect = match address & !0xfff {
-                0xe004_2000 => return self.debug.write(offset, value),
+                0xe004_2000 => self.debug.write(offset, value)?,
                 _ => self.scs.write(address, value, now)?,
             };
             return self.follow(effect);

@@ -1,26 +1,15 @@
-//! What the core executes: the time it takes, and the blocks that are kept of it.
+//! The execution of code: its time, and the blocks that are kept.
 
 use super::Chip;
+use crate::cost::{self, Block};
+use crate::memory::Region;
 use crate::scs;
-
-/// Where a block of the control interrupt began, and its cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// Address of its first instruction.
-    pub address: u32,
-    /// Bytes.
-    pub size: u32,
-    /// Cycles with its last branch not taken.
-    pub cycles: u32,
-    /// Whether that branch was taken.
-    pub taken: bool,
-}
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
 #[derive(Clone, Debug)]
 pub struct Watched {
-    /// Where it begins and ends.
-    pub range: (u32, u32),
+    /// Where it lies in the flash.
+    pub function: Region,
     /// Estimated cycles of each call, interrupts not counted.
     pub calls: Vec<u32>,
     /// The blocks of the longest.
@@ -30,16 +19,15 @@ pub struct Watched {
 }
 
 impl Watched {
-    /// A function in the flash, at an address, with its size in bytes.
-    pub fn new((address, size): (u32, u32)) -> Self {
-        let range = (address, address + size);
-        Self { range, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
+    /// Counts the calls of a function in the flash.
+    pub fn new(function: Region) -> Self {
+        Self { function, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
     }
 
     /// Whether a block is its own.
     #[inline]
     pub fn has(&self, address: u32) -> bool {
-        (self.range.0..self.range.1).contains(&address)
+        (self.function.address..self.function.end()).contains(&address)
     }
 
     /// A block of the flash is about to be executed; `cycles` of one of its own.
@@ -47,7 +35,7 @@ impl Watched {
         if let Some(last) = self.present.last_mut() {
             last.taken = last.address + last.size != address;
         }
-        if address == self.range.0 {
+        if address == self.function.address {
             self.present.clear();
         } else if self.present.is_empty() {
             return;
@@ -56,7 +44,7 @@ impl Watched {
             self.present.push(Block { address, size, cycles, taken: false });
             return;
         }
-        let spent = crate::cost::of(&self.present);
+        let spent = cost::of(&self.present);
         if self.calls.iter().all(|call| *call < spent) {
             self.longest.clone_from(&self.present);
         }
@@ -101,7 +89,7 @@ impl Chip {
     pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
         let taken = self.last_block.is_some_and(|(_, end)| end != address);
         if taken {
-            self.now += u64::from(crate::cost::TAKEN);
+            self.now += u64::from(cost::TAKEN);
         }
         self.now += u64::from(cycles);
         self.last_block = Some((address, address + size));

@@ -1,4 +1,4 @@
-//! What is left of a session: a page with plots, and the same as one JSON object.
+//! The results of a session: a page with plots, and the same as one JSON object.
 
 use hil_sim::outcome::{Figure, Panel, Series};
 use hil_sim::{Config, Outcome};
@@ -8,11 +8,11 @@ use super::transcript::{Line, Source};
 
 /// Name of the page's files.
 pub const NAME: &str = "board";
-/// What the page is about.
+/// Introduction of the page.
 pub const ABOUT: &str = "The firmware's image on an emulated STM32G474, with the simulated motor at its \
                          pins and a pseudo-terminal at its serial port.";
 
-/// What came out of a session that took so many simulated seconds.
+/// Results of a session of a simulated time, s.
 pub fn outcome(
     config: &Config,
     seconds: f64,
@@ -40,8 +40,8 @@ pub fn outcome(
     ));
     outcome.texts.push(("Log: time (s)".into(), text(|source| source == Source::Log)));
     outcome.remarks.push(
-        "Torque, flux, speed and dc link are the simulated motor's and inverter's. Reference, what is \
-         measured and what is estimated are the drive's, read from its RAM while the outputs are on. \
+        "Torque, flux, speed and dc link are the simulated motor's and inverter's. References, measured \
+         and estimated quantities are the drive's, read from its RAM while the outputs are on. \
          The angle error is shown and judged while the outputs are on and the rotor flux is above \
          0.05 Wb."
             .into(),

@@ -1,4 +1,4 @@
-//! A pseudo-terminal: what the serial port of the board is to a program on this computer.
+//! A pseudo-terminal: the serial port of the board for programs on this computer.
 
 use std::collections::VecDeque;
 use std::ffi::OsStr;
@@ -12,7 +12,7 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// Bytes kept for a reader that is slow; what comes beyond is lost, as on a port to which nobody listens.
+/// Bytes kept for a slow reader; further bytes are lost, as on a port without a listener.
 const KEPT: usize = 64 * 1024;
 
 /// A pseudo-terminal.
@@ -25,7 +25,7 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A new one, that changes no byte and echoes none.
+    /// A new pseudo-terminal that changes no byte and echoes none.
     ///
     /// # Errors
     /// The system has none left, or no /dev/pts.
@@ -46,15 +46,15 @@ impl Pty {
         Ok(Self { ours, _theirs: theirs, path, waiting: VecDeque::new() })
     }
 
-    /// What a program opens.
+    /// The device file for programs.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was written to it since the last call, at most a few thousand bytes; never waits.
+    /// The bytes written to it since the last call, at most a few thousand; never waits.
     ///
     /// # Errors
-    /// The system's.
+    /// An error of the system.
     pub fn read(&mut self) -> Result<Vec<u8>> {
         let mut buffer = vec![0; 4096];
         let read = match rustix::io::read(&self.ours, &mut buffer) {
@@ -68,7 +68,7 @@ impl Pty {
     /// Gives bytes to whoever reads; never waits.
     ///
     /// # Errors
-    /// The system's.
+    /// An error of the system.
     pub fn write(&mut self, bytes: &[u8]) -> Result<()> {
         let room = KEPT - self.waiting.len();
         self.waiting.extend(&bytes[..bytes.len().min(room)]);

@@ -6,8 +6,8 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use hil_sim::plant::Plant;
 use hil_sim::rig::{RATE_HZ, wrapped_degrees};
 
-use super::probe::Belief;
-use crate::bench::Period;
+use super::readings::Readings;
+use crate::board::Period;
 
 /// A quantity that is recorded, in the order of `Means`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +33,8 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Whether it is what the drive believes, which stands still while the outputs are off.
-    fn is_belief(self) -> bool {
+    /// Whether the drive reports it: it stands still while the outputs are off.
+    fn is_estimated(self) -> bool {
         matches!(self, Self::ReferenceQ | Self::CurrentQ | Self::SpeedEstimate | Self::DcLinkSeen)
     }
 }
@@ -62,10 +62,10 @@ impl Bucket {
 
 /// Most buckets: more than a plot has pixels, and few enough for a page and for a long session.
 const BUCKETS: usize = 30_000;
-/// A flux below this has hardly an angle, Wb: under half of what the drive magnetises to.
+/// A flux below this has hardly an angle, Wb: under half of the drive's flux.
 const FLUX_WB: f64 = 0.05;
 
-/// What was recorded.
+/// The record of a session.
 #[derive(Clone, Debug)]
 pub struct Record {
     buckets: Vec<Bucket>,
@@ -102,25 +102,25 @@ impl Default for Record {
 }
 
 impl Record {
-    /// Takes a control interrupt: the plant at its sample, and what the drive made of that.
-    pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, belief: &Belief) {
+    /// Takes a control interrupt: the plant at its sample, and the readings of the drive after it.
+    pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, readings: &Readings) {
         let rpm = 60.0 / TAU;
         let turns_to_rpm = RATE_HZ * 60.0 / plant.motor().machine.pole_pairs();
         let on = period.compare.enabled;
         let flux = plant.rotor_flux().norm();
         let mut bucket = Bucket { periods: 1.0, time, ..Bucket::default() };
         for (quantity, value) in [
-            (Quantity::ReferenceQ, belief.reference_q),
-            (Quantity::CurrentQ, belief.current_q),
+            (Quantity::ReferenceQ, readings.reference_q),
+            (Quantity::CurrentQ, readings.current_q),
             (Quantity::Torque, plant.torque()),
             (Quantity::Flux, flux),
             (Quantity::Speed, plant.mechanical_speed() * rpm),
-            (Quantity::SpeedEstimate, belief.rotor_freq * turns_to_rpm),
-            (Quantity::DcLinkSeen, belief.dc_link),
+            (Quantity::SpeedEstimate, readings.rotor_freq * turns_to_rpm),
+            (Quantity::DcLinkSeen, readings.dc_link),
             (Quantity::DcLink, plant.dc_link()),
             (Quantity::Outputs, f64::from(u8::from(on))),
         ] {
-            let counts = on || !quantity.is_belief();
+            let counts = on || !quantity.is_estimated();
             bucket.sums[quantity as usize] = if counts { value } else { 0.0 };
         }
         self.interrupts += 1;
@@ -128,7 +128,7 @@ impl Record {
         let currents = plant.phase_currents();
         self.peak_current = currents.into_iter().fold(self.peak_current, |m, i| m.max(i.abs()));
         if on && flux > FLUX_WB {
-            let error = plant.rotor_flux_angle() - belief.phi * TAU;
+            let error = plant.rotor_flux_angle() - readings.phi * TAU;
             bucket.error = [error.cos(), error.sin()];
             let degrees = wrapped_degrees(error);
             self.judged += 1;
@@ -155,18 +155,18 @@ impl Record {
         (self.error_squares / self.judged.max(1) as f64).sqrt()
     }
 
-    /// Curve of a quantity over time, s; what the drive believes is not a number while the outputs are
-    /// off.
+    /// Curve of a quantity over time, s; quantities that the drive reports are not-a-numbers while the outputs
+    /// are off.
     pub fn curve(&self, quantity: Quantity) -> Vec<(f64, f64)> {
         self.points(|bucket| {
             let on = bucket.sums[Quantity::Outputs as usize];
-            let counted = if quantity.is_belief() { on } else { bucket.periods };
+            let counted = if quantity.is_estimated() { on } else { bucket.periods };
             bucket.sums[quantity as usize] / counted
         })
     }
 
-    /// True minus estimated rotor-flux angle over time, electrical degrees; not a number where it is not
-    /// judged.
+    /// True minus estimated rotor-flux angle over time, electrical degrees; a not-a-number where it is
+    /// not judged.
     pub fn error_deg(&self) -> Vec<(f64, f64)> {
         self.points(|bucket| match bucket.error {
             [0.0, 0.0] => f64::NAN,

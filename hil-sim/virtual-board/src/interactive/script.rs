@@ -31,7 +31,7 @@ const LAST_ANSWER_S: f64 = 0.5;
 /// Longest time in a script, s: an hour, as for `seconds`.
 const LONGEST_S: f64 = 3600.0;
 
-/// What a script wants done now.
+/// The next action of a script.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Due {
     /// Nothing.
@@ -87,7 +87,7 @@ impl Script {
         }
     }
 
-    /// What is to be done at this time, s since power-on.
+    /// The action due at this time, s since power-on.
     ///
     /// # Errors
     /// A text that was waited for has not come.

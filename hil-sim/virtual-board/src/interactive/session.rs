@@ -7,15 +7,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
-use super::probe::Probe;
 use super::pty::Pty;
+use super::readings::Readings;
 use super::record::Record;
 use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
-use crate::bench::{Board, Period};
+use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
 
-/// Control periods between two looks at the world outside: 5 ms, less than anyone notices.
+/// Control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;
 /// The board is looked at this long before a control interrupt, ticks: the one before has ended, and the
 /// motor stands where it was sampled for that.
@@ -38,8 +38,8 @@ pub enum End {
     Failed(anyhow::Error),
 }
 
-/// What talks to the board besides the pseudo-terminal.
-pub struct Outside {
+/// Inputs of a session besides the pseudo-terminal.
+pub struct Inputs {
     /// Lines typed at the terminal.
     pub terminal: Receiver<String>,
     /// Set by Ctrl-C.
@@ -56,8 +56,7 @@ pub struct Outside {
 pub struct Session {
     board: Board,
     pty: Pty,
-    probe: Probe,
-    outside: Outside,
+    inputs: Inputs,
     typed: Assembler,
     said: Assembler,
     resets: usize,
@@ -72,16 +71,11 @@ pub struct Session {
 
 impl Session {
     /// A session with a board that has just been powered.
-    ///
-    /// # Errors
-    /// The image has no telemetry.
-    pub fn new(board: Board, pty: Pty, outside: Outside) -> Result<Self> {
-        let probe = Probe::new(board.image())?;
-        Ok(Self {
+    pub fn new(board: Board, pty: Pty, inputs: Inputs) -> Self {
+        Self {
             board,
             pty,
-            probe,
-            outside,
+            inputs,
             typed: Assembler::default(),
             said: Assembler::default(),
             resets: 0,
@@ -89,7 +83,7 @@ impl Session {
             lines: Vec::new(),
             record: Record::default(),
             behind_s: 0.0,
-        })
+        }
     }
 
     /// The board.
@@ -107,7 +101,7 @@ impl Session {
             if let Some(end) = end {
                 break end;
             }
-            if self.outside.paced {
+            if self.inputs.paced {
                 let due = Duration::from_secs_f64(self.board.time() - since);
                 let passed = clock.elapsed();
                 if passed > due + LATE {
@@ -134,31 +128,31 @@ impl Session {
         end
     }
 
-    /// Takes what has come, goes on for a slice, and gives what there is; why the session ends, if it does.
+    /// Takes the inputs, goes on for a slice and shows the outputs; the reason of the end, if the session ends.
     fn slice(&mut self) -> Result<Option<End>> {
         let now = self.board.time();
-        if self.outside.stop.load(Ordering::Relaxed) {
+        if self.inputs.stop.load(Ordering::Relaxed) {
             return Ok(Some(End::Signal));
         }
-        if self.outside.seconds.is_some_and(|seconds| now >= seconds) {
+        if self.inputs.seconds.is_some_and(|seconds| now >= seconds) {
             return Ok(Some(End::Time));
         }
         let typed = self.pty.read()?;
         self.send(&typed);
         loop {
-            match self.outside.terminal.try_recv() {
+            match self.inputs.terminal.try_recv() {
                 Ok(line) if is_quit(&line) => return Ok(Some(End::Quit)),
                 Ok(line) => self.send_line(&line),
-                // Nobody types any more: others still may.
+                // Without the terminal, script and pseudo-terminal go on.
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
-        if let Some(script) = &mut self.outside.script {
+        if let Some(script) = &mut self.inputs.script {
             match script.due(now)? {
                 Due::Type(line) if is_quit(&line) => return Ok(Some(End::Quit)),
                 Due::Type(line) => self.send_line(&line),
                 // An end given by the time is later.
-                Due::End if self.outside.seconds.is_none() => return Ok(Some(End::Script)),
+                Due::End if self.inputs.seconds.is_none() => return Ok(Some(End::Script)),
                 Due::End | Due::Nothing => {}
             }
         }
@@ -189,17 +183,17 @@ impl Session {
         let end = if (now + 1..now + 2 * PERIOD).contains(&next) { next } else { now + PERIOD };
         self.board.run_ticks(end - now)?;
         while let Some(period) = self.board.next_period() {
-            let belief = self.probe.read(&self.board);
+            let readings = Readings::new(&self.board);
             let time = period.began as f64 / TICKS_PER_S as f64;
-            self.record.take(time, &self.board.plant, &period, &belief);
+            self.record.take(time, &self.board.plant, &period, &readings);
             self.last = Some(period);
         }
         Ok(())
     }
 
-    /// Takes what console and log have said, and tells of resets.
+    /// Takes the output of console and log, and notes resets.
     fn hear(&mut self) -> Result<()> {
-        for text in self.board.logged()? {
+        for text in self.board.take_log()? {
             self.add(Source::Log, text);
         }
         for n in self.resets..self.board.resets.len() {
@@ -215,7 +209,7 @@ impl Session {
     }
 
     fn add(&mut self, source: Source, text: String) {
-        if let Some(script) = &mut self.outside.script
+        if let Some(script) = &mut self.inputs.script
             && matches!(source, Source::Said | Source::Log)
         {
             script.hear(&text);

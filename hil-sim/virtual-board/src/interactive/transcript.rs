@@ -1,4 +1,4 @@
-//! What was typed, answered and logged, with its times.
+//! Lines typed, answered and logged, with their times.
 
 use std::fmt;
 
@@ -22,7 +22,7 @@ pub struct Line {
     pub time: f64,
     /// Where it came from.
     pub source: Source,
-    /// What it says.
+    /// Its text.
     pub text: String,
 }
 
@@ -69,7 +69,7 @@ impl Assembler {
     }
 }
 
-/// Text of bytes; what cannot be shown is escaped.
+/// Text of bytes; those that cannot be shown are escaped.
 fn readable(bytes: &[u8]) -> String {
     let shown = |byte: &u8| match byte {
         b' '..=b'~' => char::from(*byte).to_string(),

@@ -1,8 +1,7 @@
 //! ADC1 and ADC2 (RM0440, section 21): calibration, injected sequences started together by TIM1,
 //! analog watchdog 1 on single injected channels. Nothing else of them is modelled.
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
@@ -45,12 +44,12 @@ const DEEPPWD: u32 = 1 << 29;
 const ADCAL: u32 = 1 << 31;
 /// Sampling times, halves of a converter clock.
 const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
-/// A conversion after it, likewise.
+/// A conversion after it, halves of a converter clock.
 const CONVERSION: u64 = 25;
 
-/// One converter.
+/// A converter.
 #[derive(Clone, Debug)]
-struct One {
+struct Converter {
     store: Store,
     status: u32,
     control: u32,
@@ -60,7 +59,7 @@ struct One {
     data: [u16; 4],
 }
 
-impl Default for One {
+impl Default for Converter {
     fn default() -> Self {
         Self {
             store: Store::new(KNOWN),
@@ -73,13 +72,13 @@ impl Default for One {
     }
 }
 
-/// What the pins show: codes by channel, 0 to 18.
+/// Codes at the pins by channel, 0 to 18.
 pub type Inputs = [u16; 19];
 
 /// Both converters.
 #[derive(Clone, Debug, Default)]
 pub struct Adc {
-    converters: [One; 2],
+    converters: [Converter; 2],
     common: u32,
     /// Codes at their pins.
     pub inputs: [Inputs; 2],
@@ -182,7 +181,7 @@ impl Adc {
     }
 }
 
-impl One {
+impl Converter {
     fn channel(&self, rank: u32) -> u32 {
         // JSQ1 begins at bit 9, the others follow, six bits apart.
         self.store.get(JSQR) >> (9 + 6 * rank) & 0x1f
@@ -226,8 +225,8 @@ impl One {
         Some(())
     }
 
-    /// The control register: a calibration and the start-up take no time. What the manual forbids is
-    /// not known: calibration without regulator or while enabled, enabling without regulator.
+    /// The control register: a calibration and the start-up take no time. `None` is
+    /// forbidden by the manual: calibration without regulator or while enabled, enabling without regulator.
     fn order(&mut self, value: u32) -> Option<()> {
         let ready = self.control & VREGEN != 0 && self.control & DEEPPWD == 0;
         if value & ADCAL != 0 && (!ready || self.control & ADEN != 0) {

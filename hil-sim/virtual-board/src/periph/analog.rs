@@ -41,12 +41,12 @@ impl Default for Comparators {
 }
 
 impl Comparators {
-    /// Its INPSEL: which pin is at its positive input.
+    /// Its INPSEL: the pin at its positive input.
     pub fn input_of(&self, n: usize) -> u32 {
         self.store.get(4 * n as u32) >> 8 & 1
     }
 
-    /// Its INMSEL: what is at its negative input.
+    /// Its INMSEL: the source of its negative input.
     pub fn reference_of(&self, n: usize) -> u32 {
         self.store.get(4 * n as u32) >> 4 & 7
     }

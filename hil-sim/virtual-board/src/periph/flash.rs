@@ -61,7 +61,7 @@ pub struct Flash {
     torn: Vec<bool>,
     /// Operations since the beginning: double words programmed, pages erased.
     pub operations: u64,
-    /// The power goes in this operation, counted from 1; what it was to write is torn.
+    /// The power goes in this operation, counted from 1; its double word or page is torn.
     pub power_loss_at: Option<u64>,
     /// The power has gone.
     pub power_lost: bool,
@@ -91,13 +91,7 @@ impl Flash {
         Self { bytes: self.bytes, torn: self.torn, operations: self.operations, ..Self::new() }
     }
 
-    /// Contents of the second bank.
-    pub fn contents(&self) -> &[u8] {
-        &self.bytes
-    }
-
-    /// Flips a bit of the second bank, or two of a double word: with one the check code corrects it,
-    /// with two it is torn.
+    /// Gives a double word of the second bank a wrong check code.
     pub fn tear(&mut self, address: u32) {
         if let Some(torn) = self.torn.get_mut(((address - BANK_2) / 8) as usize) {
             *torn = true;

@@ -26,11 +26,7 @@ const BRR: u32 = 0x28;
 
 /// A port.
 #[derive(Clone, Debug)]
-pub struct Gpio {
-    store: Store,
-    /// Levels from outside: pins driven, and their levels.
-    pub driven: (u16, u16),
-}
+pub struct Gpio(Store);
 
 impl Gpio {
     /// Port A is 0.
@@ -48,39 +44,33 @@ impl Gpio {
             }
             _ => {}
         }
-        Self { store, driven: (0, 0) }
+        Self(store)
     }
 
-    /// The alternate function of a pin, if that is what it is set to.
+    /// The alternate function of a pin, if it is set to one.
     pub fn alternate(&self, pin: u32) -> Option<u32> {
-        let mode = self.store.get(MODER) >> (2 * pin) & 3;
-        (mode == 2).then(|| self.store.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15)
+        let mode = self.0.get(MODER) >> (2 * pin) & 3;
+        (mode == 2).then(|| self.0.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15)
     }
 
-    /// Whether a pin is analog.
-    pub fn analog(&self, pin: u32) -> bool {
-        self.store.get(MODER) >> (2 * pin) & 3 == 3
-    }
-
+    /// Levels at the pins.
     fn levels(&self) -> u32 {
-        let pulls = self.store.get(PUPDR);
-        let up = (0..16).fold(0, |w, n| w | u32::from(pulls >> (2 * n) & 3 == 1) << n);
-        let (driven, levels) = (u32::from(self.driven.0), u32::from(self.driven.1));
-        up & !driven | levels & driven
+        let pulls = self.0.get(PUPDR);
+        (0..16).fold(0, |w, n| w | u32::from(pulls >> (2 * n) & 3 == 1) << n)
     }
 
     /// Reads a register.
     pub fn read(&self, offset: u32) -> Option<u32> {
-        if offset == IDR { Some(self.levels()) } else { self.store.read(offset) }
+        if offset == IDR { Some(self.levels()) } else { self.0.read(offset) }
     }
 
     /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        let odr = self.store.get(ODR);
+        let odr = self.0.get(ODR);
         match offset {
-            BSRR => self.store.write(ODR, odr & !(value >> 16) | value & 0xffff),
-            BRR => self.store.write(ODR, odr & !value),
-            _ => self.store.write(offset, value),
+            BSRR => self.0.write(ODR, odr & !(value >> 16) | value & 0xffff),
+            BRR => self.0.write(ODR, odr & !value),
+            _ => self.0.write(offset, value),
         }
     }
 }

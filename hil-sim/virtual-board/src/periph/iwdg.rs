@@ -1,7 +1,6 @@
 //! The independent watchdog (RM0440, section 42), with the typical 32 kHz.
 
-use super::Effect;
-use crate::chip::NEVER;
+use super::{Effect, NEVER};
 
 /// Ticks per cycle of its clock.
 const CLOCK: u64 = 170_000_000 / 32_000;
@@ -54,13 +53,8 @@ impl Iwdg {
             0x04 => self.prescaler,
             0x08 => self.reload,
             // Both values on their way.
-            0x0c => {
-                if now < self.busy_until {
-                    3
-                } else {
-                    0
-                }
-            }
+            0x0c if now < self.busy_until => 3,
+            0x0c => 0,
             0x10 => self.window,
             _ => return None,
         })

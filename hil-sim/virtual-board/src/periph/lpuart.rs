@@ -2,8 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
@@ -38,11 +37,11 @@ const FIFOEN: u32 = 1 << 29;
 /// Start bit, eight data bits, stop bit.
 const BITS: u64 = 10;
 
-/// What travels between the port and the console.
+/// Bytes between the port and the console.
 #[derive(Clone, Debug, Default)]
 pub struct Wire {
-    /// To the chip; `None` is a byte damaged on its way.
-    pub to_chip: VecDeque<Option<u8>>,
+    /// To the chip.
+    pub to_chip: VecDeque<u8>,
     /// From the chip.
     pub from_chip: Vec<u8>,
 }
@@ -108,8 +107,8 @@ impl Lpuart {
                 if self.status & RXNE != 0 {
                     self.status |= ORE;
                 } else {
-                    self.status |= RXNE | if byte.is_none() { FE } else { 0 };
-                    self.received = byte.unwrap_or(0xff);
+                    self.status |= RXNE;
+                    self.received = byte;
                 }
             }
             self.wake(now);
@@ -143,7 +142,7 @@ impl Lpuart {
         cr1 & UE != 0 && self.status & (asked | errors) != 0
     }
 
-    /// Reads a register, with what that does.
+    /// Reads a register, with its side effects.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
             ISR => Some(

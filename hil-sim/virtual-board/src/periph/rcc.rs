@@ -1,8 +1,7 @@
 //! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, but for
 //! a crystal that is dead.
 
-use super::{Effect, Plain, Store};
-use crate::chip::{NEVER, Reset};
+use super::{Effect, NEVER, Plain, Reset, Store};
 
 const ALL: u32 = u32::MAX;
 const CR: u32 = 0x00;

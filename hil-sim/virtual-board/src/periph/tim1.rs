@@ -3,8 +3,11 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
-use super::{Effect, Plain, Store};
-use crate::chip::NEVER;
+mod gates;
+
+pub use gates::{BadGates, GateLimits};
+
+use super::{Effect, NEVER, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
@@ -57,46 +60,15 @@ const MOE: u32 = 1 << 15;
 const BKE: u32 = 1 << 12;
 const BKP: u32 = 1 << 13;
 
-/// Longest and shortest that a leg's gates must respect, ticks: the dead time of the inverter, and the
-/// shortest pulse that its gate drives pass on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GateLimits {
-    /// Dead time between the switches of a leg.
-    pub dead_time: u32,
-    /// Shortest time that a switch is on.
-    pub pulse: u32,
-}
-
-/// Why a gate pattern is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BadGates {
-    /// The switches of leg `leg` may be on together: the dead time in ticks.
-    Short {
-        /// Leg, 0 is a.
-        leg: usize,
-        /// Dead time that is programmed.
-        dead_time: u32,
-    },
-    /// A switch of leg `leg` is on for too short a time.
-    Pulse {
-        /// Leg, 0 is a.
-        leg: usize,
-        /// Ticks.
-        ticks: u32,
-    },
-    /// A switch is on although nobody switched the outputs on, or with a wrong polarity.
-    NotComplementary,
-}
-
-/// What has happened at one end of the count, or between.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Event {
-    /// The converters are triggered at this time.
-    pub trigger: Option<u64>,
-    /// When it was.
-    pub at: u64,
+/// An event and its time.
+#[derive(Clone, Copy, Debug)]
+pub enum Event {
+    /// The converters are triggered.
+    Trigger(u64),
     /// The counter is at its top.
-    pub crest: bool,
+    Crest(u64),
+    /// The counter is at 0.
+    Valley,
 }
 
 /// The timer.
@@ -172,11 +144,6 @@ impl Tim1 {
         std::array::from_fn(|leg| self.store.get(CCR1 + 4 * leg as u32))
     }
 
-    /// Where the counter turns round.
-    pub fn top(&self) -> u32 {
-        self.top
-    }
-
     /// Whether the outputs are on.
     pub fn outputs_on(&self) -> bool {
         self.store.get(BDTR) & MOE != 0
@@ -187,51 +154,6 @@ impl Tim1 {
         self.status & (BIF | SBIF) != 0
     }
 
-    /// Dead time, ticks.
-    pub fn dead_time(&self) -> u32 {
-        let code = self.store.get(BDTR) & 0xff;
-        // CKD: the dead time counts every clock, every second or every fourth.
-        let clocks = [1, 2, 4, 4][(self.store.get(CR1) >> 8 & 3) as usize];
-        clocks
-            * match code >> 5 {
-                0..=3 => code,
-                4 | 5 => 2 * (64 + (code & 0x3f)),
-                6 => 8 * (32 + (code & 0x1f)),
-                _ => 16 * (32 + (code & 0x1f)),
-            }
-    }
-
-    /// Looks at the gates of the period with the compare values in force.
-    ///
-    /// # Errors
-    /// What is wrong with them.
-    pub fn check_gates(&self, limits: GateLimits) -> Result<(), BadGates> {
-        if !self.outputs_on() {
-            return Ok(());
-        }
-        // Both outputs of three legs, active high, PWM mode 1: nothing else is known to be safe.
-        let modes =
-            [self.store.get(CCMR1) >> 4, self.store.get(CCMR1) >> 12, self.store.get(CCMR2) >> 4];
-        if self.store.get(CCER) & 0xfff != 0x555 || modes.iter().any(|mode| mode & 7 != 6) {
-            return Err(BadGates::NotComplementary);
-        }
-        let dead_time = self.dead_time();
-        for (leg, compare) in self.in_force().into_iter().enumerate() {
-            if dead_time < limits.dead_time {
-                return Err(BadGates::Short { leg, dead_time });
-            }
-            let compare = compare.min(self.top);
-            for on in [2 * compare, 2 * (self.top - compare)] {
-                let ticks = on.saturating_sub(dead_time);
-                // A whole period has no edges and so no dead time; a vanished pulse is none.
-                if on != 2 * self.top && ticks > 0 && ticks < limits.pulse {
-                    return Err(BadGates::Pulse { leg, ticks });
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// When the next event is.
     pub fn next_event(&self) -> u64 {
         self.next_end.min(self.trigger_at)
@@ -240,8 +162,7 @@ impl Tim1 {
     /// Lets the next event happen.
     pub fn happen(&mut self) -> Event {
         if self.trigger_at <= self.next_end {
-            let at = std::mem::replace(&mut self.trigger_at, NEVER);
-            return Event { trigger: Some(at), at, crest: false };
+            return Event::Trigger(std::mem::replace(&mut self.trigger_at, NEVER));
         }
         let crest = self.at_top_next;
         self.at_top_next = !crest;
@@ -255,10 +176,11 @@ impl Tim1 {
             self.repetitions -= 1;
         }
         self.next_end = end + u64::from(self.top);
-        if !crest {
-            self.plan_trigger();
+        if crest {
+            return Event::Crest(end);
         }
-        Event { trigger: None, at: end, crest }
+        self.plan_trigger();
+        Event::Valley
     }
 
     /// OC4REF rises on the way up where the counter reaches its compare value.
@@ -301,18 +223,18 @@ impl Tim1 {
     /// Outputs of the comparators, from now on.
     pub fn set_comparators(&mut self, outputs: [bool; 7]) {
         self.comparators = outputs;
-        self.look_at_break();
+        self.update_break();
     }
 
     /// Level of the break pin, from now on.
     pub fn set_fault_pin(&mut self, high: bool) {
         self.fault_pin_high = high;
-        self.look_at_break();
+        self.update_break();
     }
 
     /// The break request: the enabled sources, each with its own polarity, go through one OR gate, and BKP
     /// is the polarity behind it (section 28.3.16, overview of the break circuit).
-    fn look_at_break(&mut self) {
+    fn update_break(&mut self) {
         let (af1, bdtr) = (self.store.get(AF1), self.store.get(BDTR));
         let bit = |n: usize| af1 >> n & 1 != 0;
         let pin = bit(0) && self.fault_pin_high != bit(9);
@@ -320,11 +242,11 @@ impl Tim1 {
         let comparator =
             (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));
         if bdtr & BKE != 0 && (pin || comparator) == (bdtr & BKP != 0) {
-            self.pull();
+            self.latch_break();
         }
     }
 
-    fn pull(&mut self) {
+    fn latch_break(&mut self) {
         if self.store.get(BDTR) & BKE != 0 {
             self.status |= BIF;
             self.clear_moe();
@@ -353,7 +275,7 @@ impl Tim1 {
         match offset {
             SR => {
                 self.status &= value;
-                self.look_at_break();
+                self.update_break();
                 return Some(Effect::Look);
             }
             EGR => {
@@ -365,13 +287,13 @@ impl Tim1 {
                     }
                 }
                 if value & 1 << 7 != 0 {
-                    self.pull();
+                    self.latch_break();
                 }
                 return Some(Effect::Look);
             }
             BDTR => {
                 self.store.write(BDTR, self.locked(old, value));
-                self.look_at_break();
+                self.update_break();
                 return Some(Effect::None);
             }
             // Locked with levels 2 and 3.

@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Helpers of the tests.
 #![allow(dead_code)] // every test uses its own part of it
 
 use anyhow::Result;

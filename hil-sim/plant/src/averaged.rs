@@ -1,0 +1,85 @@
+//! One PWM period with the voltages of the inverter averaged over it.
+//!
+//! Between the currents at which a phase's smoothed sign has its kinks, ±20 mA, the equations are
+//! smooth and few integration steps are enough; a step across a kink would cost accuracy. So a step
+//! that is about to take a phase across one is cut there.
+
+use crate::complex::{Complex, clarke, phases};
+use crate::integrate::MotorModel;
+use crate::machine::MachineState;
+
+/// Current, A, beyond which the sign of a phase current counts fully.
+const KINK: f64 = 0.020;
+/// Shortest part of a step that one is cut to.
+const SHORTEST: f64 = 1.0 / 16.0;
+
+/// Sign of a current, smoothed linearly over ±20 mA.
+#[inline]
+pub(crate) fn smooth_sign(i: f64) -> f64 {
+    (i * (1.0 / KINK)).clamp(-1.0, 1.0)
+}
+
+/// Averages of one period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Averaged {
+    /// Line-to-neutral voltage without errors.
+    pub v: Complex,
+    /// Voltage that each leg loses with a positive current, V.
+    pub lost: [f64; 3],
+    /// Voltage that each leg gains with a negative current, V.
+    pub gained: [f64; 3],
+}
+
+impl Averaged {
+    /// Line-to-neutral voltage at the stator current `i`.
+    #[inline]
+    fn voltage(&self, i: Complex) -> Complex {
+        let currents = phases(i);
+        let error = |k: usize| {
+            let sign = smooth_sign(currents[k]);
+            sign * if sign > 0.0 { self.lost[k] } else { self.gained[k] }
+        };
+        self.v - clarke([error(0), error(1), error(2)])
+    }
+
+    /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
+    #[inline]
+    pub(crate) fn step(&self, motor: &mut MotorModel, h: f64) -> Complex {
+        let mut rest = h;
+        let mut volt_seconds = Complex::ZERO;
+        loop {
+            let machine = &motor.machine;
+            let rates = |x: &MachineState, w| {
+                let v = self.voltage(x.i);
+                (machine.derivative(x, v, w), v)
+            };
+            let x = &motor.state.electrical;
+            let first = rates(x, machine.pole_pairs * motor.state.speed);
+            let part = match until_kink(x.i, first.0.i, rest) {
+                None => rest,
+                Some(time) => time.max(SHORTEST * h).min(rest),
+            };
+            let (state, v) = motor.stepped_from(first, part, rates);
+            motor.state = state;
+            volt_seconds += v * part;
+            if part >= rest {
+                return volt_seconds;
+            }
+            rest -= part;
+        }
+    }
+}
+
+/// Time until the first phase current crosses a kink, if one does within `h` seconds at this rate.
+#[inline]
+fn until_kink(i: Complex, rate: Complex, h: f64) -> Option<f64> {
+    let (now, later) = (phases(i), phases(i + rate * h));
+    // Which of the three pieces between the kinks a current is on.
+    let piece = |i: f64| (i > -KINK, i > KINK);
+    if (0..3).all(|k| piece(now[k]) == piece(later[k])) {
+        return None;
+    }
+    let rates = phases(rate);
+    let times = (0..3).flat_map(|k| [-KINK, KINK].map(|kink| (kink - now[k]) / rates[k]));
+    Some(times.filter(|t| *t > 0.0).fold(h, f64::min))
+}

@@ -1,0 +1,140 @@
+//! All six switches off: the diodes carry the currents into the dc link until they are zero.
+//!
+//! A phase whose current flows into the machine is held at the negative rail, one whose current
+//! flows back at the positive rail, one without current floats. A floating phase stays without
+//! current, exactly, unless its potential leaves the range between the rails. When all three float
+//! the terminals show the back-emf of the decaying rotor flux, which turns with the rotor.
+
+use crate::complex::{Complex, clarke, dot, phases};
+use crate::integrate::{MotorModel, MotorState};
+
+/// Current below which a phase counts as without, A.
+const NO_CURRENT: f64 = 1e-9;
+/// Unit vectors along which the current lies while phase a, b or c floats.
+const LINES: [Complex; 3] = [
+    Complex::new(0.0, 1.0),
+    Complex::new(0.866_025_403_784_438_6, 0.5),
+    Complex::new(0.866_025_403_784_438_6, -0.5),
+];
+/// Most changes of conduction followed within one step; more do not occur in a passive circuit but
+/// through rounding.
+const CHANGES: usize = 8;
+
+/// Which way each diode leg conducts: +1 into the machine (negative rail), -1 back (positive
+/// rail), 0 not at all.
+type Conduction = [i8; 3];
+
+/// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
+pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
+    let mut rest = h;
+    let mut volt_seconds = Complex::ZERO;
+    // Phases that began to conduct and were found not to: they float for the rest of the step.
+    let mut blocked = [false; 3];
+    for _ in 0..CHANGES {
+        let conduction = conduction(motor, vdc, blocked);
+        let (next, v) = advanced(motor, conduction, vdc, rest);
+        let Some((phase, fraction)) = first_reversal(motor, &next, conduction) else {
+            motor.state = next;
+            return volt_seconds + v * rest;
+        };
+        let done = rest * fraction;
+        if phases(motor.state.electrical.i)[phase].abs() <= NO_CURRENT {
+            blocked[phase] = true;
+            continue;
+        }
+        let (state, v) = advanced(motor, conduction, vdc, done);
+        motor.state = state;
+        volt_seconds += v * done;
+        motor.state.electrical.i = without(motor.state.electrical.i, phase);
+        rest -= done;
+    }
+    // Rounding keeps the conduction changing: the currents are practically zero.
+    motor.state.electrical.i = Complex::ZERO;
+    let (state, v) = advanced(motor, [0; 3], vdc, rest);
+    motor.state = state;
+    volt_seconds + v * rest
+}
+
+/// Which diodes conduct in the present state.
+fn conduction(motor: &MotorModel, vdc: f64, blocked: [bool; 3]) -> Conduction {
+    let x = &motor.state.electrical;
+    let w = motor.machine.pole_pairs * motor.state.speed;
+    let mut flow = phases(x.i).map(sign);
+    let conducting = flow.iter().filter(|&&f| f != 0).count();
+    match conducting {
+        // One floats: does its potential leave the range between the rails?
+        2 => {
+            let k = flow.iter().position(|&f| f == 0).unwrap_or(0);
+            let (axis, v_axis) = line(k, flow, vdc);
+            let (_, v) = motor.machine.derivative_on_line(x, v_axis, axis, w);
+            // v_k = 2/3 leg_k - 1/3 (sum of the others), and the others are on opposite rails.
+            let leg = 0.5 * vdc + 1.5 * phases(v)[k];
+            if !blocked[k] {
+                flow[k] = i8::from(leg < 0.0) - i8::from(leg > vdc);
+            }
+        }
+        // All float: does the back-emf between two of them exceed the link?
+        0 => {
+            let emf = phases(motor.machine.derivative_open(x, w).1);
+            let highest = (0..3).fold(0, |m, k| if emf[k] > emf[m] { k } else { m });
+            let lowest = (0..3).fold(0, |m, k| if emf[k] < emf[m] { k } else { m });
+            if emf[highest] - emf[lowest] > vdc && !blocked[highest] && !blocked[lowest] {
+                flow[highest] = -1;
+                flow[lowest] = 1;
+            }
+        }
+        _ => {}
+    }
+    flow
+}
+
+fn sign(i: f64) -> i8 {
+    i8::from(i > NO_CURRENT) - i8::from(i < -NO_CURRENT)
+}
+
+/// The line on which the current lies while phase `k` floats, and the terminal voltage along it.
+fn line(k: usize, flow: Conduction, vdc: f64) -> (Complex, f64) {
+    let axis = LINES[k];
+    // Legs of opposite sign about the middle of the link; the common part has no space vector.
+    let legs = flow.map(|f| -0.5 * vdc * f64::from(f));
+    (axis, dot(clarke(legs), axis))
+}
+
+/// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
+fn advanced(motor: &MotorModel, flow: Conduction, vdc: f64, h: f64) -> (MotorState, Complex) {
+    let machine = &motor.machine;
+    match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
+        (3, _) => {
+            let v = clarke(flow.map(|f| -0.5 * vdc * f64::from(f)));
+            motor.stepped(h, |x, w| (machine.derivative(x, v, w), v))
+        }
+        (2, Some(k)) => {
+            let (axis, v_axis) = line(k, flow, vdc);
+            let (mut state, v) =
+                motor.stepped(h, |x, w| machine.derivative_on_line(x, v_axis, axis, w));
+            state.electrical.i = axis * dot(state.electrical.i, axis);
+            (state, v)
+        }
+        _ => {
+            let (mut state, v) = motor.stepped(h, |x, w| machine.derivative_open(x, w));
+            state.electrical.i = Complex::ZERO;
+            (state, v)
+        }
+    }
+}
+
+/// The phase whose current first goes against its diode, and at which fraction of the step.
+fn first_reversal(motor: &MotorModel, next: &MotorState, flow: Conduction) -> Option<(usize, f64)> {
+    let (before, after) = (phases(motor.state.electrical.i), phases(next.electrical.i));
+    (0..3)
+        .filter(|&k| f64::from(flow[k]) * after[k] < 0.0)
+        .map(|k| (k, (before[k] / (before[k] - after[k])).clamp(0.0, 1.0)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The current with that of phase `k` removed.
+fn without(i: Complex, k: usize) -> Complex {
+    let axis = LINES[k];
+    let length = dot(i, axis);
+    if length.abs() <= NO_CURRENT { Complex::ZERO } else { axis * length }
+}

@@ -1,0 +1,107 @@
+//! The machine and its shaft, integrated by the classical Runge-Kutta rule.
+
+use crate::complex::Complex;
+use crate::machine::{Machine, MachineState};
+use crate::mechanics::Mechanics;
+
+/// State of the machine and its shaft.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotorState {
+    /// Electrical state.
+    pub electrical: MachineState,
+    /// Mechanical speed, rad/s.
+    pub speed: f64,
+    /// Mechanical angle of the rotor, rad, not wrapped.
+    pub angle: f64,
+}
+
+/// A machine on its shaft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorModel {
+    /// The machine.
+    pub machine: Machine,
+    /// The shaft and its load.
+    pub mechanics: Mechanics,
+    /// The state of both.
+    pub state: MotorState,
+}
+
+impl MotorModel {
+    /// At rest, without current and flux; turning already where the load holds a speed.
+    pub fn new(machine: Machine, mechanics: Mechanics) -> Self {
+        let mut motor = Self { machine, mechanics, state: MotorState::default() };
+        motor.hold_speed();
+        motor
+    }
+
+    /// Sets the speed that the load imposes, if it imposes one. To be called after a change of load.
+    pub fn hold_speed(&mut self) {
+        if let Some(speed) = self.mechanics.held_speed() {
+            self.state.speed = speed;
+        }
+    }
+
+    /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
+    pub fn step(&mut self, v: Complex, h: f64) {
+        self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
+    }
+
+    /// The state after `h` seconds, and the mean terminal voltage. `rates` gives the derivative of
+    /// the electrical state and the terminal voltage at a state and an electrical speed.
+    #[inline]
+    pub(crate) fn stepped(
+        &self,
+        h: f64,
+        rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
+    ) -> (MotorState, Complex) {
+        let w = self.machine.pole_pairs * self.state.speed;
+        self.stepped_from(rates(&self.state.electrical, w), h, rates)
+    }
+
+    /// As [`Self::stepped`]; `first` is the value of `rates` at the present state.
+    #[inline]
+    pub(crate) fn stepped_from(
+        &self,
+        first: (MachineState, Complex),
+        h: f64,
+        rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
+    ) -> (MotorState, Complex) {
+        let (m, p) = (&self.machine, self.machine.pole_pairs);
+        let (x0, n0) = (self.state.electrical, self.state.speed);
+        let accelerate = |x: &MachineState, n: f64| self.mechanics.acceleration(m.torque(x), n);
+
+        let (k1, v1) = first;
+        let a1 = accelerate(&x0, n0);
+        let half = 0.5 * h;
+        let (x, n1) = (moved(&x0, &k1, half), n0 + a1 * half);
+        let (k2, v2) = rates(&x, p * n1);
+        let a2 = accelerate(&x, n1);
+        let (x, n2) = (moved(&x0, &k2, half), n0 + a2 * half);
+        let (k3, v3) = rates(&x, p * n2);
+        let a3 = accelerate(&x, n2);
+        let (x, n3) = (moved(&x0, &k3, h), n0 + a3 * h);
+        let (k4, v4) = rates(&x, p * n3);
+        let a4 = accelerate(&x, n3);
+
+        let sixth = h * (1.0 / 6.0);
+        let mean = |a, b, c, d| (a + d + (b + c) * 2.0) * sixth;
+        let mean_f = |a: f64, b: f64, c: f64, d: f64| (a + d + (b + c) * 2.0) * sixth;
+        let state = MotorState {
+            electrical: MachineState {
+                i: x0.i + mean(k1.i, k2.i, k3.i, k4.i),
+                psi: x0.psi + mean(k1.psi, k2.psi, k3.psi, k4.psi),
+                i_lp: x0.i_lp + mean(k1.i_lp, k2.i_lp, k3.i_lp, k4.i_lp),
+            },
+            speed: n0 + mean_f(a1, a2, a3, a4),
+            angle: self.state.angle + mean_f(n0, n1, n2, n3),
+        };
+        let voltage: Complex = (v1 + v4 + (v2 + v3) * 2.0) * (1.0 / 6.0);
+        (state, voltage)
+    }
+}
+
+/// `x + k h`
+#[inline]
+fn moved(x: &MachineState, k: &MachineState, h: f64) -> MachineState {
+    MachineState { i: x.i + k.i * h, psi: x.psi + k.psi * h, i_lp: x.i_lp + k.i_lp * h }
+}

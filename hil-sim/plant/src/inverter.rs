@@ -1,0 +1,143 @@
+//! The inverter, averaged over a PWM period.
+//!
+//! A leg is high for the fraction `c/top` of the period. Its mean voltage falls short of that by
+//! the dead time (section 3.9: while both switches are off the current holds the leg at the rail it
+//! flows from) and by a residual drop of the switches, both against the direction of the current.
+//! That direction is the sign of the actual phase current, smoothed linearly over ±20 mA and
+//! evaluated at every stage of the integration. A leg that does not switch has no dead-time error.
+//!
+//! The propagation delay shifts the pulses within the period; averaged, a fraction delay/T of the
+//! previous period's voltage replaces as much of this period's, spread over the whole period. To
+//! first order in delay/T (1.3 %) that is the same delay.
+
+use drive_core::Compare;
+use serde::{Deserialize, Serialize};
+
+use crate::averaged::{Averaged, smooth_sign};
+use crate::complex::{Complex, clarke, phases};
+use crate::error::{PlantError, check};
+
+/// Settings of the inverter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InverterSettings {
+    /// Dc-link voltage, V.
+    pub vdc: f64,
+    /// Compare value that means high side on throughout. The default is 170 MHz / (2 * 6 kHz).
+    pub timer_top: u16,
+    /// Time in which both switches of a leg are off at every edge, us (section 3.9).
+    pub dead_time_us: f64,
+    /// Time from the command to the first switch acting, us (section 3.9).
+    pub propagation_us: f64,
+    /// Drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
+    pub residual_v: f64,
+    /// Whether to integrate between the exact instants of the edges rather than averages.
+    pub switched: bool,
+}
+
+impl Default for InverterSettings {
+    fn default() -> Self {
+        Self::REFERENCE
+    }
+}
+
+impl InverterSettings {
+    /// The inverter of section 3.9.
+    const REFERENCE: Self = Self {
+        vdc: 311.0,
+        timer_top: 14_167,
+        dead_time_us: 2.2,
+        propagation_us: 2.2,
+        residual_v: 1.64,
+        switched: false,
+    };
+
+    /// No dead time, no delay, no drop.
+    pub const IDEAL: Self =
+        Self { dead_time_us: 0.0, propagation_us: 0.0, residual_v: 0.0, ..Self::REFERENCE };
+}
+
+/// The inverter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inverter {
+    /// Dc-link voltage, V.
+    pub(crate) vdc: f64,
+    pub(crate) top: f64,
+    /// Seconds.
+    pub(crate) dead_time: f64,
+    /// Seconds.
+    pub(crate) propagation: f64,
+    pub(crate) residual: f64,
+    pub(crate) switched: bool,
+    /// Compare values of the period before.
+    pub(crate) previous: Compare,
+}
+
+impl Inverter {
+    /// The inverter with these settings, off.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
+        let s = settings;
+        check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
+        check("inverter.dead_time_us", s.dead_time_us, 0.0..=10.0, "us")?;
+        check("inverter.propagation_us", s.propagation_us, 0.0..=10.0, "us")?;
+        check("inverter.residual_v", s.residual_v, 0.0..=20.0, "V")?;
+        let mut inverter = Self {
+            vdc: 0.0,
+            top: f64::from(s.timer_top),
+            dead_time: s.dead_time_us * 1e-6,
+            propagation: s.propagation_us * 1e-6,
+            residual: s.residual_v,
+            switched: s.switched,
+            previous: Compare::OFF,
+        };
+        inverter.set_dc_link(s.vdc)?;
+        Ok(inverter)
+    }
+
+    /// Changes the dc-link voltage, V.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
+        check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
+        self.vdc = vdc;
+        Ok(())
+    }
+
+    /// Fraction of the period for which each leg is commanded high.
+    #[inline]
+    fn duties(&self, compare: &Compare) -> [f64; 3] {
+        let inverse = 1.0 / self.top;
+        [compare.a, compare.b, compare.c].map(|c| (f64::from(c) * inverse).min(1.0))
+    }
+
+    /// The averages of a period of `period` seconds with these compare values, outputs on.
+    #[inline]
+    pub(crate) fn averaged(&self, compare: &Compare, period: f64) -> Averaged {
+        let duties = self.duties(compare);
+        let mut v = clarke(duties);
+        if self.previous.enabled {
+            let blend = self.propagation / period;
+            v += (clarke(self.duties(&self.previous)) - v) * blend;
+        }
+        let dead = self.dead_time / period;
+        // A pulse shorter than the dead time vanishes; the dead time cannot take more than it.
+        let taken = |available: f64, duty: f64| {
+            if duty > 0.0 && duty < 1.0 { self.vdc * dead.min(available) } else { 0.0 }
+        };
+        Averaged {
+            v: v * self.vdc,
+            lost: duties.map(|d| taken(d, d) + self.residual),
+            gained: duties.map(|d| taken(1.0 - d, d) + self.residual),
+        }
+    }
+
+    /// The leg voltages `legs` less the residual drop, as a space vector.
+    pub(crate) fn dropped(&self, legs: [f64; 3], i: Complex) -> Complex {
+        let signs = phases(i).map(smooth_sign);
+        clarke(legs) - clarke(signs) * self.residual
+    }
+}

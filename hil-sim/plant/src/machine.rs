@@ -1,0 +1,299 @@
+//! The induction machine with a flux-fixed and a current-fixed saliency ("model A").
+//!
+//! All vectors are complex, in the stator frame. With `k = Lm/Lr`, `alpha = rr/Lr`,
+//! `sigma Ls = Ls - Lm^2/Lr`, `R' = rs + rr k^2`, electrical rotor speed `w` and `x*` the conjugate:
+//!
+//! ```text
+//! s       = a_psi (psi/psi_n)^2 2/(1 + r) + b1 i^2/|i|          r = (|psi|/psi_n)^2
+//! y       = v - R' i + k (alpha - j w) psi - v_R
+//! di/dt   = (y + s y*) / (sigma Ls (1 - |s|^2))                 that is, L x = sigma Ls (x - s x*)
+//! dpsi/dt = rr k i - (alpha - j w) psi
+//! v_R     = 1/2 chi rr k^2 (h - u h*)       h = i - i_lp, di_lp/dt = 2 pi 60 h, u = (psi/|psi|)^2
+//! Te      = 3/2 P k Im(psi* i)
+//! ```
+//!
+//! With `a_psi = b1 = chi = 0` this is Eq. 2.9 with the rotor currents eliminated, term by term. A
+//! positive `s` means low impedance along its axis. The size of the saliency is an assumption:
+//! nothing in the source measures it. The factor `2/(1 + r)`, one at `psi_n`, saturates the flux
+//! part at `2 |a_psi|`; the current part is held at its value for [`SALIENCY_CURRENT_A`] beyond
+//! that current, so that `|s|` stays below one whatever the currents.
+//! Iron loss, slotting, skin effect and the saturation of the main flux are absent.
+
+use serde::{Deserialize, Serialize};
+
+use crate::complex::{Complex, dot, square};
+use crate::error::{PlantError, check};
+
+/// Current up to which the current part of the saliency grows, A peak.
+pub const SALIENCY_CURRENT_A: f64 = 5.0;
+/// Largest length of the saliency vector that settings may reach.
+const SALIENCY_LIMIT: f64 = 0.5;
+/// Corner of the filter that splits off the high-frequency current for the `chi` term, rad/s.
+const CHI_CORNER: f64 = std::f64::consts::TAU * 60.0;
+/// Below these the directions of current (A) and flux (Wb squared) count as undefined.
+const NO_CURRENT: f64 = 1e-9;
+const NO_FLUX_SQUARED: f64 = 1e-18;
+
+/// Parameters of the T-equivalent circuit; the defaults are Table 5 of the source.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MachineSettings {
+    /// Stator resistance, ohm.
+    pub rs: f64,
+    /// Rotor resistance, referred to the stator, ohm.
+    pub rr: f64,
+    /// Stator leakage inductance, H.
+    pub lls: f64,
+    /// Rotor leakage inductance, referred to the stator, H.
+    pub llr: f64,
+    /// Magnetising inductance, H.
+    pub lm: f64,
+    /// Pole pairs.
+    pub pole_pairs: u32,
+}
+
+impl Default for MachineSettings {
+    fn default() -> Self {
+        Self { rs: 5.4, rr: 1.1, lls: 0.0276, llr: 0.0276, lm: 0.1771, pole_pairs: 2 }
+    }
+}
+
+/// Size of the saliency. The defaults are assumed; all zero (with any `psi_n`) is the textbook
+/// machine.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SaliencySettings {
+    /// Part fixed to the rotor flux, at the flux `psi_n`; negative is high impedance along it.
+    pub a_psi: f64,
+    /// Part fixed to the stator current, 1/A; positive is low impedance along it (saturating
+    /// leakage paths).
+    pub b1: f64,
+    /// Resistive part of Eq. 3.8, as a factor of it: 0 is none, 1 as printed. Acts well above
+    /// 60 Hz only.
+    pub chi: f64,
+    /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
+    pub psi_n: Option<f64>,
+}
+
+impl Default for SaliencySettings {
+    fn default() -> Self {
+        Self { a_psi: -0.035, b1: 0.036, chi: 0.0, psi_n: None }
+    }
+}
+
+impl SaliencySettings {
+    /// No saliency: the textbook machine.
+    pub const NONE: Self = Self { a_psi: 0.0, b1: 0.0, chi: 0.0, psi_n: None };
+}
+
+/// Electrical state of the machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MachineState {
+    /// Stator current, A.
+    pub i: Complex,
+    /// Rotor flux linkage, Wb.
+    pub psi: Complex,
+    /// Stator current behind the 60 Hz low-pass filter of the `chi` term, A; unused when that is 0.
+    pub i_lp: Complex,
+}
+
+/// Coefficients of the machine equations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Machine {
+    pub(crate) pole_pairs: f64,
+    pub(crate) coupling: f64,
+    alpha: f64,
+    rr_coupling: f64,
+    r_prime: f64,
+    sigma_ls: f64,
+    inv_sigma_ls: f64,
+    lm: f64,
+    lr: f64,
+    torque_factor: f64,
+    two_a_psi: f64,
+    b1: f64,
+    psi_n_squared: f64,
+    half_chi_r: f64,
+}
+
+impl Machine {
+    /// The machine with these settings.
+    ///
+    /// Refused are values that are not finite or outside the range named in the error, and
+    /// saliency that could reach `|s| > 0.5` with any current up to 5 A and any flux up to
+    /// `lm` 5 A. (The largest `|s|` is the sum of the largest lengths of its two parts, as their
+    /// directions are independent; the flux part grows with the flux.)
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
+    pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
+        check("machine.rs", m.rs, 0.01..=1000.0, "ohm")?;
+        check("machine.rr", m.rr, 0.01..=1000.0, "ohm")?;
+        check("machine.lls", m.lls, 1e-5..=10.0, "H")?;
+        check("machine.llr", m.llr, 1e-5..=10.0, "H")?;
+        check("machine.lm", m.lm, 1e-4..=100.0, "H")?;
+        check("machine.pole_pairs", f64::from(m.pole_pairs), 1.0..=50.0, "")?;
+        check("saliency.a_psi", s.a_psi, -0.25..=0.25, "")?;
+        check("saliency.b1", s.b1, -0.1..=0.1, "1/A")?;
+        check("saliency.chi", s.chi, 0.0..=10.0, "")?;
+        let psi_n = s.psi_n.unwrap_or(0.7 * m.lm);
+        check("saliency.psi_n", psi_n, 1e-4..=100.0, "Wb")?;
+        refuse_singular(m, s, psi_n)?;
+
+        let (ls, lr) = (m.lls + m.lm, m.llr + m.lm);
+        let coupling = m.lm / lr;
+        let sigma_ls = ls - m.lm * coupling;
+        let pole_pairs = f64::from(m.pole_pairs);
+        Ok(Self {
+            pole_pairs,
+            coupling,
+            alpha: m.rr / lr,
+            rr_coupling: m.rr * coupling,
+            r_prime: m.rs + m.rr * coupling * coupling,
+            sigma_ls,
+            inv_sigma_ls: 1.0 / sigma_ls,
+            lm: m.lm,
+            lr,
+            torque_factor: 1.5 * pole_pairs * coupling,
+            two_a_psi: 2.0 * s.a_psi,
+            b1: s.b1,
+            psi_n_squared: psi_n * psi_n,
+            half_chi_r: 0.5 * s.chi * m.rr * coupling * coupling,
+        })
+    }
+
+    /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A).
+    pub fn torque_factor(&self) -> f64 {
+        self.torque_factor
+    }
+
+    /// Pole pairs.
+    pub fn pole_pairs(&self) -> f64 {
+        self.pole_pairs
+    }
+
+    /// Transient inductance `sigma Ls`, H.
+    pub fn sigma_ls(&self) -> f64 {
+        self.sigma_ls
+    }
+
+    /// Rotor time constant `Lr/rr`, s.
+    pub fn tau_r(&self) -> f64 {
+        1.0 / self.alpha
+    }
+
+    /// The saliency vector `s`: its length is the relative saliency, half its angle the axis of
+    /// low impedance.
+    #[inline]
+    pub fn saliency(&self, x: &MachineState) -> Complex {
+        // (psi/psi_n)^2 2/(1 + r) = 2 psi^2 / (psi_n^2 + |psi|^2)
+        let flux_part = self.two_a_psi / (self.psi_n_squared + square(x.psi));
+        let length = square(x.i).sqrt();
+        let current_part = if length > NO_CURRENT {
+            let inverse = 1.0 / length;
+            self.b1 * inverse.min(SALIENCY_CURRENT_A * inverse * inverse)
+        } else {
+            0.0
+        };
+        x.psi * x.psi * flux_part + x.i * x.i * current_part
+    }
+
+    /// Electromagnetic torque, N m: Eq. 4.4 in terms of stator current and rotor flux.
+    #[inline]
+    pub fn torque(&self, x: &MachineState) -> f64 {
+        self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
+    }
+
+    /// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
+    pub fn rotor_current(&self, x: &MachineState) -> Complex {
+        (x.psi - x.i * self.lm) / self.lr
+    }
+
+    /// `(alpha - j w) psi`, the flux decay seen from the stator.
+    #[inline]
+    fn decay(&self, psi: Complex, w: f64) -> Complex {
+        Complex::new(self.alpha * psi.re + w * psi.im, self.alpha * psi.im - w * psi.re)
+    }
+
+    /// Voltage left for the transient inductance, without the terminal voltage.
+    #[inline]
+    fn drive_voltage(&self, x: &MachineState, decay: Complex) -> Complex {
+        let y = decay * self.coupling - x.i * self.r_prime;
+        if self.half_chi_r == 0.0 {
+            return y;
+        }
+        let h = x.i - x.i_lp;
+        let flux = square(x.psi);
+        let u = if flux > NO_FLUX_SQUARED { x.psi * x.psi / flux } else { Complex::ZERO };
+        y - (h - u * h.conj()) * self.half_chi_r
+    }
+
+    /// Time derivative of the state without that of the current.
+    #[inline]
+    fn rest(&self, x: &MachineState, decay: Complex) -> MachineState {
+        MachineState {
+            i: Complex::ZERO,
+            psi: x.i * self.rr_coupling - decay,
+            i_lp: (x.i - x.i_lp) * CHI_CORNER,
+        }
+    }
+
+    /// Time derivative of the state at terminal voltage `v` (V) and electrical speed `w` (rad/s).
+    #[inline]
+    pub fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
+        let decay = self.decay(x.psi, w);
+        let y = v + self.drive_voltage(x, decay);
+        let s = self.saliency(x);
+        let scale = self.inv_sigma_ls / (1.0 - square(s));
+        MachineState { i: (y + s * y.conj()) * scale, ..self.rest(x, decay) }
+    }
+
+    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit vector
+    /// `axis`, where the terminal voltage has the component `v_axis`. Also returns the terminal
+    /// voltage, whose other component follows from the machine.
+    pub(crate) fn derivative_on_line(
+        &self,
+        x: &MachineState,
+        v_axis: f64,
+        axis: Complex,
+        w: f64,
+    ) -> (MachineState, Complex) {
+        let decay = self.decay(x.psi, w);
+        let internal = self.drive_voltage(x, decay);
+        let s = self.saliency(x);
+        // Column of L x = sigma Ls (x - s x*) for x along the axis.
+        let column = (axis - s * axis.conj()) * self.sigma_ls;
+        let rate = (v_axis + dot(internal, axis)) / dot(column, axis);
+        let rates = MachineState { i: axis * rate, ..self.rest(x, decay) };
+        (rates, column * rate - internal)
+    }
+
+    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the terminal voltage.
+    pub(crate) fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
+        let decay = self.decay(x.psi, w);
+        (self.rest(x, decay), -self.drive_voltage(x, decay))
+    }
+}
+
+/// Refuses saliency that could come near the singularity; see [`Machine::new`].
+fn refuse_singular(
+    m: &MachineSettings,
+    s: &SaliencySettings,
+    psi_n: f64,
+) -> Result<(), PlantError> {
+    let r = (m.lm * SALIENCY_CURRENT_A / psi_n).powi(2);
+    let per_a_psi = 2.0 * r / (1.0 + r);
+    let (flux_part, current_part) = (s.a_psi.abs() * per_a_psi, s.b1.abs() * SALIENCY_CURRENT_A);
+    let saliency = flux_part + current_part;
+    if saliency <= SALIENCY_LIMIT {
+        return Ok(());
+    }
+    let (key, value, max, unit) = if flux_part > current_part {
+        let rest = (SALIENCY_LIMIT - current_part).max(0.0);
+        ("saliency.a_psi", s.a_psi, (rest / per_a_psi).min(0.25), "")
+    } else {
+        let rest = (SALIENCY_LIMIT - flux_part).max(0.0);
+        ("saliency.b1", s.b1, rest / SALIENCY_CURRENT_A, "1/A")
+    };
+    Err(PlantError::TooSalient { key, value, min: -max, max, unit, saliency })
+}

@@ -1,0 +1,264 @@
+//! The board: the core, its chip, and the motor, from one period to the next.
+
+mod control;
+mod exceptions;
+mod motor;
+mod options;
+mod outside;
+pub mod poison;
+pub mod snapshot;
+
+use std::collections::VecDeque;
+
+use anyhow::{Result, anyhow, bail, ensure};
+use drive_core::Sample;
+use hil_sim::plant::Plant;
+
+pub use control::{LongestPath, Period};
+pub use motor::Disturbance;
+use motor::PowerStage;
+pub use options::Options;
+
+use crate::addresses::Addresses;
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::cpu::Cpu;
+use crate::image::Image;
+use crate::log::Log;
+use crate::memory;
+use crate::periph::Reset;
+use crate::periph::tim1::GateLimits;
+use control::RunningInterrupt;
+
+/// Periods after which the log is fetched, before its buffer in RAM is full.
+const PERIODS_PER_LOG: u32 = 100;
+
+/// Turns of the loop without time passing: exceptions nest a few deep.
+const IDLE_LIMIT: u32 = 100_000;
+
+/// The board.
+pub struct Board {
+    cpu: Cpu,
+    image: Image,
+    log: Log,
+    lines: Vec<String>,
+    since_log: u32,
+    /// The motor with everything around it.
+    pub plant: Plant,
+    stage: PowerStage,
+    gates: GateLimits,
+    sleeping: bool,
+    hung: bool,
+    /// The core executes nothing before this.
+    stalled_until: u64,
+    entered: Option<RunningInterrupt>,
+    periods: VecDeque<Period>,
+    addresses: Addresses,
+    /// Changes every sample, if wanted.
+    pub disturb: Option<Disturbance>,
+    /// The check that control interrupts leave the preempted code intact, if wanted.
+    pub poison: Option<poison::Poison>,
+    /// When the outputs went off last, ticks.
+    pub went_off: Option<u64>,
+    /// Pulses below the minimum, where they are counted instead of refused; see [`Board::forgive`].
+    pub short_pulses: u64,
+    /// Resets since power-on, in order.
+    pub resets: Vec<(u64, Reset)>,
+    /// The longest control interrupt, when cycles are counted.
+    pub longest: LongestPath,
+    /// The longest way to the compare values.
+    pub longest_to_compares: LongestPath,
+    /// The control interrupt was asked for with [`Board::pend`] at this time, ticks.
+    pended: Option<u64>,
+    /// Longest from there to its first instruction, ticks.
+    pub latest_start: u64,
+    /// The core is stopped before the n-th instruction in the flash from here on, if set, and
+    /// [`Board::run_ticks`] returns.
+    preempt_at: Option<u64>,
+}
+
+impl Board {
+    /// A board that has just been powered, with this image in its flash.
+    ///
+    /// # Errors
+    /// A fault of the image or of the plant's settings.
+    pub fn new(image: Image, options: Options) -> Result<Self> {
+        let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
+        let mut cpu =
+            Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        for segment in image.segments() {
+            let end = segment.address + segment.bytes.len() as u32;
+            let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;
+            ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
+            cpu.write(segment.address, &segment.bytes);
+        }
+        let addresses = Addresses::new(&image)?;
+        let log = Log::new(&image)?;
+        let mut board = Self {
+            cpu,
+            image,
+            log,
+            lines: Vec::new(),
+            since_log: 0,
+            plant,
+            gates: options.gates,
+            stage: PowerStage::default(),
+            sleeping: false,
+            hung: false,
+            stalled_until: 0,
+            entered: None,
+            periods: VecDeque::new(),
+            addresses,
+            disturb: None,
+            poison: None,
+            went_off: None,
+            short_pulses: 0,
+            resets: Vec::new(),
+            longest: LongestPath::default(),
+            longest_to_compares: LongestPath::default(),
+            pended: None,
+            latest_start: 0,
+            preempt_at: None,
+        };
+        board.show_sample();
+        board.cpu.chip_mut().keep_blocks = options.counting.cycles;
+        board.cpu.reset(memory::FLASH);
+        Ok(board)
+    }
+
+    /// The core.
+    pub fn cpu(&mut self) -> &mut Cpu {
+        &mut self.cpu
+    }
+
+    /// A word of memory.
+    pub fn word(&self, address: u32) -> Option<u32> {
+        self.cpu.word(address)
+    }
+
+    /// A byte of memory.
+    pub fn byte(&self, address: u32) -> Option<u8> {
+        let mut byte = [0];
+        self.read(address, &mut byte).then_some(byte[0])
+    }
+
+    /// Reads memory; `false` where there is none.
+    pub fn read(&self, address: u32, bytes: &mut [u8]) -> bool {
+        self.cpu.read(address, bytes)
+    }
+
+    /// Addresses of the firmware's data.
+    pub fn addresses(&self) -> &Addresses {
+        &self.addresses
+    }
+
+    /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
+    pub fn flux_angle(&self) -> f64 {
+        f64::from(self.word(self.addresses.phi).unwrap_or(0)) / 2_f64.powi(32)
+    }
+
+    /// The chip.
+    pub fn chip(&mut self) -> &mut Chip {
+        self.cpu.chip_mut()
+    }
+
+    /// The image.
+    pub fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// The last sample.
+    pub fn sample(&self) -> Sample {
+        self.stage.sample
+    }
+
+    /// Seconds since power-on.
+    pub fn time(&self) -> f64 {
+        self.cpu.chip().now as f64 / TICKS_PER_S as f64
+    }
+
+    /// The oldest control interrupt that has ended and was not asked for yet.
+    pub fn next_period(&mut self) -> Option<Period> {
+        self.periods.pop_front()
+    }
+
+    /// Resets the chip; RAM, flash and the motor stay, unless power was lost.
+    pub fn reset(&mut self, cause: Reset) {
+        let now = self.cpu.chip().now;
+        self.advance_plant(now);
+        self.chip().reset(cause);
+        self.resets.push((now, cause));
+        if cause == Reset::Power {
+            for (base, size) in [(memory::RAM, memory::RAM_SIZE), (memory::CCM, memory::CCM_SIZE)] {
+                // Neither the old contents nor zeros.
+                self.cpu.write(base, &vec![0xa5; size as usize]);
+            }
+        }
+        self.sleeping = false;
+        self.hung = false;
+        self.stalled_until = 0;
+        self.entered = None;
+        self.follow_outputs();
+        self.cpu.reset(memory::FLASH);
+    }
+
+    /// Goes on for a number of PWM periods.
+    ///
+    /// # Errors
+    /// The access, the gate signals or the fault that the model cannot go on with.
+    pub fn run_periods(&mut self, periods: u64) -> Result<()> {
+        for _ in 0..periods {
+            self.run_ticks(TICKS_PER_PERIOD)?;
+            self.since_log += 1;
+            if self.since_log >= PERIODS_PER_LOG {
+                self.since_log = 0;
+                self.drain_log()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on for a number of ticks of 170 MHz.
+    ///
+    /// # Errors
+    /// The access, the gate signals or the fault that the model cannot go on with.
+    pub fn run_ticks(&mut self, ticks: u64) -> Result<()> {
+        let end = self.cpu.chip().now + ticks;
+        let (mut at, mut idle) = (self.cpu.chip().now, 0);
+        while self.cpu.chip().now < end {
+            idle = if at == self.cpu.chip().now { idle + 1 } else { 0 };
+            at = self.cpu.chip().now;
+            if idle > IDLE_LIMIT {
+                bail!("no time passes");
+            }
+            self.events()?;
+            if self.preempt_at.is_some_and(|at| self.cpu.chip().instructions >= at) {
+                self.preempt_at = None;
+                return Ok(());
+            }
+            self.exceptions()?;
+            self.go(end)?;
+        }
+        Ok(())
+    }
+
+    /// Lets due events happen.
+    fn events(&mut self) -> Result<()> {
+        self.follow_outputs();
+        while let Some(at) = self.cpu.chip_mut().catch_up() {
+            self.crest(at)?;
+        }
+        self.follow_outputs();
+        let chip = self.cpu.chip_mut();
+        if let Some(unknown) = chip.unknown.take() {
+            bail!("{unknown} at {}", self.image.location(unknown.at));
+        }
+        if chip.flash.power_lost {
+            chip.reset = Some(Reset::Power);
+        }
+        if let Some(cause) = chip.reset.take() {
+            self.drain_log()?;
+            self.reset(cause);
+        }
+        Ok(())
+    }
+}

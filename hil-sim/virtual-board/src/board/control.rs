@@ -1,0 +1,120 @@
+//! The control interrupt, as seen from outside: its inputs, its outputs and its cycles.
+
+use drive_core::{Compare, Hardware, Sample};
+
+use super::Board;
+use crate::addresses::Addresses;
+use crate::cost::{self, Block};
+
+/// One control interrupt, as seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Period {
+    /// When it began, ticks.
+    pub began: u64,
+    /// Its input from the converters and the encoder.
+    pub sample: Sample,
+    /// Compare values it wrote, and whether the outputs were on after it.
+    pub compare: Compare,
+    /// Whether it took an order from the console.
+    pub took_order: bool,
+    /// Estimated cycles, with entry, exit and bus, when they are counted.
+    pub cycles: u32,
+    /// How many of them go by before the last compare value is written.
+    pub to_compares: u32,
+}
+
+/// The control interrupt that runs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RunningInterrupt {
+    began: u64,
+    sample: Sample,
+    ended: bool,
+    had_order: bool,
+    accesses: u64,
+}
+
+/// The longest path through the control interrupt.
+#[derive(Clone, Debug, Default)]
+pub struct LongestPath {
+    /// Estimated cycles.
+    pub cycles: u32,
+    /// Accesses to registers.
+    pub accesses: u32,
+    /// The blocks executed.
+    pub blocks: Vec<Block>,
+}
+
+impl Board {
+    /// Whether an order waits for the control interrupt.
+    fn has_order(&self) -> bool {
+        let Addresses { orders, order_waits, .. } = self.addresses;
+        let mailbox = self.word(orders);
+        mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
+    }
+
+    pub(super) fn begin_control(&mut self) {
+        let had_order = self.has_order();
+        let chip = self.cpu.chip_mut();
+        chip.begin_interrupt();
+        let mut hardware = Hardware::empty();
+        if chip.adc.over_current() {
+            hardware |= Hardware::ANALOG_WATCHDOG;
+        }
+        if chip.tim1.broken() {
+            hardware |= Hardware::BREAK;
+        }
+        let ended = chip.adc.ended();
+        if ended[0] && !ended[1] {
+            hardware |= Hardware::CONVERTER_OVERRUN;
+        }
+        let [one, two] = chip.adc.data();
+        let sample = Sample {
+            current_a: one[0],
+            current_b: two[0],
+            dc_link: one[1],
+            heat_sink: two[1],
+            encoder: chip.tim2.count(),
+            hardware,
+        };
+        let (began, accesses) = (chip.now, chip.accesses);
+        if let Some(at) = self.pended.take() {
+            self.latest_start = self.latest_start.max(began - at);
+        }
+        self.entered =
+            Some(RunningInterrupt { began, sample, ended: ended[0], had_order, accesses });
+    }
+
+    pub(super) fn end_control(&mut self) {
+        let Some(entered) = self.entered.take() else { return };
+        let took_order = entered.had_order && !self.has_order();
+        let chip = self.cpu.chip_mut();
+        let (compared, up_to) = chip.compared;
+        let way = |blocks: &[Block], accesses: u64| {
+            let accesses = (accesses - entered.accesses) as u32;
+            (cost::of(blocks) + cost::ENTRY + accesses * cost::BUS, accesses)
+        };
+        let (cycles, accesses) = way(&chip.blocks, chip.accesses);
+        let cycles = cycles + cost::EXIT;
+        let (to_compares, accesses_before) = way(&chip.blocks[..compared], up_to);
+        let note = |longest: &mut LongestPath, cycles, accesses, blocks: &[Block]| {
+            if cycles > longest.cycles && !blocks.is_empty() {
+                *longest = LongestPath { cycles, accesses, blocks: blocks.to_vec() };
+            }
+        };
+        note(&mut self.longest, cycles, accesses, &chip.blocks);
+        note(&mut self.longest_to_compares, to_compares, accesses_before, &chip.blocks[..compared]);
+        if entered.ended {
+            let [a, b, c] = chip.tim1.written().map(|value| value as u16);
+            let compare = Compare { a, b, c, enabled: chip.tim1.outputs_on() };
+            let period = Period {
+                began: entered.began,
+                sample: entered.sample,
+                compare,
+                took_order,
+                cycles,
+                to_compares,
+            };
+            self.periods.push_back(period);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Lets the core run or sleep, and takes it into exceptions and back.
+
+use anyhow::{Context, Result, bail};
+
+use super::Board;
+use crate::chip::CONTROL_INTERRUPT;
+use crate::cpu::{Fault, Register, Stop};
+use crate::memory;
+use crate::scs;
+
+impl Board {
+    /// Takes the exception that is due.
+    pub(super) fn exceptions(&mut self) -> Result<()> {
+        let (primask, basepri) = self.masks();
+        let Some(exception) = self.cpu.chip().scs.due(primask, basepri) else { return Ok(()) };
+        self.enter(exception)
+    }
+
+    fn masks(&self) -> (u32, u32) {
+        (self.cpu.get(Register::PRIMASK), self.cpu.get(Register::BASEPRI))
+    }
+
+    fn enter(&mut self, exception: u16) -> Result<()> {
+        self.sleeping = false;
+        if exception == CONTROL_INTERRUPT {
+            self.begin_control();
+        }
+        let vector = self.cpu.chip().scs.vector(exception);
+        let handler = self.cpu.word(vector).context("no vector")?;
+        self.cpu.chip_mut().scs.begin(exception);
+        if exception == CONTROL_INTERRUPT {
+            self.remember();
+        }
+        let stacked = self.cpu.enter(exception, handler & !1);
+        if exception == CONTROL_INTERRUPT {
+            self.spoil();
+        }
+        if !stacked && exception != scs::HARD_FAULT {
+            // The stack is at its end: the frame is lost, and the fault is taken instead.
+            self.hard_fault(1 << 12, None)?;
+        }
+        Ok(())
+    }
+
+    fn hard_fault(&mut self, cfsr: u32, address: Option<u32>) -> Result<()> {
+        let pc = self.cpu.get(Register::PC);
+        let chip = self.cpu.chip_mut();
+        if chip.scs.running() < 0 && chip.forgiving {
+            // Locked up, until a reset.
+            chip.lock_up();
+            self.hung = true;
+            return Ok(());
+        }
+        if chip.scs.running() < 0 {
+            let place = self.image.location(pc);
+            bail!("lock-up: a fault in a fault handler at {place}");
+        }
+        chip.scs.cfsr |= cfsr;
+        chip.scs.hfsr |= 1 << 30;
+        if let Some(address) = address {
+            chip.scs.bfar = address;
+            chip.scs.cfsr |= 1 << 15;
+        }
+        self.enter(scs::HARD_FAULT)
+    }
+
+    /// Lets the core run, or time pass if it sleeps.
+    pub(super) fn go(&mut self, end: u64) -> Result<()> {
+        let chip = self.cpu.chip_mut();
+        chip.deadline = chip.next_event().min(end);
+        if self.stalled_until > chip.now {
+            chip.now = chip.now.max(chip.deadline.min(self.stalled_until));
+            return Ok(());
+        }
+        if self.hung || self.sleeping {
+            if self.sleeping && chip.scs.wakes() {
+                self.sleeping = false;
+                return Ok(());
+            }
+            chip.now = chip.now.max(chip.deadline);
+            return Ok(());
+        }
+        if chip.attention || chip.reset.is_some() {
+            return Ok(());
+        }
+        // A pending exception is taken at the instruction that lifts its mask: stop at every instruction.
+        if chip.scs.waits() {
+            chip.deadline = chip.now + 1;
+        }
+        if let Some(at) = self.preempt_at {
+            chip.deadline =
+                chip.deadline.min(chip.now + at.saturating_sub(chip.instructions).max(1));
+        }
+        match self.cpu.run() {
+            Stop::Asked => {}
+            Stop::Wait => self.sleeping = true,
+            Stop::Return(exc_return) => self.leave(exc_return)?,
+            Stop::Fault(Fault::Access(address))
+                if memory::is_reserved(address) || self.cpu.chip().forgiving =>
+            {
+                self.hard_fault(1 << 9, Some(address))?;
+            }
+            Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
+            Stop::Fault(Fault::Access(address)) => {
+                let place = self.image.location(self.cpu.chip().at);
+                bail!("access to {address:#010x} at {place}");
+            }
+        }
+        Ok(())
+    }
+
+    fn leave(&mut self, exc_return: u32) -> Result<()> {
+        let ended = self.cpu.chip_mut().scs.end();
+        if ended == Some(CONTROL_INTERRUPT) {
+            self.end_control();
+        }
+        if ended.is_none() || !self.cpu.leave(exc_return) {
+            self.hard_fault(1 << 11, None)?;
+        } else if ended == Some(CONTROL_INTERRUPT) {
+            self.compare_with_before()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! Options of a board.
+
+use hil_sim::config::Config;
+use hil_sim::plant::{MeasurementSettings, PlantSettings};
+
+use crate::chip::TICKS_PER_S;
+use crate::cpu::Counting;
+use crate::periph::tim1::GateLimits;
+use induction_drive::board as firmware_board;
+
+/// Options of a board.
+pub struct Options {
+    /// The motor and everything around it; see [`Options::plant`].
+    pub plant: PlantSettings,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// Counting of cycles and instructions.
+    pub counting: Counting,
+    /// Limits of the gate signals.
+    pub gates: GateLimits,
+}
+
+impl Options {
+    /// The plant that a configuration describes, with the sensors and the dead time of this board.
+    pub fn plant(config: &Config) -> PlantSettings {
+        let mut plant = hil_sim::rig::plant_settings(config);
+        // The converters have another reference than the source's.
+        let gain =
+            f64::from(firmware_board::CURRENT_A.gain / drive_core::settings::Line::CHANNEL_A.gain);
+        plant.measurement.lsb_a = MeasurementSettings::default().lsb_a * gain;
+        plant.inverter.dead_time_us =
+            f64::from(firmware_board::dead_time(firmware_board::DEAD_TIME_S).1) * 1e6;
+        plant.inverter.timer_top = firmware_board::PWM_TOP;
+        plant
+    }
+
+    /// A board with the motor of a configuration.
+    pub fn new(config: &Config, seed: u64) -> Self {
+        let us = firmware_board::CYCLES_PER_US;
+        let gates = GateLimits {
+            // As the firmware asks for; the timer makes it a little longer.
+            dead_time: (f64::from(firmware_board::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
+            // A microsecond, less the rounding to counts.
+            pulse: us - 2,
+        };
+        Self {
+            plant: Self::plant(config),
+            seed,
+            counting: Counting { cycles: true, every_instruction: false },
+            gates,
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Inputs of a board from outside, faults among them, and its console and log.
+
+use anyhow::Result;
+
+use super::Board;
+use crate::chip::CONTROL_INTERRUPT;
+
+impl Board {
+    /// Puts a line, without its end, on the wire to the console.
+    pub fn type_line(&mut self, line: &str) {
+        self.send(line.as_bytes());
+        self.send(b"\n");
+    }
+
+    /// Puts bytes on the wire to the console.
+    pub fn send(&mut self, bytes: &[u8]) {
+        let chip = self.chip();
+        chip.lpuart.wire.to_chip.extend(bytes);
+        chip.lpuart.wake(chip.now);
+    }
+
+    /// The output of the console since the last call.
+    pub fn take_console(&mut self) -> String {
+        let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    /// The log since the last call.
+    ///
+    /// # Errors
+    /// The log cannot be decoded.
+    pub fn take_log(&mut self) -> Result<Vec<String>> {
+        self.drain_log()?;
+        Ok(std::mem::take(&mut self.lines))
+    }
+
+    pub(super) fn drain_log(&mut self) -> Result<()> {
+        let lines = self.log.take(&mut self.cpu)?;
+        self.lines.extend(lines);
+        Ok(())
+    }
+
+    /// Level of the break pin: low trips.
+    pub fn set_fault_pin(&mut self, high: bool) {
+        self.chip().tim1.set_fault_pin(high);
+    }
+
+    /// The crystal stops, or lives again.
+    pub fn set_crystal(&mut self, lives: bool) {
+        self.chip().rcc.crystal_lives = lives;
+    }
+
+    /// The core executes nothing any more, until a reset.
+    pub fn hang(&mut self) {
+        self.hung = true;
+    }
+
+    /// The core executes nothing for some ticks, as if the bus were taken.
+    pub fn stall(&mut self, ticks: u64) {
+        self.stalled_until = self.cpu.chip().now + ticks;
+    }
+
+    /// From now on accesses that the model does not know behave as on the chip: reserved registers read as 0,
+    /// other accesses are faults, and a fault in a fault handler locks the core up. For runs in which the
+    /// firmware is damaged on purpose.
+    pub fn forgive(&mut self) {
+        self.cpu.chip_mut().forgiving = true;
+    }
+
+    /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.
+    pub fn stop_after(&mut self, instructions: u64) {
+        self.preempt_at = Some(self.cpu.chip().instructions + instructions);
+    }
+
+    /// Makes an exception pending: it preempts by its priority and the masks.
+    pub fn pend(&mut self, exception: u16) {
+        // A control interrupt that runs already delays only itself.
+        if exception == CONTROL_INTERRUPT && self.entered.is_none() {
+            self.pended = Some(self.cpu.chip().now);
+        }
+        self.chip().scs.pend(exception);
+    }
+}

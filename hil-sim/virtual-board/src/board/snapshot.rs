@@ -1,0 +1,66 @@
+//! Snapshots of a board: a start takes seconds, going back to a snapshot less than a millisecond.
+
+use anyhow::{Result, anyhow};
+use hil_sim::plant::Plant;
+
+use super::Board;
+use super::motor::PowerStage;
+use crate::chip::Chip;
+use crate::cpu::CoreState;
+use crate::periph::Reset;
+
+/// Everything that changes on a board.
+pub struct Snapshot {
+    core: CoreState,
+    chip: Chip,
+    plant: Plant,
+    stage: PowerStage,
+    sleeping: bool,
+    resets: Vec<(u64, Reset)>,
+}
+
+impl Board {
+    /// Keeps the board as it is now, outside an interrupt.
+    ///
+    /// # Errors
+    /// The core cannot be kept; the log cannot be decoded.
+    pub fn keep(&mut self) -> Result<Snapshot> {
+        // The log so far belongs to the time before.
+        self.take_log()?;
+        self.take_console();
+        Ok(Snapshot {
+            core: self.cpu.keep().map_err(|e| anyhow!("emulator: {e:?}"))?,
+            chip: self.cpu.chip().clone(),
+            plant: self.plant.clone(),
+            stage: self.stage,
+            sleeping: self.sleeping,
+            resets: self.resets.clone(),
+        })
+    }
+
+    /// Goes back to a snapshot of this board.
+    ///
+    /// # Errors
+    /// The core cannot go back.
+    pub fn go_back(&mut self, to: &Snapshot) -> Result<()> {
+        self.cpu.go_back(&to.core).map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let forgiving = self.cpu.chip().forgiving;
+        *self.cpu.chip_mut() = to.chip.clone();
+        self.cpu.chip_mut().forgiving = forgiving;
+        self.plant = to.plant.clone();
+        self.stage = to.stage;
+        self.sleeping = to.sleeping;
+        self.resets = to.resets.clone();
+        self.hung = false;
+        self.stalled_until = 0;
+        self.entered = None;
+        self.disturb = None;
+        self.preempt_at = None;
+        self.went_off = None;
+        self.short_pulses = 0;
+        self.periods.clear();
+        self.lines.clear();
+        self.log.forget();
+        Ok(())
+    }
+}

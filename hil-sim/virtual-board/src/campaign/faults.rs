@@ -1,0 +1,74 @@
+//! Faults that several classes share.
+
+use hil_sim::plant::EncoderFault;
+use induction_drive::board as firmware_board;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::board::Board;
+use crate::memory::Region;
+use drive_core::Sample;
+
+/// The code of a current sensor: a, or b.
+pub fn current(a: bool, sample: &mut Sample) -> &mut u16 {
+    if a { &mut sample.current_a } else { &mut sample.current_b }
+}
+
+/// The name of a current sensor.
+pub fn name(a: bool) -> &'static str {
+    if a { "sensor a" } else { "sensor b" }
+}
+
+/// The encoder loses a share of its counts.
+pub fn losing(board: &mut Board, share: f64) -> String {
+    board.plant.set_encoder_fault(EncoderFault::Losing(share));
+    format!("{:.1} %", 100.0 * share)
+}
+
+/// Gaussian noise of an rms value in codes, added to a code.
+pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(rng.random());
+    move |code| {
+        let draw: f64 = StandardNormal.sample(&mut generator);
+        let full_scale = f64::from(firmware_board::ADC_FULL_SCALE);
+        *code = (f64::from(*code) + rms * draw).clamp(0.0, full_scale) as u16;
+    }
+}
+
+/// The sensor of the dc link or of the heat sink sticks, opens, saturates or has noise.
+pub fn slow_sensor(
+    board: &mut Board,
+    rng: &mut dyn Rng,
+    of: fn(&mut Sample) -> &mut u16,
+) -> String {
+    let held = *of(&mut board.sample());
+    let rms = 2_f64.powf(rng.random_range(0.0..10.0));
+    let mut noise = noise(rng, rms);
+    let kind = rng.random_range(0..4_usize);
+    board.disturb = Some(Box::new(move |s| {
+        let code = of(s);
+        match kind {
+            0 => *code = held,
+            1 => *code = 0,
+            2 => *code = firmware_board::ADC_FULL_SCALE,
+            _ => noise(code),
+        }
+    }));
+    match kind {
+        0 => format!("stuck at {held}"),
+        1 => "open".into(),
+        2 => "saturated".into(),
+        _ => format!("{rms:.0} codes of noise"),
+    }
+}
+
+/// Flips a bit of a region.
+pub fn flip(board: &mut Board, rng: &mut dyn Rng, region: Region) -> String {
+    let offset = rng.random_range(0..region.size);
+    let address = region.address + offset;
+    let bit = rng.random_range(0..8);
+    let byte = board.byte(address).unwrap_or(0) ^ 1 << bit;
+    board.cpu().write(address, &[byte]);
+    format!("bit {bit} of {address:#010x}, {offset:#x} from the beginning")
+}
