@@ -20,8 +20,8 @@
 //! is in reset or being flashed, its pins float.
 
 use drive_core::Settings;
-use drive_core::current::sensing::Line;
 use drive_core::io::PERIOD_S;
+use drive_core::settings::Line;
 use drive_core::settings::{Inverter, Scales};
 
 // Clock ---------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::settings::SettingsError;
 use drive_core::{Command, Settings};
 use hil_sim::config::{Config, Demodulator, LoadMode};
-use hil_sim::learn;
+use hil_sim::experiments::learning;
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
 
@@ -117,8 +117,7 @@ fn all_but_the_literal_chain_track() {
     for (name, gain) in ALL {
         let config = config(&[&format!("injection.demodulator={name}")]);
         let demodulator = config.injection.demodulator;
-        let learned = learn::reference_of(demodulator, &config, 7).unwrap();
-        let table = learn::table(&learned).unwrap();
+        let table = learning::reference_of(demodulator, &config, 7).unwrap();
         let mut drive = drive_settings(&config);
         drive.injection.synchronous.reference = table;
         drive.injection.printed.learned = Some(table);

@@ -11,10 +11,10 @@ use drive_core::identify::online::{Doubt, Online, Speed};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
-use hil_sim::tracking::{Case, Moment, run};
+use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 
 /// r_r grows by 30 % between 3 and 6 s.
-const CASE: Case = Case {
+const CASE: WarmingCase = WarmingCase {
     speed_rpm: 150.0,
     iq_a: 2.0,
     excitation: (0.0, 0.0),
@@ -25,7 +25,7 @@ const CASE: Case = Case {
 
 /// The last three seconds: largest relative error of tau_r where there is an estimate and how many there
 /// are, largest flux angle error in degrees.
-fn end(moments: &[Moment]) -> (f64, usize, f64) {
+fn end(moments: &[WarmingMoment]) -> (f64, usize, f64) {
     let last = &moments[moments.len() - 30..];
     let errors: Vec<f64> = last
         .iter()
@@ -43,14 +43,14 @@ fn with_the_encoder_the_angle_stays_right_while_the_rotor_warms_up() {
         let residual = format!("inverter.residual_v={residual}");
         let config = config(&["angle.source=encoder", &residual]);
         for seed in [1, 2] {
-            let case = Case { speed_rpm, iq_a, ..CASE };
+            let case = WarmingCase { speed_rpm, iq_a, ..CASE };
             let (error, count, angle) = end(&run(&config, &case, seed).unwrap());
             println!(
                 "{speed_rpm} rpm {iq_a} A, {residual}: {:.1} %, {angle:.2} deg",
                 100.0 * error
             );
             assert!(error < 0.07 && count == 30 && angle < 1.8, "{error} {count} {angle}");
-            let left = Case { used: false, ..case };
+            let left = WarmingCase { used: false, ..case };
             let (_, _, untracked) = end(&run(&config, &left, seed).unwrap());
             assert!(untracked > 5.0 && untracked > 3.0 * angle, "{untracked}");
         }
@@ -60,11 +60,11 @@ fn with_the_encoder_the_angle_stays_right_while_the_rotor_warms_up() {
 #[test]
 fn without_a_sensor_it_takes_a_flux_that_moves() {
     let config = config(&["inverter.residual_v=0.82"]);
-    let still = run(&config, &Case { used: false, ..CASE }, 3).unwrap();
+    let still = run(&config, &WarmingCase { used: false, ..CASE }, 3).unwrap();
     for moment in &still {
         assert!(moment.estimate.is_err(), "speed and tau_r cannot be told apart: {moment:?}");
     }
-    let moved = run(&config, &Case { used: false, excitation: (0.1, 2.0), ..CASE }, 3).unwrap();
+    let moved = run(&config, &WarmingCase { used: false, excitation: (0.1, 2.0), ..CASE }, 3).unwrap();
     let (error, count, _) = end(&moved);
     assert!(error < 0.06 && count == 30, "{error} {count}");
     for moment in &moved[moved.len() - 30..] {
@@ -81,7 +81,7 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
 fn no_torque_no_estimate() {
     // At i_q = 0 the rotor carries no current: nothing shows its resistance.
     let config = config(&["angle.source=encoder"]);
-    let moments = run(&config, &Case { iq_a: 0.0, seconds: 6.0, ..CASE }, 1).unwrap();
+    let moments = run(&config, &WarmingCase { iq_a: 0.0, seconds: 6.0, ..CASE }, 1).unwrap();
     assert!(moments.iter().all(|m| m.estimate.is_err()));
 }
 

@@ -19,7 +19,7 @@ use core::ops::Range;
 
 use crate::carrier::CarrierSample;
 use crate::carrier::injection::{Carrier, CarrierPeriod};
-use crate::current::inverter_drop::InverterDropState;
+use crate::current::inverter_drop::{DropSample, InverterDropState};
 use crate::current::pi::{DqPiState, ReferenceState};
 use crate::current::sensing::SensingState;
 use crate::fault::Fault;
@@ -140,7 +140,6 @@ impl Drive {
     pub const CHANGES: usize = offset_of!(Self, changes);
 
     /// A drive that is off.
-    #[inline]
     pub fn new(coefficients: Coefficients) -> Self {
         Self {
             c: coefficients,
@@ -161,7 +160,6 @@ impl Drive {
     }
 
     /// Whether [`online`](crate::identify::online) is to be given what the last step saw.
-    #[inline]
     pub fn tracks_rotor(&self) -> bool {
         self.c.track_rotor && self.state.regulates()
     }
@@ -171,8 +169,6 @@ impl Drive {
     ///
     /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
     /// with the outputs off in the same step.
-    // Neither inlined here nor kept from it: compiled for speed, and put into the interrupt, its only caller,
-    // where the image is linked.
     pub fn step(&mut self, sample: &Sample) -> Compare {
         let result =
             if self.state.has_current() { self.regulate(sample) } else { self.prepare(sample) };
@@ -187,18 +183,17 @@ impl Drive {
     ///
     /// # Errors
     /// The state to go to with the outputs off: a fault, or off where it has stopped.
-    #[inline(always)]
     fn regulate(&mut self, sample: &Sample) -> Result<Compare, State> {
         let (c, s) = (&self.c, &mut self.control);
         let measured = c.sensing.step(&s.sensing, sample);
-        c.protect(&s.sensing, sample, &measured)?;
+        c.protect(sample, &measured)?;
         if c.source == AngleSource::Encoder {
             s.seen.rotor_count = sample.encoder;
         }
         let wanted = self.reference()?;
         let held = self.state == State::Magnetising;
         let counts = self.counts();
-        let (c, s) = (&self.c, near(&mut self.control));
+        let (c, s) = (&self.c, &mut self.control);
         let index = s.carrier.advance();
         let reference = Dq {
             d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
@@ -214,7 +209,7 @@ impl Drive {
         } else {
             s.estimator.flux()
         };
-        (s.seen.phi, s.seen.flux_freq) = (flux.phi, flux.step);
+        (s.seen.phi, s.seen.flux_freq) = (flux.phi, flux.freq);
         let phi = flux.phi.unit_vector();
         let axes = &s.axes;
 
@@ -224,7 +219,7 @@ impl Drive {
             if c.inject { s.carrier.at(&c.injection, index) } else { CarrierPeriod::default() };
         let carrier_axis = phi.turned_by(axes.carrier);
         let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
-        let filtered = LPF.step_alpha_beta(&mut s.low_pass, rest);
+        let filtered = LPF.step(&mut s.low_pass, rest);
 
         // Current loop.
         let flux_axis = phi.turned_by(axes.seen);
@@ -249,19 +244,20 @@ impl Drive {
         }
 
         if held {
-            c.inverter_drop.step(
-                &mut s.inverter_drop,
-                (self.elapsed, c.sequence.magnetise),
-                (current, voltage, s.indirect.magnetising),
-                signs.to_abc().to_alpha_beta().to_dq(applied),
-                measured.dc_link,
-            );
+            let sample = DropSample {
+                current,
+                voltage,
+                magnetising: s.indirect.magnetising,
+                signs: signs.to_abc().to_alpha_beta().to_dq(applied),
+                dc_link: measured.dc_link,
+            };
+            c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample);
         }
 
         // Angles for the next sample.
         if c.demodulate {
             let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
-            c.estimator.observe(&mut s.estimator, &sample, flux.step);
+            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
         }
         let rotor_freq = if counts {
             c.indirect.slip(&mut s.indirect, current.q);
@@ -279,7 +275,7 @@ impl Drive {
 
         // What was computed must make sense before it is put out. (The current and the reference of the step
         // before are in the voltage, and what the demodulation sees is in the speed.)
-        if !(voltage.d + voltage.q + flux.step + rotor_freq).is_finite() {
+        if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
         }
 
@@ -293,7 +289,7 @@ impl Drive {
             voltage,
             carrier_axis,
             flux_axis,
-            flux_freq: flux.step,
+            flux_freq: flux.freq,
             rotor_freq,
             held,
             learning: self.mode == Mode::Learning,
@@ -339,7 +335,6 @@ impl Drive {
 
     /// Whether the flux is where the rotor is counted to be, and the slip ahead of it: by the encoder, or where
     /// the shaft is locked.
-    #[inline]
     fn counts(&self) -> bool {
         self.c.source == AngleSource::Encoder || self.mode == Mode::Learning
     }
@@ -352,15 +347,7 @@ impl Drive {
 
 impl ControlState {
     /// Where the rotor is, counted as by an encoder, by the flux less the slip.
-    #[inline]
     fn count_by_flux(&mut self) -> u32 {
         self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
     }
-}
-
-/// The same, at an address that the compiler does not know: relative to it all of the state is near, while
-/// relative to the drive, or as an absolute address, each load and store computes its own.
-#[inline(always)]
-fn near(control: &mut ControlState) -> &mut ControlState {
-    core::hint::black_box(control)
 }

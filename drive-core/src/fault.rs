@@ -20,7 +20,6 @@ macro_rules! faults {
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
             /// What it means, in a few words. (Not inlined: its texts are many, and needed seldom.)
-            #[inline(never)]
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$name => $text,)+ }
             }

@@ -15,6 +15,11 @@ use bitflags::bitflags;
 /// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
 pub const PERIOD_S: f32 = 1.0 / 6000.0;
 
+/// Whole control periods in a time in s, rounded. Not for the control step.
+pub(crate) fn periods(seconds: f32) -> u32 {
+    libm::roundf(seconds / PERIOD_S) as u32
+}
+
 /// What the converters and the encoder read at the instant `k T` of one PWM period.
 ///
 /// Plain register values: scaling is the drive's work, so that there is one place for it.
@@ -77,7 +82,6 @@ impl Compare {
     pub const LOW_SIDES_ON: Self = Self { a: 0, b: 0, c: 0, enabled: true };
 
     /// Outputs on, with the compare values of a, b, c.
-    #[inline]
     pub const fn on([a, b, c]: [u16; 3]) -> Self {
         Self { a, b, c, enabled: true }
     }

@@ -1,13 +1,10 @@
-//! Angles, vectors and their frames, complex numbers.
+//! Angles, vectors and their frames.
 
 pub mod angle;
-pub mod complex;
 pub mod decimal;
-pub mod elementary;
 pub mod frames;
 
 /// `value` within ±`largest`.
-#[inline]
 pub(crate) fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {
         largest

@@ -94,7 +94,6 @@ pub struct MotionState {
 impl Motion {
     /// With the controllers of a design; `counts` of the position per mechanical turn, largest speed
     /// in turns/s, largest acceleration of the reference in turns/s^2, largest current in A.
-    #[inline]
     pub fn new(design: &MotionDesign, counts: u32, limit: f32, ramp: f32, i_q_limit: f32) -> Self {
         let rate = (1.0 / design.period_s) as f32;
         Self {
@@ -175,7 +174,6 @@ pub struct RotorCount {
 
 impl RotorCount {
     /// Follows the rotor to its present angle, less than half a turn away; the count.
-    #[inline]
     pub fn follow(&mut self, rotor: Angle) -> u32 {
         let now = (rotor.to_bits() >> 16) as u16;
         let moved = now.wrapping_sub(self.count as u16) as i16;

@@ -11,7 +11,6 @@ pub mod table;
 use core::fmt;
 
 use crate::carrier::DemodulatorKind;
-use crate::current::sensing::Line;
 use crate::math::decimal::Shortest;
 use crate::tuning::{FirstOrder, TuningError};
 
@@ -62,6 +61,11 @@ impl Motor {
         self.l_ls + self.l_m * (self.l_lr / self.l_r())
     }
 
+    /// (L_m / L_r) L_m, H: what couples the rotor flux to the stator.
+    pub fn coupled_inductance(&self) -> f32 {
+        self.l_m / self.l_r() * self.l_m
+    }
+
     /// Rotor time constant L_r / r_r, s.
     pub fn tau_r(&self) -> f32 {
         self.l_r() / self.r_r
@@ -91,6 +95,33 @@ impl Default for Inverter {
     /// Section 3.9; full compensation from 30 mA on: three times the spread of noise and prediction.
     fn default() -> Self {
         Self { top: 14_167, dead_time_s: 2.2e-6, compensate: true, full_compensation_a: 0.03 }
+    }
+}
+
+/// Calibration line of one channel: `value = gain * code + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Units per code.
+    pub gain: f32,
+    /// Value at code 0.
+    pub offset: f32,
+}
+
+impl Line {
+    /// Channel A of the dissertation's board, Eq. 3.5.
+    pub const CHANNEL_A: Self = Self { gain: 0.002_212_0, offset: -4.472_713_4 };
+    /// Channel B, Eq. 3.5, with all printed digits.
+    #[allow(clippy::excessive_precision)]
+    pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
+
+    /// The line times a factor.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self { gain: factor * self.gain, offset: factor * self.offset }
+    }
+
+    /// Value at a code.
+    pub fn at(self, code: u16) -> f32 {
+        self.gain * f32::from(code) + self.offset
     }
 }
 

@@ -35,9 +35,8 @@ use core::fmt;
 
 use crate::filter::dissertation::LPF;
 use crate::filter::section::{Section, response};
-use crate::math::complex::Complex;
 use crate::math::decimal::{Fixed, Shortest};
-use crate::math::elementary::{atan2, exp_m1, sin_cos};
+use num_complex::Complex64;
 
 mod margins;
 mod motion;
@@ -182,12 +181,12 @@ fn check_plant(k: f64, p: f64) -> Result<(), TuningError> {
 
 impl FirstOrder {
     /// G(e^(j omega_t)).
-    pub fn response(&self, omega_t: f64) -> Complex {
-        Complex::new(self.k, 0.0) / (Complex::unit(omega_t) - Complex::new(self.p, 0.0))
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        Complex64::new(self.k, 0.0) / (Complex64::cis(omega_t) - Complex64::new(self.p, 0.0))
     }
 
     /// Poles of this plant under k_c (z - z_c)/(z - 1), with nothing else in the loop.
-    pub fn closed_loop_poles(&self, k_c: f64, z_c: f64) -> Option<[Complex; 2]> {
+    pub fn closed_loop_poles(&self, k_c: f64, z_c: f64) -> Option<[Complex64; 2]> {
         // (z - 1)(z - p) + k_c k (z - z_c)
         let gain = k_c * self.k;
         roots([gain - 1.0 - self.p, self.p - gain * z_c])
@@ -196,13 +195,13 @@ impl FirstOrder {
 
 impl IntegratorLag {
     /// G(e^(j omega_t)).
-    pub fn response(&self, omega_t: f64) -> Complex {
-        let z = Complex::unit(omega_t);
-        Complex::new(self.k, 0.0) / ((z - Complex::ONE) * (z - Complex::new(self.p, 0.0)))
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        let z = Complex64::cis(omega_t);
+        Complex64::new(self.k, 0.0) / ((z - Complex64::ONE) * (z - Complex64::new(self.p, 0.0)))
     }
 
     /// Poles of this plant under k_c (z - z_c)/(z - 1), with nothing else in the loop.
-    pub fn closed_loop_poles(&self, k_c: f64, z_c: f64) -> Option<[Complex; 3]> {
+    pub fn closed_loop_poles(&self, k_c: f64, z_c: f64) -> Option<[Complex64; 3]> {
         // (z - 1)^2 (z - p) + k_c k (z - z_c)
         let gain = k_c * self.k;
         roots([-2.0 - self.p, 1.0 + 2.0 * self.p + gain, -self.p - gain * z_c])
@@ -228,7 +227,7 @@ pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningErr
     let r = motor.r_s + motor.r_r * (motor.l_m / l_r) * (motor.l_m / l_r);
     let sigma_l_s = motor.l_m + motor.l_ls - motor.l_m * motor.l_m / l_r;
     let exponent = -period_s * r / sigma_l_s;
-    let decay = -exp_m1(exponent);
+    let decay = -libm::expm1(exponent);
     let plant = FirstOrder { k: decay / r, p: 1.0 - decay };
     check_plant(plant.k, plant.p)?;
     Ok(plant)
@@ -241,11 +240,11 @@ pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningErr
 pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<Rule, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
-    let wanted = 100.0 * (PI / 180.0) + atan2(4.0, 1.0);
+    let wanted = 100.0 * (PI / 180.0) + libm::atan2(4.0, 1.0);
     // The lag of G/(z - 1) grows from 90° at dc to 360° at half the sampling rate: one solution.
     let lag = |omega_t: f64| {
-        let z = Complex::unit(omega_t);
-        (z - Complex::new(plant.p, 0.0)).arg() + (0.5 * PI + 0.5 * omega_t)
+        let z = Complex64::cis(omega_t);
+        (z - Complex64::new(plant.p, 0.0)).arg() + (0.5 * PI + 0.5 * omega_t)
     };
     let (mut low, mut high) = (0.0, PI);
     for _ in 0..60 {
@@ -256,11 +255,11 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<Rule, TuningError> {
             high = middle;
         }
     }
-    let (sin, cos) = sin_cos(0.5 * low);
+    let (sin, cos) = libm::sincos(0.5 * low);
     let half_v_t = sin / cos;
     let z_c = zero_at(half_v_t / 4.0);
     Ok(Rule {
-        k_c: 1.0 / (pi_response(1.0, z_c, low) * plant.response(low)).abs(),
+        k_c: 1.0 / (pi_response(1.0, z_c, low) * plant.response(low)).norm(),
         z_c,
         v: 2.0 / period_s * half_v_t,
     })
@@ -272,9 +271,9 @@ fn zero_at(half_w_t: f64) -> f64 {
 }
 
 /// C(e^(j omega_t)) of k_c (z - z_c)/(z - 1) (3.35).
-pub fn pi_response(k_c: f64, z_c: f64, omega_t: f64) -> Complex {
-    let z = Complex::unit(omega_t);
-    (z - Complex::new(z_c, 0.0)) * k_c / (z - Complex::ONE)
+pub fn pi_response(k_c: f64, z_c: f64, omega_t: f64) -> Complex64 {
+    let z = Complex64::cis(omega_t);
+    (z - Complex64::new(z_c, 0.0)) * k_c / (z - Complex64::ONE)
 }
 
 /// Margins of k_c (z - z_c)/(z - 1) with `plant`, the cascade `filter` and `delay` periods.
@@ -303,17 +302,17 @@ fn current_loop(
     plant: FirstOrder,
     filter: &[Section],
     delay: f64,
-) -> impl Fn(f64) -> Complex {
+) -> impl Fn(f64) -> Complex64 {
     move |omega_t| {
         pi_response(1.0, z_c, omega_t)
             * plant.response(omega_t)
             * response(filter, omega_t)
-            * Complex::unit(-delay * omega_t)
+            * Complex64::cis(-delay * omega_t)
     }
 }
 
 fn margins_or_error(
-    open_loop: &dyn Fn(f64) -> Complex,
+    open_loop: &dyn Fn(f64) -> Complex64,
     integrators: u8,
     z_c: f64,
     period_s: f64,

@@ -5,12 +5,12 @@ use core::f64::consts::{PI, TAU};
 use drive_core::filter::dissertation::{LPF, LPF_AS_PRINTED};
 use drive_core::filter::section::Section;
 use drive_core::filter::sos::SosState;
-use drive_core::math::complex::Complex;
 use drive_core::tuning::{
     DELAY, FirstOrder, IntegratorLag, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, Motor, TuningError,
     current_loop_margins, design_current_loop, design_motion_loops, motor_plant, pi_response,
     roots, rule_3_8,
 };
+use num_complex::Complex64;
 use proptest::prelude::*;
 
 const T: f64 = 1.0 / 6000.0;
@@ -59,15 +59,20 @@ fn rule_of_section_3_8() {
 
         // It is what the section says: phase of G/(z - 1), zero at a quarter (2.16), unit gain.
         let omega_t = 2.0 * libm::atan(0.5 * T * rule.v);
-        let g = plant.response(omega_t) / (Complex::unit(omega_t) - Complex::ONE);
-        let phase = g.arg_deg();
+        let g = plant.response(omega_t) / (Complex64::cis(omega_t) - Complex64::ONE);
+        let phase = g.arg().to_degrees();
         assert_close("phase", if phase > 0.0 { phase - 360.0 } else { phase }, -175.963_757, 1e-8);
         let w = 2.0 / T * (rule.z_c - 1.0) / (rule.z_c + 1.0);
         assert_close("w", w, -rule.v / 4.0, 1e-12);
         let l = pi_response(rule.k_c, rule.z_c, omega_t) * plant.response(omega_t);
-        assert_close("gain", l.abs(), 1.0, 1e-12);
+        assert_close("gain", l.norm(), 1.0, 1e-12);
         // The zero's atan(vT/2) of Eq. 2.27 is what the rule leaves out: 6.1° for 3.34.
-        assert_close("phase with the zero", l.arg_deg(), -100.0 + 0.5 * omega_t * 180.0 / PI, 1e-9);
+        assert_close(
+            "phase with the zero",
+            l.arg().to_degrees(),
+            -100.0 + 0.5 * omega_t * 180.0 / PI,
+            1e-9,
+        );
     }
     // What is printed was read off a graph: within 1 %.
     let rule = rule_3_8(EQ_3_34, T).expect("3.34");
@@ -114,7 +119,7 @@ fn what_the_rule_leaves_on_the_motor() {
 /// response to a step of the reference dies out.
 fn settles(k_c: f64, z_c: f64) -> bool {
     let plant = table_5();
-    let mut filter = SosState::ZERO;
+    let mut filter = SosState::default();
     let (mut i, mut u, mut delayed, mut e_before) = (0.0, 0.0, 0.0, 0.0);
     let mut late = 0.0f64;
     for k in 0..12_000 {
@@ -184,7 +189,7 @@ fn current_loops_of_the_dissertation() {
 fn position_loop_as_printed_is_unstable() {
     let largest = |k_c: f64, z_c: f64| {
         let poles = EQ_4_1.closed_loop_poles(k_c, z_c).expect("finite");
-        poles.iter().fold(0.0f64, |m, p| m.max(p.abs()))
+        poles.iter().fold(0.0f64, |m, p| m.max(p.norm()))
     };
     assert_close("|z| of 4.1 with 4.2", largest(6.466, 0.974), 1.0462, 5e-5);
     // Stable up to 0.926 with that zero.
@@ -196,7 +201,7 @@ fn position_loop_as_printed_is_unstable() {
     let mut before = -180.0;
     for n in 1..3000 {
         let w = PI * f64::from(n) / 3000.0;
-        let lag_of_pole = (Complex::unit(w) - Complex::new(EQ_4_1.p, 0.0)).arg_deg();
+        let lag_of_pole = (Complex64::cis(w) - Complex64::new(EQ_4_1.p, 0.0)).arg().to_degrees();
         let phase = -(180.0 + w * 180.0 / PI) - lag_of_pole;
         assert!(phase < before);
         before = phase;
@@ -283,19 +288,19 @@ fn errors_name_the_value_and_its_range() {
 fn roots_of_known_polynomials() {
     // (z - 0.5)(z + 0.25)(z^2 + 0.81)
     let c = [-0.25, 0.81 - 0.125, -0.25 * 0.81, -0.125 * 0.81];
-    let mut found = roots(c).expect("finite").map(Complex::abs);
+    let mut found = roots(c).expect("finite").map(|z| z.norm());
     found.sort_by(f64::total_cmp);
     for (found, expected) in found.iter().zip([0.25, 0.5, 0.9, 0.9]) {
         assert!((found - expected).abs() < 1e-13);
     }
     // Double and triple roots at 1, as integrators give them.
     for root in roots([-2.0, 1.0]).expect("double") {
-        assert!((root - Complex::ONE).abs() < 1e-7);
+        assert!((root - Complex64::ONE).norm() < 1e-7);
     }
     for root in roots([-3.0, 3.0, -1.0]).expect("triple") {
-        assert!((root - Complex::ONE).abs() < 1e-4);
+        assert!((root - Complex64::ONE).norm() < 1e-4);
     }
-    assert_eq!(roots([0.0; 3]).map(|r| r.map(|z| z.abs() < 1e-4)), Some([true; 3]));
+    assert_eq!(roots([0.0; 3]).map(|r| r.map(|z| z.norm() < 1e-4)), Some([true; 3]));
     assert!(roots([f64::NAN]).is_none() && roots([0.0, f64::INFINITY]).is_none());
 }
 

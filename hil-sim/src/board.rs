@@ -1,7 +1,7 @@
-//! `cargo sim board`: the image that is flashed, on the virtual board, with a serial port to talk to it.
+//! `cargo sim board`: the flashed image on the virtual board, with a serial port.
 //!
-//! The virtual board is a program of its own: its emulator is GPL-2.0, so that nothing here links it. This
-//! module knows its options, builds the image and becomes that program.
+//! The virtual board is a separate program, because its emulator is GPL-2.0 and must not be linked here.
+//! This module parses the options, builds the image and replaces this process by that program.
 
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -9,17 +9,17 @@ use std::process::{Command, Stdio};
 
 use clap::Args;
 
-use crate::cli::{Input, OUT};
 use crate::config::{Config, Value};
 use crate::error::Error;
+use crate::input::{Input, OUT};
 
-/// What a session with the virtual board is asked for.
+/// Options of a session with the virtual board.
 #[derive(Args)]
 pub struct Options {
     /// Motor, seed and duration.
     #[command(flatten)]
     pub input: Input,
-    /// What is coupled to the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
+    /// Load on the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
     #[arg(long, value_names = ["LOAD", "RPM"], num_args = 1..=2, allow_negative_numbers = true)]
     pub load: Option<Vec<String>>,
     /// Types the lines of a file: `at SECONDS: LINE`, `wait SECONDS: LINE`, `wait for TEXT`; ends after it
@@ -31,16 +31,16 @@ pub struct Options {
     /// Folder of the page
     #[arg(long, value_name = "DIR", default_value = OUT)]
     pub out: PathBuf,
-    /// The firmware's ELF [default: what `cargo firmware` builds]
+    /// The firmware's ELF [default: the image that `cargo firmware` builds]
     #[arg(long, value_name = "FILE")]
     pub elf: Option<PathBuf>,
 }
 
 impl Options {
-    /// The configuration of the motor and of what is around it.
+    /// The configuration of motor, inverter, measurement and load.
     ///
     /// # Errors
-    /// What is wrong with it, by name.
+    /// As [`Input::config`]; [`Error::Refused`] when `--load` is not one of its forms.
     pub fn config(&self) -> Result<Config, Error> {
         let mut config = self.input.config()?;
         let words: Vec<&str> = self.load.iter().flatten().map(String::as_str).collect();
@@ -61,12 +61,9 @@ impl Options {
         Ok(config)
     }
 
-    /// What has to be typed to have this board again.
+    /// The command line that repeats this session with this configuration.
     pub fn command(&self, config: &Config) -> String {
-        let mut command = format!("cargo sim board --seed {}", self.input.seed);
-        for change in config.changes() {
-            command.push_str(&format!(" --set {change}"));
-        }
+        let mut command = self.input.command("board", config);
         if let Some(script) = &self.script {
             command.push_str(&format!(" --script {}", script.display()));
         }
@@ -77,13 +74,13 @@ impl Options {
     }
 }
 
-/// Builds the image, unless one is named, and becomes the program of the virtual board, with the arguments
-/// of this process behind `board`.
+/// Builds the image, unless one is named, and replaces this process by the virtual board, which gets the
+/// arguments behind `board`. Returns on failure only.
 ///
 /// # Errors
-/// What is wrong with the options; the image cannot be built; cargo does not run.
+/// As [`Options::config`]; [`Error::Internal`] when the image cannot be built or cargo does not run.
 pub fn become_board(options: &Options) -> Result<(), Error> {
-    // Before a minute of building.
+    // Wrong options are reported before the build, which takes a minute.
     options.config()?;
     let mut command = cargo();
     command.args(["run", "--quiet", "--release", "--package", "virtual-board", "--bin", "board"]);
@@ -95,7 +92,7 @@ pub fn become_board(options: &Options) -> Result<(), Error> {
     Err(replaced_by(command))
 }
 
-/// Only returns if that fails. One process gets the terminal and its Ctrl-C.
+/// Replaces this process, so that one process gets the terminal and its Ctrl-C. Returns on failure only.
 #[cfg(unix)]
 fn replaced_by(mut command: Command) -> Error {
     let error = std::os::unix::process::CommandExt::exec(&mut command);
@@ -107,7 +104,7 @@ fn replaced_by(_: Command) -> Error {
     Error::Refused("the virtual board needs pseudo-terminals, which only Unix has".into())
 }
 
-/// Builds the image as it is flashed, and checks it; where it is.
+/// Builds and checks the image as it is flashed; returns its path.
 fn built_image() -> Result<PathBuf, Error> {
     let failed = |why: String| Error::Internal(format!("cargo xtask firmware: {why}"));
     let mut child = cargo()

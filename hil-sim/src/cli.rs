@@ -4,13 +4,13 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
-use rayon::prelude::*;
+use clap::{Parser, Subcommand};
 
 use crate::board;
-use crate::config::{Config, KEYS, Value};
+use crate::config::{Config, KEYS};
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
+use crate::input::{Input, OUT};
 use crate::outcome::{Cell, Outcome, Table};
 use crate::progress::Progress;
 use crate::report::{self, Section};
@@ -60,28 +60,8 @@ enum Command {
     Board(board::Options),
 }
 
-/// What a simulation is made of.
-#[derive(Args, Default)]
-pub struct Input {
-    /// Configuration file, TOML
-    #[arg(long, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// Sets one key, after the configuration file; can be given many times
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub assignments: Vec<String>,
-    /// Seed of all that is random
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    pub seed: u64,
-    /// Simulated time, s; the same as --set seconds=S
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub seconds: Option<f64>,
-}
-
-/// Where pages are written unless another folder is named.
-pub const OUT: &str = "out";
-
-/// Reads the arguments of the process, does what they ask, and says how it went: 0 done, 1 failed,
-/// 2 something has to be changed in what was asked for.
+/// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed, 2 the request
+/// has to be changed.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         None => run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, None, false),
@@ -99,29 +79,6 @@ pub fn main() -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::from(error.exit_code())
         }
-    }
-}
-
-impl Input {
-    /// The configuration that it describes.
-    ///
-    /// # Errors
-    /// What is wrong with it, by name.
-    pub fn config(&self) -> Result<Config, Error> {
-        let mut config = Config::load(self.config.as_deref(), &self.assignments)?;
-        if let Some(seconds) = self.seconds {
-            config.set("seconds", &Value::Number(seconds))?;
-        }
-        Ok(config)
-    }
-
-    /// What has to be typed to repeat a run.
-    fn command(&self, experiment: &str, config: &Config) -> String {
-        let mut command = format!("cargo sim run {experiment} --seed {}", self.seed);
-        for change in config.changes() {
-            command.push_str(&format!(" --set {change}"));
-        }
-        command
     }
 }
 
@@ -146,14 +103,8 @@ fn keys() -> Table {
     table
 }
 
-fn execute(
-    experiment: &Experiment,
-    config: &Config,
-    seed: u64,
-    progress: &Progress,
-) -> Result<Outcome, Error> {
-    let seconds = config.extent.seconds;
-    (experiment.run)(&Context { config, seed, seconds, progress: progress.clone() })
+fn context(config: &Config, seed: u64) -> Context<'_> {
+    Context { config, seed, seconds: config.extent.seconds, progress: Progress::default() }
 }
 
 fn section<'a>(
@@ -163,13 +114,19 @@ fn section<'a>(
     outcome: &'a Outcome,
 ) -> Section<'a> {
     let Experiment { name, stands_for, about, .. } = experiment;
-    Section { name, stands_for, about, command: input.command(name, config), outcome }
+    Section {
+        name,
+        stands_for,
+        about,
+        command: input.command(&format!("run {name}"), config),
+        outcome,
+    }
 }
 
 fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<(), Error> {
     let experiment = experiments::find(name)?;
     let config = input.config()?;
-    let outcome = execute(experiment, &config, input.seed, &Progress::default())?;
+    let outcome = (experiment.run)(&context(&config, input.seed))?;
     let folder = out.or_else(|| (!json).then(|| OUT.into()));
     let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
     if let (Some(folder), Some(path)) = (&folder, &path) {
@@ -195,17 +152,9 @@ fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<()
 
 fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
-    let progress = Progress::default();
-    let bar = progress.bar("report", EXPERIMENTS.len() as u64);
-    let outcomes: Vec<Result<Outcome, Error>> = EXPERIMENTS
-        .par_iter()
-        .map(|experiment| {
-            let outcome = execute(experiment, &config, input.seed, &progress);
-            bar.advance(1);
-            outcome
-        })
-        .collect();
-    let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let context = context(&config, input.seed);
+    let outcomes =
+        context.in_parallel("report", EXPERIMENTS, |_, experiment| (experiment.run)(&context))?;
     let sections: Vec<_> = EXPERIMENTS
         .iter()
         .zip(&outcomes)
@@ -213,7 +162,6 @@ fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
         .collect();
     let path = out.join("report.html");
     report::write_whole(&path, &report::page("Induction drive: all experiments", &sections)?)?;
-    drop(bar);
     say(&format!("Report: {}\n", path.display()))
 }
 

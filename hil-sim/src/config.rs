@@ -5,6 +5,8 @@ mod value;
 
 use std::path::Path;
 
+use drive_core::tuning;
+
 pub use keys::*;
 pub use value::{Allowed, Value};
 
@@ -12,6 +14,9 @@ use crate::error::{Error, nearest};
 
 impl Key {
     /// The key with this name.
+    ///
+    /// # Errors
+    /// [`Error::UnknownKey`] with the most similar name.
     pub fn find(name: &str) -> Result<&'static Self, Error> {
         KEYS.iter().find(|key| key.name == name).ok_or_else(|| Error::UnknownKey {
             key: name.to_owned(),
@@ -25,8 +30,20 @@ impl Key {
     }
 }
 
+impl MotorConfig {
+    /// The T-equivalent circuit, ohm and H.
+    pub fn circuit(&self) -> tuning::Motor {
+        let Self { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *self;
+        tuning::Motor { r_s, r_r, l_m, l_ls, l_lr }
+    }
+}
+
 impl Config {
     /// The defaults, changed first by the file and then by the assignments `KEY=VALUE`, in order.
+    ///
+    /// # Errors
+    /// [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
+    /// assignment without an equals sign, and as [`Config::set`].
     pub fn load(file: Option<&Path>, assignments: &[String]) -> Result<Self, Error> {
         let mut config = Self::default();
         if let Some(path) = file {
@@ -44,8 +61,10 @@ impl Config {
         Ok(config)
     }
 
-    /// Sets one key. Nothing changes on an error, which names the key, the value and the values
-    /// that are allowed.
+    /// Sets one key; on an error nothing changes.
+    ///
+    /// # Errors
+    /// [`Error::UnknownKey`]; [`Error::Value`] with the key, the value and the allowed values.
     pub fn set(&mut self, name: &str, value: &Value) -> Result<(), Error> {
         let key = Key::find(name)?;
         (key.set)(self, value).map_err(|problem| Error::Value {
@@ -67,7 +86,7 @@ impl Config {
         Ok(())
     }
 
-    /// The keys whose value is not the default, as `KEY=VALUE`: what `--set` needs to get here.
+    /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
     pub fn changes(&self) -> Vec<String> {
         let default = Self::default();
         KEYS.iter()
@@ -76,10 +95,10 @@ impl Config {
             .collect()
     }
 
-    /// The motor as the drive believes it to be.
-    pub fn believed_motor(&self) -> Motor {
+    /// The motor parameters that the drive is set to.
+    pub fn believed_motor(&self) -> MotorConfig {
         let (motor, believed) = (&self.motor, &self.drive_motor);
-        Motor {
+        MotorConfig {
             rs: believed.rs.unwrap_or(motor.rs),
             rr: believed.rr.unwrap_or(motor.rr),
             lls: believed.lls.unwrap_or(motor.lls),

@@ -1,9 +1,9 @@
-//! What can go wrong, and the exit code it leads to.
+//! The errors of a command, and their exit codes.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a command did not do what it was asked to.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// No experiment has this name.
@@ -29,7 +29,7 @@ pub enum Error {
         key: String,
         /// The value that was given.
         value: String,
-        /// What is wrong with it.
+        /// The reason why it is refused.
         problem: &'static str,
         /// The values that are allowed, with their unit.
         allowed: String,
@@ -42,11 +42,10 @@ pub enum Error {
     ConfigFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The reason.
         problem: String,
     },
-    /// Every value is in its range, but together they are refused by a model, a filter or a design
-    /// rule.
+    /// Each value is in its range, but a model, a filter or a design rule refuses their combination.
     #[error("{0}")]
     Refused(String),
     /// A file or folder cannot be written.
@@ -54,22 +53,26 @@ pub enum Error {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// Something that no input should be able to bring about.
+    /// A failure that no input should be able to cause.
     #[error("{0}")]
     Internal(String),
 }
 
 impl Error {
-    /// A failure to write `path`.
+    /// The error of a part that refuses its settings.
+    pub fn refused(reason: impl std::fmt::Display) -> Self {
+        Self::Refused(reason.to_string())
+    }
+
+    /// The error of a failure to write `path`.
     pub fn write(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Write { path: path.to_owned(), source }
     }
 
-    /// What the process exits with: 2 where the user has to change something in what was asked for,
-    /// 1 for everything else.
+    /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Write { .. } | Self::Internal(_) => 1,
@@ -82,29 +85,13 @@ fn did_you_mean(nearest: &Option<&'static str>) -> String {
     nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
-/// The name most similar to `name`, if any is similar enough to be what was meant.
+/// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.
 pub fn nearest(name: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
     known
-        .map(|candidate| (edit_distance(name, candidate), candidate))
+        .map(|candidate| (strsim::levenshtein(&name.to_lowercase(), candidate), candidate))
         .filter(|&(distance, candidate)| distance <= 2 + candidate.len() / 4)
         .min()
         .map(|(_, candidate)| candidate)
-}
-
-/// Levenshtein distance, without regard to case.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.to_lowercase().chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.to_lowercase().chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -117,6 +104,6 @@ mod tests {
         assert_eq!(nearest("motor.sr", known.into_iter()), Some("motor.rr"));
         assert_eq!(nearest("inverter.vcd", known.into_iter()), Some("inverter.vdc"));
         assert_eq!(nearest("xylophone", known.into_iter()), None);
-        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(nearest("MOTOR.RS", known.into_iter()), Some("motor.rs"));
     }
 }

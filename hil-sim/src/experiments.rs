@@ -15,6 +15,8 @@ mod identify_recursive;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
+pub mod learning;
+mod linear_model;
 mod lock_monitor;
 mod modulation;
 mod monte_carlo;
@@ -34,35 +36,59 @@ mod sweep;
 mod torque;
 mod torque_drift;
 mod tracking;
+pub mod warming_rotor;
 
 pub use torque::assumptions;
+
+use rayon::prelude::*;
 
 use crate::config::Config;
 use crate::error::{Error, nearest};
 use crate::outcome::Outcome;
 use crate::progress::Progress;
 
-/// What an experiment is given.
+/// Input of an experiment.
 pub struct Context<'a> {
-    /// What is simulated.
+    /// The configuration.
     pub config: &'a Config,
     /// Seed of all that is random.
     pub seed: u64,
     /// Simulated time, s; unset: the experiment's own.
     pub seconds: Option<f64>,
-    /// For long work.
+    /// Progress bars.
     pub progress: Progress,
+}
+
+impl Context<'_> {
+    /// Runs `run` with the number and the value of every job on all cores, with a progress bar.
+    ///
+    /// # Errors
+    /// The error of a job that failed.
+    pub fn in_parallel<J: Sync, T: Send>(
+        &self,
+        label: &str,
+        jobs: &[J],
+        run: impl Fn(u64, &J) -> Result<T, Error> + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let bar = self.progress.bar(label, jobs.len() as u64);
+        let one = |(number, job): (usize, &J)| {
+            let result = run(number as u64, job);
+            bar.advance(1);
+            result
+        };
+        jobs.par_iter().enumerate().map(one).collect()
+    }
 }
 
 /// An experiment.
 pub struct Experiment {
-    /// How the command line names it.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What of the source it stands for: `Figure 38`.
+    /// The part of the source that it reproduces: `Figure 38`.
     pub stands_for: &'static str,
-    /// What it does, in one sentence.
+    /// Description in one sentence.
     pub about: &'static str,
-    /// Does it.
+    /// Runs it.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
 }
 
@@ -104,11 +130,11 @@ pub const EXPERIMENTS: &[Experiment] = &[
     online_tracking::EXPERIMENT,
 ];
 
-/// What runs when nothing is asked for.
+/// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";
 
-/// What a name on the command line stands for: an experiment, or a group of them, all whose names begin
-/// with it and a hyphen, as `identify`. A name of nothing stands for itself.
+/// The experiments that a name on the command line means: one, or a group of all whose names begin with
+/// it and a hyphen, as `identify`. An unknown name is returned as it is.
 pub fn named(name: &str) -> Vec<&str> {
     let known = || EXPERIMENTS.iter().map(|experiment| experiment.name);
     let begins = format!("{name}-");
@@ -117,6 +143,9 @@ pub fn named(name: &str) -> Vec<&str> {
 }
 
 /// The experiment with this name.
+///
+/// # Errors
+/// [`Error::UnknownExperiment`] with the most similar name.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
         Error::UnknownExperiment {
@@ -129,7 +158,7 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
 /// Runs the experiment with this name for its own time, and shows no progress.
 ///
 /// # Errors
-/// No experiment has this name; what the experiment refuses.
+/// As [`find`], and the errors of the experiment.
 pub fn run(name: &str, config: &Config, seed: u64) -> Result<Outcome, Error> {
     let context = Context { config, seed, seconds: None, progress: Progress::hidden() };
     (find(name)?.run)(&context)

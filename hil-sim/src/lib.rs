@@ -1,4 +1,4 @@
-//! The motor, inverter and sensors that the drive is tested against, and the experiments.
+//! The drive connected to a simulated motor: experiments, reports and the command line.
 
 pub mod board;
 pub mod cli;
@@ -6,16 +6,14 @@ pub mod config;
 pub mod error;
 pub mod experiments;
 pub mod identification;
-pub mod learn;
+pub mod input;
 pub mod outcome;
-pub mod perturbation;
-pub mod plant;
 pub mod progress;
 pub mod report;
 pub mod rig;
 pub mod stats;
-pub mod tracking;
 
 pub use config::Config;
 pub use error::Error;
+pub use motor_plant as plant;
 pub use outcome::Outcome;

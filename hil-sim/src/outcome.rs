@@ -1,4 +1,4 @@
-//! What an experiment returns: numbers, tables and figures, and how they become JSON.
+//! The outcome of an experiment: numbers, tables and figures, and their JSON form.
 
 mod figure;
 mod table;
@@ -8,9 +8,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 pub use figure::{Figure, Panel, Series, Style};
 pub use table::{Cell, Table};
 
-use crate::identification::study::Entry;
-
-/// What came out of an experiment.
+/// The outcome of an experiment.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     /// Numbers by name; a name ends in its unit, like `angle_error_rms_deg`.
@@ -25,7 +23,7 @@ pub struct Outcome {
     pub figures: Vec<Figure>,
     /// Texts to be read as they are, line by line, with their titles.
     pub texts: Vec<(String, String)>,
-    /// What the reader must know: differences from the source, assumptions, limits.
+    /// Remarks for the reader: differences from the source, assumptions, limits.
     pub remarks: Vec<String>,
 }
 
@@ -78,6 +76,37 @@ pub struct Step {
     pub angle_error_mean_deg: f64,
 }
 
+/// The error of one estimated parameter, as printed in the source (if it is) and as found here.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Entry {
+    /// `A` to `D` or `S`.
+    pub model: &'static str,
+    /// `Sg` or `Ss`.
+    pub signal: &'static str,
+    /// Electrical rad/s.
+    pub speed_rad_s: f64,
+    /// Sampling period, µs.
+    pub h_us: f64,
+    /// `r_s`, `tau_r`, `sigma_l_s`, `l_s`, `omega_m`, or a coefficient like `f_1a`.
+    pub parameter: &'static str,
+    /// Printed error, %.
+    pub printed_pct: Option<f64>,
+    /// Our error, %.
+    pub ours_pct: f64,
+}
+
+impl Entry {
+    /// Ours over printed.
+    pub fn ratio(&self) -> Option<f64> {
+        self.printed_pct.map(|printed| self.ours_pct / printed)
+    }
+
+    /// Whether ours and printed differ by no more than this factor.
+    pub fn within(&self, factor: f64) -> bool {
+        self.ratio().is_some_and(|ratio| ratio <= factor && ratio * factor >= 1.0)
+    }
+}
+
 /// The one JSON object of an experiment.
 #[derive(serde::Serialize)]
 struct Json<'a> {
@@ -91,7 +120,7 @@ struct Json<'a> {
     table: Rows<'a>,
 }
 
-/// What JSON calls `table`.
+/// Content of `table` in JSON.
 #[derive(serde::Serialize)]
 #[serde(untagged)]
 enum Rows<'a> {
@@ -134,6 +163,9 @@ impl Serialize for AllSeries<'_> {
 impl Outcome {
     /// The one JSON object: `experiment`, `seed`, `metrics`, `series`, and where there are any
     /// `steps` and `table`. A number that is not finite becomes `null`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string`].
     pub fn to_json(&self, experiment: &str, seed: u64) -> serde_json::Result<String> {
         serde_json::to_string(&Json {
             experiment,

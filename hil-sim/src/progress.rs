@@ -38,7 +38,7 @@ impl Progress {
 pub struct Bar(ProgressBar);
 
 impl Bar {
-    /// So much more of the work is done.
+    /// Adds `units` of finished work.
     pub fn advance(&self, units: u64) {
         self.0.inc(units);
     }

@@ -1,9 +1,7 @@
 //! Results for people: tables on the console, one page with plots, and files written whole.
 
-mod axis;
 mod console;
-mod layout;
-mod line;
+mod envelope;
 mod page;
 mod plot;
 
@@ -16,8 +14,11 @@ pub use plot::svg;
 
 use crate::error::Error;
 
-/// Writes a file whole or not at all: into a file beside it, which then takes its name. Folders on
-/// the way are made.
+/// Writes a file completely or not at all: into a temporary file beside it, which is then renamed.
+/// Missing folders are created.
+///
+/// # Errors
+/// [`Error::Write`] with the path that could not be written.
 pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -30,7 +31,7 @@ pub fn write_whole(path: &Path, contents: &str) -> Result<(), Error> {
         .and_then(|mut file| file.write_all(contents.as_bytes()).and_then(|()| file.sync_all()))
         .and_then(|()| std::fs::rename(&beside, path));
     written.map_err(|e| {
-        // What could not be finished is not left behind; that it may not have been begun is fine.
+        // The unfinished file is removed; it need not exist.
         let _ = std::fs::remove_file(&beside);
         Error::write(path)(e)
     })

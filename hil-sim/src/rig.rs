@@ -29,16 +29,16 @@ pub struct Rig {
     periods: u64,
 }
 
-/// What was true and what the drive saw at one sample.
+/// True state of the plant and estimates of the drive at one sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Point {
     /// Time, s.
     pub t: f64,
     /// Current reference on the quadrature axis, after its filter, A.
     pub iq_ref: f64,
-    /// Currents in the estimated frame as the drive sees them, A.
+    /// Direct-axis current in the estimated flux frame, as measured by the drive, A.
     pub id: f64,
-    /// Quadrature axis, likewise.
+    /// Quadrature-axis current, likewise.
     pub iq: f64,
     /// Electromagnetic torque of the motor, Nm.
     pub torque: f64,
@@ -50,7 +50,7 @@ pub struct Point {
     pub angle_error_deg: f64,
     /// Current difference of the demodulation, A.
     pub delta_i: f64,
-    /// Saliency that the synchronous demodulation sees.
+    /// Saliency q of the synchronous demodulation.
     pub saliency: f64,
     /// Carrier current along the injection axis, A.
     pub carrier: f64,
@@ -64,13 +64,13 @@ pub struct Point {
     pub torque_per_flux_ampere: f64,
     /// Position of the rotor, mechanical turns.
     pub turns: f64,
-    /// Position as the drive sees it, mechanical turns from its start.
+    /// Estimated position, mechanical turns from the start of the drive.
     pub turns_estimate: f64,
 }
 
 impl Point {
-    /// What the demodulation in use gives: a current difference in A or, with the synchronous one, a
-    /// saliency. (The other of the two rests at zero.)
+    /// Signal of the demodulation in use: a current difference in A or, with the synchronous one, a
+    /// saliency. (The other of the two is zero.)
     pub fn signal(&self) -> f64 {
         self.delta_i + self.saliency
     }
@@ -80,12 +80,11 @@ impl Rig {
     /// A drive that is off, connected to a motor at rest.
     ///
     /// # Errors
-    /// What the plant or the drive refuse, by name.
+    /// [`Error::Refused`] with the setting that the plant or the drive refuses.
     pub fn new(plant: &PlantSettings, drive: &Settings, seed: u64) -> Result<Self, Error> {
-        let refused = |e: &dyn std::fmt::Display| Error::Refused(e.to_string());
         Ok(Self {
-            plant: Plant::new(plant, seed).map_err(|e| refused(&e))?,
-            drive: Drive::new(drive.build().map_err(|e| refused(&e))?),
+            plant: Plant::new(plant, seed).map_err(Error::refused)?,
+            drive: Drive::new(drive.build().map_err(Error::refused)?),
             pending: Compare::OFF,
             periods: 0,
         })
@@ -126,7 +125,7 @@ impl Rig {
         self.step_with(&sample);
     }
 
-    /// One PWM period in which the drive is given `sample` instead of what was sampled.
+    /// One PWM period in which the drive is given `sample` instead of the sample of the plant.
     #[inline]
     pub fn step_with(&mut self, sample: &Sample) {
         let compare = self.drive.step(sample);
@@ -139,10 +138,10 @@ impl Rig {
         self.periods += 1;
     }
 
-    /// Goes on for `seconds` and hands every sample to `look` before the period is simulated.
+    /// Runs for `seconds` and passes the point of every sample to `look`.
     pub fn run(&mut self, seconds: f64, mut look: impl FnMut(&Point)) {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
-            // The truth at the instant of the sample, and what the drive makes of that sample.
+            // The truth at the instant of the sample, and the estimates of the drive from that sample.
             let mut point = self.truth();
             let phi = self.plant.rotor_flux_angle();
             self.step();
@@ -187,8 +186,7 @@ impl Rig {
     /// # Errors
     /// When the drive refuses it.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
-        let refused = |e| Error::Refused(format!("{command:?}: {e}"));
-        self.drive.command(command).map_err(refused)
+        self.drive.command(command).map_err(|e| Error::refused(format!("{command:?}: {e}")))
     }
 
     /// Couples another load.
@@ -196,7 +194,7 @@ impl Rig {
     /// # Errors
     /// When the load is out of range.
     pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
-        self.plant.set_load(load).map_err(|e| Error::Refused(e.to_string()))
+        self.plant.set_load(load).map_err(Error::refused)
     }
 
     fn truth(&self) -> Point {
@@ -212,6 +210,16 @@ impl Rig {
             ..Point::default()
         }
     }
+}
+
+/// A quantity over time: means over `samples` points, at the time of the first of them.
+pub fn means_over(
+    samples: usize,
+    points: &[Point],
+    quantity: impl Fn(&Point) -> f64,
+) -> Vec<(f64, f64)> {
+    let mean = |part: &[Point]| part.iter().map(&quantity).sum::<f64>() / part.len() as f64;
+    points.chunks(samples).map(|part| (part[0].t, mean(part))).collect()
 }
 
 /// An angle in radians as degrees within ±180.
@@ -271,13 +279,13 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     }
 }
 
-/// The drive that the configuration describes: it knows its converters, its dead time and what it
-/// was told of the motor.
+/// The drive that the configuration describes, with the calibration of its converters, its dead time
+/// and the believed motor.
 pub fn drive_settings(config: &Config) -> Settings {
     let (believed, base) = (config.believed_motor(), Settings::default());
     let measurement = plant_settings(config).measurement;
     let [line_a, line_b] = measurement.calibration();
-    let line = |l: CalibrationLine| drive_core::current::sensing::Line {
+    let line = |l: CalibrationLine| drive_core::settings::Line {
         gain: l.a_per_code as f32,
         offset: l.a_at_zero as f32,
     };

@@ -10,14 +10,14 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Of all these values.
+    /// Statistics of these values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut stats = Self::default();
         values.into_iter().for_each(|v| stats.push(v));
         stats
     }
 
-    /// Takes one value in.
+    /// Adds one value.
     pub fn push(&mut self, value: f64) {
         self.count += 1;
         self.sum += value;
@@ -46,8 +46,32 @@ impl Stats {
     }
 }
 
-/// The rate, per trial, that `events` in `trials` leave possible at 95 % confidence: the largest for
-/// which so few would be seen in 5 % of all cases. With none it is 3 / trials.
+/// A straight line `y = slope x + intercept`.
+#[derive(Clone, Copy, Debug)]
+pub struct StraightLine {
+    /// Slope, unit of y per unit of x.
+    pub slope: f64,
+    /// Value at x = 0.
+    pub intercept: f64,
+}
+
+impl StraightLine {
+    /// Least squares of y on x.
+    pub fn through(points: &[(f64, f64)]) -> Self {
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| Stats::of(points.iter().map(f)).mean();
+        let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+        let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2));
+        Self { slope, intercept: y - slope * x }
+    }
+
+    /// The value at `x`.
+    pub fn at(self, x: f64) -> f64 {
+        self.slope * x + self.intercept
+    }
+}
+
+/// Upper bound of a rate per trial at 95 % confidence after `events` in `trials`: the rate at which as
+/// few events would occur in 5 % of all cases. Without events it is 3 / trials.
 pub fn upper_bound_95(events: u64, trials: u64) -> f64 {
     let at_most = |mean: f64| {
         let mut term = (-mean).exp();

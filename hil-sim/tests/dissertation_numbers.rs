@@ -1,4 +1,4 @@
-//! D1: the numbers of Barroso (2017), recomputed. What is printed and wrong is asserted as wrong.
+//! The numbers of Barroso (2017), recomputed. Printed values that are wrong are asserted as wrong.
 //!
 //! Elsewhere: plant, rule of section 3.8, controllers, 3.41 and 3.42 and the unstable 4.1 under 4.2 in
 //! `drive-core/tests/tuning.rs`; step 3.39 and figure 40 in `drive-core/tests/pi.rs`; filters of appendix C

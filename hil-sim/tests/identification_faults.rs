@@ -101,7 +101,8 @@ fn run(signal: Signal, speed: f64, fault: Fault, level: Noise) -> Result {
         }
         let single = |x: Complex| AlphaBeta { alpha: x.re as f32, beta: x.im as f32 };
         if matches!(fault, Fault::NoCurrent | Fault::OpenPhase) && n == RETURN {
-            rls.reset_covariance();
+            // Keeps the estimate and forgets how sure it is.
+            rls.begin_at(rls.latest());
         }
         rls.step(single(v), single(i));
         let latest = rls.latest();

@@ -1,8 +1,9 @@
 //! The tables of the paper: what can be reproduced (T1), and which machine they were made with (T2).
 
 use hil_sim::identification::Parameters;
-use hil_sim::identification::study::{Entry, Errors, all};
+use hil_sim::identification::study::{Errors, all};
 use hil_sim::identification::trial::Noise;
+use hil_sim::outcome::Entry;
 use hil_sim::{Config, Outcome, experiments};
 
 const TRIALS: u64 = 60;

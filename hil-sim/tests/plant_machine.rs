@@ -1,8 +1,8 @@
 //! The machine model against the exact solution of the textbook machine, and its power balance.
 
 use hil_sim::plant::{
-    Complex, Load, Machine, MachineSettings, MachineState, Mechanics, MechanicsSettings, Motor,
-    SaliencySettings,
+    Complex, Load, Machine, MachineSettings, MachineState, Mechanics, MechanicsSettings,
+    MotorModel, SaliencySettings,
 };
 use nalgebra::{Matrix4, Matrix4x2, SMatrix, Vector2, Vector4};
 use rand::{RngExt, SeedableRng};
@@ -13,8 +13,8 @@ const M: MachineSettings =
     MachineSettings { rs: 5.4, rr: 1.1, lls: 0.0276, llr: 0.0276, lm: 0.1771, pole_pairs: 2 };
 const LS: f64 = 0.0276 + 0.1771;
 
-fn motor(saliency: &SaliencySettings, mechanics: &MechanicsSettings) -> Motor {
-    Motor::new(
+fn motor(saliency: &SaliencySettings, mechanics: &MechanicsSettings) -> MotorModel {
+    MotorModel::new(
         Machine::new(&M, saliency).expect("machine"),
         Mechanics::new(mechanics).expect("shaft"),
     )
@@ -147,7 +147,7 @@ fn power_balances_at_every_instant() {
 fn energy_balances_over_a_start() {
     let shaft = MechanicsSettings { friction: 0.0, ..Default::default() };
     let mut motor = motor(&SaliencySettings::NONE, &shaft);
-    let power = |motor: &Motor, v: Complex| {
+    let power = |motor: &MotorModel, v: Complex| {
         let x = &motor.state.electrical;
         let (i, i_r) = (x.i, motor.machine.rotor_current(x));
         1.5 * ((i.conj() * v).re - M.rs * i.norm_sqr() - M.rr * i_r.norm_sqr())

@@ -5,8 +5,8 @@
 use std::f64::consts::TAU;
 
 use hil_sim::plant::{
-    Complex, Load, Machine, MachineSettings, Mechanics, MechanicsSettings, Motor, SaliencySettings,
-    clarke, phases,
+    Complex, Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel,
+    SaliencySettings, clarke, phases,
 };
 use nalgebra::{Matrix6, Vector6};
 
@@ -93,7 +93,7 @@ fn agrees_with_the_six_phase_equations() {
     // Different leakages of stator and rotor, so that mixing them up would show.
     let settings = MachineSettings { lls: 0.0207, llr: 0.0345, ..Default::default() };
     let shaft = MechanicsSettings { load: Load::Free { torque: LOAD }, ..Default::default() };
-    let mut motor = Motor::new(
+    let mut motor = MotorModel::new(
         Machine::new(&settings, &SaliencySettings::NONE).expect("machine"),
         Mechanics::new(&shaft).expect("shaft"),
     );

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use hil_sim::plant::{
     Complex, EncoderSettings, InverterSettings, Load, Machine, MachineSettings, MachineState,
-    MeasurementSettings, Mechanics, MechanicsSettings, Motor, Plant, PlantSettings,
+    MeasurementSettings, Mechanics, MechanicsSettings, MotorModel, Plant, PlantSettings,
     SALIENCY_CURRENT_A, SaliencySettings,
 };
 
@@ -17,7 +17,7 @@ const STEPS: u32 = 50;
 fn injected(saliency: SaliencySettings, id: f64, v: f64, angle: f64) -> [Complex; 2] {
     let machine = Machine::new(&MachineSettings::default(), &saliency).expect("machine");
     let locked = MechanicsSettings { load: Load::Locked, ..Default::default() };
-    let mut motor = Motor::new(machine, Mechanics::new(&locked).expect("shaft"));
+    let mut motor = MotorModel::new(machine, Mechanics::new(&locked).expect("shaft"));
     let dc = Complex::new(5.4 * id, 0.0);
     // Six rotor time constants (186 ms).
     for _ in 0..12_000 {

@@ -96,9 +96,8 @@ impl Default for Demodulator {
 struct BandPass(BpfState);
 
 impl BandPass {
-    #[inline(never)]
     fn step(&mut self, x: AlphaBeta) -> AlphaBeta {
-        BPF.step_alpha_beta(&mut self.0, x)
+        BPF.step(&mut self.0, x)
     }
 
     /// Behind the rotation, as in Figure 9: the carrier currents of the two channels, A. In this order
@@ -116,7 +115,6 @@ impl BandPass {
 struct Post(PpState);
 
 impl Post {
-    #[inline(never)]
     fn step(&mut self, x: f32) -> f32 {
         PP.step(&mut self.0, x)
     }

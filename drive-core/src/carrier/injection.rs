@@ -1,9 +1,9 @@
 //! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
 
-use crate::math::complex::Complex;
 use crate::math::frames::Dq;
 use crate::tuning::FirstOrder;
+use num_complex::Complex64;
 
 /// Samples per period of the carrier.
 pub const CARRIER_SAMPLES: usize = 10;
@@ -41,38 +41,34 @@ pub struct Injection {
 impl Injection {
     /// For an amplitude in V, the current response of the motor, A/V, sampled at ten times the carrier
     /// frequency, and the time constant of the analog filter in samples.
-    #[inline]
     pub fn new(amplitude_v: f32, plant: FirstOrder, analog: f32) -> Self {
         // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
         // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of
         // the samples at both ends, to 0.1 %.
-        let one = Complex { re: 1.0, im: 0.0 };
-        let turn = Complex { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
-        let response = Complex { re: plant.k, im: 0.0 } / (turn - one * plant.p);
+        let one = Complex64 { re: 1.0, im: 0.0 };
+        let turn = Complex64 { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
+        let response = Complex64 { re: plant.k, im: 0.0 } / (turn - one * plant.p);
         let mean = response * (one + turn) * 0.5;
         // What is computed in step k acts from the sample k + 1 on: at sample k the response is that
         // of period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-        let sampled = response / (turn * Complex { re: 1.0, im: w * f64::from(analog) });
-        let single = |z: Complex| (z.re as f32, z.im as f32);
+        let sampled = response / (turn * Complex64 { re: 1.0, im: w * f64::from(analog) });
+        let single = |z: Complex64| (z.re as f32, z.im as f32);
         let ((s_re, s_im), (m_re, m_im)) = (single(sampled), single(mean));
-        let mut periods = [CarrierPeriod::default(); CARRIER_SAMPLES];
-        // (By a length that the compiler does not know: else it writes this out ten times.)
-        for (index, period) in core::hint::black_box(periods.as_mut_slice()).iter_mut().enumerate()
-        {
+        let periods = core::array::from_fn(|index| {
             let (cos, sin) = (CARRIER_COS[index], CARRIER_SIN[index]);
-            *period = CarrierPeriod {
+            CarrierPeriod {
                 voltage: amplitude_v * cos,
                 mean_current: amplitude_v * (m_re * cos - m_im * sin),
                 sampled: amplitude_v * (s_re * cos - s_im * sin),
                 cos,
                 sin,
-            };
-        }
+            }
+        });
         Self {
             amplitude: amplitude_v,
             periods,
-            current_amplitude: response.abs() as f32 * amplitude_v,
+            current_amplitude: response.norm() as f32 * amplitude_v,
         }
     }
 }
@@ -167,7 +163,6 @@ impl Carrier {
 
     /// Goes on to the next PWM period: its number in the carrier period, 0 to 9, which counts with or
     /// without a carrier.
-    #[inline]
     pub fn advance(&mut self) -> usize {
         // Below ten by construction: this is for a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
@@ -176,7 +171,6 @@ impl Carrier {
     }
 
     /// The carrier in PWM period `index`.
-    #[inline]
     pub fn at(&self, injection: &Injection, index: usize) -> CarrierPeriod {
         let full = &injection.periods[if index < CARRIER_SAMPLES { index } else { 0 }];
         CarrierPeriod {

@@ -50,7 +50,6 @@ struct Average {
 
 impl Average {
     /// Takes a carrier period in; the average, times [`WEIGHTS`].
-    #[inline]
     fn step(&mut self, sum: f32, ramp: f32) -> f32 {
         const N: f32 = CARRIER_SAMPLES as f32;
         let [one, two, three] = self.earlier;
@@ -80,7 +79,6 @@ pub struct SynchronousState {
 
 impl SynchronousState {
     /// Mixes a sample.
-    #[inline]
     pub fn mix(&mut self, sample: &CarrierSample) {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
@@ -93,8 +91,6 @@ impl SynchronousState {
     }
 
     /// Once a carrier period, behind its last sample: averages, and begins the next.
-    // Always: left to itself the compiler makes a call of it, which costs a tenth of it.
-    #[inline(always)]
     pub fn average(&mut self) {
         let Period { sum, ramp } = &mut self.period;
         for n in 0..sum.len() {
@@ -106,7 +102,6 @@ impl SynchronousState {
 
     /// The same average of the reference of the quadrature current, A, of one sample in each of the carrier
     /// periods, that of [`REFERENCE_AT`]: 1, 3, 3, 1 eighths.
-    #[inline]
     pub fn see_reference(&mut self, now: f32) {
         let (i_q, [one, two, three]) = (0.125 * now, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
@@ -114,7 +109,6 @@ impl SynchronousState {
     }
 
     /// Once a carrier period, after [`average`](Self::average): the saliency.
-    #[inline]
     pub fn see(&mut self) {
         // The mean of the mixed current is half the amplitude.
         const MEAN: f32 = 2.0 / WEIGHTS;
@@ -127,7 +121,6 @@ impl SynchronousState {
     }
 
     /// The carrier current in the carrier period before this one.
-    #[inline]
     pub fn carrier_current(&self) -> CarrierCurrent {
         let [x_re, x_im, y_re, y_im] = self.last.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
         CarrierCurrent { along: (x_re, x_im), across: (y_re, y_im) }

@@ -5,6 +5,7 @@
 //! (4.1 V at 311 V and 2.2 us). The same voltage is added beforehand. Near zero current, where the
 //! sign is uncertain, the compensation goes through zero linearly.
 
+use crate::io::PERIOD_S;
 use crate::math::frames::Abc;
 
 /// Coefficients of the compensation.
@@ -32,10 +33,9 @@ impl Signs {
 }
 
 impl DeadTime {
-    /// For a dead time and a period in s, full from `full_at_a` A on.
-    #[inline]
-    pub fn new(dead_time_s: f32, period_s: f32, full_at_a: f32) -> Self {
-        Self { ratio: dead_time_s / period_s, per_ampere: ONE / full_at_a }
+    /// For a dead time in s, full from `full_at_a` A on.
+    pub fn new(dead_time_s: f32, full_at_a: f32) -> Self {
+        Self { ratio: dead_time_s / PERIOD_S, per_ampere: ONE / full_at_a }
     }
 
     /// No compensation.
@@ -43,7 +43,6 @@ impl DeadTime {
 
     /// The signs of the currents `i` that are expected to flow, A; all zero when nothing is to be
     /// compensated.
-    #[inline]
     pub fn signs(&self, i: Abc) -> Signs {
         let sign = |i: f32| (i * self.per_ampere) as i32 as f32;
         Signs(Abc { a: sign(i.a), b: sign(i.b), c: sign(i.c) })
@@ -51,7 +50,6 @@ impl DeadTime {
 
     /// The voltage to add, V per phase, at these signs and a dc link of `v_dc`, V, with `drop` V that
     /// are lost beside the dead time (see [`crate::current::inverter_drop`]).
-    #[inline]
     pub fn voltage(&self, signs: Signs, v_dc: f32, drop: f32) -> Abc {
         signs.0 * ((self.ratio * v_dc + drop) * (1.0 / ONE))
     }
@@ -63,7 +61,7 @@ mod tests {
 
     #[test]
     fn full_voltage_beyond_the_threshold_and_smooth_through_zero() {
-        let dt = DeadTime::new(2.2e-6, 1.0 / 6000.0, 0.05);
+        let dt = DeadTime::new(2.2e-6, 0.05);
         let step = |dt: &DeadTime, i| dt.voltage(dt.signs(i), 311.0, 0.0);
         let v = step(&dt, Abc::new(1.0, -0.5, 0.025));
         assert!((v.a - 4.105).abs() < 1e-3 && (v.b + 4.105).abs() < 1e-3);

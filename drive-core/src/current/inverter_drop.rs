@@ -13,7 +13,9 @@
 //! along the axis of a phase). The means at the two levels give r_s and v_drop, whatever the
 //! temperature of the stator. An error of r_r by 30 % makes one of 0.17 V.
 
+use crate::io::periods;
 use crate::math::frames::Dq;
+use crate::settings::{Motor, Sequence};
 
 /// Level of the forcing current, of the magnetising current.
 const FORCED: f32 = 1.5;
@@ -36,6 +38,8 @@ pub struct InverterDrop {
     until: u32,
     /// Control period from which on the lower level is averaged.
     from: u32,
+    /// Control periods of the magnetisation.
+    end: u32,
     /// r_r (L_m/L_r)^2, ohm.
     rotor: f32,
     /// Stator resistance as believed, ohm.
@@ -59,28 +63,36 @@ pub struct InverterDropState {
     pub volts: f32,
 }
 
+/// One period of the magnetisation, as the measurement takes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DropSample {
+    /// Current in the flux frame, A.
+    pub current: Dq,
+    /// Voltage for it, V.
+    pub voltage: Dq,
+    /// Magnetising current, A.
+    pub magnetising: f32,
+    /// Signs of the phase currents, as a vector in the flux frame.
+    pub signs: Dq,
+    /// Dc link, V.
+    pub dc_link: f32,
+}
+
 impl InverterDrop {
-    /// For the duration of the magnetisation and the rotor time constant, s, the period of the
-    /// control, s, the magnetising current and the largest one, A, r_r (L_m/L_r)^2 and r_s, ohm.
-    #[inline]
-    pub fn new(
-        magnetise_s: f32,
-        tau_r: f32,
-        period_s: f32,
-        (i_d, largest): (f32, f32),
-        rotor: f32,
-        r_s: f32,
-    ) -> Self {
-        let room = if FORCED * i_d < largest { FORCED } else { largest / i_d };
-        // Until the flux has the value of the lower level: 1 - e^(-t/T) = 1/forced.
-        let until_s = tau_r * libm::logf(room / (room - 1.0));
-        let fits = room >= LEAST_FORCED && magnetise_s >= 2.0 * (until_s + AVERAGE_S);
+    /// For the magnetisation of a motor with currents up to `largest_a`, A.
+    pub fn new(motor: &Motor, sequence: &Sequence, largest_a: f32) -> Self {
+        let room =
+            if FORCED * sequence.i_d < largest_a { FORCED } else { largest_a / sequence.i_d };
+        // Until the flux has the value of the lower level: 1 - e^(-t/tau_r) = 1/forced.
+        let until_s = motor.tau_r() * libm::logf(room / (room - 1.0));
+        let fits = room >= LEAST_FORCED && sequence.magnetise_s >= 2.0 * (until_s + AVERAGE_S);
         Self {
             forced: if fits { room } else { 1.0 },
-            until: if fits { libm::roundf(until_s / period_s) as u32 } else { 0 },
-            from: libm::roundf((magnetise_s - AVERAGE_S) / period_s) as u32,
-            rotor,
-            r_s,
+            until: if fits { periods(until_s) } else { 0 },
+            from: periods(sequence.magnetise_s - AVERAGE_S),
+            end: periods(sequence.magnetise_s),
+            rotor: motor.r_r * (motor.l_m / motor.l_r()) * (motor.l_m / motor.l_r()),
+            r_s: motor.r_s,
         }
     }
 
@@ -89,17 +101,8 @@ impl InverterDrop {
         if elapsed < self.until { self.forced } else { 1.0 }
     }
 
-    /// One period of the magnetisation: the current, A; the voltage for it, V; the magnetising
-    /// current, A; and the signs of the phase currents. In the last of the `end` periods the drop is
-    /// found, judged by the dc link, V.
-    pub fn step(
-        &self,
-        state: &mut InverterDropState,
-        (elapsed, end): (u32, u32),
-        (current, voltage, magnetising): (Dq, Dq, f32),
-        signs: Dq,
-        dc_link: f32,
-    ) {
+    /// Takes period `elapsed` of the magnetisation; in the last one the drop is found.
+    pub fn step(&self, state: &mut InverterDropState, elapsed: u32, sample: &DropSample) {
         let level = if elapsed < self.until {
             // The first half is for the current to settle.
             if 2 * elapsed < self.until { None } else { Some(0) }
@@ -110,12 +113,13 @@ impl InverterDrop {
         };
         if let Some(level) = level.and_then(|n| state.levels.get_mut(n)) {
             level.count += 1.0;
-            level.voltage += voltage.d - self.rotor * (current.d - magnetising);
-            level.current += current.d;
-            level.signs += signs.d;
+            level.voltage +=
+                sample.voltage.d - self.rotor * (sample.current.d - sample.magnetising);
+            level.current += sample.current.d;
+            level.signs += sample.signs.d;
         }
-        if elapsed.saturating_add(1) == end {
-            state.volts = self.found(&state.levels, LARGEST * dc_link);
+        if elapsed.saturating_add(1) == self.end {
+            state.volts = self.found(&state.levels, LARGEST * sample.dc_link);
         }
     }
 
@@ -140,22 +144,32 @@ impl InverterDrop {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::PERIOD_S;
 
-    const PERIOD: f32 = 1.0 / 6000.0;
+    /// For the motor of Table 5, magnetised with `i_d` A for 0.8 s.
+    fn inverter_drop(i_d: f32, largest_a: f32) -> InverterDrop {
+        let sequence = Sequence { i_d, magnetise_s: 0.8, ..Sequence::default() };
+        InverterDrop::new(&Motor::default(), &sequence, largest_a)
+    }
 
     /// What is found on a motor of `r_s` ohm behind a drop of `volts`.
     fn found(r_s: f32, volts: f32, i_d: f32, largest: f32) -> f32 {
-        let (tau_r, rotor) = (0.186, 0.823);
-        let drop = InverterDrop::new(0.8, tau_r, PERIOD, (i_d, largest), rotor, 5.4);
+        let drop = inverter_drop(i_d, largest);
+        let (tau_r, rotor) = (Motor::default().tau_r(), drop.rotor);
         let mut state = InverterDropState::default();
         let mut magnetising = 0.0;
         for k in 0..4800 {
             let i = drop.level(k) * i_d;
-            magnetising += PERIOD / tau_r * (i - magnetising);
+            magnetising += PERIOD_S / tau_r * (i - magnetising);
             let v = r_s * i + rotor * (i - magnetising) + 4.0 / 3.0 * volts;
-            let (current, voltage) = (Dq::new(i, 0.0), Dq::new(v, 0.0));
-            let signs = Dq::new(4.0 / 3.0, 0.0);
-            drop.step(&mut state, (k, 4800), (current, voltage, magnetising), signs, 311.0);
+            let sample = DropSample {
+                current: Dq::new(i, 0.0),
+                voltage: Dq::new(v, 0.0),
+                magnetising,
+                signs: Dq::new(4.0 / 3.0, 0.0),
+                dc_link: 311.0,
+            };
+            drop.step(&mut state, k, &sample);
         }
         state.volts
     }
@@ -182,10 +196,10 @@ mod tests {
 
     #[test]
     fn forcing_leaves_the_flux_where_it_belongs() {
-        let drop = InverterDrop::new(0.8, 0.186, PERIOD, (0.7, 3.5), 0.8, 5.4);
+        let drop = inverter_drop(0.7, 3.5);
         let (mut flux, mut k) = (0.0, 0);
         while drop.level(k) > 1.0 {
-            flux += PERIOD / 0.186 * (drop.level(k) * 0.7 - flux);
+            flux += PERIOD_S / Motor::default().tau_r() * (drop.level(k) * 0.7 - flux);
             k += 1;
         }
         assert!((flux - 0.7_f32).abs() < 0.002, "{flux}");

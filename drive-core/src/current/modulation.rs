@@ -5,6 +5,7 @@
 //! voltage is put at half the dc link: no sectors, no tables. A test compares it with the on-times
 //! of Table 2.
 
+use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta, SQRT_3};
 
 /// Pulses shorter than the dead time plus this much are dropped or extended, s.
@@ -35,16 +36,15 @@ pub struct Modulated {
 }
 
 impl Modulator {
-    /// For a timer that counts to `top`, a period and a dead time in s.
+    /// For a timer that counts to `top` and a dead time in s.
     ///
     /// `compensated`: whether a dead-time compensation is going to be added, which takes twice its
     /// amplitude from the dc link.
-    #[inline]
-    pub fn new(top: u16, period_s: f32, dead_time_s: f32, compensated: bool) -> Self {
-        let ratio = dead_time_s / period_s;
+    pub fn new(top: u16, dead_time_s: f32, compensated: bool) -> Self {
+        let ratio = dead_time_s / PERIOD_S;
         Self {
             top: f32::from(top),
-            shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / period_s) * f32::from(top),
+            shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / PERIOD_S) * f32::from(top),
             usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
         }
     }
@@ -59,57 +59,32 @@ impl Modulator {
     /// the power stage takes off again, V per phase, at a dc link of `v_dc` > 0, V.
     ///
     /// A voltage outside the hexagon is shortened without turning its angle.
-    #[inline]
     pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
-        let leg = wanted.to_abc() + compensation;
-        let per_volt = self.top / v_dc;
-        let (low, high) = extremes(leg);
-        // Shortest pulses fit in above and below: nothing to limit. Not-a-number fails the test.
-        if (high - low) * per_volt <= self.top - 2.0 * self.shortest {
-            let [a, b, c] = self.centred(leg, low + high, per_volt);
-            let compare = [rounded(a), rounded(b), rounded(c)];
-            return Modulated { compare, realised: wanted, limited: false };
-        }
-        let Modulated { compare, realised, limited } = self.limited(wanted, compensation, v_dc);
-        Modulated { compare, realised, limited }
-    }
-
-    /// The same without the short cut for what needs no limiting.
-    #[inline(always)]
-    pub(crate) fn limited(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
-        let Abc { a, b, c } = compensation;
-        self.limited_by_parts(wanted, a, b, c, v_dc)
-    }
-
-    // By parts: they come in registers, and need not be stored where nothing is limited.
-    #[inline(never)]
-    fn limited_by_parts(&self, wanted: AlphaBeta, a: f32, b: f32, c: f32, v_dc: f32) -> Modulated {
-        let compensation = Abc { a, b, c };
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
-        if span > usable {
+        let shortened = span > usable;
+        if shortened {
             motor = motor * (usable / span);
         }
+        // The middle between the lowest and the highest leg is put at half the dc link.
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
-        let counts = self.centred(leg, low + high, self.top / v_dc).map(|c| self.drop_or_extend(c));
-        let volts = v_dc / self.top;
-        let [a, b, c] = counts;
-        let realised = (Abc::new(a, b, c) * volts - compensation).to_alpha_beta();
-        Modulated { compare: counts.map(rounded), realised, limited: true }
-    }
-
-    /// Counts of the legs, V, with `ends`, the sum of the lowest and the highest of them, at half the
-    /// dc link.
-    #[inline]
-    fn centred(&self, leg: Abc, ends: f32, per_volt: f32) -> [f32; 3] {
-        let centre = 0.5 * (self.top - ends * per_volt);
-        [centre + leg.a * per_volt, centre + leg.b * per_volt, centre + leg.c * per_volt]
+        let per_volt = self.top / v_dc;
+        let centre = 0.5 * (self.top - (low + high) * per_volt);
+        let ideal = [leg.a, leg.b, leg.c].map(|volts| centre + volts * per_volt);
+        let [a, b, c] = ideal.map(|count| self.drop_or_extend(count));
+        // Not-a-number is not equal to itself.
+        let limited = shortened || [a, b, c] != ideal;
+        let realised = if limited {
+            (Abc::new(a, b, c) * (v_dc / self.top) - compensation).to_alpha_beta()
+        } else {
+            wanted
+        };
+        Modulated { compare: [rounded(a), rounded(b), rounded(c)], realised, limited }
     }
 
     /// Moves a pulse of either switch that is too short to the nearer of none and the shortest.
-    #[inline(never)]
     fn drop_or_extend(&self, count: f32) -> f32 {
         let from_top = self.top - count;
         if count < self.shortest {
@@ -142,12 +117,11 @@ mod tests {
 
     const TOP: u16 = 14_167;
     const V_DC: f32 = 311.0;
-    const PERIOD: f32 = 1.0 / 6000.0;
     /// Half a count, as a phase voltage, plus what f32 loses.
     const COUNT_V: f64 = 311.0 / 14_167.0;
 
     fn modulator() -> Modulator {
-        Modulator::new(TOP, PERIOD, 2.2e-6, false)
+        Modulator::new(TOP, 2.2e-6, false)
     }
 
     fn polar(length: f64, angle: f64) -> AlphaBeta {
@@ -190,8 +164,8 @@ mod tests {
     #[test]
     fn compensation_does_not_cost_the_wanted_voltage() {
         // With the part for the compensation kept free, the compensated legs never saturate.
-        let m = Modulator::new(TOP, PERIOD, 2.2e-6, true);
-        let dt = V_DC * 2.2e-6 / PERIOD;
+        let m = Modulator::new(TOP, 2.2e-6, true);
+        let dt = V_DC * 2.2e-6 / PERIOD_S;
         for degrees in 0..360 {
             let w = polar(400.0, f64::from(degrees).to_radians());
             let out = m.step(w, Abc::new(dt, -dt, dt), V_DC);
@@ -231,7 +205,7 @@ mod tests {
             let m = Modulator { shortest: 0.0, ..modulator() };
             let out = m.step(polar(length, angle), Abc::ZERO, V_DC).realised;
             let turned = f64::from(out.beta).atan2(f64::from(out.alpha)) - angle;
-            prop_assert!((turned + PI).rem_euclid(2.0 * PI) - PI < 1e-5);
+            prop_assert!(((turned + PI).rem_euclid(2.0 * PI) - PI).abs() < 1e-5);
             // and the result lies on the hexagon: the span is the dc link
             let (low, high) = extremes(out.to_abc());
             prop_assert!((high - low - V_DC).abs() < 1e-3);

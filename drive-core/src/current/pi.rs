@@ -10,14 +10,13 @@
 //! source prints `u[k+1]` on the left (B.1, B.3); taken literally that is one more delay, the
 //! printed example is then unstable without any limit (|z| = 1.0996) and Figure 40 does not come out.
 //!
-//! A step is two calls: `step` gives the output that is wanted, `realised` takes the difference
-//! between what was applied and what was wanted. Not calling `realised` (or calling it with zero)
-//! is the unlimited controller, exactly.
+//! A step is two calls: `step` gives the wanted output, `back_calculate` takes the difference between
+//! applied and wanted output. Without the second call (or with zero) it is the unlimited controller, exactly.
 //!
 //! The output is the integrator, in `f32`: near 180 V it stops moving for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
 
-use crate::Dq;
+use crate::math::frames::Dq;
 
 /// Coefficients of a PI controller, Eq. 3.35.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +36,6 @@ pub struct PiState {
 
 impl Pi {
     /// The output wanted for this error.
-    #[inline]
     pub fn step(&self, state: &mut PiState, error: f32) -> f32 {
         let output = state.output + self.k_c * (error - self.z_c * state.error);
         *state = PiState { output, error };
@@ -46,35 +44,14 @@ impl Pi {
 }
 
 impl PiState {
-    /// At rest.
-    pub const ZERO: Self = Self { output: 0.0, error: 0.0 };
-
-    /// Tells what was realised: `correction` = applied - wanted, zero if nothing was limited.
-    #[inline]
+    /// Anti-windup: adds `correction` = applied - wanted output, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: f32) {
         self.output += correction;
-    }
-
-    /// Continues from `output` as if `error` had stood for ever, so that the next step with the
-    /// same error moves the output by its integral part k_c (1 - z_c) e only.
-    pub fn preset(&mut self, output: f32, error: f32) {
-        *self = Self { output, error };
-    }
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        *self = Self::ZERO;
     }
 
     /// The output of the last step as realised.
     pub fn output(&self) -> f32 {
         self.output
-    }
-
-    /// Whether the state is finite; once it is not, only [`PiState::reset`] or
-    /// [`PiState::preset`] helps.
-    pub fn is_finite(&self) -> bool {
-        self.output.is_finite() && self.error.is_finite()
     }
 }
 
@@ -90,52 +67,27 @@ pub struct DqPi {
 /// State of the current loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DqPiState {
-    output: Dq,
-    error: Dq,
+    d: PiState,
+    q: PiState,
 }
 
 impl DqPi {
-    /// The voltage wanted for this current error: exactly [`Pi::step`] on each axis.
-    #[inline]
+    /// The voltage wanted for this current error.
     pub fn step(&self, state: &mut DqPiState, error: Dq) -> Dq {
-        let output = Dq {
-            d: state.output.d + self.d.k_c * (error.d - self.d.z_c * state.error.d),
-            q: state.output.q + self.q.k_c * (error.q - self.q.z_c * state.error.q),
-        };
-        *state = DqPiState { output, error };
-        output
+        Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
 }
 
 impl DqPiState {
-    /// At rest.
-    pub const ZERO: Self = Self { output: Dq::ZERO, error: Dq::ZERO };
-
-    /// Tells what was realised: `correction` = applied - wanted voltage, zero if nothing was
-    /// limited.
-    #[inline]
+    /// Anti-windup: adds `correction` = applied - wanted voltage, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: Dq) {
-        self.output += correction;
-    }
-
-    /// See [`PiState::preset`].
-    pub fn preset(&mut self, output: Dq, error: Dq) {
-        *self = Self { output, error };
-    }
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        *self = Self::ZERO;
+        self.d.back_calculate(correction.d);
+        self.q.back_calculate(correction.q);
     }
 
     /// The voltage of the last step as realised.
     pub fn output(&self) -> Dq {
-        self.output
-    }
-
-    /// Whether the state is finite; see [`PiState::is_finite`].
-    pub fn is_finite(&self) -> bool {
-        self.output.is_finite() && self.error.is_finite()
+        Dq { d: self.d.output, q: self.q.output }
     }
 }
 
@@ -162,25 +114,9 @@ impl ReferenceFilter {
     }
 
     /// One sample.
-    #[inline]
     pub fn step(&self, state: &mut ReferenceState, reference: f32) -> f32 {
         let output = state.next;
         state.next += self.one_minus_p * (reference - output);
         output
-    }
-}
-
-impl ReferenceState {
-    /// At rest.
-    pub const ZERO: Self = Self { next: 0.0 };
-
-    /// Continues from `output`.
-    pub fn preset(&mut self, output: f32) {
-        self.next = output;
-    }
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        *self = Self::ZERO;
     }
 }

@@ -3,69 +3,7 @@
 use crate::fault::Fault;
 use crate::io::Sample;
 use crate::math::frames::{Abc, AlphaBeta};
-
-/// Calibration line of one channel: `value = gain * code + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// Units per code.
-    pub gain: f32,
-    /// Value at code 0.
-    pub offset: f32,
-}
-
-impl Line {
-    /// Channel A of the dissertation's board, Eq. 3.5.
-    pub const CHANNEL_A: Self = Self { gain: 0.002_212_0, offset: -4.472_713_4 };
-    /// Channel B, Eq. 3.5, with all printed digits.
-    #[allow(clippy::excessive_precision)]
-    pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
-
-    /// The line times a factor.
-    pub fn scaled(self, factor: f32) -> Self {
-        Self { gain: factor * self.gain, offset: factor * self.offset }
-    }
-
-    /// Value at a code.
-    pub fn at(self, code: u16) -> f32 {
-        self.gain * f32::from(code) + self.offset
-    }
-}
-
-/// Codes between which nothing is wrong: one subtraction and one comparison.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    lowest: u16,
-    span: u16,
-}
-
-impl Window {
-    /// No code of a converter.
-    pub const NONE: Self = Self { lowest: u16::MAX, span: 0 };
-
-    /// The codes whose values lie between two, at or inside them, and within the range of a converter
-    /// without its two ends; `full_scale` is its largest code.
-    // Not inlined: it stands once, and there is time when it is called.
-    #[inline(never)]
-    pub fn new(line: Line, values: [f32; 2], full_scale: u16) -> Self {
-        // A code further in: what is computed here is rounded.
-        let [from, to] = values.map(|x| (x - line.offset) / line.gain);
-        let (from, to) = ((from + 2.0) as u16, (to - 1.0) as u16);
-        let lowest = if from > 1 { from } else { 1 };
-        let below = full_scale.saturating_sub(1);
-        let highest = if to < below { to } else { below };
-        match highest.checked_sub(lowest) {
-            Some(span) => Self { lowest, span },
-            None => Self::NONE,
-        }
-    }
-
-    /// Whether a code is among them.
-    #[inline]
-    pub fn has(self, code: u16) -> bool {
-        // (In the width of the core: a subtraction of 16 bits is two instructions.)
-        u32::from(code).wrapping_sub(u32::from(self.lowest)) <= u32::from(self.span)
-    }
-}
+use crate::settings::Line;
 
 /// Coefficients of the sensing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,29 +22,15 @@ pub struct Sensing {
     pub calibration_samples: u16,
     /// Largest offset that is believed, A.
     pub largest_offset: f32,
-    /// Largest phase current, A.
-    pub trip_a: f32,
-    /// Codes of a dc link that is neither too high nor too low.
-    pub dc_window: Window,
 }
 
-/// State of the sensing: what was found at start.
-#[derive(Clone, Copy, Debug)]
+/// State of the sensing: the offsets found at start.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SensingState {
     /// Value at code 0 with that of no current taken off, channels a and b, A.
     zeros: [f32; 2],
-    /// Codes of currents that are neither too large nor at an end of the range; none before the offsets
-    /// are known.
-    windows: [Window; 2],
     sum: [f32; 2],
     count: u16,
-}
-
-impl Default for SensingState {
-    /// Nothing known; see [`Sensing::start`].
-    fn default() -> Self {
-        Self { zeros: [0.0; 2], windows: [Window::NONE; 2], sum: [0.0; 2], count: 0 }
-    }
 }
 
 /// One sample in SI units.
@@ -138,36 +62,24 @@ impl Sensing {
         }
     }
 
-    /// Whether all codes are well inside their limits, and the third current, A, too. If not, something may be
-    /// wrong; what it is takes longer to say.
-    #[inline]
-    pub fn is_well_inside(&self, state: &SensingState, sample: &Sample, current_c: f32) -> bool {
-        state.windows[0].has(sample.current_a)
-            & state.windows[1].has(sample.current_b)
-            & self.dc_window.has(sample.dc_link)
-            & (sample.heat_sink <= self.heat_sink_trip)
-            & (current_c.abs() <= self.trip_a)
-    }
-
-    /// The fault of a saturated channel or a hot heat sink, if any.
-    pub fn check(&self, sample: &Sample) -> Option<Fault> {
-        if self.saturated(sample.current_a) {
-            Some(Fault::SensorSaturatedA)
-        } else if self.saturated(sample.current_b) {
-            Some(Fault::SensorSaturatedB)
+    /// Checks the codes.
+    ///
+    /// # Errors
+    /// The fault of a saturated channel or of a hot heat sink.
+    pub fn check(&self, sample: &Sample) -> Result<(), Fault> {
+        let saturated = |code: u16| code == 0 || code >= self.full_scale;
+        if saturated(sample.current_a) {
+            Err(Fault::SensorSaturatedA)
+        } else if saturated(sample.current_b) {
+            Err(Fault::SensorSaturatedB)
         } else if sample.heat_sink > self.heat_sink_trip {
-            Some(Fault::OverTemperature)
+            Err(Fault::OverTemperature)
         } else {
-            None
+            Ok(())
         }
     }
 
-    fn saturated(&self, code: u16) -> bool {
-        code == 0 || code >= self.full_scale
-    }
-
     /// Begins with the lines as they are set, and no offsets known.
-    #[inline]
     pub fn start(&self, state: &mut SensingState) {
         *state = SensingState {
             zeros: [self.current_a.offset, self.current_b.offset],
@@ -201,11 +113,6 @@ impl Sensing {
             (_, false) => Err(Fault::OffsetB),
             _ => {
                 state.zeros = [self.current_a.offset - a, self.current_b.offset - b];
-                let window = |line: Line, offset: f32| {
-                    let values = [offset - self.trip_a, offset + self.trip_a];
-                    Window::new(line, values, self.full_scale)
-                };
-                state.windows = [window(self.current_a, a), window(self.current_b, b)];
                 Ok(Some(()))
             }
         }
@@ -225,38 +132,7 @@ mod tests {
             heat_sink_trip: 4000,
             calibration_samples: 64,
             largest_offset: 0.2,
-            trip_a: 4.0,
-            dc_window: Window::new(Line { gain: 0.11, offset: 0.0 }, [200.0, 410.0], 4095),
         }
-    }
-
-    /// What is well inside is inside; and only some codes at the limits are not well inside.
-    #[test]
-    fn windows_lie_inside_their_limits() {
-        let s = sensing();
-        let mut state = SensingState::default();
-        let rest = Sample { current_a: 2040, current_b: 1990, dc_link: 2827, ..Sample::default() };
-        assert!(!s.is_well_inside(&state, &rest, 0.0), "not calibrated");
-        while s.calibrate(&mut state, &rest).unwrap().is_none() {}
-        for code in 0..=4095 {
-            let limits = |value: f32, low: f32, high: f32| (low..=high).contains(&value);
-            let (a, b) = (Sample { current_a: code, ..rest }, Sample { current_b: code, ..rest });
-            let dc = Sample { dc_link: code, ..rest };
-            let inside = |x: &Sample, value: f32, low: f32, high: f32, lsb: f32| {
-                let fine = limits(value, low, high) && s.check(x).is_none();
-                let well =
-                    limits(value, low + 3.0 * lsb, high - 3.0 * lsb) && (4..4092).contains(&code);
-                let said = s.is_well_inside(&state, x, 0.0);
-                assert!(fine || !said, "{code}: not fine, but said to be well inside");
-                assert!(said || !well, "{code}: well inside, but not said to be");
-            };
-            inside(&a, s.step(&state, &a).phases.a, -4.0, 4.0, 0.0023);
-            inside(&b, s.step(&state, &b).phases.b, -4.0, 4.0, 0.0023);
-            inside(&dc, s.step(&state, &dc).dc_link, 200.0, 410.0, 0.11);
-        }
-        assert!(!s.is_well_inside(&state, &Sample { heat_sink: 4001, ..rest }, 0.0));
-        assert!(!s.is_well_inside(&state, &rest, -4.01));
-        assert!(!s.is_well_inside(&state, &rest, f32::NAN));
     }
 
     #[test]
@@ -310,18 +186,17 @@ mod tests {
     #[test]
     fn both_ends_of_the_range_are_saturated() {
         let sample = Sample { current_a: 2000, current_b: 2000, ..Sample::default() };
-        assert_eq!(sensing().check(&sample), None);
-        assert_eq!(
-            sensing().check(&Sample { current_a: 0, ..sample }),
-            Some(Fault::SensorSaturatedA)
-        );
-        assert_eq!(
-            sensing().check(&Sample { current_b: 4095, ..sample }),
-            Some(Fault::SensorSaturatedB)
-        );
-        assert_eq!(
-            sensing().check(&Sample { heat_sink: 4001, ..sample }),
-            Some(Fault::OverTemperature)
-        );
+        assert_eq!(sensing().check(&sample), Ok(()));
+        let cases = [
+            (Sample { current_a: 0, ..sample }, Err(Fault::SensorSaturatedA)),
+            (Sample { current_a: 1, ..sample }, Ok(())),
+            (Sample { current_b: 4095, ..sample }, Err(Fault::SensorSaturatedB)),
+            (Sample { current_b: 4094, ..sample }, Ok(())),
+            (Sample { heat_sink: 4001, ..sample }, Err(Fault::OverTemperature)),
+            (Sample { heat_sink: 4000, ..sample }, Ok(())),
+        ];
+        for (sample, found) in cases {
+            assert_eq!(sensing().check(&sample), found, "{sample:?}");
+        }
     }
 }

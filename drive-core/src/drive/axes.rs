@@ -34,7 +34,6 @@ const VOLTAGE_LEAD: f32 = 1.5;
 impl Coefficients {
     /// The current is seen from where the flux was when the filtered current flowed; the voltage is put
     /// where the flux will be when it acts. `step` is how far the flux turns in a period, turns.
-    #[inline]
     pub(super) fn turn(&self, axes: &mut Axes, step: f32, injection: UnitVector) {
         let along = UnitVector { cos: 1.0, sin: 0.0 };
         let lag = self.lag_share * (lpf_lag_samples(step * TAU) + self.current_lag);

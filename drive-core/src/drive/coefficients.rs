@@ -8,23 +8,23 @@ use crate::current::dead_time::DeadTime;
 use crate::current::inverter_drop::InverterDrop;
 use crate::current::modulation::Modulator;
 use crate::current::pi::{DqPi, Pi, ReferenceFilter};
-use crate::current::sensing::{Sensing, Window};
+use crate::current::sensing::Sensing;
 use crate::flux::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 use crate::flux::indirect::Indirect;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, Tracker};
 use crate::identify::learning::Learning;
-use crate::io::PERIOD_S;
+use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
-use crate::math::complex::Complex;
 use crate::motion::{self, Motion};
 use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
-use crate::protect::plausibility::{Prediction, RotorFlux};
+use crate::protect::plausibility::Prediction;
 use crate::protect::saliency_check::SaliencyCheck;
 use crate::protect::wiring_check::WiringCheck;
 use crate::settings::{AngleSource, CurrentPlant, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
+use num_complex::Complex64;
 
 /// Group delay of the band-pass at 600 Hz, samples: by so much the envelope of the carrier current
 /// lags.
@@ -112,6 +112,9 @@ impl Coefficients {
 /// Limits in the units of the control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Protection {
+    /// Largest phase current, A.
+    pub trip_a: f32,
+    /// Dc link, V.
     pub dc_over: f32,
     pub dc_under: f32,
     /// Electrical turns per period.
@@ -131,17 +134,13 @@ pub(crate) struct SequenceSteps {
     pub stop_ramp: f32,
 }
 
-fn periods(seconds: f32) -> u32 {
-    libm::roundf(seconds / PERIOD_S) as u32
-}
-
 /// Delay, samples, of the envelope of the carrier current behind that of its voltage: the group delay
 /// of the plant k / (z - p) at the carrier, less the half sample by which the voltage is held. The
 /// angle of the voltage is that of the middle of its period already. 0.053 for the motor of Table 5:
 /// left out, it is 0.9° at 600 rpm.
 fn carrier_lag(plant: FirstOrder) -> f32 {
     let turn = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-    let Complex { re: c, im: s } = Complex::unit(turn);
+    let Complex64 { re: c, im: s } = Complex64::cis(turn);
     let (re, im) = (c - plant.p, s);
     ((1.0 - plant.p * c) / (re * re + im * im) - 0.5) as f32
 }
@@ -152,8 +151,6 @@ impl Settings {
     /// # Errors
     /// The first value outside its range, by name, with the range; or why a design rule cannot be
     /// met.
-    // `inline`, as the other design code: compiled where it is called, in the firmware for size.
-    #[inline]
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         self.check()?;
         let m = &self.motor;
@@ -178,11 +175,6 @@ impl Settings {
         let injecting =
             self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
         let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
-        let rotor_flux = RotorFlux {
-            coupled_inductance: m.l_m / m.l_r() * m.l_m,
-            tau_r: m.tau_r(),
-            period_s: PERIOD_S,
-        };
         let synchronous = self.angle_source == AngleSource::Injection
             && self.injection.demodulator == DemodulatorKind::Synchronous;
         let t = &self.injection.synchronous;
@@ -223,20 +215,12 @@ impl Settings {
                 heat_sink_trip: self.scales.heat_sink_trip,
                 calibration_samples: periods(self.sequence.calibrate_s) as u16,
                 largest_offset: 0.2,
-                trip_a: self.limits.trip_a,
-                dc_window: Window::new(
-                    self.scales.dc_link,
-                    [self.limits.dc_under_v, self.limits.dc_over_v],
-                    self.scales.full_scale,
-                ),
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
             indirect: Indirect::new(
+                m,
                 self.scales.encoder_counts,
-                m.pole_pairs,
-                m.tau_r(),
-                PERIOD_S,
                 self.sequence.i_d,
                 2.0 * self.limits.speed_rpm / 60.0,
             ),
@@ -251,7 +235,7 @@ impl Settings {
                 let gains = [self.scales.current_a.gain, self.scales.current_b.gain];
                 NoiseWatch::new(t.flux_saliency, injection.current_amplitude, gains)
             }),
-            wiring: WiringCheck::new(m.sigma_l_s(), PERIOD_S),
+            wiring: WiringCheck::new(m.sigma_l_s()),
             estimator: self.estimator(
                 lag_share,
                 current_lag + carrier_lag(motor_plant),
@@ -267,37 +251,21 @@ impl Settings {
             lag_share,
             modulator: Modulator::new(
                 self.inverter.top,
-                PERIOD_S,
                 self.inverter.dead_time_s,
                 self.inverter.compensate,
             ),
             dead_time: if self.inverter.compensate {
-                DeadTime::new(
-                    self.inverter.dead_time_s,
-                    PERIOD_S,
-                    self.inverter.full_compensation_a,
-                )
+                DeadTime::new(self.inverter.dead_time_s, self.inverter.full_compensation_a)
             } else {
                 DeadTime::NONE
             },
-            inverter_drop: InverterDrop::new(
-                self.sequence.magnetise_s,
-                m.tau_r(),
-                PERIOD_S,
-                (self.sequence.i_d, self.limits.current_a),
-                m.r_r * (m.l_m / m.l_r()) * (m.l_m / m.l_r()),
-                m.r_s,
-            ),
-            learning: Learning::new(
-                m.tau_r(),
-                PERIOD_S,
-                (self.sequence.i_d, self.limits.current_a),
-                (m.l_ls + m.l_m - rotor_flux.coupled_inductance, rotor_flux.coupled_inductance),
-            ),
-            prediction: Prediction::new(motor_plant, rotor_flux, self.limits.unexplained_v),
+            inverter_drop: InverterDrop::new(m, &self.sequence, self.limits.current_a),
+            learning: Learning::new(m, self.sequence.i_d, self.limits.current_a),
+            prediction: Prediction::new(m, motor_plant, self.limits.unexplained_v),
             motion: self.motion(&motion_design),
             freq_per_speed: turns_per_step(60.0),
             protection: Protection {
+                trip_a: self.limits.trip_a,
                 dc_over: self.limits.dc_over_v,
                 dc_under: self.limits.dc_under_v,
                 rotor_freq: turns_per_step(highest_rpm),
@@ -315,7 +283,6 @@ impl Settings {
         })
     }
 
-    #[inline]
     fn motion_design(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
         let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
@@ -331,7 +298,6 @@ impl Settings {
         )
     }
 
-    #[inline]
     fn motion(&self, design: &MotionDesign) -> Motion {
         let counts = match self.angle_source {
             AngleSource::Encoder => self.scales.encoder_counts,
@@ -348,12 +314,11 @@ impl Settings {
         let checked = t.check
             && self.angle_source == AngleSource::Injection
             && self.injection.demodulator == DemodulatorKind::Synchronous;
-        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r(), PERIOD_S))
+        checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r()))
     }
 
     /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
     /// `carrier_a` the amplitude of that current, A.
-    #[inline]
     fn estimator(
         &self,
         lag_share: f32,
@@ -372,7 +337,7 @@ impl Settings {
                     t.current_saliency,
                     self.sequence.i_d,
                 ),
-                pll: Pll::new(t.bandwidth_hz, PERIOD_S),
+                pll: Pll::new(t.bandwidth_hz),
             },
             _ => AngleLoop::Pii {
                 reference: match p.learned {

@@ -7,6 +7,8 @@ use crate::math::decimal::Shortest;
 use crate::math::frames::Dq;
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
+// The large variant is passed by reference and kept once, in a mailbox.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the

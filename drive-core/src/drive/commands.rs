@@ -123,8 +123,6 @@ impl Drive {
         }
     }
 
-    // Not inlined: there the compiler knows that the two do not overlap, and copies in one go.
-    #[inline(never)]
     fn configure(&mut self, coefficients: &Coefficients) {
         self.c = *coefficients;
         self.changes = self.changes.wrapping_add(1);

@@ -9,6 +9,7 @@ use crate::fault::Fault;
 use crate::io::Sample;
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
+use crate::protect::plausibility::RotorFlux;
 use crate::settings::AngleSource;
 
 /// What it sees of the step, beside the state.
@@ -37,7 +38,6 @@ pub(super) struct Seen<'a> {
 
 impl Coefficients {
     /// What is due in sample `index` of the carrier period, which counts with or without a carrier.
-    #[inline(always)]
     pub(super) fn in_turn(
         &self,
         s: &mut ControlState,
@@ -96,7 +96,6 @@ impl Coefficients {
     }
 
     /// For the noise of the sensors.
-    #[inline(always)]
     fn listen(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, sample),
@@ -105,13 +104,16 @@ impl Coefficients {
     }
 
     /// What the current will be compared with.
-    #[inline]
     fn expect(&self, s: &mut ControlState, step: &Seen) {
-        let rotor = (s.indirect.magnetising, step.rotor_freq);
-        self.prediction.expect(&mut s.prediction, rotor, (step.flux_axis, step.flux_freq));
+        let flux = RotorFlux {
+            magnetising: s.indirect.magnetising,
+            rotor_freq: step.rotor_freq,
+            axis: step.flux_axis,
+            flux_freq: step.flux_freq,
+        };
+        self.prediction.expect(&mut s.prediction, &flux);
     }
 
-    #[inline]
     fn check_lock(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
@@ -124,7 +126,6 @@ impl Coefficients {
         }
     }
 
-    #[inline]
     fn check_both_channels(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());
@@ -135,7 +136,6 @@ impl Coefficients {
     }
 
     /// Beside the fundamental.
-    #[inline]
     fn check_carrier_headroom(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());

@@ -6,19 +6,13 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::estimator::AngleLoop;
-use crate::identify::learning::{Learned, Next};
+use crate::identify::learning::{Learned, LearningSample, Next};
 use crate::math::angle::Angle;
 
 impl Drive {
     /// What the last learning found, used or not; none before the end of the first.
     pub fn learned(&self) -> Option<&Learned> {
         self.learned.as_ref()
-    }
-
-    /// While it learns: points that are done, and all points.
-    pub fn learning_progress(&self) -> Option<(usize, usize)> {
-        (self.state == State::Learning)
-            .then(|| (self.control.learning.done(), self.c.learning.points()))
     }
 
     pub(super) fn can_learn(&self) -> bool {
@@ -34,9 +28,14 @@ impl Drive {
         let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
         let saliency = *s.estimator.saliency();
         let signal = if normalised { saliency.q } else { s.estimator.delta_i };
-        let theta = t.phi + Angle::QUARTER;
-        let seen = (signal, saliency.carrier_squared);
-        match c.learning.step(&mut s.learning, seen, theta, t.flux_freq, t.voltage) {
+        let sample = LearningSample {
+            signal,
+            carrier_squared: saliency.carrier_squared,
+            theta: t.phi + Angle::QUARTER,
+            flux_freq: t.flux_freq,
+            voltage: t.voltage,
+        };
+        match c.learning.step(&mut s.learning, &sample) {
             Next::Current(i_q) => self.control.references.current.q = i_q,
             Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
             Next::Done => {

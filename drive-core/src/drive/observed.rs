@@ -59,7 +59,6 @@ pub(super) struct Observed {
 
 impl Drive {
     /// What it saw and did in the last step.
-    #[inline]
     pub fn telemetry(&self) -> Telemetry {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {

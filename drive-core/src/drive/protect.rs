@@ -1,58 +1,40 @@
-//! What must hold in every step.
+//! The checks of every step: the sample before it is used, and the state when a result is not finite.
 
 use super::Drive;
-use crate::current::sensing::{Measured, SensingState};
+use crate::current::sensing::Measured;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Sample};
 
 impl Coefficients {
-    /// What must hold in every period with the outputs on or about to be.
-    #[inline]
-    pub(super) fn protect(
-        &self,
-        sensing: &SensingState,
-        sample: &Sample,
-        measured: &Measured,
-    ) -> Result<(), Fault> {
-        let fine = sample.hardware == Hardware::empty()
-            && self.sensing.is_well_inside(sensing, sample, measured.phases.c);
-        if fine {
-            return Ok(());
+    /// Checks a sample, with the outputs on or about to be.
+    ///
+    /// # Errors
+    /// The first fault that it shows.
+    pub(super) fn protect(&self, sample: &Sample, measured: &Measured) -> Result<(), Fault> {
+        if !sample.hardware.is_empty() {
+            return Err(of_hardware(sample.hardware));
         }
-        let wrong =
-            self.what_is_wrong(sample, measured.phases.a, measured.phases.b, measured.dc_link);
-        wrong.map_or(Ok(()), Err)
-    }
-
-    /// The first thing that is wrong, if anything is, with the currents in A and the dc link in V.
-    #[inline(never)]
-    fn what_is_wrong(&self, sample: &Sample, a: f32, b: f32, dc_link: f32) -> Option<Fault> {
-        if sample.hardware != Hardware::empty() {
-            return Some(of_hardware(sample.hardware));
-        }
-        if let Some(fault) = self.sensing.check(sample) {
-            return Some(fault);
-        }
-        let (p, trip_a) = (&self.protection, self.sensing.trip_a);
-        if a.abs() > trip_a {
-            Some(Fault::OverCurrentA)
-        } else if b.abs() > trip_a {
-            Some(Fault::OverCurrentB)
-        } else if (a + b).abs() > trip_a {
-            Some(Fault::OverCurrentC)
-        } else if dc_link > p.dc_over {
-            Some(Fault::DcLinkOverVoltage)
-        } else if dc_link < p.dc_under {
-            Some(Fault::DcLinkUnderVoltage)
+        self.sensing.check(sample)?;
+        let (limits, phases) = (&self.protection, &measured.phases);
+        if phases.a.abs() > limits.trip_a {
+            Err(Fault::OverCurrentA)
+        } else if phases.b.abs() > limits.trip_a {
+            Err(Fault::OverCurrentB)
+        } else if phases.c.abs() > limits.trip_a {
+            Err(Fault::OverCurrentC)
+        } else if measured.dc_link > limits.dc_over {
+            Err(Fault::DcLinkOverVoltage)
+        } else if measured.dc_link < limits.dc_under {
+            Err(Fault::DcLinkUnderVoltage)
         } else {
-            None
+            Ok(())
         }
     }
 }
 
 impl Drive {
-    /// Which of settings, references and state is to blame when a result is not finite.
+    /// The fault when a result is not finite: settings, references or state, whichever is not.
     pub(super) fn not_finite(&self) -> Option<Fault> {
         let r = &self.control.references;
         if !self.c.is_finite() {
@@ -67,7 +49,7 @@ impl Drive {
     }
 }
 
-/// The most telling of the events: what switched off first comes first.
+/// The fault of the most telling event: the one that switched off first comes first.
 fn of_hardware(events: Hardware) -> Fault {
     if events.intersects(Hardware::BREAK) {
         Fault::Break
@@ -79,5 +61,37 @@ fn of_hardware(events: Hardware) -> Fault {
         Fault::DeadlineMiss
     } else {
         Fault::ConverterOverrun
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::frames::{Abc, AlphaBeta};
+    use crate::settings::{Limits, Settings};
+
+    #[test]
+    fn each_limit_trips_beyond_its_value_and_not_at_it() {
+        let coefficients = Settings::default().build().unwrap();
+        let Limits { trip_a, dc_over_v, dc_under_v, .. } = Limits::default();
+        let sample = Sample { current_a: 2000, current_b: 2000, ..Sample::default() };
+        let check = |a: f32, b: f32, dc_link: f32| {
+            let (phases, current) = (Abc::new(a, b, -(a + b)), AlphaBeta::ZERO);
+            coefficients.protect(&sample, &Measured { phases, current, dc_link })
+        };
+        let (more, half) = (1.001 * trip_a, 0.5 * trip_a);
+        for sign in [1.0, -1.0] {
+            let at = |a: f32, b: f32| check(sign * a, sign * b, 311.0);
+            assert_eq!(at(trip_a, -half), Ok(()));
+            assert_eq!(at(more, -half), Err(Fault::OverCurrentA));
+            assert_eq!(at(-half, trip_a), Ok(()));
+            assert_eq!(at(-half, more), Err(Fault::OverCurrentB));
+            assert_eq!(at(half, half), Ok(()));
+            assert_eq!(at(half, half * 1.002), Err(Fault::OverCurrentC));
+        }
+        assert_eq!(check(0.0, 0.0, dc_over_v), Ok(()));
+        assert_eq!(check(0.0, 0.0, dc_over_v + 0.1), Err(Fault::DcLinkOverVoltage));
+        assert_eq!(check(0.0, 0.0, dc_under_v), Ok(()));
+        assert_eq!(check(0.0, 0.0, dc_under_v - 0.1), Err(Fault::DcLinkUnderVoltage));
     }
 }

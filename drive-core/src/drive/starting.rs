@@ -12,13 +12,12 @@ use crate::settings::AngleSource;
 
 impl Drive {
     /// A step without current control: off, in fault, or on the way to it.
-    #[inline(never)]
     pub(super) fn prepare(&mut self, sample: &Sample) -> Result<Compare, State> {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Ok(Compare::OFF);
         }
         let measured = self.c.sensing.step(&self.control.sensing, sample);
-        self.c.protect(&self.control.sensing, sample, &measured)?;
+        self.c.protect(sample, &measured)?;
         Ok(match self.state {
             State::Calibrating => self.calibrate(sample)?,
             State::Precharge => self.precharge(sample),
@@ -51,8 +50,7 @@ impl Drive {
             Next::Apply(voltage, flowing) => {
                 let signs = self.c.dead_time.signs(flowing.to_abc());
                 let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
-                // (Which is there already; `step` would be written out again.)
-                let modulated = self.c.modulator.limited(voltage, compensation, measured.dc_link);
+                let modulated = self.c.modulator.step(voltage, compensation, measured.dc_link);
                 Compare::on(modulated.compare)
             }
             Next::Passed => {

@@ -60,7 +60,6 @@ impl State {
     }
 
     /// Whether the current is regulated, for whatever purpose.
-    #[inline]
     pub(crate) const fn has_current(self) -> bool {
         matches!(
             self,
@@ -75,21 +74,18 @@ impl State {
     }
 
     /// Whether torque, speed or position is regulated as asked for.
-    #[inline]
     pub const fn regulates(self) -> bool {
         matches!(self, Self::Torque | Self::Speed | Self::Position)
     }
 }
 
 impl From<Fault> for State {
-    #[inline]
     fn from(fault: Fault) -> Self {
         Self::Fault(fault)
     }
 }
 
 impl fmt::Display for State {
-    #[inline(never)] // not once more for every reference to it
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Off => "off",

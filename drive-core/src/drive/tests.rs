@@ -4,9 +4,9 @@
 use super::*;
 use crate::math::frames::Abc;
 
-use crate::current::sensing::Line;
 use crate::io::Hardware;
 use crate::math::angle::Angle;
+use crate::settings::Line;
 use crate::settings::{CurrentPlant, Settings};
 use proptest::prelude::*;
 
@@ -324,15 +324,12 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         (|d| d.c.current_loop.d.k_c = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.c.sensing.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.control.references.current.q = f32::NAN, Fault::NonFiniteCommand),
-        (
-            |d| d.control.current_loop.preset(Dq::new(f32::NAN, 0.0), Dq::ZERO),
-            Fault::NonFiniteState,
-        ),
+        (|d| d.control.current_loop.back_calculate(Dq::new(f32::NAN, 0.0)), Fault::NonFiniteState),
         (|d| d.control.estimator.rotor_freq = f32::NAN, Fault::NonFiniteState),
         (
             |d| {
                 let nan = AlphaBeta::new(f32::NAN, 0.0);
-                LPF.step_alpha_beta(&mut d.control.low_pass, nan);
+                LPF.step(&mut d.control.low_pass, nan);
             },
             Fault::NonFiniteState,
         ),

@@ -21,7 +21,8 @@
 //! | [`BPF`] | 0.01000 | -0.49 dB, -3.9° | 0.80 | 8.83 | 500 Hz to 700 Hz |
 //! | [`PP`] | 0.94406 | -75.8 dB | 24.46 | - | below 100 Hz |
 
-use crate::filter::sos::{AlphaBetaState, Sos, SosState};
+use crate::filter::sos::{Sos, SosState};
+use crate::math::frames::AlphaBeta;
 
 /// "LPF" as printed (Table 7): an 8th-order band stop around the injected 600 Hz.
 ///
@@ -104,11 +105,11 @@ pub const PP: Sos<2> = Sos::from_f64(&[
 ]);
 
 /// State of [`LPF`] on a current vector.
-pub type LpfState = AlphaBetaState<4>;
+pub type LpfState = SosState<AlphaBeta, 4>;
 /// State of [`BPF`] on a current vector.
-pub type BpfState = AlphaBetaState<2>;
+pub type BpfState = SosState<AlphaBeta, 2>;
 /// State of [`PP`] on the current difference.
-pub type PpState = SosState<2>;
+pub type PpState = SosState<f32, 2>;
 
 const LPF_LAG: f32 = 1.530_412;
 const LPF_LAG_SQUARED: f32 = 5.315_48;
@@ -118,7 +119,6 @@ const LPF_LAG_SQUARED: f32 = 5.315_48;
 ///
 /// Least-squares fit of the phase up to 60 Hz. Error of the phase, measured: below 0.0002° up to
 /// 60 Hz, 0.01° at 100 Hz, 0.5° at 200 Hz. Even in `omega_t`; total.
-#[inline]
 pub fn lpf_lag_samples(omega_t: f32) -> f32 {
     LPF_LAG + LPF_LAG_SQUARED * (omega_t * omega_t)
 }

@@ -18,7 +18,6 @@ impl<const SIGNALS: usize, const LENGTH: usize> Default for MovingSum<SIGNALS, L
 impl<const SIGNALS: usize, const LENGTH: usize> MovingSum<SIGNALS, LENGTH> {
     /// Takes the newest values in at place `index` of the ring; the sums of as many samples as the
     /// index has values before it starts again.
-    #[inline]
     pub fn step(&mut self, index: usize, new: [i32; SIGNALS]) -> [i32; SIGNALS] {
         let slot = &mut self.ring[if index < LENGTH { index } else { 0 }];
         for ((sum, old), new) in self.sum.iter_mut().zip(slot.iter()).zip(new) {

@@ -1,6 +1,6 @@
 //! Second-order sections and their frequency response.
 
-use crate::math::complex::Complex;
+use num_complex::Complex64;
 
 /// One section,
 ///
@@ -67,9 +67,9 @@ impl Section {
 /// H(e^(j ωT)) of a cascade, with the coefficients as they are stored; `omega_t` in rad/sample.
 ///
 /// Not for the control step.
-pub fn response(sections: &[Section], omega_t: f64) -> Complex {
-    let delay = Complex::unit(-omega_t);
-    sections.iter().fold(Complex::ONE, |h, s| {
+pub fn response(sections: &[Section], omega_t: f64) -> Complex64 {
+    let delay = Complex64::cis(-omega_t);
+    sections.iter().fold(Complex64::ONE, |h, s| {
         h * polynomial(s.numerator(), delay) / polynomial(s.denominator(), delay)
     })
 }
@@ -78,7 +78,7 @@ pub fn response(sections: &[Section], omega_t: f64) -> Complex {
 ///
 /// A zero exactly at this frequency makes it not-a-number. Not for the control step.
 pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
-    let delay = Complex::unit(-omega_t);
+    let delay = Complex64::cis(-omega_t);
     let of = |[c0, c1, c2]: [f64; 3]| {
         let derivative = polynomial([0.0, c1, 2.0 * c2], delay);
         (derivative / polynomial([c0, c1, c2], delay)).re
@@ -86,6 +86,6 @@ pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
     sections.iter().map(|s| of(s.numerator()) - of(s.denominator())).sum()
 }
 
-fn polynomial([c0, c1, c2]: [f64; 3], x: Complex) -> Complex {
-    Complex::new(c0, 0.0) + x * (Complex::new(c1, 0.0) + x * Complex::new(c2, 0.0))
+fn polynomial([c0, c1, c2]: [f64; 3], x: Complex64) -> Complex64 {
+    Complex64::new(c0, 0.0) + x * (Complex64::new(c1, 0.0) + x * Complex64::new(c2, 0.0))
 }

@@ -1,18 +1,17 @@
 //! Digital filters as second-order sections.
 //!
-//! A filter is a constant set of coefficients ([`Sos`]) and any number of states ([`SosState`] for
-//! one signal, [`AlphaBetaState`] for both components of a vector). The step is transposed direct
-//! form II in `f32`: it never panics, and anything non-finite that enters stays in the state until
-//! [`SosState::reset`].
+//! A filter is a constant set of coefficients ([`Sos`]) and any number of states ([`SosState`]), each for a
+//! number or a vector. The step is transposed direct form II in `f32`: it never panics, and anything
+//! non-finite that enters stays in the state until it is replaced.
 //!
 //! There is no direct form (Eq. C.1) of higher order here, on purpose. With the coefficients of
 //! Tables 7 and 8 rounded to `f32` it is wrong by 13 mA (LPF) and up to 15 mA rms (PP) for currents
 //! of 3 A, more than the 10 mA the demodulation looks for; sections are wrong by 2 µA and 11 µA.
 
-use crate::AlphaBeta;
+use core::ops::{Add, Mul, Sub};
 
 use crate::filter::section::{Section, group_delay, response};
-use crate::math::complex::Complex;
+use num_complex::Complex64;
 
 /// A cascade of `N` sections: coefficients only.
 ///
@@ -87,37 +86,20 @@ impl<const N: usize> Sos<N> {
         true
     }
 
-    /// One sample, any unit.
-    #[inline]
-    pub fn step(&self, state: &mut SosState<N>, x: f32) -> f32 {
+    /// One sample of a signal, any unit. A vector is filtered component by component.
+    pub fn step<V: Signal>(&self, state: &mut SosState<V, N>, x: V) -> V {
         let mut y = x;
         for (c, s) in self.sections.iter().zip(state.sections.iter_mut()) {
             let x = y;
-            y = c.b0 * x + s[0];
-            s[0] = c.b1 * x - c.a1 * y + s[1];
-            s[1] = c.b2 * x - c.a2 * y;
-        }
-        y
-    }
-
-    /// One sample of both components of a vector: exactly [`Sos::step`] on each, in one loop.
-    #[inline]
-    pub fn step_alpha_beta(&self, state: &mut AlphaBetaState<N>, x: AlphaBeta) -> AlphaBeta {
-        let mut y = x;
-        for (c, s) in self.sections.iter().zip(state.sections.iter_mut()) {
-            let x = y;
-            y.alpha = c.b0 * x.alpha + s[0].alpha;
-            y.beta = c.b0 * x.beta + s[0].beta;
-            s[0].alpha = c.b1 * x.alpha - c.a1 * y.alpha + s[1].alpha;
-            s[0].beta = c.b1 * x.beta - c.a1 * y.beta + s[1].beta;
-            s[1].alpha = c.b2 * x.alpha - c.a2 * y.alpha;
-            s[1].beta = c.b2 * x.beta - c.a2 * y.beta;
+            y = x * c.b0 + s[0];
+            s[0] = x * c.b1 - y * c.a1 + s[1];
+            s[1] = x * c.b2 - y * c.a2;
         }
         y
     }
 
     /// [`response`] of this filter.
-    pub fn response(&self, omega_t: f64) -> Complex {
+    pub fn response(&self, omega_t: f64) -> Complex64 {
         response(&self.sections, omega_t)
     }
 
@@ -127,56 +109,25 @@ impl<const N: usize> Sos<N> {
     }
 }
 
-/// What an [`Sos`] remembers of one signal.
+/// A signal that a filter takes: a number or a vector.
+pub trait Signal:
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self>
+{
+}
+
+impl<V> Signal for V where
+    V: Copy + Default + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>
+{
+}
+
+/// The state of an [`Sos`] for one signal; at rest by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SosState<const N: usize> {
-    sections: [[f32; 2]; N],
+pub struct SosState<V, const N: usize> {
+    sections: [[V; 2]; N],
 }
 
-impl<const N: usize> SosState<N> {
-    /// At rest.
-    pub const ZERO: Self = Self { sections: [[0.0; 2]; N] };
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        *self = Self::ZERO;
-    }
-
-    /// Whether every state is finite; once one is not, only [`SosState::reset`] helps.
-    pub fn is_finite(&self) -> bool {
-        self.sections.iter().all(|s| s[0].is_finite() && s[1].is_finite())
-    }
-}
-
-impl<const N: usize> Default for SosState<N> {
+impl<V: Signal, const N: usize> Default for SosState<V, N> {
     fn default() -> Self {
-        Self::ZERO
-    }
-}
-
-/// What an [`Sos`] remembers of both components of a vector.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AlphaBetaState<const N: usize> {
-    sections: [[AlphaBeta; 2]; N],
-}
-
-impl<const N: usize> AlphaBetaState<N> {
-    /// At rest.
-    pub const ZERO: Self = Self { sections: [[AlphaBeta::ZERO; 2]; N] };
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        *self = Self::ZERO;
-    }
-
-    /// Whether every state is finite; once one is not, only [`AlphaBetaState::reset`] helps.
-    pub fn is_finite(&self) -> bool {
-        self.sections.iter().all(|s| s[0].is_finite() && s[1].is_finite())
-    }
-}
-
-impl<const N: usize> Default for AlphaBetaState<N> {
-    fn default() -> Self {
-        Self::ZERO
+        Self { sections: [[V::default(); 2]; N] }
     }
 }

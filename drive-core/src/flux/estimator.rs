@@ -125,12 +125,12 @@ pub struct Lost;
 impl EstimatorState {
     /// The flux angle at the present sample.
     pub fn flux(&self) -> FluxAngle {
-        FluxAngle { phi: self.tracker.angle - Angle::QUARTER, step: self.tracker.step }
+        FluxAngle { phi: self.tracker.angle - Angle::QUARTER, freq: self.tracker.freq }
     }
 
     /// Whether everything is a finite number.
     pub fn is_finite(&self) -> bool {
-        (self.tracker.step + self.mean_freq + self.rotor_freq + self.delta_i).is_finite()
+        (self.tracker.freq + self.mean_freq + self.rotor_freq + self.delta_i).is_finite()
             && self.synchronous.seen.q.is_finite()
     }
 
@@ -173,7 +173,6 @@ impl Estimator {
 
     /// Demodulates one sample: the current, A; the injection axis, delayed by [`lag`](Self::lag), and how
     /// fast it turns, turns per period; the carrier; the reference of the quadrature current, A.
-    #[inline]
     pub fn observe(&self, state: &mut EstimatorState, sample: &CarrierSample, step: f32) {
         state.synchronous.mix(sample);
         if let AngleLoop::Pii { .. } = self.angle_loop {
@@ -182,7 +181,6 @@ impl Estimator {
     }
 
     /// Once a carrier period, where the synchronous demodulation tracks: the saliency that the one before shows.
-    #[inline]
     pub fn see(&self, state: &mut EstimatorState) {
         if let AngleLoop::Pll { .. } = self.angle_loop {
             state.synchronous.see();
@@ -191,7 +189,6 @@ impl Estimator {
 
     /// Once a carrier period, with the saliency of the one before: which way the axis is pushed by it. An
     /// acceleration of the rotor that is asked for is known, turns per period in each.
-    #[inline]
     pub fn push(&self, state: &mut EstimatorState, acceleration: f32) {
         if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
             let (error, share) = schedule.correction(state.saliency());
@@ -200,7 +197,6 @@ impl Estimator {
     }
 
     /// The other demodulations.
-    #[inline(never)]
     fn observe_printed(&self, state: &mut EstimatorState, mut sample: CarrierSample, step: f32) {
         if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
             // These rotate what has passed the band-pass.
@@ -220,13 +216,12 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Lost`] when the speed has reached its limit.
-    #[inline]
     pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_freq: f32) -> Result<(), Lost> {
         match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);
-                let rotor_freq = state.tracker.step - slip_freq;
+                let rotor_freq = state.tracker.freq - slip_freq;
                 state.rotor_freq += ROTOR_SMOOTHING * (rotor_freq - state.rotor_freq);
                 if held { Ok(()) } else { Err(Lost) }
             }

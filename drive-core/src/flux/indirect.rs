@@ -8,7 +8,9 @@
 use core::f32::consts::TAU;
 
 use crate::carrier::injection::CARRIER_SAMPLES;
+use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
+use crate::settings::Motor;
 
 /// Coefficients of the encoder and the slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +22,6 @@ pub struct Indirect {
     rate: f32,
     /// The same of the settings, for [`Self::track`].
     nominal_rate: f32,
-    period_s: f32,
     /// Least magnetising current that is divided by, A.
     least: f32,
     /// Share of the newest step in the mean speed.
@@ -59,7 +60,7 @@ pub struct FluxAngle {
     /// At the present sample.
     pub phi: Angle,
     /// Electrical turns per period.
-    pub step: f32,
+    pub freq: f32,
 }
 
 /// The encoder moved, or stood still, as the rotor cannot.
@@ -83,28 +84,20 @@ pub const TRACKED_STEP: f32 = 0.02;
 const SPEED_FILTER_S: f32 = 5e-3;
 
 impl Indirect {
-    /// `counts` of the encoder per mechanical turn, pole pairs, rotor time constant and period in
-    /// s, the nominal magnetising current in A and the highest speed, mechanical turns per s.
-    #[inline]
-    pub fn new(
-        counts: u32,
-        pole_pairs: u8,
-        tau_r: f32,
-        period_s: f32,
-        nominal_a: f32,
-        highest: f32,
-    ) -> Self {
-        let bits = (u64::from(pole_pairs) << 32) as f64 / f64::from(counts);
+    /// For a motor with `counts` of the encoder per mechanical turn, the nominal magnetising current
+    /// `i_d`, A, and the `highest` speed, mechanical turns/s.
+    pub fn new(motor: &Motor, counts: u32, i_d: f32, highest: f32) -> Self {
+        let bits = (u64::from(motor.pole_pairs) << 32) as f64 / f64::from(counts);
+        let rate = PERIOD_S / motor.tau_r();
         Self {
             bits_per_count: libm::round(bits) as u32,
-            rate: period_s / tau_r,
-            nominal_rate: period_s / tau_r,
-            period_s,
-            least: 0.2 * nominal_a,
-            smoothing: period_s / SPEED_FILTER_S,
-            most_counts: 2 + (highest * period_s * counts as f32) as i32,
-            missed: STOPS_WITHIN * f32::from(pole_pairs),
-            judged_from: JUDGED_FROM * f32::from(pole_pairs) * period_s,
+            rate,
+            nominal_rate: rate,
+            least: 0.2 * i_d,
+            smoothing: PERIOD_S / SPEED_FILTER_S,
+            most_counts: 2 + (highest * PERIOD_S * counts as f32) as i32,
+            missed: STOPS_WITHIN * f32::from(motor.pole_pairs),
+            judged_from: JUDGED_FROM * f32::from(motor.pole_pairs) * PERIOD_S,
         }
     }
 
@@ -113,23 +106,22 @@ impl Indirect {
     ///
     /// # Errors
     /// The smallest and the largest one allowed, s.
-    #[inline]
     pub fn track(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
-        let limits = LIMITS.map(|factor| factor * self.period_s / self.nominal_rate);
+        let limits = LIMITS.map(|factor| factor * PERIOD_S / self.nominal_rate);
         if !(limits[0]..=limits[1]).contains(&tau_r) {
             return Err(limits);
         }
         let most = TRACKED_STEP * self.nominal_rate;
-        let change = self.period_s / tau_r - self.rate;
+        let change = PERIOD_S / tau_r - self.rate;
         if change > most {
             self.rate += most;
         } else if change < -most {
             self.rate -= most;
         } else {
-            self.rate = self.period_s / tau_r;
+            self.rate = PERIOD_S / tau_r;
             return Ok(tau_r);
         }
-        Ok(self.period_s / self.rate)
+        Ok(PERIOD_S / self.rate)
     }
 
     /// The flux angle at the present sample from the encoder's counter.
@@ -154,18 +146,16 @@ impl Indirect {
             (state.missed, state.moving_freq) = (0.0, state.rotor_freq);
         }
         let rotor = Angle::from_bits(count.wrapping_mul(self.bits_per_count) as i32);
-        Ok(FluxAngle { phi: rotor + state.slip, step: state.rotor_freq + state.slip_freq })
+        Ok(FluxAngle { phi: rotor + state.slip, freq: state.rotor_freq + state.slip_freq })
     }
 
     /// Integrates the slip over one period with the quadrature current, A.
-    #[inline]
     pub fn slip(&self, state: &mut IndirectState, i_q: f32) {
         state.slip_freq = state.slip_per_ampere * i_q;
         state.slip += Angle::within_turn(state.slip_freq);
     }
 
     /// Once a carrier period: the magnetising current follows the direct current, A.
-    #[inline]
     pub fn magnetise(&self, state: &mut IndirectState, i_d: f32) {
         let i_m =
             state.magnetising + CARRIER_SAMPLES as f32 * self.rate * (i_d - state.magnetising);
@@ -181,7 +171,7 @@ mod tests {
     use super::*;
 
     fn indirect() -> Indirect {
-        Indirect::new(10_000, 2, 0.186, 1.0 / 6000.0, 0.7, 60.0)
+        Indirect::new(&Motor::default(), 10_000, 0.7, 60.0)
     }
 
     #[test]
@@ -224,7 +214,7 @@ mod tests {
             ind.slip(&mut state, 1.4);
         }
         let phi = ind.angle(&mut state, 0).unwrap().phi.to_radians();
-        assert!((phi - 0.1 * 2.0 / 0.186).abs() < 1e-3, "{phi}");
+        assert!((phi - 0.1 * 2.0 / Motor::default().tau_r()).abs() < 1e-3, "{phi}");
     }
 
     #[test]

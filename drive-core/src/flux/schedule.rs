@@ -8,7 +8,7 @@
 //! instead of 2 |a|. The gain is scheduled to make up for that.
 
 use crate::carrier::Saliency;
-use crate::settings::table::{POINTS, ReferenceTable, STEP_A, between, each, odd, place};
+use crate::settings::table::{POINTS, ReferenceTable, STEP_A, between, odd, place};
 
 /// Share of the proportional part that is left however steep the fast slope. Only errors faster than
 /// the current loop see that slope in full; with all of it taken out the tracking loop has too little
@@ -32,9 +32,8 @@ pub struct GainSchedule {
 impl GainSchedule {
     /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
     /// current, 1/A, and the direct-axis current, A.
-    #[inline]
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
-        let by_current = |n: usize, _: f32| {
+        let share = core::array::from_fn(|n| {
             let i_q = n as f32 * STEP_A;
             let length = libm::sqrtf(i_d * i_d + i_q * i_q);
             // b |i| cos 2 gamma, where it adds to the slope
@@ -42,9 +41,7 @@ impl GainSchedule {
             let by_slope =
                 a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 });
             LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope
-        };
-        let mut share = [0.0; POINTS];
-        each(&mut share, by_current);
+        });
         Self {
             table: *table,
             share,

@@ -7,6 +7,7 @@
 
 use core::f32::consts::TAU;
 
+use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::limited;
 use crate::tuning;
@@ -28,7 +29,7 @@ pub struct TrackerState {
     /// The tracked angle at the present sample.
     pub angle: Angle,
     /// Turns per period.
-    pub step: f32,
+    pub freq: f32,
     error: f32,
     /// Turns per period and period.
     acceleration: f32,
@@ -37,7 +38,6 @@ pub struct TrackerState {
 impl Tracker {
     /// `k_s` in rad/A and `z_s` as in Eq. 3.44; `limit` is the largest speed, turns per period,
     /// below 1/2.
-    #[inline]
     pub fn new(k_s: f32, z_s: f32, limit: f32) -> Self {
         Self { gain: k_s / TAU, zero: z_s, limit }
     }
@@ -45,11 +45,11 @@ impl Tracker {
     /// Moves on by one period with the error `reference - delta_i`, A. False when the speed has
     /// reached its limit (or is not a number): the angle is lost.
     pub fn step(&self, state: &mut TrackerState, error: f32) -> bool {
-        let step = state.step + self.gain * (error - self.zero * state.error);
+        let freq = state.freq + self.gain * (error - self.zero * state.error);
         state.error = error;
-        state.step = step;
-        state.angle += Angle::within_turn(step);
-        step < self.limit && step > -self.limit
+        state.freq = freq;
+        state.angle += Angle::within_turn(freq);
+        freq < self.limit && freq > -self.limit
     }
 }
 
@@ -81,10 +81,9 @@ pub struct Pll {
 const LARGEST_ERROR: f32 = 0.6;
 
 impl Pll {
-    /// For a bandwidth in Hz and the period of the control, s.
-    #[inline]
-    pub fn new(bandwidth_hz: f32, period_s: f32) -> Self {
-        let w = TAU * bandwidth_hz * period_s;
+    /// For a bandwidth in Hz.
+    pub fn new(bandwidth_hz: f32) -> Self {
+        let w = TAU * bandwidth_hz * PERIOD_S;
         let c = tuning::THIRD_POLE as f32;
         Self {
             proportional: (2.0 + c) * w / TAU,
@@ -95,7 +94,6 @@ impl Pll {
 
     /// What an angle error, rad, turns, with the schedule's share of the proportional part, while the rotor
     /// gets faster by `known` turns per period in each: the angle does not lag by that.
-    #[inline]
     pub fn push(&self, error: f32, share: f32, known: f32) -> Push {
         let error = limited(error, LARGEST_ERROR);
         Push {
@@ -107,12 +105,11 @@ impl Pll {
 
     /// Moves on by one period, pushed by the error that was seen last, with the slip, turns per period. The
     /// rotor's speed is kept in `rotor_freq`. (The drive looks at its limit and whether it is a number.)
-    #[inline]
     pub fn step(state: &mut TrackerState, rotor_freq: &mut f32, push: Push, slip_freq: f32) {
         state.acceleration += push.acceleration;
         *rotor_freq += push.speed + state.acceleration;
-        state.step = *rotor_freq + slip_freq;
-        state.angle += Angle::within_turn(state.step + push.angle);
+        state.freq = *rotor_freq + slip_freq;
+        state.angle += Angle::within_turn(state.freq + push.angle);
     }
 }
 

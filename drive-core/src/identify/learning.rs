@@ -21,8 +21,10 @@
 
 use core::f32::consts::TAU;
 
+use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{Dq, SQRT_3};
+use crate::settings::Motor;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, STEP_A};
 
 /// Time for flux and averages to settle at a point, in rotor time constants.
@@ -66,7 +68,22 @@ pub struct Learning {
     /// L_m^2 / L_r, H.
     coupled: f32,
     /// rad/s of a turn per period.
-    per_step: f32,
+    rad_per_s: f32,
+}
+
+/// One period of the learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearningSample {
+    /// The demodulated signal: the saliency, or a current difference in A.
+    pub signal: f32,
+    /// Square of the carrier current, A^2.
+    pub carrier_squared: f32,
+    /// The injection axis.
+    pub theta: Angle,
+    /// How fast it turns, turns per period.
+    pub flux_freq: f32,
+    /// Voltage without the carrier, V.
+    pub voltage: Dq,
 }
 
 /// Sums over one point.
@@ -156,25 +173,18 @@ pub struct Learned {
 }
 
 impl Learning {
-    /// For the rotor time constant and the control period, s, the direct and the largest current, A,
-    /// sigma L_s and L_m^2 / L_r, H.
-    #[inline]
-    pub fn new(
-        tau_r: f32,
-        period_s: f32,
-        (i_d, largest_a): (f32, f32),
-        (leakage, coupled): (f32, f32),
-    ) -> Self {
-        let periods = |s: f32| libm::roundf(s / period_s) as u32;
+    /// For a motor with the direct current `i_d`, A, and currents up to `largest_a`, A.
+    pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
+        let coupled = motor.coupled_inductance();
         Self {
-            settle: periods(SETTLE_T * tau_r),
+            settle: periods(SETTLE_T * motor.tau_r()),
             average: (periods(AVERAGE_S.0), periods(AVERAGE_S.1)),
             points: (most as usize).min(POINTS - 1),
             i_d,
-            leakage,
+            leakage: motor.l_ls + motor.l_m - coupled,
             coupled,
-            per_step: TAU / period_s,
+            rad_per_s: TAU / PERIOD_S,
         }
     }
 
@@ -189,16 +199,8 @@ impl Learning {
         if point.is_multiple_of(2) { i_q } else { -i_q }
     }
 
-    /// One period: the demodulated signal and the square of the carrier current, A^2; the injection axis
-    /// and how fast it turns, turns per period; the voltage, V.
-    pub fn step(
-        &self,
-        state: &mut LearningState,
-        (signal, carrier_squared): (f32, f32),
-        theta: Angle,
-        flux_freq: f32,
-        voltage: Dq,
-    ) -> Next {
+    /// Takes one period.
+    pub fn step(&self, state: &mut LearningState, sample: &LearningSample) -> Next {
         if state.point >= self.points() {
             return Next::Done;
         }
@@ -207,15 +209,15 @@ impl Learning {
         if s.elapsed <= self.settle {
             return Next::Current(self.current(state.point));
         }
-        let seen = theta - Angle::within_turn(flux_freq * LAG);
+        let seen = sample.theta - Angle::within_turn(sample.flux_freq * LAG);
         let UnitVector { cos, sin } = (seen + seen - TWELFTH).unit_vector();
         s.count += 1;
-        s.turned += flux_freq;
-        s.signal += signal;
-        s.carrier += carrier_squared;
-        s.in_phase += signal * sin;
-        s.quadrature += signal * cos;
-        s.voltage += voltage;
+        s.turned += sample.flux_freq;
+        s.signal += sample.signal;
+        s.carrier += sample.carrier_squared;
+        s.in_phase += sample.signal * sin;
+        s.quadrature += sample.signal * cos;
+        s.voltage += sample.voltage;
         if s.count > self.average.1 {
             return Next::Stuck;
         }
@@ -252,7 +254,7 @@ impl Learning {
             return true;
         }
         let even = (voltage + state.voltage) * 0.5;
-        let x = self.per_step * s.turned * mean * self.current(point);
+        let x = self.rad_per_s * s.turned * mean * self.current(point);
         let direct = even.d + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
         let of_free = self.coupled * (x - first_x);
@@ -286,9 +288,7 @@ impl Learning {
         let mut q = [0.0; POINTS];
         let (mut asymmetry, mut held) = (0.0_f32, 0.0);
         let (mut xx, mut xq, mut qq) = (0.0_f32, 0.0_f32, 0.0_f32);
-        // (By a length that the compiler does not know: else it writes this out sixteen times.)
-        let places = core::hint::black_box(q.as_mut_slice()).iter_mut();
-        for (n, (place, (p, m))) in places.zip(plus.iter().zip(minus)).enumerate() {
+        for (n, (place, (p, m))) in q.iter_mut().zip(plus.iter().zip(minus)).enumerate() {
             if n <= self.points {
                 held = 0.5 * (p - m);
                 let even = 0.5 * (p + m) - offset;
@@ -316,8 +316,7 @@ impl Learning {
         };
         let mut ratio = [1.0; POINTS];
         let mut held = 1.0;
-        let places = core::hint::black_box(ratio.as_mut_slice()).iter_mut();
-        for (n, (place, square)) in places.zip(state.carrier).enumerate().skip(1) {
+        for (n, (place, square)) in ratio.iter_mut().zip(state.carrier).enumerate().skip(1) {
             if n <= self.points {
                 held = libm::sqrtf(square / baseline);
             }
@@ -340,7 +339,6 @@ impl Learning {
 impl Learned {
     /// Whether a stored result is one that a learning can have found and accepted; the tables check
     /// their own values.
-    #[inline]
     pub fn is_believable(&self) -> bool {
         let within = |fitted: &Fitted, largest: f32| {
             fitted.misfit.is_finite() && (!fitted.accepted || fitted.value.abs() <= largest)
@@ -355,7 +353,6 @@ impl Learned {
 
     /// The result that holds after this learning, done on a drive that worked with `before`. A value
     /// that was not found stays as it was; the gain mismatch adds to the one corrected already.
-    #[inline]
     pub fn on_top_of(&self, before: Option<&Self>) -> Self {
         let mut learned = *self;
         if let Some(before) = before {
@@ -374,20 +371,12 @@ impl Learned {
     }
 }
 
-impl LearningState {
-    /// Points that are done.
-    pub fn done(&self) -> usize {
-        self.point
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
     use core::f64::consts::TAU as TURN;
 
-    const PERIOD: f32 = 1.0 / 6000.0;
     /// Carrier current at no torque current, A.
     const CARRIER: f32 = 0.26;
 
@@ -397,7 +386,7 @@ mod tests {
     }
 
     fn learning() -> Learning {
-        Learning::new(0.186, PERIOD, (0.7, 3.5), (0.0515, 0.153))
+        Learning::new(&Motor::default(), 0.7, 3.5)
     }
 
     /// Goes through all points with the signal that `q(i_q, theta)` gives and the voltage `v(i_q)`.
@@ -405,12 +394,19 @@ mod tests {
         let (learning, mut state) = (learning(), LearningState::default());
         let (mut i_q, mut theta) = (0.0_f32, 0.25_f64);
         for _ in 0..3_000_000 {
-            let step = i_q / (0.7 * 0.186) * PERIOD / TAU;
+            let step = i_q / (0.7 * 0.186) * PERIOD_S / TAU;
             theta += f64::from(step);
             let seen = (theta - f64::from(LAG) * f64::from(step)) * TURN;
             let signal = q(i_q.into(), seen) as f32;
             let angle = Angle::from_turns(theta as f32);
-            match learning.step(&mut state, (signal, carrier(i_q)), angle, step, v(i_q)) {
+            let sample = LearningSample {
+                signal,
+                carrier_squared: carrier(i_q),
+                theta: angle,
+                flux_freq: step,
+                voltage: v(i_q),
+            };
+            match learning.step(&mut state, &sample) {
                 Next::Current(next) => i_q = next,
                 other => return (other, state),
             }
@@ -485,9 +481,14 @@ mod tests {
     #[test]
     fn a_flux_that_does_not_turn_ends_it() {
         let (learning, mut state) = (learning(), LearningState::default());
-        let stuck = (0..200_000).any(|_| {
-            learning.step(&mut state, (0.0, 0.0), Angle::ZERO, 0.0, Dq::ZERO) == Next::Stuck
-        });
+        let nothing = LearningSample {
+            signal: 0.0,
+            carrier_squared: 0.0,
+            theta: Angle::ZERO,
+            flux_freq: 0.0,
+            voltage: Dq::ZERO,
+        };
+        let stuck = (0..200_000).any(|_| learning.step(&mut state, &nothing) == Next::Stuck);
         assert!(stuck);
     }
 

@@ -40,11 +40,12 @@ use core::fmt;
 
 use crate::flux::indirect::LIMITS;
 use crate::identify::rls::filter::Filter;
-use crate::identify::rls::{Complex32, Rls, RlsError, RlsSettings};
+use crate::identify::rls::{Rls, RlsError, RlsSettings};
 use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::settings::Settings;
 use fit::{Machine, Unknowns};
+use num_complex::Complex32;
 
 /// Control periods to one sample of the least squares: 750 Hz. At 6 kHz the increments, which carry
 /// the rotor, would be a thousandth of the signals.
@@ -152,7 +153,6 @@ pub struct Online {
 
 /// `base`, but with `limit` no more than 50 times as large, and no less: what the least squares ask for, for
 /// any motor that the drive takes.
-#[inline]
 fn between(base: f32, limit: f32) -> f32 {
     if base > limit {
         limit
@@ -163,7 +163,6 @@ fn between(base: f32, limit: f32) -> f32 {
     }
 }
 
-#[inline]
 const fn squared(x: f32) -> f32 {
     x * x
 }
@@ -183,14 +182,12 @@ struct Motor {
 
 impl Motor {
     /// What the settings say, with this speed, electrical rad/s.
-    #[inline]
     fn nominal(&self, omega_m: f32) -> Unknowns {
         Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
     }
 
     /// The machine's inductances with `current`, A: L x = sigma L_s (x - s x*), and x turns with the
     /// current in the steady state.
-    #[inline]
     fn machine(&self, current: Dq) -> Machine {
         let square = current.length_squared();
         let along = current.d * current.d - current.q * current.q;
@@ -214,7 +211,6 @@ impl Online {
     /// # Errors
     /// What the recursive least squares refuse: nothing of settings that
     /// [`build`](Settings::build) takes.
-    #[inline]
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let (m, limits) = (&settings.motor, &settings.limits);
         let synchronous = &settings.injection.synchronous;
@@ -258,7 +254,6 @@ impl Online {
 
     /// One control period, in order and without gaps: the current that was measured, A, and the voltage
     /// that the same step put out, V ([`Telemetry`](crate::Telemetry) has both).
-    #[inline]
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta) {
         // What a step puts out acts from the next sample on; the current is seen later still.
         let voltage = self.present + (self.before - self.present) * self.delay;
@@ -271,8 +266,7 @@ impl Online {
         }
     }
 
-    /// What every control period costs. Not inlined: it would be compiled for size, as the firmware around
-    /// it.
+    /// The work of a control period. Not inlined: `cargo xtask cycles` counts it by its name.
     #[inline(never)]
     fn sample(&mut self, voltage: Complex32, current: Complex32) {
         let [on_voltage, on_current] = &mut self.filters;
@@ -291,7 +285,6 @@ impl Online {
     }
 
     /// Samples were lost, or the outputs were off: begins anew, but with what it believes.
-    #[inline]
     pub fn restart(&mut self) {
         self.rls.reset();
         self.begin();
@@ -301,7 +294,6 @@ impl Online {
     }
 
     /// The least squares begin anew with what is believed.
-    #[inline]
     fn begin(&mut self) {
         let nominal = self.motor.nominal(self.speed);
         self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
@@ -317,7 +309,6 @@ impl Online {
     ///
     /// # Errors
     /// Why the estimate must not be used now.
-    #[inline]
     pub fn refine(&mut self, current: Dq, speed: Speed) -> Result<Tracked, Doubt> {
         let (Speed::Known(seen) | Speed::Guess(seen)) = speed;
         let free_speed = matches!(speed, Speed::Guess(_));

@@ -21,13 +21,12 @@
 //! A sample costs the same whatever it is, an estimated 1000 cycles of a Cortex-M4: two filters, one update of [`ud::Ud`], no loop that
 //! depends on data, no function of a maths library, no panic.
 
-mod complex;
 pub mod filter;
 pub mod ud;
 
-pub use complex::Complex32;
+use num_complex::Complex32;
 
-use crate::AlphaBeta;
+use crate::math::frames::AlphaBeta;
 use filter::{Filter, Filtered};
 use ud::{N, Ud};
 
@@ -197,7 +196,7 @@ impl Rls {
             return;
         }
         for (power, x) in self.power.iter_mut().zip([v2, i2]) {
-            *power += LOUDNESS * (x.square() - *power);
+            *power += LOUDNESS * (x.norm_sqr() - *power);
         }
         for (mean, x) in self.axes.iter_mut().zip([i2.re * i2.re, i2.im * i2.im, i2.re * i2.im]) {
             *mean += AXES * self.forget * (x - *mean);
@@ -218,7 +217,6 @@ impl Rls {
         }
     }
 
-    #[inline]
     fn remember(&mut self, v: Filtered, i: Filtered) {
         for (history, x) in self.history.iter_mut().zip([v, i]) {
             *history = [x.change, history[2], x.value];
@@ -226,7 +224,6 @@ impl Rls {
     }
 
     /// A sample was not used.
-    #[inline]
     fn unused(&mut self) {
         self.validity.missing = self.validity.missing.saturating_add(1);
         if self.validity.missing > self.memory {
@@ -235,14 +232,13 @@ impl Rls {
     }
 
     /// A sample was used.
-    #[inline]
     fn judge(&mut self, error: Complex32, signal: Complex32) {
         let (forget, validity) = (self.forget, &mut self.validity);
         validity.missing = 0;
-        validity.error += forget * (error.square() - validity.error);
-        validity.signal += forget * (signal.square() - validity.signal);
-        let fits =
-            validity.error < MISFIT * validity.signal && error.square() < OUTLIER * validity.signal;
+        validity.error += forget * (error.norm_sqr() - validity.error);
+        validity.signal += forget * (signal.norm_sqr() - validity.signal);
+        let fits = validity.error < MISFIT * validity.signal
+            && error.norm_sqr() < OUTLIER * validity.signal;
         let known = self.ud.largest() < self.unknown;
         validity.good = if fits && known { validity.good.saturating_add(1) } else { 0 };
     }
@@ -263,7 +259,6 @@ impl Rls {
     }
 
     /// The same, valid or not; finite in any case.
-    #[inline]
     pub fn latest(&self) -> [Complex32; N] {
         let admittance = self.scale[0] * self.settings.current_base;
         let [g1, g0, h1, u0] = self.ud.theta;
@@ -272,7 +267,6 @@ impl Rls {
 
     /// A difference of coefficients, like those of [`latest`](Self::latest), as numbers of size one that know
     /// nothing of each other; see [`Ud::whitened`].
-    #[inline]
     pub fn whitened(&self, [g1, g0, h1, u0]: [Complex32; N]) -> [Complex32; N] {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud.whitened([g1, g0, h1 * impedance, u0 * impedance])
@@ -303,15 +297,7 @@ impl Rls {
         if self.validity.signal > 0.0 { self.validity.error / self.validity.signal } else { 1.0 }
     }
 
-    /// Forgets how sure the estimate is, and keeps it: after a fault.
-    #[inline]
-    pub fn reset_covariance(&mut self) {
-        self.ud = Ud::new(self.ud.theta, self.settings.p0);
-        self.validity = Validity::NONE;
-    }
-
     /// Begins from these coefficients, as [`latest`](Self::latest) gives them, instead of from zero.
-    #[inline]
     pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
@@ -320,7 +306,6 @@ impl Rls {
 
     /// Forgets everything but the settings.
     #[cold]
-    #[inline(never)]
     pub fn reset(&mut self) {
         self.ud = Ud::new(START, self.settings.p0);
         self.voltage = Filter::new(self.settings.corner);

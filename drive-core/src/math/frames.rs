@@ -5,6 +5,8 @@
 
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
+use num_complex::Complex32;
+
 use crate::math::angle::UnitVector;
 
 macro_rules! frame {
@@ -190,6 +192,18 @@ impl Dq {
     /// The square of the length.
     pub fn length_squared(self) -> f32 {
         self.d * self.d + self.q * self.q
+    }
+}
+
+impl From<AlphaBeta> for Complex32 {
+    fn from(x: AlphaBeta) -> Self {
+        Self::new(x.alpha, x.beta)
+    }
+}
+
+impl From<Complex32> for AlphaBeta {
+    fn from(x: Complex32) -> Self {
+        Self::new(x.re, x.im)
     }
 }
 

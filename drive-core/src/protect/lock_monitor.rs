@@ -33,7 +33,7 @@
 
 use crate::carrier::Saliency;
 use crate::fault::Fault;
-use crate::settings::table::{CarrierTable, POINTS, between, each, place};
+use crate::settings::table::{CarrierTable, POINTS, between, place};
 
 /// Coefficients of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,14 +102,11 @@ const LEAST_CARRIER: f32 = 0.5;
 const WEAK_PERIODS: u8 = 8;
 
 fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
-    let mut squares = *table.points();
-    each(&mut squares, |_, r| 1.0 / (r * r));
-    squares
+    table.points().map(|r| 1.0 / (r * r))
 }
 
 impl LockMonitor {
     /// See [`LockMonitorSettings`].
-    #[inline]
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {

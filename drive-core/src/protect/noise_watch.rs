@@ -71,7 +71,6 @@ struct Channel {
 impl NoiseWatch {
     /// For the saliency fixed to the flux, the amplitude of the carrier current, A, and the gains of
     /// channels a and b, A per code.
-    #[inline]
     pub fn new(flux_saliency: f32, carrier_a: f32, gains: [f32; 2]) -> Self {
         let square = |gain: f32| {
             let codes = ALLOWED * flux_saliency * carrier_a / gain;
@@ -85,8 +84,6 @@ impl NoiseWatch {
     ///
     /// # Errors
     /// The channel is noisy, which comes out with its third.
-    // Always: it is called with a number, and of all this little is left then.
-    #[inline(always)]
     pub fn step(
         &self,
         state: &mut NoiseWatchState,
@@ -116,7 +113,6 @@ impl NoiseWatch {
 
 impl Channel {
     /// Whether its mean square has passed what is allowed.
-    #[inline(never)]
     fn is_noisy(&mut self, allowed: f32) -> bool {
         // Wrapping: four times four codes fit; a flipped bit may not.
         let [one, two] = self.last;

@@ -12,8 +12,10 @@ use core::f32::consts::TAU;
 use crate::carrier::CarrierCurrent;
 use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::fault::Fault;
+use crate::io::PERIOD_S;
 use crate::math::angle::UnitVector;
 use crate::math::frames::{AlphaBeta, Dq, SQRT_3};
+use crate::settings::Motor;
 use crate::tuning::FirstOrder;
 
 /// Share of the expected carrier amplitude below which a channel counts as silent.
@@ -36,7 +38,6 @@ impl CarrierWatch {
     ///
     /// # Errors
     /// A channel does not see it.
-    #[inline(never)]
     pub fn step(
         &mut self,
         seen: CarrierCurrent,
@@ -86,15 +87,17 @@ pub struct Prediction {
     allowed: f32,
 }
 
-/// What the comparison takes of the motor, SI units.
+/// The rotor flux in a sample, as the comparison takes it. Frequencies in electrical turns per period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFlux {
-    /// (L_m / L_r) L_m, H.
-    pub coupled_inductance: f32,
-    /// Rotor time constant, s.
-    pub tau_r: f32,
-    /// Period of the control, s.
-    pub period_s: f32,
+    /// Magnetising current, A.
+    pub magnetising: f32,
+    /// Speed of the rotor.
+    pub rotor_freq: f32,
+    /// Axis of the flux when the sampled current flowed.
+    pub axis: UnitVector,
+    /// Frequency of the flux.
+    pub flux_freq: f32,
 }
 
 /// State of the comparison.
@@ -122,33 +125,28 @@ const SMOOTHING: f32 = 0.276;
 const EMF_SHARE: f32 = 1.0;
 
 impl Prediction {
-    /// For the current response of the motor, A/V, its rotor flux, and an allowed voltage, V.
-    #[inline]
-    pub fn new(plant: FirstOrder, flux: RotorFlux, allowed_v: f32) -> Self {
+    /// For a motor, its current response, A/V, and an allowed voltage, V.
+    pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32) -> Self {
+        let coupled = motor.coupled_inductance();
         Self {
             per_ampere: (1.0 / plant.k) as f32,
             pole: plant.p as f32,
-            decay: flux.coupled_inductance / flux.tau_r,
-            emf: flux.coupled_inductance * TAU / flux.period_s,
+            decay: coupled / motor.tau_r(),
+            emf: coupled * TAU / PERIOD_S,
             allowed: allowed_v,
         }
     }
 
     /// The sample before it is judged: the voltage that the rotor flux adds to the applied one, V,
-    /// (L_m/L_r)(1/tau_r - j w_r) psi, with the magnetising current in A, the electrical speed of the rotor
-    /// in turns per period, and the flux as it is `seen` in this sample, turning by `flux_freq` turns per
-    /// period.
-    #[inline]
-    pub fn expect(
-        &self,
-        state: &mut PredictionState,
-        (magnetising, rotor_freq): (f32, f32),
-        (seen, flux_freq): (UnitVector, f32),
-    ) {
-        let rotor = Dq { d: self.decay * magnetising, q: -self.emf * magnetising * rotor_freq };
+    /// (L_m/L_r)(1/tau_r - j w_r) psi.
+    pub fn expect(&self, state: &mut PredictionState, flux: &RotorFlux) {
+        let rotor = Dq {
+            d: self.decay * flux.magnetising,
+            q: -self.emf * flux.magnetising * flux.rotor_freq,
+        };
         // The middle of the samples lies so far back from here.
         const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
-        state.rotor = rotor.to_alpha_beta(seen.turned_slightly(-MIDDLE * flux_freq));
+        state.rotor = rotor.to_alpha_beta(flux.axis.turned_slightly(-MIDDLE * flux.flux_freq));
     }
 
     /// Every fifth sample: the current, A, which is [collected](PredictionState::collect)
@@ -158,7 +156,6 @@ impl Prediction {
     ///
     /// # Errors
     /// The current is not as predicted.
-    #[inline(never)]
     pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
@@ -176,7 +173,6 @@ impl Prediction {
 
 impl PredictionState {
     /// One sample: the current, A, and the voltage just computed, V.
-    #[inline]
     pub fn collect(&mut self, current: AlphaBeta, computed: AlphaBeta) {
         self.currents += current;
         self.voltages += computed;
@@ -184,7 +180,6 @@ impl PredictionState {
 
     /// Two samples before it is judged: what is computed in a sample acts between the next one and the one
     /// after that, and so explains the current two samples later.
-    #[inline]
     pub fn take(&mut self) {
         self.taken = core::mem::replace(&mut self.voltages, AlphaBeta::ZERO);
     }

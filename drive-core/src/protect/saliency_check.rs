@@ -8,6 +8,7 @@
 //! the power stage drops has the direction of the carrier. At 45° a drop of 1.6 V a phase looks like a
 //! saliency of 0.0135.) Then the flux is built up again.
 
+use crate::io::periods;
 use crate::math::angle::UnitVector;
 use crate::math::frames::SQRT_3;
 
@@ -62,10 +63,8 @@ const LEAST_SHARE: f32 = 0.161;
 const RESTORE_T: f32 = 2.4;
 
 impl SaliencyCheck {
-    /// For the saliency fixed to the flux, the rotor time constant and the control period, s.
-    #[inline]
-    pub fn new(flux_saliency: f32, tau_r: f32, period_s: f32) -> Self {
-        let periods = |s: f32| libm::roundf(s / period_s) as u32;
+    /// For the saliency fixed to the flux and the rotor time constant, s.
+    pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
         let average = periods(AVERAGE_S);
         Self {
             settle: periods(SETTLE_S),

@@ -22,6 +22,7 @@
 //! sensor that works ends it at the next sample: down to a fifth below 0.5 A.
 
 use crate::fault::Fault;
+use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta};
 
 /// Height to which the pulses are made, A.
@@ -83,10 +84,9 @@ const AXES: [AlphaBeta; 3] = [
 ];
 
 impl WiringCheck {
-    /// For the transient inductance of the motor, H, and the control period, s.
-    #[inline]
-    pub fn new(sigma_ls: f32, period_s: f32) -> Self {
-        let volt_periods = EXPECTED_A * sigma_ls / period_s;
+    /// For the transient inductance of the motor, H.
+    pub fn new(sigma_ls: f32) -> Self {
+        let volt_periods = EXPECTED_A * sigma_ls / PERIOD_S;
         let rise = (volt_periods / HIGHEST_V) as u32 + 1;
         let rise = rise.clamp(SHORTEST_RISE, LONGEST_RISE);
         let volts = volt_periods / rise as f32;
@@ -166,7 +166,7 @@ mod tests {
         /// Whatever is measured, it ends, and a voltage is never higher than asked for.
         #[test]
         fn it_ends(sigma_ls in 1e-6_f32..100.0, bits: [u32; 16]) {
-            let check = WiringCheck::new(sigma_ls, 1.0 / 6000.0);
+            let check = WiringCheck::new(sigma_ls);
             let mut state = WiringCheckState::default();
             let longest = (2 * LONGEST_RISE + REST) * PULSES_PER_ROUND * ROUNDS;
             let ends = (0..longest).any(|n| {
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn not_a_number_is_no_current() {
-        let check = WiringCheck::new(0.05, 1.0 / 6000.0);
+        let check = WiringCheck::new(0.05);
         let nan = Abc::new(f32::NAN, 0.0, 0.0);
         let next = check.step(&mut WiringCheckState::default(), nan);
         assert_eq!(next, Err(Fault::WiringCurrent));

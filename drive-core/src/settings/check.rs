@@ -11,7 +11,6 @@ struct Ranges(Option<SettingsError>);
 
 impl Ranges {
     /// Not inlined: it is called fifty times, and never in a hurry.
-    #[inline(never)]
     fn check(&mut self, name: &'static str, value: f32, min: f32, max: f32) {
         // Not-a-number fails the test.
         let inside = value >= min && value <= max;

@@ -4,14 +4,12 @@ use super::Settings;
 
 impl Settings {
     /// Whether what was learned with `other` set would be learned with these as well.
-    #[inline]
     pub fn learns_as(&self, other: &Self) -> bool {
         self.learning_depends_on() == other.learning_depends_on()
     }
 
     /// All that the reference, the carrier current and the gains depend on when they are learned, and all
     /// that they take the place of.
-    #[inline(never)]
     fn learning_depends_on(&self) -> [f32; 25] {
         let (m, i, s) = (&self.motor, &self.inverter, &self.scales);
         let j = &self.injection;

@@ -51,7 +51,6 @@ impl ReferenceTable {
     ///
     /// # Errors
     /// See [`TableError`].
-    #[inline]
     pub fn new(points: &[(f32, f32)]) -> Result<Self, TableError> {
         let first = points.first().ok_or(TableError::TooShort)?;
         if *first != (0.0, 0.0) {
@@ -75,7 +74,7 @@ impl ReferenceTable {
 
     /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
     pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
-        let believable = all_within(&q, -LARGEST, LARGEST);
+        let believable = q.iter().all(|q| (-LARGEST..=LARGEST).contains(q));
         (q[0] == 0.0 && believable).then_some(Self { q })
     }
 
@@ -104,7 +103,6 @@ impl Default for ReferenceTable {
 
 /// A table of the line through points `(i_q in A, value)`, of which there are two at least and whose
 /// currents increase; constant beyond the last.
-#[inline]
 pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
     core::array::from_fn(|n| {
         let i_q = n as f32 * STEP_A;
@@ -113,19 +111,6 @@ pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
             None => points[points.len() - 1].1,
         }
     })
-}
-
-/// Goes through a table, not in the control step. (By a length that the compiler does not know: else it
-/// writes `f` out sixteen times.)
-pub(crate) fn each(table: &mut [f32; POINTS], mut f: impl FnMut(usize, f32) -> f32) {
-    for (n, x) in core::hint::black_box(table.as_mut_slice()).iter_mut().enumerate() {
-        *x = f(n, *x);
-    }
-}
-
-/// Whether all values of a table lie from `low` to `high`; not in the control step. (See [`each`].)
-pub(crate) fn all_within(table: &[f32; POINTS], low: f32, high: f32) -> bool {
-    core::hint::black_box(table.as_slice()).iter().all(|x| (low..=high).contains(x))
 }
 
 /// The interval of the tables in which a current lies, A, and the share of it that is past. The last
@@ -159,7 +144,7 @@ pub struct CarrierTable {
 impl CarrierTable {
     /// From its values at multiples of [`STEP_A`](crate::flux::schedule::STEP_A); none when the first is not 1 or any is out of range.
     pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
-        let believable = all_within(&ratio, RATIO.0, RATIO.1);
+        let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
 

@@ -2,8 +2,7 @@
 
 use core::f64::consts::{PI, TAU};
 
-use crate::math::complex::Complex;
-use crate::math::elementary::{exp_m1, sqrt};
+use num_complex::Complex64;
 
 /// How far a loop is from instability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +35,7 @@ const LN_SPLIT_OVER_START: f64 = 8.517_193_191_416_238;
 fn grid(n: u32) -> f64 {
     if n < LOW {
         // Even in the logarithm: START (SPLIT / START)^(n / LOW).
-        START * (1.0 + exp_m1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
+        START * (1.0 + libm::expm1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
     } else {
         SPLIT + (PI - SPLIT) * (f64::from(n - LOW) / f64::from(HIGH))
     }
@@ -45,12 +44,12 @@ fn grid(n: u32) -> f64 {
 /// Margins of an open loop, a function of ωT, that has `integrators` poles at z = 1 and no pole
 /// outside the unit circle. `None` if its gain never crosses 1 on the grid.
 pub(super) fn scan(
-    open_loop: &dyn Fn(f64) -> Complex,
+    open_loop: &dyn Fn(f64) -> Complex64,
     integrators: u8,
     period_s: f64,
 ) -> Option<Margins> {
     let hz = |omega_t: f64| omega_t / (TAU * period_s);
-    let distance = |w: f64| (Complex::ONE + open_loop(w)).abs();
+    let distance = |w: f64| (Complex64::ONE + open_loop(w)).norm();
 
     let mut nearest = (grid(0), f64::INFINITY, 0);
     let mut phase_margin: Option<(f64, f64)> = None;
@@ -63,20 +62,20 @@ pub(super) fn scan(
         let w = grid(n);
         let l = open_loop(w);
         // Argument of 1 + L, summed over the small steps.
-        turned += ((Complex::ONE + l) / (Complex::ONE + before)).arg();
-        let d = (Complex::ONE + l).abs();
+        turned += ((Complex64::ONE + l) / (Complex64::ONE + before)).arg();
+        let d = (Complex64::ONE + l).norm();
         if d < nearest.1 {
             nearest = (w, d, n);
         }
-        if (before.abs() >= 1.0) != (l.abs() >= 1.0) {
-            let w = crossing(&|w| open_loop(w).abs() - 1.0, w_before, w);
-            let angle = 180.0 - open_loop(w).arg_deg().abs();
+        if (before.norm() >= 1.0) != (l.norm() >= 1.0) {
+            let w = crossing(&|w| open_loop(w).norm() - 1.0, w_before, w);
+            let angle = 180.0 - open_loop(w).arg().to_degrees().abs();
             if phase_margin.is_none_or(|(smallest, _)| angle < smallest) {
                 phase_margin = Some((angle, w));
             }
         }
         if (before.im < 0.0) != (l.im < 0.0) && before.re < 0.0 && l.re < 0.0 {
-            let gain = open_loop(crossing(&|w| open_loop(w).im, w_before, w)).abs();
+            let gain = open_loop(crossing(&|w| open_loop(w).im, w_before, w)).norm();
             if gain < 1.0 && 1.0 / gain < gain_margin {
                 gain_margin = 1.0 / gain;
             }
@@ -111,7 +110,7 @@ pub(super) fn scan(
 /// gain g, |1 + g L| >= 1/Ms is a quadratic in g; the phase margin forbids g = 1/|L| wherever L lies
 /// within the margin of the negative real axis.
 pub(super) fn gain_limit(
-    open_loop: &dyn Fn(f64) -> Complex,
+    open_loop: &dyn Fn(f64) -> Complex64,
     phase_margin_deg: f64,
     ms: f64,
 ) -> f64 {
@@ -121,9 +120,10 @@ pub(super) fn gain_limit(
         let c = 1.0 - 1.0 / (ms * ms);
         let root = l.re * l.re - a * c;
         // Smaller root of a g² + 2 re g + c = 0, written without cancellation.
-        let by_ms = if l.re < 0.0 && root >= 0.0 { c / (sqrt(root) - l.re) } else { f64::INFINITY };
-        let by_phase = if 180.0 - l.arg_deg().abs() < phase_margin_deg {
-            1.0 / sqrt(a)
+        let by_ms =
+            if l.re < 0.0 && root >= 0.0 { c / (libm::sqrt(root) - l.re) } else { f64::INFINITY };
+        let by_phase = if 180.0 - l.arg().to_degrees().abs() < phase_margin_deg {
+            1.0 / libm::sqrt(a)
         } else {
             f64::INFINITY
         };
@@ -196,7 +196,7 @@ mod tests {
         let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
         let open_loop = |w: f64| {
             // The filter as its delay of 1.53 samples, and one period.
-            pi_response(1.0, 0.9538, w) * plant.response(w) * Complex::unit(-2.53 * w)
+            pi_response(1.0, 0.9538, w) * plant.response(w) * Complex64::cis(-2.53 * w)
         };
         for (phase_margin_deg, ms) in
             [(45.0, 2.2), (55.0, 2.2), (50.0, 5.0), (20.0, 1.5), (1.0, 50.0)]

@@ -4,8 +4,7 @@ use core::f64::consts::{PI, TAU};
 
 use super::margins::{Margins, scan};
 use super::{TuningError, check, check_period, pi_response, zero_at};
-use crate::math::complex::Complex;
-use crate::math::elementary::{atan2, exp_m1, sin_cos};
+use num_complex::Complex64;
 
 /// What [`design_motion_loops`] gives, and for what.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,11 +71,11 @@ pub fn design_motion_loops(
     // 76° is what the zero leaves.
     check("phase margin of the speed loop in degrees", phase_margin_deg, 20.0, 75.0)?;
     let tracking = tracking_hz.map(|hz| TAU * hz);
-    let smoothing = tracking.map_or(1.0, |w_n| -exp_m1(-CORNER * w_n * period_s));
+    let smoothing = tracking.map_or(1.0, |w_n| -libm::expm1(-CORNER * w_n * period_s));
 
-    let spare = atan2(SPREAD, 1.0) - phase_margin_deg * (PI / 180.0);
+    let spare = libm::atan2(SPREAD, 1.0) - phase_margin_deg * (PI / 180.0);
     let lag = |omega_t: f64| {
-        let tracked = tracking.map_or(Complex::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
+        let tracked = tracking.map_or(Complex64::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
     // Below the solution it is smaller, above larger.
@@ -90,7 +89,7 @@ pub fn design_motion_loops(
         }
     }
     let crossover = low / period_s;
-    let (sin, cos) = sin_cos(0.5 * low);
+    let (sin, cos) = libm::sincos(0.5 * low);
     let mut design = MotionDesign {
         k_c: 1.0,
         z_c: zero_at(sin / cos / SPREAD),
@@ -101,37 +100,37 @@ pub fn design_motion_loops(
         smoothing,
         period_s,
     };
-    design.k_c = 1.0 / design.open_loop(low).abs();
+    design.k_c = 1.0 / design.open_loop(low).norm();
     design.k_x = crossover / SPREAD;
     Ok(design)
 }
 
 /// What the tracking loop makes of the rotor's angle, at a frequency in units of its natural one:
 /// 1 - s^3 / ((s + 1)^2 (s + c)).
-fn tracked(omega: f64) -> Complex {
-    let s = Complex::new(0.0, omega);
-    let (pole, third) = (s + Complex::ONE, s + Complex::new(THIRD_POLE, 0.0));
-    Complex::ONE - s * s * s / (pole * pole * third)
+fn tracked(omega: f64) -> Complex64 {
+    let s = Complex64::new(0.0, omega);
+    let (pole, third) = (s + Complex64::ONE, s + Complex64::new(THIRD_POLE, 0.0));
+    Complex64::ONE - s * s * s / (pole * pole * third)
 }
 
 /// share / (1 - (1 - share) z^-1)
-fn low_pass(share: f64, omega_t: f64) -> Complex {
-    let kept = Complex::unit(-omega_t) * (1.0 - share);
-    Complex::new(share, 0.0) / (Complex::ONE - kept)
+fn low_pass(share: f64, omega_t: f64) -> Complex64 {
+    let kept = Complex64::cis(-omega_t) * (1.0 - share);
+    Complex64::new(share, 0.0) / (Complex64::ONE - kept)
 }
 
 impl MotionDesign {
     /// From the position to the speed that the controller sees, 1/s.
-    fn slope(&self, omega_t: f64) -> Complex {
-        let difference = (Complex::ONE - Complex::unit(-omega_t)) * (1.0 / self.period_s);
+    fn slope(&self, omega_t: f64) -> Complex64 {
+        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.period_s);
         difference * low_pass(self.smoothing, omega_t)
     }
 
     /// The position seen, over the current: turns per A.
-    fn rotor(&self, omega_t: f64) -> Complex {
-        let (z, t) = (Complex::unit(omega_t), self.period_s);
-        let rigid = (z + Complex::ONE) * (0.5 * t * t * self.acceleration)
-            / ((z - Complex::ONE) * (z - Complex::ONE));
+    fn rotor(&self, omega_t: f64) -> Complex64 {
+        let (z, t) = (Complex64::cis(omega_t), self.period_s);
+        let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.acceleration)
+            / ((z - Complex64::ONE) * (z - Complex64::ONE));
         match self.tracking {
             None => rigid,
             Some(w_n) => rigid * tracked(omega_t / (t * w_n)),
@@ -139,17 +138,17 @@ impl MotionDesign {
     }
 
     /// Open loop of the speed mode.
-    pub fn open_loop(&self, omega_t: f64) -> Complex {
+    pub fn open_loop(&self, omega_t: f64) -> Complex64 {
         pi_response(self.k_c, self.z_c, omega_t) * self.rotor(omega_t) * self.slope(omega_t)
     }
 
     /// Open loop of the position mode, broken at the current: the position moves the reference of the
     /// speed, and with it the current that is fed forward.
-    pub fn open_position_loop(&self, omega_t: f64) -> Complex {
-        let difference = (Complex::ONE - Complex::unit(-omega_t)) * (1.0 / self.period_s);
+    pub fn open_position_loop(&self, omega_t: f64) -> Complex64 {
+        let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.period_s);
         let pi = pi_response(self.k_c, self.z_c, omega_t);
         let forward = difference * (self.k_x / self.acceleration);
-        self.rotor(omega_t) * (pi * (self.slope(omega_t) + Complex::new(self.k_x, 0.0)) + forward)
+        self.rotor(omega_t) * (pi * (self.slope(omega_t) + Complex64::new(self.k_x, 0.0)) + forward)
     }
 
     /// Margins of the speed mode and of the position mode.

@@ -7,7 +7,7 @@ mod states;
 
 use core::f64::consts::{PI, TAU};
 
-use drive_core::math::complex::Complex;
+use num_complex::Complex64;
 
 const RATE: f64 = 6000.0;
 
@@ -16,8 +16,8 @@ fn rad(hz: f64) -> f64 {
 }
 
 /// Largest distance between two responses from dc to half the sampling rate.
-fn largest_distance(one: impl Fn(f64) -> Complex, other: impl Fn(f64) -> Complex) -> f64 {
+fn largest_distance(one: impl Fn(f64) -> Complex64, other: impl Fn(f64) -> Complex64) -> f64 {
     (0..=6000)
         .map(|n| PI * f64::from(n) / 6000.0)
-        .fold(0.0, |m, w| m.max((one(w) - other(w)).abs()))
+        .fold(0.0, |m, w| m.max((one(w) - other(w)).norm()))
 }

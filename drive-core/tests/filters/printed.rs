@@ -1,7 +1,7 @@
 //! The filters as printed: Tables 7 and 8, and the difference equation C.1.
 
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
+use num_complex::Complex64;
 
 /// Table 7 and 8, Eq. C.1: numerator and denominator in falling powers of z, as printed.
 pub struct Printed<const N: usize> {
@@ -69,10 +69,10 @@ pub const TABLE_8_PP: Printed<5> = Printed {
 };
 
 impl<const N: usize> Printed<N> {
-    pub fn response(&self, omega_t: f64) -> Complex {
-        let z = Complex::unit(omega_t);
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        let z = Complex64::cis(omega_t);
         let of = |c: &[f64; N]| {
-            c.iter().fold(Complex::default(), |sum, c| sum * z + Complex::new(*c, 0.0))
+            c.iter().fold(Complex64::default(), |sum, c| sum * z + Complex64::new(*c, 0.0))
         };
         of(&self.b) / of(&self.a)
     }
@@ -89,7 +89,7 @@ impl<const N: usize> Printed<N> {
     pub fn largest_pole<const M: usize>(&self) -> f64 {
         let mut monic = [0.0; M];
         monic.copy_from_slice(&self.a[1..]);
-        roots(monic).expect("finite").iter().fold(0.0, |m, p| m.max(p.abs()))
+        roots(monic).expect("finite").iter().fold(0.0, |m, p| m.max(p.norm()))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The one table of keys: name, type, default, allowed values, unit, meaning.
 //!
-//! The configuration types, their defaults, the checks, the error messages and what `keys` prints
+//! The configuration types, their defaults, the checks, the error messages and the output of `keys`
 //! all come from it. To add a key, add a line.
 
 use super::value::{Allowed, Field, Value, words};
@@ -16,7 +16,7 @@ words! {
 }
 
 words! {
-    /// What is made of the carrier current.
+    /// Demodulation of the carrier current.
     Demodulator {
         /// As printed: the difference of the two channels, filtered.
         Literal = "literal",
@@ -32,7 +32,7 @@ words! {
 }
 
 words! {
-    /// What the shaft is coupled to.
+    /// Load on the shaft.
     LoadMode {
         /// Shaft blocked.
         Locked = "locked",
@@ -52,11 +52,11 @@ pub struct Key {
     pub unit: &'static str,
     /// The values it can have.
     pub allowed: Allowed,
-    /// What it is.
+    /// Its meaning.
     pub doc: &'static str,
     /// Reads it.
     pub get: fn(&Config) -> Value,
-    /// Writes it, if the value is allowed; otherwise says what is wrong with the value.
+    /// Writes it; the error is the reason why the value is not allowed.
     pub set: fn(&mut Config, &Value) -> Result<(), &'static str>,
 }
 
@@ -96,7 +96,7 @@ macro_rules! keys {
             }
         )+
 
-        /// Everything that an experiment can be told.
+        /// The configuration of an experiment.
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
         pub struct Config {
             $(#[doc = $group_doc] pub $group: $type,)+
@@ -119,7 +119,7 @@ macro_rules! keys {
 
 keys! {
     /// The motor: T equivalent circuit of Figure 21, values of Table 5.
-    "motor." motor: Motor {
+    "motor." motor: MotorConfig {
         /// Stator resistance.
         rs: f64 = 5.4, [0.01 .. 1000], "ohm";
         /// Rotor resistance, referred to the stator.
@@ -137,8 +137,8 @@ keys! {
         /// Viscous friction (assumed; not in the source).
         friction: f64 = 0.001, [0 .. 10], "Nm s/rad";
     }
-    /// What makes the motor differ from the textbook machine; all of it is assumed.
-    "saliency." saliency: Saliency {
+    /// Differences of the motor from the textbook machine; all of them are assumed.
+    "saliency." saliency: SaliencyConfig {
         /// Saliency fixed to the rotor flux, at nominal flux.
         a_psi: f64 = -0.035, [-0.25 .. 0.25], "";
         /// Saliency that follows the stator current.
@@ -147,7 +147,7 @@ keys! {
         chi: f64 = 0.0, [0 .. 10], "";
     }
     /// The inverter.
-    "inverter." inverter: Inverter {
+    "inverter." inverter: InverterConfig {
         /// Voltage of the dc link.
         vdc: f64 = 311.0, [20 .. 1000], "V";
         /// Time during which neither switch of a leg conducts, at each edge.
@@ -163,7 +163,7 @@ keys! {
         switched: bool = false, [switch], "";
     }
     /// The current sensors and their converter.
-    "measurement." measurement: Measurement {
+    "measurement." measurement: MeasurementConfig {
         /// Noise of each channel, rms.
         noise_a: f64 = 0.005, [0 .. 1], "A";
         /// Step of the converter; a finer one has more bits over the same range, up to 16.
@@ -179,8 +179,8 @@ keys! {
         /// Offset of channel b.
         offset_b: f64 = 0.0, [-5 .. 5], "A";
     }
-    /// The injected voltage and what is made of the current it causes.
-    "injection." injection: Injection {
+    /// The injected voltage and the demodulation of the current it causes.
+    "injection." injection: InjectionConfig {
         /// Peak of the injected voltage.
         amplitude_v: f64 = 50.0, [0 .. 150], "V";
         /// How the angle error is taken from the carrier current.
@@ -207,15 +207,15 @@ keys! {
         bandwidth_hz: f64 = 3.5, [0.1 .. 30], "Hz";
     }
     /// The flux angle.
-    "angle." angle: Angle {
+    "angle." angle: AngleConfig {
         /// Where the drive takes the flux angle from.
         source: AngleSource = AngleSource::Injection, [AngleSource], "";
         /// Whether the known delays of measurement and demodulation are compensated.
         compensate_delays: bool = true, [switch], "";
     }
     /// The load.
-    "load." load: Load {
-        /// What the shaft is coupled to.
+    "load." load: LoadConfig {
+        /// Load on the shaft.
         mode: LoadMode = LoadMode::Locked, [LoadMode], "";
         /// Speed that the dynamometer holds, with load.mode = speed.
         speed_rpm: f64 = 0.0, [-6000 .. 6000], "rpm";
@@ -223,14 +223,14 @@ keys! {
         torque_nm: f64 = 0.0, [-1000 .. 1000], "Nm";
     }
     /// References, for experiments that do not bring their own.
-    "reference." reference: Reference {
+    "reference." reference: ReferenceConfig {
         /// Direct-axis (magnetising) current, peak.
         id_a: f64 = 0.7, [0.01 .. 3.5], "A";
         /// Quadrature-axis (torque) current, peak.
         iq_a: f64 = 1.0, [-20 .. 20], "A";
     }
     /// The speed and the position loop.
-    "speed." speed: Speed {
+    "speed." speed: SpeedConfig {
         /// Largest speed that is asked for; unset: 300, or the experiment's own.
         limit_rpm: Option<f64> = None, [1 .. 2000], "rpm";
         /// Largest acceleration that is asked for; unset: 300, or the experiment's own.
@@ -238,8 +238,8 @@ keys! {
         /// Phase margin that the speed loop is designed for.
         phase_margin_deg: f64 = 60.0, [45 .. 70], "deg";
     }
-    /// What the drive believes of the motor; what is not set follows `motor.*`.
-    "drive.motor." drive_motor: DriveMotor {
+    /// The motor parameters that the drive is set to; unset ones follow `motor.*`.
+    "drive.motor." drive_motor: BelievedMotorConfig {
         /// Stator resistance; follows motor.rs.
         rs: Option<f64> = None, [0.01 .. 1000], "ohm";
         /// Rotor resistance; follows motor.rr.
@@ -251,14 +251,14 @@ keys! {
         /// Magnetising inductance; follows motor.lm.
         lm: Option<f64> = None, [1e-4 .. 100], "H";
     }
-    /// What the drive does before the experiment.
-    "drive." drive: DriveSteps {
+    /// Preparation of the drive before the experiment.
+    "drive." drive: DriveConfig {
         /// In steady runs (monte-carlo, speed-torque-sweep): whether the drive learns first, with the
         /// shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
     }
-    /// What monte-carlo draws anew for every run beside the operating point.
-    "spread." spread: Spread {
+    /// Errors that monte-carlo draws for every run, beside the operating point.
+    "spread." spread: SpreadConfig {
         /// Largest relative error of each parameter that the drive believes of its motor.
         motor: f64 = 0.0, [0 .. 0.5], "";
         /// Largest relative change of the sensors' noise.
@@ -267,7 +267,7 @@ keys! {
         gain: f64 = 0.0, [0 .. 0.1], "";
     }
     /// How much is simulated.
-    "" extent: Extent {
+    "" extent: ExtentConfig {
         /// Runs of a statistical experiment; unset: the experiment's own number.
         runs: Option<u32> = None, [1 .. 1000000], "";
         /// Simulated time; unset: the experiment's own.

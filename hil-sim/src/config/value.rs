@@ -1,4 +1,4 @@
-//! Values of keys: what they can be, and how text and TOML become one.
+//! Values of configuration keys: allowed values, and conversion from text and TOML.
 
 use std::fmt;
 
@@ -14,12 +14,12 @@ pub enum Value {
     Switch(bool),
     /// A word.
     Word(String),
-    /// Nothing was given: the doc of the key says what holds then.
+    /// Not given; the documentation of the key states the value used instead.
     Unset,
 }
 
 impl Value {
-    /// From what stands behind the equals sign on the command line.
+    /// From the text behind the equals sign on the command line.
     pub fn from_text(text: &str) -> Self {
         let text = text.trim();
         match (text.parse(), text) {
@@ -84,7 +84,10 @@ impl Allowed {
 pub trait Field: Sized {
     /// The value as text or TOML would give it.
     fn to_value(&self) -> Value;
-    /// From a value; the error says what is wrong with it.
+    /// From a value.
+    ///
+    /// # Errors
+    /// The reason why the value is not allowed.
     fn from_value(value: &Value, allowed: &Allowed) -> Result<Self, &'static str>;
 }
 

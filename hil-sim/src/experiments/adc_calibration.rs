@@ -3,6 +3,7 @@
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::stats::StraightLine as Line;
 
 /// Table 4, Figure 17, Eq. 3.5.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -29,47 +30,9 @@ const PRINTED: [(&str, f64, f64); 2] = [("A", 0.0022120, -4.4727134), ("B", 0.00
 /// Codes of the converter: 12 bits.
 const LAST_CODE: f64 = 4095.0;
 
-/// `current = slope * code + intercept`.
-#[derive(Clone, Copy)]
-struct Line {
-    slope: f64,
-    intercept: f64,
-}
-
-impl Line {
-    /// Least squares of the current on the code.
-    fn through(points: &[(f64, f64)]) -> Self {
-        let count = points.len() as f64;
-        let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / count;
-        let (code, current) = (mean(|p| p.0), mean(|p| p.1));
-        let (mut both, mut square) = (0.0, 0.0);
-        for p in points {
-            both += (p.0 - code) * (p.1 - current);
-            square += (p.0 - code) * (p.0 - code);
-        }
-        let slope = both / square;
-        Self { slope, intercept: current - slope * code }
-    }
-
-    fn at(self, code: f64) -> f64 {
-        self.slope * code + self.intercept
-    }
-}
-
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
-    let mut lines = Table::new(
-        "Calibration lines, I = slope n + intercept",
-        &[
-            "channel",
-            "",
-            "slope (A)",
-            "intercept (A)",
-            "largest residual (mA)",
-            "code 0 (A)",
-            "code 4095 (A)",
-        ],
-    );
+    let mut lines = Table::new("Calibration lines, I = slope n + intercept", &[]);
     let mut readings = Panel::new("converter code", "current (A)");
     let mut residuals = Panel::new("converter code", "residual (mA)");
     for (channel, (name, slope, intercept)) in PRINTED.into_iter().enumerate() {
@@ -80,14 +43,14 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
             |line: Line| points.map(|(code, current)| (code, 1e3 * (line.at(code) - current)));
         let largest = |line: Line| residual(line).iter().map(|p| p.1.abs()).fold(0.0, f64::max);
         for (kind, line) in [("least squares", fitted), ("printed", printed)] {
-            lines.row([
-                Cell::from(name),
-                Cell::from(kind),
-                Cell::fixed(line.slope, 8),
-                Cell::fixed(line.intercept, 6),
-                Cell::fixed(largest(line), 2),
-                Cell::fixed(line.at(0.0), 4),
-                Cell::fixed(line.at(LAST_CODE), 4),
+            lines.record([
+                ("channel", Cell::from(name)),
+                ("", Cell::from(kind)),
+                ("slope (A)", Cell::fixed(line.slope, 8)),
+                ("intercept (A)", Cell::fixed(line.intercept, 6)),
+                ("largest residual (mA)", Cell::fixed(largest(line), 2)),
+                ("code 0 (A)", Cell::fixed(line.at(0.0), 4)),
+                ("code 4095 (A)", Cell::fixed(line.at(LAST_CODE), 4)),
             ]);
         }
         let ends = [0.0, LAST_CODE].map(|code| (code, fitted.at(code)));

@@ -4,9 +4,7 @@
 mod measure;
 mod model;
 
-use rayon::prelude::*;
-
-use super::bode::{Bode, frequencies};
+use super::bode::{Bode, frequencies, largest_pole};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::config::{Config, Demodulator};
@@ -14,7 +12,7 @@ use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::RATE_HZ;
 use measure::{Record, SLOW, StepResponses};
-use model::{Model, PRINTED_PII, Pii, TABLE_6, largest};
+use model::{Model, PRINTED_PII, Pii, TABLE_6};
 
 /// Section 3.11.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -32,29 +30,29 @@ const LIKELY_PII: Pii = Pii { z_s: 0.99, ..PRINTED_PII };
 /// Gain of band-pass and post-processing filter at dc.
 const LEAK: f64 = 0.0100 * 0.944_061;
 
-/// What is identified.
-struct Subject {
+/// A demodulation whose angle plant is identified.
+struct Demodulation {
     name: &'static str,
     demodulator: Demodulator,
     /// Of a thousandth of the signal.
     unit: &'static str,
 }
 
-const SUBJECTS: [Subject; 3] = [
-    Subject { name: "literal", demodulator: Demodulator::Literal, unit: "mA" },
-    Subject { name: "rectified", demodulator: Demodulator::Rectified, unit: "mA" },
-    Subject { name: "synchronous", demodulator: Demodulator::Synchronous, unit: "10^-3" },
+const DEMODULATIONS: [Demodulation; 3] = [
+    Demodulation { name: "literal", demodulator: Demodulator::Literal, unit: "mA" },
+    Demodulation { name: "rectified", demodulator: Demodulator::Rectified, unit: "mA" },
+    Demodulation { name: "synchronous", demodulator: Demodulator::Synchronous, unit: "10^-3" },
 ];
 
-/// At one torque current.
-struct Point {
+/// Identification at one torque current.
+struct IdentifiedPoint {
     record: Record,
     /// By equation error and by output error.
     models: [Model; 2],
     steps: StepResponses,
 }
 
-impl Point {
+impl IdentifiedPoint {
     /// Signal per rad once the current has followed the angle.
     fn slow_gain(&self) -> f64 {
         self.steps.with_current[SLOW].iter().sum::<f64>() / SLOW.len() as f64
@@ -67,38 +65,33 @@ impl Point {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let jobs: Vec<(&Subject, f64)> =
-        SUBJECTS.iter().flat_map(|s| TABLE_6.iter().map(move |row| (s, row.0))).collect();
-    let bar = context.progress.bar("angle-identification", jobs.len() as u64);
-    let points: Vec<Point> = jobs
-        .par_iter()
-        .map(|&(subject, iq)| {
-            let (config, seed) = (context.config, context.seed);
-            let record = measure::sequence(config, subject.demodulator, iq, seed)?;
-            let steps = measure::steps(config, subject.demodulator, iq, seed)?;
-            bar.advance(1);
-            Ok(Point { models: Model::identify(&record)?, record, steps })
-        })
-        .collect::<Result<_, Error>>()?;
-    let all = || SUBJECTS.iter().zip(points.chunks(TABLE_6.len()));
+    let jobs: Vec<(&Demodulation, f64)> =
+        DEMODULATIONS.iter().flat_map(|s| TABLE_6.iter().map(move |row| (s, row.0))).collect();
+    let points = context.in_parallel("angle-identification", &jobs, |_, &(demodulation, iq)| {
+        let (config, seed) = (context.config, context.seed);
+        let record = measure::sequence(config, demodulation.demodulator, iq, seed)?;
+        let steps = measure::steps(config, demodulation.demodulator, iq, seed)?;
+        Ok(IdentifiedPoint { models: Model::identify(&record)?, record, steps })
+    })?;
+    let all = || DEMODULATIONS.iter().zip(points.chunks(TABLE_6.len()));
 
     let mut outcome = Outcome::default();
-    for (subject, points) in all() {
-        outcome.tables.push(identified(subject, points));
-        metrics(&mut outcome, subject, points);
+    for (demodulation, points) in all() {
+        outcome.tables.push(identified(demodulation, points));
+        metrics(&mut outcome, demodulation, points);
     }
-    for (subject, points) in all() {
-        outcome.tables.push(gains(subject, points, context.config));
+    for (demodulation, points) in all() {
+        outcome.tables.push(gains(demodulation, points, context.config));
     }
     outcome.tables.push(controllers(all()));
-    for (subject, points) in all() {
-        outcome.figures.push(fit_figure(subject, &points[DESIGN_ROW]));
+    for (demodulation, points) in all() {
+        outcome.figures.push(fit_figure(demodulation, &points[DESIGN_ROW]));
     }
-    for (subject, points) in all() {
-        outcome.figures.push(bode_figure(subject, points));
+    for (demodulation, points) in all() {
+        outcome.figures.push(bode_figure(demodulation, points));
     }
-    for (subject, points) in all() {
-        outcome.figures.push(step_figure(subject, points));
+    for (demodulation, points) in all() {
+        outcome.figures.push(step_figure(demodulation, points));
     }
     outcome.figures.push(poles_figure(all()));
     outcome.remarks = remarks();
@@ -106,10 +99,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn metrics(outcome: &mut Outcome, subject: &Subject, points: &[Point]) {
+fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[IdentifiedPoint]) {
     let m = &mut outcome.metrics;
     for ((iq, ..), p) in TABLE_6.iter().zip(points) {
-        let name = |what: &str| format!("{}_{what}_iq_{iq}a", subject.name);
+        let name = |what: &str| format!("{}_{what}_iq_{iq}a", demodulation.name);
         m.set(name("fit_pct"), p.models[1].fit(&p.record).1);
         m.set(name("static_gain_milli"), p.models[1].static_gain() * 1e3);
         m.set(name("held_gain_milli"), p.held_gain() * 1e3);
@@ -131,23 +124,10 @@ fn poles_text(model: &Model) -> String {
     }
 }
 
-fn identified(subject: &Subject, points: &[Point]) -> Table {
-    let gain = format!("static gain ({} / rad)", subject.unit);
-    let heads = [
-        "iq (A)",
-        "k_phi x 10^5",
-        "printed",
-        "ratio",
-        "poles",
-        "printed poles",
-        gain.as_str(),
-        "printed (mA/rad)",
-        "ratio of gains",
-        "fit (%)",
-        "fit of equation error (%)",
-    ];
-    let title = format!("Eq. 3.43 for {}, beside Table 6", subject.name);
-    let mut table = Table::new(title, &heads).note(
+fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table {
+    let gain = format!("static gain ({} / rad)", demodulation.unit);
+    let title = format!("Eq. 3.43 for {}, beside Table 6", demodulation.name);
+    let mut table = Table::new(title, &[]).note(
         "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
          least squares of Appendix A fits, which with noise on the output shifts poles and gain. Fit: \
          100 % less rms error over rms signal, of the simulated output.",
@@ -155,37 +135,28 @@ fn identified(subject: &Subject, points: &[Point]) -> Table {
     for (row, p) in points.iter().enumerate() {
         let [equation, model] = &p.models;
         let printed = Model::printed(row);
-        table.row([
-            Cell::fixed(TABLE_6[row].0, 1),
-            Cell::fixed(model.k * 1e5, 3),
-            Cell::fixed(printed.k * 1e5, 3),
-            Cell::fixed(model.k / printed.k, 2),
-            Cell::from(poles_text(model)),
-            Cell::from(poles_text(&printed)),
-            Cell::fixed(model.static_gain() * 1e3, 1),
-            Cell::fixed(printed.static_gain() * 1e3, 1),
-            Cell::fixed(model.static_gain() / printed.static_gain(), 2),
-            Cell::fixed(model.fit(&p.record).1, 1),
-            Cell::fixed(equation.fit(&p.record).1, 1),
+        table.record([
+            ("iq (A)", Cell::fixed(TABLE_6[row].0, 1)),
+            ("k_phi x 10^5", Cell::fixed(model.k * 1e5, 3)),
+            ("printed", Cell::fixed(printed.k * 1e5, 3)),
+            ("ratio", Cell::fixed(model.k / printed.k, 2)),
+            ("poles", Cell::from(poles_text(model))),
+            ("printed poles", Cell::from(poles_text(&printed))),
+            (&gain, Cell::fixed(model.static_gain() * 1e3, 1)),
+            ("printed (mA/rad)", Cell::fixed(printed.static_gain() * 1e3, 1)),
+            ("ratio of gains", Cell::fixed(model.static_gain() / printed.static_gain(), 2)),
+            ("fit (%)", Cell::fixed(model.fit(&p.record).1, 1)),
+            ("fit of equation error (%)", Cell::fixed(equation.fit(&p.record).1, 1)),
         ]);
     }
     table
 }
 
 /// The gains of the axis alone and of axis and current together, measured and predicted.
-fn gains(subject: &Subject, points: &[Point], config: &Config) -> Table {
-    let unit = |what: &str| format!("{what} ({} / rad)", subject.unit);
-    let heads = [
-        "iq (A)".to_owned(),
-        unit("axis alone, identified"),
-        unit("axis alone, step"),
-        unit("predicted"),
-        unit("with the current, step"),
-        unit("predicted"),
-        "axis alone over with the current".to_owned(),
-    ];
-    let mut table =
-        Table { columns: heads.to_vec(), ..Table::new("", &[]) }.note(match subject.demodulator {
+fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
+    let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit);
+    let title = format!("Two plants: {}", demodulation.name);
+    let mut table = Table::new(title, &[]).note(match demodulation.demodulator {
             Demodulator::Literal => {
                 "Predicted: the leak of the fundamental, -sqrt2 0.01 0.944 |i| sin(x + gamma) with x the \
                  axis seen from the current's frame: slope sqrt2 0.00944 iq while the current is held; \
@@ -203,7 +174,6 @@ fn gains(subject: &Subject, points: &[Point], config: &Config) -> Table {
                  of the chain, 0.945 2/pi 0.944. "
             }
         });
-    table.title = format!("Two plants: {}", subject.name);
     let (id, s) = (config.reference.id_a, &config.saliency);
     let inductance = config.motor.lls + config.motor.llr; // near sigma L_s
     let carrier = config.injection.amplitude_v / (std::f64::consts::TAU * 600.0 * inductance);
@@ -212,44 +182,34 @@ fn gains(subject: &Subject, points: &[Point], config: &Config) -> Table {
         let cos_2_gamma = (id * id - iq * iq) / (length * length);
         let flux_part = 2.0 * s.a_psi.abs();
         let current_part = -2.0 * s.b1 * length * cos_2_gamma;
-        let scale = match subject.demodulator {
+        let scale = match demodulation.demodulator {
             Demodulator::Rectified => {
                 2f64.sqrt() * carrier * 0.9452 * std::f64::consts::FRAC_2_PI * 0.944_061
             }
             _ => 1.0,
         };
-        let predicted = match subject.demodulator {
+        let predicted = match demodulation.demodulator {
             Demodulator::Literal => [2f64.sqrt() * LEAK * iq, 0.0],
             _ => [scale * (flux_part + current_part), scale * flux_part],
         };
         let (held, slow) = (p.held_gain(), p.slow_gain());
-        table.row([
-            Cell::fixed(*iq, 1),
-            Cell::fixed(p.models[1].static_gain() * 1e3, 1),
-            Cell::fixed(held * 1e3, 1),
-            Cell::fixed(predicted[0] * 1e3, 1),
-            Cell::fixed(slow * 1e3, 1),
-            Cell::fixed(predicted[1] * 1e3, 1),
-            if predicted[1] == 0.0 { "-".into() } else { Cell::fixed(held / slow, 2) },
+        let ratio = if predicted[1] == 0.0 { "-".into() } else { Cell::fixed(held / slow, 2) };
+        table.record([
+            ("iq (A)".to_owned(), Cell::fixed(*iq, 1)),
+            (unit("axis alone, identified"), Cell::fixed(p.models[1].static_gain() * 1e3, 1)),
+            (unit("axis alone, step"), Cell::fixed(held * 1e3, 1)),
+            (unit("predicted"), Cell::fixed(predicted[0] * 1e3, 1)),
+            (unit("with the current, step"), Cell::fixed(slow * 1e3, 1)),
+            (unit("predicted"), Cell::fixed(predicted[1] * 1e3, 1)),
+            ("axis alone over with the current".to_owned(), ratio),
         ]);
     }
     table
 }
 
 /// The controllers on the identified plants.
-fn controllers<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Table {
-    let heads = [
-        "plant",
-        "iq (A)",
-        "largest pole, printed k_s, z_s = 0.90",
-        "printed k_s, z_s = 0.99",
-        "designed for 1.5 A",
-        "k_s (rad per signal)",
-        "z_s",
-        "crossover (Hz)",
-        "poles of the design",
-    ];
-    let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &heads).note(
+fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedPoint])>) -> Table {
+    let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &[]).note(
         "Largest magnitude of the poles of (z-1)^2 (z-p1)(z-p2) + k_s k_phi (z - z_s); above 1 the loop \
          is unstable. Design: the fastest with its zero at a quarter of the crossover and a sensitivity peak of 2 at \
          most, on the plant at 1.5 A, as in the source; the printed k_s is in rad/A and says nothing for the synchronous signal.",
@@ -258,52 +218,62 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Tab
     let mut rows = |name: &str, plants: &[Model], in_amperes: bool| {
         let design = plants[DESIGN_ROW].design();
         for ((iq, ..), plant) in TABLE_6.iter().zip(plants) {
-            let with = |pii: Pii| Cell::fixed(largest(plant.closed_loop(pii)), 5);
+            let with = |pii: Pii| Cell::fixed(largest_pole(plant.closed_loop(pii)), 5);
             let or_dash = |cell: Option<Cell>| cell.unwrap_or_else(|| "-".into());
             let here = design.filter(|_| *iq == TABLE_6[DESIGN_ROW].0);
             let poles = here.and_then(|(pii, _)| plant.closed_loop(pii)).map(|poles| {
                 let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
                 upper.collect::<Vec<_>>().join(", ")
             });
-            table.row([
-                Cell::from(name),
-                Cell::fixed(*iq, 1),
-                or_dash(in_amperes.then(|| with(PRINTED_PII))),
-                or_dash(in_amperes.then(|| with(LIKELY_PII))),
-                or_dash(design.map(|(pii, _)| with(pii))),
-                or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
-                or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4))),
-                or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / std::f64::consts::TAU, 1))),
-                or_dash(poles.map(Cell::from)),
+            table.record([
+                ("plant", Cell::from(name)),
+                ("iq (A)", Cell::fixed(*iq, 1)),
+                (
+                    "largest pole, printed k_s, z_s = 0.90",
+                    or_dash(in_amperes.then(|| with(PRINTED_PII))),
+                ),
+                ("printed k_s, z_s = 0.99", or_dash(in_amperes.then(|| with(LIKELY_PII)))),
+                ("designed for 1.5 A", or_dash(design.map(|(pii, _)| with(pii)))),
+                (
+                    "k_s (rad per signal)",
+                    or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
+                ),
+                ("z_s", or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4)))),
+                (
+                    "crossover (Hz)",
+                    or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / std::f64::consts::TAU, 1))),
+                ),
+                ("poles of the design", or_dash(poles.map(Cell::from))),
             ]);
         }
     };
     rows("Table 6", &printed, true);
-    for (subject, points) in all {
+    for (demodulation, points) in all {
         let plants: Vec<Model> = points.iter().map(|p| p.models[1]).collect();
-        rows(subject.name, &plants, subject.demodulator != Demodulator::Synchronous);
+        rows(demodulation.name, &plants, demodulation.demodulator != Demodulator::Synchronous);
     }
     table
 }
 
-fn fit_figure(subject: &Subject, p: &Point) -> Figure {
+fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
     let shown = (0.5 * RATE_HZ) as usize;
     let line = |y: &[f64]| {
         y.iter().take(shown).enumerate().map(|(k, y)| (k as f64 / RATE_HZ, y * 1e3)).collect()
     };
     let (model, fit) = p.models[1].fit(&p.record);
-    let title = format!("{}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %", subject.name);
+    let title =
+        format!("{}: measured and by Eq. 3.43, iq = 1.5 A, fit {fit:.0} %", demodulation.name);
     let turn = p.record.u.iter().map(|u| u.to_degrees() / 1e3).collect::<Vec<_>>();
-    Figure::new(format!("fit_{}", subject.name), title, "Figure 34")
+    Figure::new(format!("fit_{}", demodulation.name), title, "Figure 34")
         .panel(
-            Panel::new("time (s)", format!("signal ({})", subject.unit))
+            Panel::new("time (s)", format!("signal ({})", demodulation.unit))
                 .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
                 .with(Series::reference("Eq. 3.43", line(&model))),
         )
         .panel(Panel::new("time (s)", "turn of the axis (°)").with(Series::line("u", line(&turn))))
 }
 
-fn bode_figure(subject: &Subject, points: &[Point]) -> Figure {
+fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
     let hz = frequencies(1.0, 600.0, 120);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
     // In thousandths, as the signals are printed.
@@ -313,7 +283,7 @@ fn bode_figure(subject: &Subject, points: &[Point]) -> Figure {
         .zip(points)
         .map(|((iq, ..), p)| (format!("{iq} A"), scaled(p.models[1])))
         .chain(
-            (subject.demodulator != Demodulator::Synchronous)
+            (demodulation.demodulator != Demodulator::Synchronous)
                 .then(|| ("Table 6, 1.5 A".into(), scaled(Model::printed(DESIGN_ROW)))),
         )
         .collect();
@@ -322,13 +292,13 @@ fn bode_figure(subject: &Subject, points: &[Point]) -> Figure {
     let as_functions: Vec<(&str, &dyn Fn(f64) -> drive_core::math::complex::Complex)> =
         responses.iter().map(|(name, response)| (*name, response as _)).collect();
     let (gain, phase) = bode.panels(&as_functions);
-    let title = format!("{}: identified, gain in {} per rad", subject.name, subject.unit);
-    Figure::new(format!("bode_{}", subject.name), title, "Figure 35").panel(gain).panel(phase)
+    let title = format!("{}: identified, gain in {} per rad", demodulation.name, demodulation.unit);
+    Figure::new(format!("bode_{}", demodulation.name), title, "Figure 35").panel(gain).panel(phase)
 }
 
-fn step_figure(subject: &Subject, points: &[Point]) -> Figure {
-    let panel = |of: &str, pick: fn(&Point) -> &Vec<f64>| {
-        let y = format!("{of} ({} / rad)", subject.unit);
+fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
+    let panel = |of: &str, pick: fn(&IdentifiedPoint) -> &Vec<f64>| {
+        let y = format!("{of} ({} / rad)", demodulation.unit);
         TABLE_6.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, ((iq, ..), p)| {
             // Over a carrier period: the rest is ripple.
             let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
@@ -340,13 +310,15 @@ fn step_figure(subject: &Subject, points: &[Point]) -> Figure {
             panel.with(Series::line(format!("iq = {iq} A"), line))
         })
     };
-    let title = format!("{}: answer to a step of the axis", subject.name);
-    Figure::new(format!("step_{}", subject.name), title, "")
+    let title = format!("{}: answer to a step of the axis", demodulation.name);
+    Figure::new(format!("step_{}", demodulation.name), title, "")
         .panel(panel("axis alone", |p| &p.steps.alone))
         .panel(panel("with the current", |p| &p.steps.with_current))
 }
 
-fn poles_figure<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Figure {
+fn poles_figure<'a>(
+    all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedPoint])>,
+) -> Figure {
     let arc = (0..=60)
         .map(|n| {
             let x: f64 = 0.004 * f64::from(n - 30);
@@ -360,9 +332,9 @@ fn poles_figure<'a>(all: impl Iterator<Item = (&'a Subject, &'a [Point])>) -> Fi
         panel.series.push(Series::points(name, points));
     };
     add("Table 6, printed controller", Model::printed(DESIGN_ROW), Some(PRINTED_PII));
-    for (subject, points) in all {
+    for (demodulation, points) in all {
         let plant = points[DESIGN_ROW].models[1];
-        add(&format!("{}, designed", subject.name), plant, plant.design().map(|d| d.0));
+        add(&format!("{}, designed", demodulation.name), plant, plant.design().map(|d| d.0));
     }
     panel.series.push(Series::limit("unit circle", arc));
     Figure::new("poles", "Poles of the closed loop at iq = 1.5 A", "Eq. 3.44").panel(panel)

@@ -1,9 +1,9 @@
-//! What anti-windup is for, on the example of Appendix B.
+//! Effect of anti-windup in the example of Appendix B.
 
 use drive_core::current::pi::{Pi, PiState};
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
 
+use super::bode::largest_pole;
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -21,7 +21,7 @@ const Z_C: f64 = 0.1;
 const LIMIT: f64 = 0.15;
 const SAMPLES: usize = 200;
 
-/// A controller: from the error to the output it wants, given what it is limited to.
+/// A controller: from the error to the output before the limit.
 type Controller = Box<dyn FnMut(f64) -> f64>;
 
 /// Eq. B.1 in immediate form, which forgets that there is a limit.
@@ -37,7 +37,7 @@ fn without() -> Controller {
 /// The controller of the drive.
 fn with() -> Controller {
     let pi = Pi { k_c: K_C as f32, z_c: Z_C as f32 };
-    let mut state = PiState::ZERO;
+    let mut state = PiState::default();
     Box::new(move |e| {
         let u = pi.step(&mut state, e as f32);
         state.back_calculate(u.clamp(-LIMIT as f32, LIMIT as f32) - u);
@@ -92,27 +92,13 @@ fn highest(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn largest_pole<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
-}
-
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     // (z - 1)^2 + k_c (z - z_c), and z (z - 1)^2 + k_c (z - z_c) with the delayed index.
     let immediate = largest_pole(roots([K_C - 2.0, 1.0 - K_C * Z_C]));
     let delayed = largest_pole(roots([-2.0, 1.0 + K_C, -K_C * Z_C]));
 
-    let mut table = Table::new(
-        "Unit step, limit 0.15",
-        &[
-            "controller",
-            "largest y",
-            "largest u",
-            "u where y reaches 1",
-            "saturated (%)",
-            "largest pole |z|, no limit",
-        ],
-    );
+    let mut table = Table::new("Unit step, limit 0.15", &[]);
     let cases = [
         ("without anti-windup", "plain", without as fn() -> Controller, immediate),
         ("with anti-windup", "anti_windup", with, immediate),
@@ -126,13 +112,13 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     );
     for (name, key, controller, pole) in cases {
         let response = Response::of(controller(), LIMIT);
-        table.row([
-            Cell::from(name),
-            Cell::fixed(highest(&response.y), 3),
-            Cell::fixed(highest(&response.u), 3),
-            Cell::fixed(response.u_at_crossing(), 3),
-            Cell::fixed(100.0 * response.saturated(), 1),
-            Cell::fixed(pole, 4),
+        table.record([
+            ("controller", Cell::from(name)),
+            ("largest y", Cell::fixed(highest(&response.y), 3)),
+            ("largest u", Cell::fixed(highest(&response.u), 3)),
+            ("u where y reaches 1", Cell::fixed(response.u_at_crossing(), 3)),
+            ("saturated (%)", Cell::fixed(100.0 * response.saturated(), 1)),
+            ("largest pole |z|, no limit", Cell::fixed(pole, 4)),
         ]);
         outcome.metrics.set(format!("{key}_y_max"), highest(&response.y));
         outcome.metrics.set(format!("{key}_u_max"), highest(&response.u));

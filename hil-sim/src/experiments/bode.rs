@@ -61,6 +61,11 @@ pub fn unwrapped(values: &[Complex]) -> Vec<f64> {
     phases
 }
 
+/// Largest magnitude of some poles; not a number without them.
+pub fn largest_pole<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
+    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
+}
+
 /// Fictitious frequency of the w plane (Eq. 2.18), Hz, of a real one.
 pub fn fictitious(hz: f64) -> f64 {
     RATE / (0.5 * TAU) * (0.5 * omega_t(hz)).tan()

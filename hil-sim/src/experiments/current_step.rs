@@ -51,17 +51,7 @@ fn settling(response: &[f64]) -> usize {
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
-    let mut table = Table::new(
-        "Unit step, C(z) = 52.48 (z - 0.94786)/(z - 1)",
-        &[
-            "plant",
-            "reference filter",
-            "overshoot (%)",
-            "within 2 % (samples)",
-            "within 2 % (ms)",
-            "closed-loop poles",
-        ],
-    );
+    let mut table = Table::new("Unit step, C(z) = 52.48 (z - 0.94786)/(z - 1)", &[]);
     let larger = FirstOrder { p: 1.03 * PLANT.p, ..PLANT };
     let plants = [("Eq. 3.34", "nominal", PLANT), ("pole x 1.03", "larger_pole", larger)];
     let mut figure = Figure::new(
@@ -86,13 +76,13 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         {
             let response = step(plant, filtered);
             let samples = settling(&response);
-            table.row([
-                Cell::from(name),
-                Cell::from(if filtered { "Eq. 3.40" } else { "none" }),
-                Cell::fixed(100.0 * overshoot(&response), 2),
-                Cell::fixed(samples as f64, 0),
-                Cell::fixed(samples as f64 * PERIOD_MS, 1),
-                Cell::from(poles.as_str()),
+            table.record([
+                ("plant", Cell::from(name)),
+                ("reference filter", Cell::from(if filtered { "Eq. 3.40" } else { "none" })),
+                ("overshoot (%)", Cell::fixed(100.0 * overshoot(&response), 2)),
+                ("within 2 % (samples)", Cell::fixed(samples as f64, 0)),
+                ("within 2 % (ms)", Cell::fixed(samples as f64 * PERIOD_MS, 1)),
+                ("closed-loop poles", Cell::from(poles.as_str())),
             ]);
             let prefix = format!("{key}_{filter_key}");
             outcome

@@ -82,7 +82,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.angle.source = AngleSource::Encoder;
     config.inverter.switched = true;
     config.inverter.compensate = compensate;
-    // The residual is what no compensation knows of; here the dead time alone is looked at.
+    // No compensation knows the residual drop; this experiment is about the dead time alone.
     config.inverter.residual_v = 0.0;
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;

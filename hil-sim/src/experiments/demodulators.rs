@@ -1,7 +1,7 @@
 //! The five demodulations on one motor.
 
-mod seen;
-mod subject;
+mod demodulation;
+mod signal;
 mod tracked;
 
 use rayon::prelude::*;
@@ -13,9 +13,9 @@ use super::{Context, Experiment};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use seen::Seen;
-use subject::{KINDS, Kind, SUBJECTS, Subject};
-use tracked::Steps;
+use demodulation::{DEMODULATIONS, Demodulation, KINDS, ReferenceKind};
+use signal::SignalQuality;
+use tracked::StepsRun;
 
 /// Section 5.2 names two ways to extract the carrier better.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -34,25 +34,25 @@ const RUN_IQ_A: f64 = 1.5;
 /// Speeds, rpm.
 const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 
-/// What was found of one demodulation.
-struct Findings {
+/// Results of one demodulation.
+struct DemodulationResults {
     /// With saliency and without, by torque current.
     maps: [Vec<Curve>; 2],
-    seen: Vec<Seen>,
-    isotropic: Vec<Seen>,
+    seen: Vec<SignalQuality>,
+    isotropic: Vec<SignalQuality>,
     /// Samples; none where the saliency makes no difference.
     delay: Option<f64>,
     /// By kind of reference and controller.
-    tracked: [Option<Tracked>; 3],
+    tracked: [Option<ClosedLoop>; 3],
 }
 
-impl Findings {
-    fn at_one_ampere(&self) -> (&Seen, &Seen) {
+impl DemodulationResults {
+    fn at_one_ampere(&self) -> (&SignalQuality, &SignalQuality) {
         let one = IQ_A.iter().position(|&iq| iq == DELAY_IQ_A).unwrap_or(0);
         (&self.seen[one], &self.isotropic[one])
     }
 
-    /// What of the signal is there without saliency.
+    /// Share of the signal that is also there without saliency.
     fn isotropic_share(&self) -> f64 {
         let (seen, isotropic) = self.at_one_ampere();
         (isotropic.signal / seen.signal).abs()
@@ -63,38 +63,32 @@ impl Findings {
     }
 }
 
-struct Tracked {
-    steps: Steps,
+struct ClosedLoop {
+    steps: StepsRun,
     turning: Vec<Option<SteadyRun>>,
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let bar = context.progress.bar("demodulators", SUBJECTS.len() as u64);
-    let found: Vec<Findings> = SUBJECTS
-        .par_iter()
-        .map(|subject| {
-            let findings = findings(subject, context.config, context.seed);
-            bar.advance(1);
-            findings
-        })
-        .collect::<Result<_, _>>()?;
+    let found = context.in_parallel("demodulators", &DEMODULATIONS, |_, demodulation| {
+        findings(demodulation, context.config, context.seed)
+    })?;
 
     let mut outcome = Outcome::default();
-    let all = || SUBJECTS.iter().zip(&found);
+    let all = || DEMODULATIONS.iter().zip(&found);
     outcome.tables.push(summary(all()));
     outcome.tables.push(seen_table(all()));
     outcome.tables.push(tracked_table(all()));
-    outcome.figures.extend(all().map(|(subject, f)| map_figure(subject, f)));
+    outcome.figures.extend(all().map(|(demodulation, f)| map_figure(demodulation, f)));
     outcome.figures.push(steps_figure(all()));
-    for (subject, f) in all() {
+    for (demodulation, f) in all() {
         let m = &mut outcome.metrics;
         let (seen, _) = f.at_one_ampere();
-        m.set(format!("{}_delay_samples", subject.key), f.delay.unwrap_or(f64::NAN));
-        m.set(format!("{}_noise_deg", subject.key), degrees(seen.noise / seen.slope));
-        m.set(format!("{}_isotropic_share", subject.key), f.isotropic_share());
+        m.set(format!("{}_delay_samples", demodulation.key()), f.delay.unwrap_or(f64::NAN));
+        m.set(format!("{}_noise_deg", demodulation.key()), degrees(seen.noise / seen.slope));
+        m.set(format!("{}_isotropic_share", demodulation.key()), f.isotropic_share());
         for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
             let Some(t) = tracked else { continue };
-            let name = |what: &str| format!("{}_{kind}_{what}", subject.key);
+            let name = |what: &str| format!("{}_{kind}_{what}", demodulation.key());
             m.set(name("steps_lost"), f64::from(u8::from(t.steps.lost)));
             m.set(name("steps_rms_deg"), t.steps.stats.rms());
             m.set(name("steps_max_deg"), t.steps.stats.largest());
@@ -109,14 +103,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn findings(subject: &Subject, config: &Config, seed: u64) -> Result<Findings, Error> {
+fn findings(
+    demodulation: &Demodulation,
+    config: &Config,
+    seed: u64,
+) -> Result<DemodulationResults, Error> {
     let mut isotropic = config.clone();
     (isotropic.saliency.a_psi, isotropic.saliency.b1, isotropic.saliency.chi) = (0.0, 0.0, 0.0);
     let map = |saliency: bool| {
         let variant = Variant {
-            name: subject.name,
-            title: subject.name,
-            demodulator: subject.demodulator,
+            name: demodulation.name,
+            title: demodulation.name,
+            demodulator: demodulation.demodulator,
             saliency,
             inject: true,
             compensate: config.angle.compensate_delays,
@@ -127,27 +125,31 @@ fn findings(subject: &Subject, config: &Config, seed: u64) -> Result<Findings, E
     };
     let at_each = |config: &Config| {
         IQ_A.par_iter()
-            .map(|&iq| seen::seen(subject, config, iq, seed))
+            .map(|&iq| signal::signal_quality(demodulation, config, iq, seed))
             .collect::<Result<Vec<_>, _>>()
     };
-    let learned = subject.learn(config, seed)?;
-    let track = |kind: Kind| -> Result<Option<Tracked>, Error> {
-        let Some(drive) = subject.drive(kind, config, learned) else { return Ok(None) };
+    let learned = demodulation.learn(config, seed)?;
+    let track = |kind: ReferenceKind| -> Result<Option<ClosedLoop>, Error> {
+        let Some(drive) = demodulation.drive(kind, config, learned) else { return Ok(None) };
         let turning = SPEEDS_RPM
             .par_iter()
             .map(|&rpm| tracked::turning(&drive, config, rpm, RUN_IQ_A, seed))
             .collect::<Result<_, _>>()?;
-        Ok(Some(Tracked { steps: tracked::steps(&drive, config, seed)?, turning }))
+        Ok(Some(ClosedLoop { steps: tracked::steps(&drive, config, seed)?, turning }))
     };
-    let mut found = Findings {
+    let mut found = DemodulationResults {
         maps: [map(true)?, map(false)?],
         seen: at_each(config)?,
         isotropic: at_each(&isotropic)?,
         delay: None,
-        tracked: [track(Kind::Constant)?, track(Kind::Learned)?, track(Kind::Retuned)?],
+        tracked: [
+            track(ReferenceKind::Constant)?,
+            track(ReferenceKind::Learned)?,
+            track(ReferenceKind::Retuned)?,
+        ],
     };
     if found.isotropic_share() < 0.5 {
-        found.delay = Some(seen::delay(subject, config, DELAY_IQ_A, seed)?);
+        found.delay = Some(signal::delay(demodulation, config, DELAY_IQ_A, seed)?);
     }
     Ok(found)
 }
@@ -157,9 +159,9 @@ fn degrees(radians: f64) -> f64 {
 }
 
 /// One line for each.
-fn summary<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table {
+fn summary<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
     let mut table = Table::new("Summary", &["demodulation", "in one line"]);
-    for (subject, f) in all {
+    for (demodulation, f) in all {
         let (seen, share) = (f.at_one_ampere().0, f.isotropic_share());
         let sees = match f.delay {
             None => "blind: the same signal on a motor without saliency".to_owned(),
@@ -170,14 +172,14 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table 
                 degrees(seen.noise / seen.slope)
             ),
         };
-        let closed = |t: &Option<Tracked>| match t {
+        let closed = |t: &Option<ClosedLoop>| match t {
             None => "-".to_owned(),
             Some(t) if t.steps.lost => "lost".to_owned(),
             Some(t) => format!("{:.1}°", t.steps.stats.rms()),
         };
         let [constant, learned, retuned] = &f.tracked;
         table.row([
-            Cell::from(subject.name),
+            Cell::from(demodulation.name),
             Cell::from(format!(
                 "{sees}; torque steps, constant / learned / learned and retuned: {} / {} / {} rms",
                 closed(constant),
@@ -189,44 +191,34 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table 
     table
 }
 
-fn seen_table<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table {
-    let heads = [
-        "demodulation",
-        "iq (A)",
-        "unit",
-        "signal",
-        "slope (per rad)",
-        "noise, rms",
-        "noise as angle (°)",
-        "signal without saliency",
-        "as angle (°)",
-        "slope without saliency",
-    ];
-    let mut table = Table::new("What each sees at the right angle", &heads).note(
+fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
+    let mut table = Table::new("What each sees at the right angle", &[]).note(
         "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
          current stays. Without saliency: the same drive on a motor with a_psi = b1 = 0, where nothing \
          should be seen; as angle: what that would shift the angle by.",
     );
-    for (subject, f) in all {
+    for (demodulation, f) in all {
         for ((iq, s), i) in IQ_A.iter().zip(&f.seen).zip(&f.isotropic) {
-            table.row([
-                Cell::from(subject.name),
-                Cell::fixed(*iq, 1),
-                Cell::from(subject.unit()),
-                Cell::fixed(s.signal * 1e3, 2),
-                Cell::fixed(s.slope * 1e3, 1),
-                Cell::fixed(s.noise * 1e3, 3),
-                Cell::fixed(degrees(s.noise / s.slope), 2),
-                Cell::fixed(i.signal * 1e3, 2),
-                Cell::fixed(degrees(i.signal / s.slope), 1),
-                Cell::fixed(i.slope * 1e3, 1),
+            table.record([
+                ("demodulation", Cell::from(demodulation.name)),
+                ("iq (A)", Cell::fixed(*iq, 1)),
+                ("unit", Cell::from(demodulation.unit())),
+                ("signal", Cell::fixed(s.signal * 1e3, 2)),
+                ("slope (per rad)", Cell::fixed(s.slope * 1e3, 1)),
+                ("noise, rms", Cell::fixed(s.noise * 1e3, 3)),
+                ("noise as angle (°)", Cell::fixed(degrees(s.noise / s.slope), 2)),
+                ("signal without saliency", Cell::fixed(i.signal * 1e3, 2)),
+                ("as angle (°)", Cell::fixed(degrees(i.signal / s.slope), 1)),
+                ("slope without saliency", Cell::fixed(i.slope * 1e3, 1)),
             ]);
         }
     }
     table
 }
 
-fn tracked_table<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Table {
+fn tracked_table<'a>(
+    all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>,
+) -> Table {
     let mut heads =
         vec!["demodulation".to_owned(), "reference".to_owned(), "delay (samples)".to_owned()];
     heads.push("torque steps, rms (°)".into());
@@ -244,10 +236,10 @@ fn tracked_table<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> 
              demodulation has its own loop. Delay: from a change of the motor's saliency to the signal, \
              the motor and the sampling included."
         ));
-    for (subject, f) in all {
+    for (demodulation, f) in all {
         for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
             let Some(t) = tracked else { continue };
-            let mut row = vec![Cell::from(subject.name), Cell::from(*kind), f.delay_text()];
+            let mut row = vec![Cell::from(demodulation.name), Cell::from(*kind), f.delay_text()];
             if t.steps.lost {
                 row.extend([Cell::from("lost"), Cell::from("lost")]);
             } else {
@@ -269,32 +261,34 @@ fn tracked_table<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> 
     table
 }
 
-fn map_figure(subject: &Subject, f: &Findings) -> Figure {
+fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
     let panel = |family: &[Curve], of: &str| {
-        let y = format!("{of} ({})", subject.unit());
+        let y = format!("{of} ({})", demodulation.unit());
         IQ_A.iter()
             .zip(family)
             .fold(Panel::new("phi2 - theta (° electrical)", y), |panel, (iq, curve)| {
                 panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
             })
     };
-    let title = format!("{}: over the injection angle", subject.name);
-    Figure::new(format!("map_{}", subject.key), title, "Figure 19")
+    let title = format!("{}: over the injection angle", demodulation.name);
+    Figure::new(format!("map_{}", demodulation.key()), title, "Figure 19")
         .panel(panel(&f.maps[0], "with saliency"))
         .panel(panel(&f.maps[1], "without"))
 }
 
-fn steps_figure<'a>(all: impl Iterator<Item = (&'a Subject, &'a Findings)>) -> Figure {
+fn steps_figure<'a>(
+    all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>,
+) -> Figure {
     let x = "time (s)";
     let mut panels = [
         Panel::new(x, "error, constant reference (°)").y_range(-60.0, 60.0),
         Panel::new(x, "error, learned reference (°)").y_range(-60.0, 60.0),
         Panel::new(x, "error, learned, retuned (°)").y_range(-20.0, 20.0),
     ];
-    for (subject, f) in all {
+    for (demodulation, f) in all {
         for (panel, tracked) in panels.iter_mut().zip(&f.tracked) {
             if let Some(t) = tracked {
-                panel.series.push(Series::line(subject.name, t.steps.error.clone()));
+                panel.series.push(Series::line(demodulation.name, t.steps.error.clone()));
             }
         }
     }

@@ -1,8 +1,8 @@
-//! The three digital filters: response, and what single precision does to them.
+//! The three digital filters: response, and error in single precision.
 
+mod compared;
 mod direct;
 mod precision;
-mod subject;
 
 use drive_core::filter::dissertation::LPF;
 use drive_core::math::complex::Complex;
@@ -11,7 +11,7 @@ use super::bode::{Bode, RATE, frequencies, omega_t};
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use subject::{Subject, subjects};
+use compared::{ComparedFilter, filters};
 
 /// Figure 30, Tables 7 and 8.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -27,14 +27,14 @@ const SECONDS: f64 = 100.0;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let samples = (context.seconds.unwrap_or(SECONDS) * RATE) as u64;
-    let subjects = subjects();
+    let filters = filters();
     let mut outcome = Outcome::default();
-    outcome.figures.push(bode(&subjects));
-    outcome.figures.push(stop_band(subjects[0].as_ref()));
-    let table = characteristics(&subjects, &mut outcome);
+    outcome.figures.push(bode(&filters));
+    outcome.figures.push(stop_band(filters[0].as_ref()));
+    let table = characteristics(&filters, &mut outcome);
     outcome.tables.push(table);
-    outcome.tables.push(edges(&subjects));
-    let errors = precision::errors(&subjects, samples, context, &mut outcome);
+    outcome.tables.push(edges(&filters));
+    let errors = precision::errors(&filters, samples, context, &mut outcome);
     outcome.tables.push(errors);
     outcome.remarks.push(
         "Tables 7 and 8 hold elliptic designs without a misprint. \"LPF\" is a band stop: it \
@@ -63,12 +63,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn bode(subjects: &[Box<dyn Subject + Send>]) -> Figure {
+fn bode(filters: &[Box<dyn ComparedFilter + Send>]) -> Figure {
     let hz = frequencies(10.0, 2990.0, 1500);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
-    let responses: Vec<_> = subjects
+    let responses: Vec<_> = filters
         .iter()
-        .map(|subject| (subject.name(), |omega_t: f64| subject.sections(omega_t)))
+        .map(|filter| (filter.name(), |omega_t: f64| filter.sections(omega_t)))
         .collect();
     let responses: Vec<(&str, &dyn Fn(f64) -> Complex)> =
         responses.iter().map(|(name, f)| (*name, f as &dyn Fn(f64) -> Complex)).collect();
@@ -78,7 +78,7 @@ fn bode(subjects: &[Box<dyn Subject + Send>]) -> Figure {
         .panel(phase)
 }
 
-fn stop_band(lpf: &dyn Subject) -> Figure {
+fn stop_band(lpf: &dyn ComparedFilter) -> Figure {
     let along = |response: &dyn Fn(f64) -> Complex| {
         (0..=900)
             .map(|k| 440.0 + f64::from(k) * 0.25)
@@ -99,58 +99,42 @@ fn stop_band(lpf: &dyn Subject) -> Figure {
     .panel(panel)
 }
 
-fn characteristics(subjects: &[Box<dyn Subject + Send>], outcome: &mut Outcome) -> Table {
-    let mut table = Table::new(
-        "Responses",
-        &[
-            "filter",
-            "form",
-            "gain at dc",
-            "gain at 600 Hz (dB)",
-            "group delay at dc (samples)",
-            "largest pole |z|",
-        ],
-    );
-    for subject in subjects {
+fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Outcome) -> Table {
+    let mut table = Table::new("Responses", &[]);
+    for filter in filters {
         let w = omega_t(600.0);
-        let [pole, pole_rounded] = subject.largest_poles();
-        let delay = Cell::fixed(subject.group_delay(0.0), 2);
-        let (printed, sections) = (subject.direct(w).db(), subject.sections(w).db());
+        let [pole, pole_rounded] = filter.largest_poles();
+        let delay = Cell::fixed(filter.group_delay(0.0), 2);
+        let (printed, sections) = (filter.direct(w).db(), filter.sections(w).db());
         let rows = [
-            (
-                "Tables 7, 8, f64",
-                subject.direct(0.0),
-                printed,
-                Cell::from(""),
-                Cell::fixed(pole, 6),
-            ),
-            ("sections, f32", subject.sections(0.0), sections, delay, Cell::from("")),
+            ("Tables 7, 8, f64", filter.direct(0.0), printed, Cell::from(""), Cell::fixed(pole, 6)),
+            ("sections, f32", filter.sections(0.0), sections, delay, Cell::from("")),
             (
                 "direct form, f32",
-                subject.direct_rounded(0.0),
-                subject.direct_rounded(w).db(),
+                filter.direct_rounded(0.0),
+                filter.direct_rounded(w).db(),
                 Cell::from(""),
                 Cell::fixed(pole_rounded, 6),
             ),
         ];
         for (form, dc, carrier, delay, pole) in rows {
             let dc = Cell::fixed(dc.re, 5);
-            table.row([
-                subject.name().into(),
-                form.into(),
-                dc,
-                Cell::fixed(carrier, 2),
-                delay,
-                pole,
+            table.record([
+                ("filter", filter.name().into()),
+                ("form", form.into()),
+                ("gain at dc", dc),
+                ("gain at 600 Hz (dB)", Cell::fixed(carrier, 2)),
+                ("group delay at dc (samples)", delay),
+                ("largest pole |z|", pole),
             ]);
         }
-        let key = subject.name().to_lowercase();
-        outcome.metrics.set(format!("{key}_dc_gain"), subject.sections(0.0).re);
+        let key = filter.name().to_lowercase();
+        outcome.metrics.set(format!("{key}_dc_gain"), filter.sections(0.0).re);
         outcome.metrics.set(format!("{key}_gain_600hz_db"), sections);
         outcome
             .metrics
-            .set(format!("{key}_gain_600hz_f32_direct_db"), subject.direct_rounded(w).db());
-        outcome.metrics.set(format!("{key}_group_delay_dc_samples"), subject.group_delay(0.0));
+            .set(format!("{key}_gain_600hz_f32_direct_db"), filter.direct_rounded(w).db());
+        outcome.metrics.set(format!("{key}_group_delay_dc_samples"), filter.group_delay(0.0));
     }
     let divided = LPF.response(omega_t(600.0)).db();
     table.note(format!(
@@ -158,16 +142,16 @@ fn characteristics(subjects: &[Box<dyn Subject + Send>], outcome: &mut Outcome) 
     ))
 }
 
-fn edges(subjects: &[Box<dyn Subject + Send>]) -> Table {
+fn edges(filters: &[Box<dyn ComparedFilter + Send>]) -> Table {
     let levels = [-0.6, -3.0, -20.0, -40.0];
     let heads = ["filter", "-0.6 dB at (Hz)", "-3 dB at (Hz)", "-20 dB at (Hz)", "-40 dB at (Hz)"];
     let mut table = Table::new("Edges", &heads);
-    for subject in subjects {
+    for filter in filters {
         let crossings = levels.map(|level| {
-            let found = crossings(|hz| subject.sections(omega_t(hz)).db() - level);
+            let found = crossings(|hz| filter.sections(omega_t(hz)).db() - level);
             Cell::from(found.iter().map(|hz| format!("{hz:.1}")).collect::<Vec<_>>().join(", "))
         });
-        table.row([Cell::from(subject.name())].into_iter().chain(crossings));
+        table.row([Cell::from(filter.name())].into_iter().chain(crossings));
     }
     table.note("The ripple of the pass bands is 0.5 dB: each filter is measured against 0 dB.")
 }

@@ -5,8 +5,8 @@ use super::identify_discrete::{NOTE, both, shares, table};
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::identification::Parameters;
-use crate::identification::study::{Entry, MODELS};
-use crate::outcome::{Cell, Outcome, Table};
+use crate::identification::study::MODELS;
+use crate::outcome::{Cell, Entry, Outcome, Table};
 
 /// Tables 2, 3 and 5.
 pub const EXPERIMENT: Experiment = Experiment {

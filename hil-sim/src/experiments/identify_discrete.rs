@@ -3,9 +3,9 @@
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::identification::Parameters;
-use crate::identification::study::{Case, Entry, errors};
+use crate::identification::study::{Case, errors};
 use crate::identification::trial::Noise;
-use crate::outcome::{Cell, Outcome, Table};
+use crate::outcome::{Cell, Entry, Outcome, Table};
 
 /// Tables 1 and 4.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -38,32 +38,21 @@ pub(super) fn both(
 
 /// A table of entries beside the printed ones, and the share of them within a factor of two.
 pub(super) fn table(title: &str, entries: &[(Entry, f64)]) -> Table {
-    let heads = [
-        "model",
-        "signal",
-        "h (µs)",
-        "parameter",
-        "printed (%)",
-        "ours (%)",
-        "ratio",
-        "printed noise (%)",
-        "ratio",
-    ];
-    let mut table = Table::new(title, &heads);
+    let mut table = Table::new(title, &[]);
     for (entry, literal) in entries {
         let number = |value: Option<f64>| {
             value.map_or_else(|| Cell::from("-"), |value| Cell::significant(value, 3))
         };
-        table.row([
-            Cell::from(entry.model),
-            Cell::from(entry.signal),
-            Cell::fixed(entry.h_us, 0),
-            Cell::from(entry.parameter),
-            number(entry.printed_pct),
-            Cell::significant(entry.ours_pct, 3),
-            number(entry.ratio()),
-            Cell::significant(*literal, 3),
-            number(entry.printed_pct.map(|printed| literal / printed)),
+        table.record([
+            ("model", Cell::from(entry.model)),
+            ("signal", Cell::from(entry.signal)),
+            ("h (µs)", Cell::fixed(entry.h_us, 0)),
+            ("parameter", Cell::from(entry.parameter)),
+            ("printed (%)", number(entry.printed_pct)),
+            ("ours (%)", Cell::significant(entry.ours_pct, 3)),
+            ("ratio", number(entry.ratio())),
+            ("printed noise (%)", Cell::significant(*literal, 3)),
+            ("ratio", number(entry.printed_pct.map(|printed| literal / printed))),
         ]);
     }
     table
@@ -80,7 +69,7 @@ pub(super) fn shares(entries: &[(Entry, f64)]) -> [f64; 2] {
     ]
 }
 
-/// What every table of this kind needs said.
+/// Note of every table of printed errors.
 pub(super) const NOTE: &str = "Mean absolute errors of seven measurements of 4000 samples (Eq. 45). The machine is inferred \
      from the tables themselves (identify-machine). \"Ours\" reads the printed ranges of the noise \
      as peak to peak, which was chosen because it comes nearer to these tables and contradicts the \

@@ -93,18 +93,7 @@ fn convergence(estimates: &[[Value; 5]], k: usize) -> f64 {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let seconds = context.seconds.unwrap_or(2.0).clamp(0.2, 60.0);
     let mut outcome = Outcome::default();
-    let mut table = Table::new(
-        "Recursive least squares, lambda 0.999, P0 = 1000 I",
-        &[
-            "figure",
-            "signal",
-            "speed (rad/s)",
-            "r_s converges (s)",
-            "tau_r converges (s)",
-            "paper, worst (s)",
-            "speed, f32 - f64 (rad/s rms)",
-        ],
-    );
+    let mut table = Table::new("Recursive least squares, lambda 0.999, P0 = 1000 I", &[]);
     let bar = context.progress.bar("identification", 2 * CASES.len() as u64);
     for (index, (source, signal, speed, paper)) in CASES.into_iter().enumerate() {
         let machine = Parameters::PX.at(speed);
@@ -114,14 +103,17 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let noisy = estimate(&trial, LEVEL, seconds, context.seed)?;
         bar.advance(1);
         let times = [0, 1].map(|k| convergence(&clean.estimates, k));
-        table.row([
-            Cell::from(source),
-            Cell::from(signal.name()),
-            Cell::fixed(speed, 1),
-            Cell::fixed(times[0], 3),
-            Cell::fixed(times[1], 3),
-            paper.map_or_else(|| Cell::from("-"), |paper| Cell::fixed(paper, 1)),
-            Cell::significant(noisy.speed_rms, 2),
+        table.record([
+            ("figure", Cell::from(source)),
+            ("signal", Cell::from(signal.name())),
+            ("speed (rad/s)", Cell::fixed(speed, 1)),
+            ("r_s converges (s)", Cell::fixed(times[0], 3)),
+            ("tau_r converges (s)", Cell::fixed(times[1], 3)),
+            (
+                "paper, worst (s)",
+                paper.map_or_else(|| Cell::from("-"), |paper| Cell::fixed(paper, 1)),
+            ),
+            ("speed, f32 - f64 (rad/s rms)", Cell::significant(noisy.speed_rms, 2)),
         ]);
         let key = format!("figure_{}", index + 2);
         outcome.metrics.set(format!("{key}_r_s_converges_s"), times[0]);

@@ -23,7 +23,7 @@ const H: f64 = 50e-6;
 /// Noise of a real converter: a tenth of that of section 5.
 const LEVEL: Noise = Noise { voltage: 0.005, current: 0.02 };
 
-/// Title, what Model C found with S_g, and with S_s, in the order of [`Parameters::NAMES`].
+/// Title, and the printed estimates of Model C with S_g and with S_s.
 const PRINTED: [(&str, Parameters, Parameters); 2] = [
     (
         "Table 6: 60 Hz, 366 rad/s",
@@ -43,17 +43,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     for ((title, sg, ss), speed) in PRINTED.into_iter().zip(SPEEDS) {
         let machine = ss.at(speed);
-        let heads = [
-            "parameter",
-            "rbv, printed",
-            "C with Sg, printed",
-            "C with Ss, printed",
-            "simulated machine",
-            "C with Sg, ours",
-            "C with Ss, ours",
-            "S with Ss, ours",
-        ];
-        let mut table = Table::new(title, &heads);
+        let mut table = Table::new(title, &[]);
         let data = |signal| Trial::printed(machine, signal, H, LEVEL).run(context.seed, 0);
         let refused = |e: crate::identification::NotIdentifiable| Error::Refused(e.to_string());
         let regressions = Signal::ALL.map(|signal| data(signal).regression());
@@ -64,15 +54,15 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
             let value =
                 |x: Option<f64>| x.map_or_else(|| Cell::from("-"), |x| Cell::significant(x, 3));
-            table.row([
-                Cell::from(name),
-                value((k < 4).then(|| Parameters::RBV.array()[k])),
-                value(Some(sg.array()[k])),
-                value(Some(ss.array()[k])),
-                value(Some(machine.array()[k])),
-                value(c[0][k].ok()),
-                value(c[1][k].ok()),
-                value(s.ok().map(|s| s[k])),
+            table.record([
+                ("parameter", Cell::from(name)),
+                ("rbv, printed", value((k < 4).then(|| Parameters::RBV.array()[k]))),
+                ("C with Sg, printed", value(Some(sg.array()[k]))),
+                ("C with Ss, printed", value(Some(ss.array()[k]))),
+                ("simulated machine", value(Some(machine.array()[k]))),
+                ("C with Sg, ours", value(c[0][k].ok())),
+                ("C with Ss, ours", value(c[1][k].ok())),
+                ("S with Ss, ours", value(s.ok().map(|s| s[k]))),
             ]);
         }
         outcome.tables.push(table.note(
@@ -81,12 +71,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
              far Model C gets back to the machine, at a tenth of the noise of section 5.",
         ));
         if speed == SPEEDS[0] {
-            // Figure 5 simulates with what S_s gave.
+            // Figure 5 uses the estimate with S_s.
             let estimated = model_c(&by_ss.delta, H).parameters().map_err(refused)?;
             figure_5(&machine, &estimated.at(speed), &mut outcome);
         }
     }
-    // What the noise as printed, ten times that of a real converter, does to tau_r of such a machine.
+    // Error of tau_r on such a machine with the printed noise, ten times that of a real converter.
     let [sg, ss] = Signal::ALL.map(|signal| {
         let case = Case { speed: 375.0, signal, period: 0 };
         errors(Parameters::RBV, case, Noise::PRINTED, context.seed, 7).continuous[1][1].percent

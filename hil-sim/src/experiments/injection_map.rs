@@ -1,7 +1,6 @@
 //! The current difference over the injection angle, Figure 19.
 
 use drive_core::Command;
-use rayon::prelude::*;
 
 use super::{Context, Experiment};
 use crate::config::{Config, Demodulator};
@@ -98,15 +97,9 @@ pub(super) type Curve = Vec<(f64, f64)>;
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(Variant, f64)> =
         VARIANTS.iter().flat_map(|&v| IQ_A.iter().map(move |&iq| (v, iq))).collect();
-    let bar = context.progress.bar("injection-map", jobs.len() as u64);
-    let curves: Vec<Curve> = jobs
-        .par_iter()
-        .map(|&(variant, iq)| {
-            let result = curve(context.config, context.seed, variant, iq);
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let curves = context.in_parallel("injection-map", &jobs, |_, &(variant, iq)| {
+        curve(context.config, context.seed, variant, iq)
+    })?;
 
     let mut outcome = Outcome::default();
     for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
@@ -189,21 +182,10 @@ fn zero(curve: &Curve) -> f64 {
         .map_or(f64::NAN, |w| w[0].0 - w[0].1 * (w[1].0 - w[0].0) / (w[1].1 - w[0].1))
 }
 
-/// The printed chain on the motor without saliency beside what leakage predicts, and the rectified
+/// The printed chain on the motor without saliency beside the predicted leakage, and the rectified
 /// chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
-    let heads = [
-        "iq (A)",
-        "leak predicts at -90° (mA)",
-        "as printed, isotropic, at -90° (mA)",
-        "leak predicts zero at (°)",
-        "zero found at (°)",
-        "rectified, saliency, at 90° (mA)",
-        "rectified, isotropic, at 90° (mA)",
-        "delay left in, saliency, at 90° (mA)",
-        "delay left in, isotropic, at 90° (mA)",
-    ];
-    let mut table = Table::new("What Figure 19 shows", &heads).note(
+    let mut table = Table::new("What Figure 19 shows", &[]).note(
         "The leak predicts delta_i = -sqrt2 * 0.01 * 0.944 * |i| * sin(phi2 - theta + gamma), gamma \
          = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
          (In the source the 0.944 of the low-pass, which makes the real currents larger than \
@@ -211,16 +193,16 @@ fn table(curves: &[Curve], id: f64) -> Table {
     );
     let n = IQ_A.len();
     for (k, iq) in IQ_A.iter().enumerate() {
-        table.row([
-            Cell::fixed(*iq, 1),
-            Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3),
-            Cell::fixed(at(&curves[n + k], -90.0), 3),
-            Cell::fixed(-(iq / id).atan().to_degrees(), 2),
-            Cell::fixed(zero(&curves[n + k]), 2),
-            Cell::fixed(at(&curves[3 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[4 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[5 * n + k], 90.0), 2),
-            Cell::fixed(at(&curves[6 * n + k], 90.0), 2),
+        table.record([
+            ("iq (A)", Cell::fixed(*iq, 1)),
+            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3)),
+            ("as printed, isotropic, at -90° (mA)", Cell::fixed(at(&curves[n + k], -90.0), 3)),
+            ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
+            ("zero found at (°)", Cell::fixed(zero(&curves[n + k]), 2)),
+            ("rectified, saliency, at 90° (mA)", Cell::fixed(at(&curves[3 * n + k], 90.0), 2)),
+            ("rectified, isotropic, at 90° (mA)", Cell::fixed(at(&curves[4 * n + k], 90.0), 2)),
+            ("delay left in, saliency, at 90° (mA)", Cell::fixed(at(&curves[5 * n + k], 90.0), 2)),
+            ("delay left in, isotropic, at 90° (mA)", Cell::fixed(at(&curves[6 * n + k], 90.0), 2)),
         ]);
     }
     table

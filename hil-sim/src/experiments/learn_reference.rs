@@ -1,12 +1,11 @@
-//! The drive learns what its angle tracking compares with.
+//! The drive learns the reference of its angle tracking.
 
 use drive_core::identify::learning::Fitted;
 use drive_core::settings::table::STEP_A;
 
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{Context, Experiment, learning};
 use crate::error::Error;
-use crate::learn;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
 /// Section 5.2 asks for a detection that works at every operating point.
@@ -18,7 +17,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let learned = learn::on(context.config, context.seed)?;
+    let learned = learning::learned(context.config, context.seed)?;
     let mut outcome = Outcome::default();
     let points: Vec<(f64, f64)> = learned
         .reference

@@ -1,10 +1,8 @@
-//! Does the drive notice a lost or false lock, and only that?
+//! Trials of the lock monitor: lost and false locks, and false alarms.
 
 mod trials;
 
-use rayon::prelude::*;
-
-use self::trials::{Forced, Healthy, KINDS, OVER_SPEED_S, OverSpeed, Start};
+use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -34,7 +32,7 @@ const START_RPM: [f64; 11] = [0.0, 5.0, -5.0, 15.0, -15.0, 30.0, -50.0, 80.0, 15
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = u64::from(context.config.extent.runs.unwrap_or(RUNS));
-    let work = Work { context, runs };
+    let work = Trials { context, runs };
     let mut outcome = Outcome::default();
     work.forced(&mut outcome)?;
     work.healthy(&mut outcome)?;
@@ -51,12 +49,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 }
 
 /// All that the parts share.
-struct Work<'a> {
+struct Trials<'a> {
     context: &'a Context<'a>,
     runs: u64,
 }
 
-impl Work<'_> {
+impl Trials<'_> {
     /// `count` trials on all cores, each with a seed of its own.
     fn all<T: Send>(
         &self,
@@ -65,38 +63,18 @@ impl Work<'_> {
         count: u64,
         trial: impl Fn(u64, u64) -> Result<T, Error> + Sync,
     ) -> Result<Vec<T>, Error> {
-        let bar = self.context.progress.bar(name, count);
         let first = self.context.seed.wrapping_mul(1_000_003).wrapping_add(part << 40);
-        (0..count)
-            .into_par_iter()
-            .map(|n| {
-                let result = trial(n, first.wrapping_add(n));
-                bar.advance(1);
-                result
-            })
-            .collect()
+        let seeds: Vec<u64> = (0..count).map(|n| first.wrapping_add(n)).collect();
+        self.context.in_parallel(name, &seeds, |n, &seed| trial(n, seed))
     }
 
     fn forced(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let heads = [
-            "forced by (°)",
-            "trials",
-            "stopped",
-            "recovered",
-            "median (s)",
-            "99 % (s)",
-            "longest (s)",
-            "not in time",
-        ];
-        let mut table = Table::new("Angle forced off: how long it stays wrong", &heads);
-        let mut late = Table::new(
-            "Not in time",
-            &["forced by (°)", "seed", "iq (A)", "speed (rpm)", "wrong for (s)"],
-        );
+        let mut table = Table::new("Angle forced off: how long it stays wrong", &[]);
+        let mut late = Table::new("Not in time", &[]);
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
         for (number, (degrees, name)) in OFFSETS.into_iter().enumerate() {
-            let trials: Vec<Forced> = self.all(
+            let trials: Vec<ForcedTrial> = self.all(
                 &format!("forced by {degrees}°"),
                 number as u64,
                 self.runs,
@@ -110,25 +88,25 @@ impl Work<'_> {
                 wrong[((wrong.len() as f64 * share).ceil() as usize).clamp(1, wrong.len()) - 1]
             };
             let stopped = trials.iter().filter(|t| t.fault.is_some()).count();
-            let missed: Vec<&Forced> = trials.iter().filter(|t| !t.is_in_time()).collect();
+            let missed: Vec<&ForcedTrial> = trials.iter().filter(|t| !t.is_in_time()).collect();
             let count = |n: usize| Cell::fixed(n as f64, 0);
-            table.row([
-                Cell::fixed(degrees, 0),
-                count(trials.len()),
-                count(stopped),
-                count(trials.len() - stopped),
-                Cell::fixed(at(0.5), 3),
-                Cell::fixed(at(0.99), 3),
-                Cell::fixed(at(1.0), 3),
-                count(missed.len()),
+            table.record([
+                ("forced by (°)", Cell::fixed(degrees, 0)),
+                ("trials", count(trials.len())),
+                ("stopped", count(stopped)),
+                ("recovered", count(trials.len() - stopped)),
+                ("median (s)", Cell::fixed(at(0.5), 3)),
+                ("99 % (s)", Cell::fixed(at(0.99), 3)),
+                ("longest (s)", Cell::fixed(at(1.0), 3)),
+                ("not in time", count(missed.len())),
             ]);
             for t in &missed {
-                late.row([
-                    Cell::fixed(degrees, 0),
-                    Cell::from(t.case.seed.to_string()),
-                    Cell::fixed(t.case.iq, 3),
-                    Cell::fixed(t.case.rpm, 1),
-                    Cell::fixed(t.wrong_s, 3),
+                late.record([
+                    ("forced by (°)", Cell::fixed(degrees, 0)),
+                    ("seed", Cell::from(t.case.seed.to_string())),
+                    ("iq (A)", Cell::fixed(t.case.iq, 3)),
+                    ("speed (rpm)", Cell::fixed(t.case.rpm, 1)),
+                    ("wrong for (s)", Cell::fixed(t.wrong_s, 3)),
                 ]);
             }
             let m = &mut outcome.metrics;
@@ -151,13 +129,13 @@ impl Work<'_> {
     }
 
     fn healthy(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let runs: Vec<Healthy> =
+        let runs: Vec<HealthyRun> =
             self.all("false alarms", 10, HEALTHY_PER_RUN * self.runs, |n, seed| {
                 let kind = KINDS[n as usize % KINDS.len()];
                 trials::healthy(self.context.config, seed, kind)
             })?;
-        let alarms: Vec<&Healthy> = runs.iter().filter(|r| r.fault.is_some()).collect();
-        let largest = |of: fn(&Healthy) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let alarms: Vec<&HealthyRun> = runs.iter().filter(|r| r.fault.is_some()).collect();
+        let largest = |of: fn(&HealthyRun) -> f64| runs.iter().map(of).fold(0.0, f64::max);
         let bound = upper_bound_95(alarms.len() as u64, runs.len() as u64);
         let m = &mut outcome.metrics;
         m.set("false_alarms", alarms.len() as f64);
@@ -203,10 +181,10 @@ impl Work<'_> {
 
     fn over_speed(&self, outcome: &mut Outcome) -> Result<(), Error> {
         let limit = self.context.config.injection.tracked_rpm + ESTIMATE_RPM;
-        let trials: Vec<OverSpeed> = self.all("over-speed", 11, self.runs, |_, seed| {
+        let trials: Vec<OverSpeedTrial> = self.all("over-speed", 11, self.runs, |_, seed| {
             trials::over_speed(self.context.config, seed, limit)
         })?;
-        let late: Vec<&OverSpeed> =
+        let late: Vec<&OverSpeedTrial> =
             trials.iter().filter(|t| t.fault.is_none() || t.late_s > OVER_SPEED_S).collect();
         let latest = trials.iter().map(|t| t.late_s).fold(0.0, f64::max);
         let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
@@ -248,7 +226,7 @@ impl Work<'_> {
                 })
             };
             let (starts, relocks) = (of_kind(false)?, of_kind(true)?);
-            let accepted = |all: &[Start]| all.iter().filter(|s| s.accepted).count();
+            let accepted = |all: &[StartTrial]| all.iter().filter(|s| s.accepted).count();
             let wrong = starts.iter().chain(&relocks).filter(|s| !s.is_honest()).count();
             if rpm == 0.0 {
                 refused_at_rest = 2 * each as usize - accepted(&starts) - accepted(&relocks);

@@ -51,7 +51,7 @@ impl Inverter {
         modulated.compare.map(f64::from)
     }
 
-    /// What the compare values give at the motor, V.
+    /// Mean voltage at the motor for these compare values, V.
     fn voltage(&self, compare: [f64; 3]) -> (f64, f64) {
         clarke(compare.map(|c| c / self.top * self.vdc))
     }
@@ -69,7 +69,7 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let settings = settings::Inverter::default();
     let inverter = Inverter {
-        modulator: Modulator::new(settings.top, PERIOD_S, settings.dead_time_s, false),
+        modulator: Modulator::new(settings.top, settings.dead_time_s, false),
         top: f64::from(settings.top),
         vdc: context.config.inverter.vdc,
     };
@@ -86,16 +86,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Phase and line voltages of the eight states, computed from the states of the legs.
 fn table_2(outcome: &mut Outcome) -> Table {
-    let heads = [
-        "vector",
-        "a b c",
-        "va vb vc (thirds)",
-        "vab vbc vca",
-        "angle (°)",
-        "length",
-        "as printed",
-    ];
-    let mut table = Table::new("Table 2, voltages over the dc link", &heads);
+    let mut table = Table::new("Table 2, voltages over the dc link", &[]);
     let mut differences = 0;
     for (name, legs, phases, lines) in TABLE_2 {
         let [a, b, c] = legs.map(|leg| leg as i8);
@@ -108,14 +99,14 @@ fn table_2(outcome: &mut Outcome) -> Table {
         let angle = beta.atan2(alpha).to_degrees().rem_euclid(360.0);
         let join =
             |values: [i8; 3]| values.map(|v| v.to_string()).join(" ").replace('-', "\u{2212}");
-        table.row([
-            Cell::from(name),
-            Cell::from(join([a, b, c])),
-            Cell::from(join(computed)),
-            Cell::from(join(line)),
-            if length > 0.0 { Cell::fixed(angle, 0) } else { Cell::from("-") },
-            Cell::fixed(length, 4),
-            Cell::from(if agrees { "yes" } else { "no" }),
+        table.record([
+            ("vector", Cell::from(name)),
+            ("a b c", Cell::from(join([a, b, c]))),
+            ("va vb vc (thirds)", Cell::from(join(computed))),
+            ("vab vbc vca", Cell::from(join(line))),
+            ("angle (°)", if length > 0.0 { Cell::fixed(angle, 0) } else { Cell::from("-") }),
+            ("length", Cell::fixed(length, 4)),
+            ("as printed", Cell::from(if agrees { "yes" } else { "no" })),
         ]);
     }
     outcome.metrics.set("table_2_differences", f64::from(differences));

@@ -2,9 +2,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rayon::prelude::*;
 
-use super::steady::{Case, SteadyRun, steady_run};
+use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::config::Config;
@@ -31,29 +30,23 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = context.config.extent.runs.unwrap_or(RUNS);
     let bound = context.config.load.speed_rpm.abs();
     let bound = if bound > 0.0 { bound } else { SPEED_RPM };
-    let bar = context.progress.bar("monte-carlo", runs.into());
-    let cases: Vec<(Case, Config)> = (0..u64::from(runs))
+    let cases: Vec<(OperatingPoint, Config)> = (0..u64::from(runs))
         .map(|number| {
             // A generator of its own for every run: each can be repeated alone by its seed.
             let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
             let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
             let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
             let iq = sign * random.random_range(IQ_A.0..=IQ_A.1);
-            let case = Case { rpm: random.random_range(-bound..=bound), iq, seed };
+            let case = OperatingPoint { rpm: random.random_range(-bound..=bound), iq, seed };
             (case, spread(context.config, &mut random))
         })
         .collect();
-    let results: Vec<SteadyRun> = cases
-        .par_iter()
-        .map(|(case, config)| {
-            let result = steady_run(config, *case, context.seconds.unwrap_or(2.0));
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let results = context.in_parallel("monte-carlo", &cases, |_, (case, config)| {
+        steady_run(config, *case, context.seconds.unwrap_or(2.0))
+    })?;
 
     let mut outcome = Outcome::default();
-    let kept: Vec<(&Case, &SteadyRun)> =
+    let kept: Vec<(&OperatingPoint, &SteadyRun)> =
         cases.iter().map(|(case, _)| case).zip(&results).filter(|(_, r)| !r.lost).collect();
     let mut largest: Vec<f64> = kept.iter().map(|(_, r)| r.error.largest()).collect();
     largest.sort_by(f64::total_cmp);
@@ -111,7 +104,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// The configuration with what `spread` asks for drawn at random.
+/// The configuration with the errors of `spread` drawn at random.
 fn spread(config: &Config, random: &mut Xoshiro256PlusPlus) -> Config {
     let mut drawn = config.clone();
     let mut factor = |largest: f64| 1.0 + random.random_range(-largest..=largest);

@@ -88,33 +88,24 @@ fn readings_table(ours: &Readings) -> Table {
 }
 
 fn circuit_table(readings: &Readings, motor: &Circuit) -> Table {
-    let mut table = Table::new(
-        "Equivalent circuit",
-        &[
-            "parameter",
-            "Table 5",
-            "from the printed readings",
-            "from ours, as in section 3.6",
-            "ratio to Table 5",
-            "from ours, nothing neglected",
-            "ratio to the motor",
-            "from the printed readings, nothing neglected",
-        ],
-    );
+    let mut table = Table::new("Equivalent circuit", &[]);
     let (printed, classical) = (Readings::PRINTED.as_printed(), readings.as_printed());
     let (exact, theirs) = (readings.exact(), Readings::PRINTED.exact());
     for (k, name) in Circuit::NAMES.iter().enumerate() {
         let (scale, unit, digits) = if k < 2 { (1.0, "ohm", 4) } else { (1000.0, "mH", 4) };
         let value = |circuit: &Circuit| Cell::significant(scale * circuit.array()[k], digits);
-        table.row([
-            Cell::from(format!("{name} ({unit})")),
-            value(&Circuit::TABLE_5),
-            value(&printed),
-            value(&classical),
-            Cell::fixed(classical.array()[k] / Circuit::TABLE_5.array()[k], 3),
-            value(&exact),
-            Cell::fixed(exact.array()[k] / motor.array()[k], 3),
-            value(&theirs),
+        table.record([
+            ("parameter", Cell::from(format!("{name} ({unit})"))),
+            ("Table 5", value(&Circuit::TABLE_5)),
+            ("from the printed readings", value(&printed)),
+            ("from ours, as in section 3.6", value(&classical)),
+            (
+                "ratio to Table 5",
+                Cell::fixed(classical.array()[k] / Circuit::TABLE_5.array()[k], 3),
+            ),
+            ("from ours, nothing neglected", value(&exact)),
+            ("ratio to the motor", Cell::fixed(exact.array()[k] / motor.array()[k], 3)),
+            ("from the printed readings, nothing neglected", value(&theirs)),
         ]);
     }
     table

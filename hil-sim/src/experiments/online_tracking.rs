@@ -1,14 +1,12 @@
 //! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
-use rayon::prelude::*;
-
+use super::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 use super::{Context, Experiment};
 use crate::config::{AngleSource, Config};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::tracking::{Case, Moment, run as simulate};
 
-/// Beyond the sources: what the recursive estimate is for.
+/// Not in the sources: the recursive estimate in use.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "online-tracking",
     stands_for: "Jacobina 1996, on the drive",
@@ -17,7 +15,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Begin and end of the warming, s, and what r_r grows by. Fast: a motor takes minutes.
+/// Begin and end of the warming, s, and the relative growth of r_r. Fast: a motor takes minutes.
 const WARMING: (f64, f64, f64) = (4.0, 10.0, 0.3);
 const SECONDS: f64 = 18.0;
 /// From here on the estimate has settled again, s.
@@ -45,8 +43,8 @@ fn residual(config: &Config, share: f64) -> f64 {
     share * config.inverter.vdc * config.inverter.dead_time_us * 6e-3
 }
 
-/// What a run ends with.
-struct Ending {
+/// Means over the end of a run.
+struct FinalMeans {
     /// Mean error of tau_r (%) and of the speed (rad/s), and how often there was an estimate (%).
     tau_r: Option<f64>,
     speed: Option<f64>,
@@ -62,10 +60,10 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-fn ending(moments: &[Moment]) -> Ending {
-    let last: Vec<&Moment> = moments.iter().filter(|m| m.t > SETTLED).collect();
+fn ending(moments: &[WarmingMoment]) -> FinalMeans {
+    let last: Vec<&WarmingMoment> = moments.iter().filter(|m| m.t > SETTLED).collect();
     let estimates: Vec<_> = last.iter().filter_map(|m| m.estimate.ok().map(|e| (m, e))).collect();
-    Ending {
+    FinalMeans {
         tau_r: mean(estimates.iter().map(|(m, e)| 100.0 * (f64::from(e.tau_r) / m.tau_r - 1.0))),
         speed: mean(estimates.iter().map(|(m, e)| f64::from(e.omega_m) - m.omega_m)),
         valid: 100.0 * estimates.len() as f64 / last.len().max(1) as f64,
@@ -98,21 +96,16 @@ fn jobs() -> Vec<Job> {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs = jobs();
-    let bar = context.progress.bar("online-tracking", jobs.len() as u64);
-    let runs: Vec<Vec<Moment>> = jobs
-        .par_iter()
-        .map(|&(source, (speed_rpm, iq_a), excitation, share, used)| {
-            let mut config = context.config.clone();
-            config.angle.source = source;
-            config.inverter.residual_v = residual(&config, share);
-            let seconds = SECONDS;
-            let case = Case { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
-            let moments = simulate(&config, &case, context.seed);
-            bar.advance(1);
-            moments
-        })
-        .collect::<Result<_, _>>()?;
-    let endings: Vec<Ending> = runs.iter().map(|moments| ending(moments)).collect();
+    let runs = context.in_parallel("online-tracking", &jobs, |_, &job| {
+        let (source, (speed_rpm, iq_a), excitation, share, used) = job;
+        let mut config = context.config.clone();
+        config.angle.source = source;
+        config.inverter.residual_v = residual(&config, share);
+        let seconds = SECONDS;
+        let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
+        simulate(&config, &case, context.seed)
+    })?;
+    let endings: Vec<FinalMeans> = runs.iter().map(|moments| ending(moments)).collect();
     let (encoder, sensorless) = endings.split_at(4 * POINTS.len());
 
     let mut outcome = Outcome::default();
@@ -129,19 +122,8 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or_else(|| Cell::from("too poor"), |value| Cell::fixed(value, decimals))
 }
 
-fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
-    let mut table = Table::new(
-        "With the encoder: tau_r of the warm rotor, used by the drive",
-        &[
-            "speed (rpm)",
-            "i_q (A)",
-            "error (%), all dead time compensated",
-            "20 % of it left",
-            "50 % left",
-            "angle error (°), 50 % left",
-            "without tracking (°)",
-        ],
-    );
+fn with_encoder(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Table {
+    let mut table = Table::new("With the encoder: tau_r of the warm rotor, used by the drive", &[]);
     let (mut worst, mut angle, mut untracked) = ([0.0f64; 3], 0.0f64, 0.0f64);
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
         for (worst, ending) in worst.iter_mut().zip(row) {
@@ -149,14 +131,14 @@ fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Ta
         }
         angle = angle.max(row[2].angle.abs());
         untracked = untracked.max(row[3].angle.abs());
-        table.row([
-            Cell::fixed(point.0, 0),
-            Cell::fixed(point.1, 1),
-            number(row[0].tau_r, 1),
-            number(row[1].tau_r, 1),
-            number(row[2].tau_r, 1),
-            Cell::fixed(row[2].angle, 2),
-            Cell::fixed(row[3].angle, 2),
+        table.record([
+            ("speed (rpm)", Cell::fixed(point.0, 0)),
+            ("i_q (A)", Cell::fixed(point.1, 1)),
+            ("error (%), all dead time compensated", number(row[0].tau_r, 1)),
+            ("20 % of it left", number(row[1].tau_r, 1)),
+            ("50 % left", number(row[2].tau_r, 1)),
+            ("angle error (°), 50 % left", Cell::fixed(row[2].angle, 2)),
+            ("without tracking (°)", Cell::fixed(row[3].angle, 2)),
         ]);
     }
     for (share, worst) in RESIDUALS.iter().zip(worst) {
@@ -167,19 +149,9 @@ fn with_encoder(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Ta
     table.note("Means of the last three of 18 s; r_r grows by 30 % between 4 and 10 s.")
 }
 
-fn without(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
-    let mut table = Table::new(
-        "Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz",
-        &[
-            "speed (rpm)",
-            "i_q (A)",
-            "dead time left (%)",
-            "tau_r error (%)",
-            "speed error (rad/s)",
-            "there was an estimate (% of the time)",
-            "Model D's speed error (rad/s)",
-        ],
-    );
+fn without(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Table {
+    let mut table =
+        Table::new("Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz", &[]);
     let (mut tau, mut speed, mut still) = (0.0f64, 0.0f64, 0.0f64);
     for (point, rows) in SENSORLESS.iter().zip(endings.chunks_exact(4)) {
         for (n, ending) in rows.iter().enumerate() {
@@ -192,14 +164,14 @@ fn without(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
             } else {
                 still = still.max(ending.valid);
             }
-            table.row([
-                Cell::fixed(point.0, 0),
-                Cell::fixed(point.1, 1),
-                left,
-                number(ending.tau_r, 1),
-                number(ending.speed, 2),
-                Cell::fixed(ending.valid, 0),
-                number(ending.inverse_speed, 1),
+            table.record([
+                ("speed (rpm)", Cell::fixed(point.0, 0)),
+                ("i_q (A)", Cell::fixed(point.1, 1)),
+                ("dead time left (%)", left),
+                ("tau_r error (%)", number(ending.tau_r, 1)),
+                ("speed error (rad/s)", number(ending.speed, 2)),
+                ("there was an estimate (% of the time)", Cell::fixed(ending.valid, 0)),
+                ("Model D's speed error (rad/s)", number(ending.inverse_speed, 1)),
             ]);
         }
     }
@@ -209,10 +181,11 @@ fn without(endings: &[Ending], metrics: &mut crate::outcome::Metrics) -> Table {
     table
 }
 
-fn figure(used: &[Moment], unused: &[Moment]) -> Figure {
+fn figure(used: &[WarmingMoment], unused: &[WarmingMoment]) -> Figure {
     let truth = used.iter().map(|m| (m.t, m.tau_r)).collect();
-    let estimate = |m: &Moment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
-    let angle = |moments: &[Moment]| moments.iter().map(|m| (m.t, m.angle_error_deg)).collect();
+    let estimate = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
+    let angle =
+        |moments: &[WarmingMoment]| moments.iter().map(|m| (m.t, m.angle_error_deg)).collect();
     Figure::new("tracking", "The rotor warms up: 150 rpm, 2 A, encoder", "")
         .panel(
             Panel::new("time (s)", "rotor time constant (s)")
@@ -226,10 +199,10 @@ fn figure(used: &[Moment], unused: &[Moment]) -> Figure {
         )
 }
 
-fn speed_figure(moments: &[Moment]) -> Figure {
-    let estimate = |m: &Moment| (m.t, m.estimate.map_or(f64::NAN, |e| e.omega_m.into()));
+fn speed_figure(moments: &[WarmingMoment]) -> Figure {
+    let estimate = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.omega_m.into()));
     let truth = moments.iter().map(|m| (m.t, m.omega_m)).collect();
-    let tau = |m: &Moment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
+    let tau = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
     let tau_truth = moments.iter().map(|m| (m.t, m.tau_r)).collect();
     let title = "Speed and rotor time constant without a sensor: 150 rpm, 2 A";
     Figure::new("sensorless", title, "")

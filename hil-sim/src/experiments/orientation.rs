@@ -1,7 +1,6 @@
 //! Field orientation with the encoder: where the drive believes the flux to be, and the torque.
 
 use drive_core::{Command, Mode};
-use rayon::prelude::*;
 
 use super::{Context, Experiment};
 use crate::config::{AngleSource, LoadMode};
@@ -22,47 +21,34 @@ const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;
 
 /// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) psi i_q.
-type Result1 = (f64, f64);
+type Orientation = (f64, f64);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let jobs: Vec<(bool, f64)> =
         [true, false].iter().flat_map(|&c| SPEEDS_RPM.iter().map(move |&n| (c, n))).collect();
-    let bar = context.progress.bar("encoder-orientation", jobs.len() as u64);
-    let results: Vec<Result1> = jobs
-        .par_iter()
-        .map(|&(compensate, rpm)| {
-            let result = one(context, compensate, rpm);
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let results = context.in_parallel("encoder-orientation", &jobs, |_, &(compensate, rpm)| {
+        orientation(context, compensate, rpm)
+    })?;
     let (with, without) = results.split_at(SPEEDS_RPM.len());
 
     let mut outcome = Outcome::default();
-    let heads = [
-        "speed (rpm)",
-        "angle error, delays compensated (°)",
-        "delays left in (°)",
-        "torque, compensated (% of Eq. 2.7)",
-        "left in (%)",
-    ];
-    let mut table = Table::new("Field orientation over speed", &heads).note(format!(
+    let mut table = Table::new("Field orientation over speed", &[]).note(format!(
         "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m^2/L_r belongs; \
          the torque is compared with 3/2 P (L_m/L_r) psi i_q."
     ));
     let mut lines = [Vec::new(), Vec::new()];
     for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {
-        table.row([
-            Cell::fixed(rpm, 0),
-            Cell::fixed(a.0, 3),
-            Cell::fixed(b.0, 3),
-            Cell::fixed(a.1 * 100.0, 2),
-            Cell::fixed(b.1 * 100.0, 2),
+        table.record([
+            ("speed (rpm)", Cell::fixed(rpm, 0)),
+            ("angle error, delays compensated (°)", Cell::fixed(a.0, 3)),
+            ("delays left in (°)", Cell::fixed(b.0, 3)),
+            ("torque, compensated (% of Eq. 2.7)", Cell::fixed(a.1 * 100.0, 2)),
+            ("left in (%)", Cell::fixed(b.1 * 100.0, 2)),
         ]);
         lines[0].push((rpm, a.0));
         lines[1].push((rpm, b.0));
     }
-    let largest = |r: &[Result1]| r.iter().map(|x| x.0.abs()).fold(0.0, f64::max);
+    let largest = |r: &[Orientation]| r.iter().map(|x| x.0.abs()).fold(0.0, f64::max);
     outcome.metrics.set("angle_error_max_deg", largest(with));
     outcome.metrics.set("angle_error_uncompensated_max_deg", largest(without));
     let torque = with.iter().map(|x| (x.1 - 1.0).abs()).fold(0.0, f64::max);
@@ -84,7 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn one(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Result1, Error> {
+fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orientation, Error> {
     let mut config = context.config.clone();
     config.angle.source = AngleSource::Encoder;
     config.angle.compensate_delays = compensate;

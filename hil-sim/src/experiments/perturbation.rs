@@ -4,12 +4,12 @@
 use drive_core::{Command, Mode, State};
 use rayon::prelude::*;
 
+use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
 use super::{Context, Experiment};
 use crate::config::{AngleSource, Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::perturbation::{Disturbance, Linear};
 use crate::plant::Load;
 use crate::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
 use crate::stats::Stats;
@@ -22,7 +22,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Seeds over which the measured response is averaged: what is left of the noise is a fifth.
+/// Seeds over which the measured response is averaged; a fifth of the noise remains.
 const SEEDS: u64 = 24;
 /// Time before the step from which on it is compared, and after it, s.
 const BEFORE_S: f64 = 0.5;
@@ -30,7 +30,7 @@ const AFTER_S: f64 = 1.5;
 
 /// One disturbance.
 #[derive(Clone, Copy)]
-struct Case {
+struct StepCase {
     name: &'static str,
     disturbance: Disturbance,
     /// Speed reference, rpm, or torque current before the step, A.
@@ -39,15 +39,15 @@ struct Case {
     warmer: f64,
 }
 
-const fn load(name: &'static str, rpm: f64, nm: f64) -> Case {
-    Case { name, disturbance: Disturbance::Load(nm), from: rpm, warmer: 1.0 }
+const fn load(name: &'static str, rpm: f64, nm: f64) -> StepCase {
+    StepCase { name, disturbance: Disturbance::Load(nm), from: rpm, warmer: 1.0 }
 }
 
-const fn current(name: &'static str, from: f64, to: f64, warmer: f64) -> Case {
-    Case { name, disturbance: Disturbance::TorqueCurrent(to - from), from, warmer }
+const fn current(name: &'static str, from: f64, to: f64, warmer: f64) -> StepCase {
+    StepCase { name, disturbance: Disturbance::TorqueCurrent(to - from), from, warmer }
 }
 
-const CASES: [Case; 8] = [
+const CASES: [StepCase; 8] = [
     load("0.6 Nm at 0 rpm", 0.0, 0.6),
     load("0.6 Nm at 30 rpm", 30.0, 0.6),
     load("0.6 Nm at -150 rpm", -150.0, 0.6),
@@ -58,9 +58,9 @@ const CASES: [Case; 8] = [
     current("3 A to -3 A, rotor 30 % warmer", 3.0, -3.0, 1.3),
 ];
 
-/// What one case came to.
-struct Measured {
-    case: Case,
+/// Measured and predicted response of a case.
+struct StepResponse {
+    case: StepCase,
     /// Mean over the seeds, less the mean before the step.
     angle: Vec<f64>,
     speed: Vec<f64>,
@@ -71,7 +71,7 @@ struct Measured {
     predicted_speed: Vec<f64>,
 }
 
-impl Measured {
+impl StepResponse {
     /// Measured minus predicted, rms, degrees.
     fn fit(&self) -> f64 {
         Stats::of(self.angle.iter().zip(&self.predicted).map(|(m, p)| m - p)).rms()
@@ -83,7 +83,7 @@ fn peak(of: &[f64]) -> f64 {
 }
 
 /// The configuration of a case: the drive believes the resistance that the experiment was given.
-fn configured(config: &Config, case: &Case) -> Config {
+fn configured(config: &Config, case: &StepCase) -> Config {
     let mut config = config.clone();
     let believed = config.believed_motor().rr;
     config.drive_motor.rr = Some(believed);
@@ -98,7 +98,7 @@ fn configured(config: &Config, case: &Case) -> Config {
 }
 
 /// Angle error and speed from the step on; the first value is the mean before it.
-fn one(config: &Config, case: &Case, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
+fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f64, bool), Error> {
     let mut rig = Rig::from_config(config, seed)?;
     match case.disturbance {
         Disturbance::Load(_) => {
@@ -131,7 +131,7 @@ fn one(config: &Config, case: &Case, seed: u64) -> Result<(Vec<[f64; 2]>, f64, b
     Ok((points, largest, lost))
 }
 
-fn measure(config: &Config, case: Case, seed: u64) -> Result<Measured, Error> {
+fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, Error> {
     let config = configured(config, &case);
     let (plant, drive) = (plant_settings(&config), drive_settings(&config));
     // Where the drive ends up: there it is for most of the response.
@@ -139,7 +139,7 @@ fn measure(config: &Config, case: Case, seed: u64) -> Result<Measured, Error> {
         Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.sequence.i_d)),
         Disturbance::TorqueCurrent(by) => case.from + by,
     };
-    let linear = Linear::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
+    let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;
     let predicted = linear.response(case.disturbance, AFTER_S);
 
     let mut sum = vec![[0.0; 2]; predicted.angle_deg.len()];
@@ -157,7 +157,7 @@ fn measure(config: &Config, case: Case, seed: u64) -> Result<Measured, Error> {
         largest = largest.max(most);
         lost += usize::from(is_lost);
     }
-    Ok(Measured {
+    Ok(StepResponse {
         case,
         angle: sum.iter().map(|p| p[0]).collect(),
         speed: sum.iter().map(|p| p[1]).collect(),
@@ -177,42 +177,35 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
 
     let mut outcome = Outcome::default();
-    let heads = [
-        "step",
-        "peak, measured (°)",
-        "predicted (°)",
-        "fit, rms of the difference (°)",
-        "largest single error (°)",
-    ];
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
-    let mut table = Table::new(title, &heads).note(
+    let mut table = Table::new(title, &[]).note(
         "The mean before the step is taken away, but not from the largest single error, which has \
          noise and bias in it.",
     );
-    let is_load = |m: &&Measured| matches!(m.case.disturbance, Disturbance::Load(_));
+    let is_load = |m: &&StepResponse| matches!(m.case.disturbance, Disturbance::Load(_));
     for m in &results {
-        table.row([
-            Cell::from(m.case.name),
-            Cell::fixed(peak(&m.angle), 2),
-            Cell::fixed(peak(&m.predicted), 2),
-            Cell::fixed(m.fit(), 2),
-            Cell::fixed(m.largest, 2),
+        table.record([
+            ("step", Cell::from(m.case.name)),
+            ("peak, measured (°)", Cell::fixed(peak(&m.angle), 2)),
+            ("predicted (°)", Cell::fixed(peak(&m.predicted), 2)),
+            ("fit, rms of the difference (°)", Cell::fixed(m.fit(), 2)),
+            ("largest single error (°)", Cell::fixed(m.largest, 2)),
         ]);
     }
     outcome.tables.push(table);
-    let most = |of: &dyn Fn(&Measured) -> f64, keep: &dyn Fn(&&Measured) -> bool| {
+    let most = |of: &dyn Fn(&StepResponse) -> f64, keep: &dyn Fn(&&StepResponse) -> bool| {
         results.iter().filter(keep).map(of).fold(0.0, f64::max)
     };
     let metrics = &mut outcome.metrics;
     metrics.set("load_step_error_max_deg", most(&|m| m.largest, &is_load));
-    metrics.set("load_step_fit_rms_deg", most(&Measured::fit, &is_load));
+    metrics.set("load_step_fit_rms_deg", most(&StepResponse::fit, &is_load));
     metrics.set("load_step_dip_rpm", most(&|m| peak(&m.speed).abs(), &is_load));
-    let known = |m: &&Measured| !is_load(m) && m.case.warmer == 1.0;
-    let warm = |m: &&Measured| m.case.warmer > 1.0;
+    let known = |m: &&StepResponse| !is_load(m) && m.case.warmer == 1.0;
+    let warm = |m: &&StepResponse| m.case.warmer > 1.0;
     metrics.set("current_step_error_max_deg", most(&|m| m.largest, &known));
-    metrics.set("current_step_fit_rms_deg", most(&Measured::fit, &known));
+    metrics.set("current_step_fit_rms_deg", most(&StepResponse::fit, &known));
     metrics.set("current_step_warm_error_max_deg", most(&|m| m.largest, &warm));
-    metrics.set("current_step_warm_fit_rms_deg", most(&Measured::fit, &warm));
+    metrics.set("current_step_warm_fit_rms_deg", most(&StepResponse::fit, &warm));
     metrics.set("lost_runs", results.iter().map(|m| m.lost).sum::<usize>() as f64);
 
     let title = "Angle error after a step: measured mean, and the linear model";

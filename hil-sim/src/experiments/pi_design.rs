@@ -6,13 +6,12 @@ mod differences;
 use drive_core::filter::dissertation::LPF;
 use drive_core::math::complex::Complex;
 use drive_core::tuning::{
-    CurrentLoopDesign, DELAY, FirstOrder, Motor, Rule, TuningError, design_current_loop,
-    motor_plant, pi_response, rule_3_8,
+    CurrentLoopDesign, DELAY, FirstOrder, Rule, design_current_loop, motor_plant, pi_response,
+    rule_3_8,
 };
 
 use super::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use super::{Context, Experiment};
-use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -27,7 +26,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const PERIOD_S: f64 = 1.0 / RATE;
 
-/// An identified plant (A/V) and what the source prints for its controller.
+/// An identified plant (A/V) and the printed controller for it.
 struct Identified {
     name: &'static str,
     key: &'static str,
@@ -57,26 +56,18 @@ const IDENTIFIED: [Identified; 3] = [
     },
 ];
 
-fn refused(error: TuningError) -> Error {
-    Error::Refused(error.to_string())
-}
-
-fn motor(config: &Config) -> Motor {
-    let motor = config.believed_motor();
-    Motor { r_s: motor.rs, r_r: motor.rr, l_m: motor.lm, l_ls: motor.lls, l_lr: motor.llr }
-}
-
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let motor = motor(context.config);
-    let physical = motor_plant(&motor, PERIOD_S).map_err(refused)?;
+    let motor = context.config.believed_motor().circuit();
+    let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
     let rules = IDENTIFIED.map(|i| rule_3_8(i.plant, PERIOD_S).map(|rule| (i, rule)));
-    let rules = rules.into_iter().collect::<Result<Vec<_>, _>>().map_err(refused)?;
+    let rules = rules.into_iter().collect::<Result<Vec<_>, _>>().map_err(Error::refused)?;
     outcome.figures.push(w_plane(IDENTIFIED[0].plant, rules[0].1));
     outcome.tables.push(rule_table(&rules));
     let mut designs = Vec::new();
     for (identified, rule) in &rules {
-        let design = design_current_loop(identified.plant, physical, PERIOD_S).map_err(refused)?;
+        let design =
+            design_current_loop(identified.plant, physical, PERIOD_S).map_err(Error::refused)?;
         let key = identified.key;
         outcome.metrics.set(format!("{key}_kc_v_per_a"), rule.k_c);
         outcome.metrics.set(format!("{key}_zc"), rule.z_c);
@@ -161,32 +152,22 @@ fn rule_table(rules: &[(Identified, Rule)]) -> Table {
 }
 
 fn margin_table(designs: &[(&str, CurrentLoopDesign)]) -> Table {
-    let heads = [
-        "identified plant",
-        "gain",
-        "kc (V/A)",
-        "crossover (Hz)",
-        "phase margin (°)",
-        "Ms",
-        "at (Hz)",
-        "gain margin",
-    ];
-    let mut table = Table::new("Margins on the motor, with LPF and one period of delay", &heads);
+    let mut table = Table::new("Margins on the motor, with LPF and one period of delay", &[]);
     for (name, design) in designs {
         let rows = [
             ("by the rule", design.rule_k_c, design.rule_margins),
             ("used", design.k_c, design.margins),
         ];
         for (label, k_c, margins) in rows {
-            table.row([
-                Cell::from(*name),
-                Cell::from(label),
-                Cell::fixed(k_c, 2),
-                Cell::fixed(margins.crossover_hz, 1),
-                Cell::fixed(margins.phase_margin_deg, 1),
-                Cell::fixed(margins.ms, 2),
-                Cell::fixed(margins.ms_hz, 0),
-                Cell::fixed(margins.gain_margin, 2),
+            table.record([
+                ("identified plant", Cell::from(*name)),
+                ("gain", Cell::from(label)),
+                ("kc (V/A)", Cell::fixed(k_c, 2)),
+                ("crossover (Hz)", Cell::fixed(margins.crossover_hz, 1)),
+                ("phase margin (°)", Cell::fixed(margins.phase_margin_deg, 1)),
+                ("Ms", Cell::fixed(margins.ms, 2)),
+                ("at (Hz)", Cell::fixed(margins.ms_hz, 0)),
+                ("gain margin", Cell::fixed(margins.gain_margin, 2)),
             ]);
         }
     }

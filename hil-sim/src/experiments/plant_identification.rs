@@ -2,7 +2,7 @@
 //! follow from them.
 
 use drive_core::filter::dissertation::{LPF, LpfState};
-use drive_core::tuning::{FirstOrder, Motor, design_current_loop, motor_plant, rule_3_8};
+use drive_core::tuning::{FirstOrder, design_current_loop, motor_plant, rule_3_8};
 use drive_core::{AlphaBeta, Command, Dq, Mode};
 
 use super::{Context, Experiment};
@@ -66,9 +66,8 @@ impl Record {
     /// between the two, and the plant is that of the motor.
     fn alike(&self) -> Vec<f64> {
         let mut state = LpfState::default();
-        let filtered = |u: &f64| {
-            f64::from(LPF.step_alpha_beta(&mut state, AlphaBeta::new(*u as f32, 0.0)).alpha)
-        };
+        let filtered =
+            |u: &f64| f64::from(LPF.step(&mut state, AlphaBeta::new(*u as f32, 0.0)).alpha);
         self.u.iter().map(filtered).collect()
     }
 
@@ -82,7 +81,7 @@ impl Record {
     }
 }
 
-/// What the source did, and what it prints.
+/// An excitation of the source, and the printed plant.
 struct Trial {
     name: &'static str,
     key: &'static str,
@@ -149,10 +148,10 @@ fn prbs(rig: &mut Rig, axis: Axis) -> Result<Record, Error> {
     Ok(record.without_mean())
 }
 
-/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and what is left of the current,
-/// A rms.
+/// A first-order plant (b1 + b2 z^-1) z^-d / (z - p) with k = b1 + b2, and the rms residual of the
+/// current, A.
 #[derive(Clone, Copy)]
-struct Found {
+struct IdentifiedPlant {
     plant: FirstOrder,
     b: [f64; 2],
     delay: usize,
@@ -162,12 +161,17 @@ struct Found {
 
 /// With two coefficients of the voltage where the delay is no whole number of samples: the current's
 /// analog filter has 0.18.
-fn first_order(u: &[f64], y: &[f64], inputs: usize, delay: usize) -> Result<Found, Error> {
+fn first_order(
+    u: &[f64],
+    y: &[f64],
+    inputs: usize,
+    delay: usize,
+) -> Result<IdentifiedPlant, Error> {
     let orders = Orders { outputs: 1, inputs, delay };
     let Arx { a, b, condition, rms } =
         fit(u, y, orders).map_err(|e| Error::Refused(format!("least squares: {e}")))?;
     let b = [b[0], b.get(1).copied().unwrap_or(0.0)];
-    Ok(Found { plant: FirstOrder { k: b[0] + b[1], p: -a[0] }, b, delay, condition, rms })
+    Ok(IdentifiedPlant { plant: FirstOrder { k: b[0] + b[1], p: -a[0] }, b, delay, condition, rms })
 }
 
 fn bench(context: &Context<'_>) -> Result<Rig, Error> {
@@ -180,9 +184,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {
-    let m = config.believed_motor();
-    let motor = Motor { r_s: m.rs, r_r: m.rr, l_m: m.lm, l_ls: m.lls, l_lr: m.llr };
-    motor_plant(&motor, 1.0 / RATE_HZ).map_err(|e| Error::Refused(e.to_string()))
+    motor_plant(&config.believed_motor().circuit(), 1.0 / RATE_HZ).map_err(Error::refused)
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -190,31 +192,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut plants = Table::new(
         "Plants (b1 + b2 z^-1) z^-d / (z - p), k = b1 + b2, by least squares (appendix A)",
-        &[
-            "data",
-            "voltage",
-            "d",
-            "k (A/V)",
-            "printed",
-            "ratio",
-            "p",
-            "printed",
-            "condition",
-            "left (mA rms)",
-        ],
+        &[],
     );
-    let mut designs = Table::new(
-        "Controllers by the rule of section 3.8",
-        &[
-            "data",
-            "k_c (V/A)",
-            "from the printed plant",
-            "ratio",
-            "z_c",
-            "from the printed plant",
-            "k_c reduced to the margins (V/A)",
-        ],
-    );
+    let mut designs = Table::new("Controllers by the rule of section 3.8", &[]);
     for trial in &TRIALS {
         let mut rig = bench(context)?;
         let record = (trial.record)(&mut rig)?;
@@ -227,31 +207,31 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let best = found.iter().copied().reduce(|a, b| if b.rms < a.rms { b } else { a });
         let best = best.ok_or_else(|| Error::Internal("no delay was tried".to_owned()))?;
         for (how, one) in [("as printed", printed), ("filtered alike", best)] {
-            plants.row([
-                Cell::from(trial.name),
-                Cell::from(how),
-                Cell::fixed(one.delay as f64, 0),
-                Cell::significant(one.plant.k, 4),
-                Cell::significant(trial.printed.k, 4),
-                Cell::fixed(one.plant.k / trial.printed.k, 2),
-                Cell::fixed(one.plant.p, 4),
-                Cell::fixed(trial.printed.p, 4),
-                Cell::significant(one.condition, 2),
-                Cell::fixed(1e3 * one.rms, 1),
+            plants.record([
+                ("data", Cell::from(trial.name)),
+                ("voltage", Cell::from(how)),
+                ("d", Cell::fixed(one.delay as f64, 0)),
+                ("k (A/V)", Cell::significant(one.plant.k, 4)),
+                ("printed", Cell::significant(trial.printed.k, 4)),
+                ("ratio", Cell::fixed(one.plant.k / trial.printed.k, 2)),
+                ("p", Cell::fixed(one.plant.p, 4)),
+                ("printed", Cell::fixed(trial.printed.p, 4)),
+                ("condition", Cell::significant(one.condition, 2)),
+                ("left (mA rms)", Cell::fixed(1e3 * one.rms, 1)),
             ]);
         }
-        let refused = |e: drive_core::tuning::TuningError| Error::Refused(e.to_string());
-        let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(refused)?;
-        let theirs = rule_3_8(trial.printed, 1.0 / RATE_HZ).map_err(refused)?;
-        let design = design_current_loop(best.plant, motor, 1.0 / RATE_HZ).map_err(refused)?;
-        designs.row([
-            Cell::from(trial.name),
-            Cell::fixed(rule.k_c, 2),
-            Cell::fixed(theirs.k_c, 2),
-            Cell::fixed(rule.k_c / theirs.k_c, 2),
-            Cell::fixed(rule.z_c, 4),
-            Cell::fixed(theirs.z_c, 4),
-            Cell::fixed(design.k_c, 2),
+        let rule = rule_3_8(best.plant, 1.0 / RATE_HZ).map_err(Error::refused)?;
+        let theirs = rule_3_8(trial.printed, 1.0 / RATE_HZ).map_err(Error::refused)?;
+        let design =
+            design_current_loop(best.plant, motor, 1.0 / RATE_HZ).map_err(Error::refused)?;
+        designs.record([
+            ("data", Cell::from(trial.name)),
+            ("k_c (V/A)", Cell::fixed(rule.k_c, 2)),
+            ("from the printed plant", Cell::fixed(theirs.k_c, 2)),
+            ("ratio", Cell::fixed(rule.k_c / theirs.k_c, 2)),
+            ("z_c", Cell::fixed(rule.z_c, 4)),
+            ("from the printed plant", Cell::fixed(theirs.z_c, 4)),
+            ("k_c reduced to the margins (V/A)", Cell::fixed(design.k_c, 2)),
         ]);
         let key = trial.key;
         for (name, value) in [
@@ -278,8 +258,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// The current beside what the plant makes of the same voltage, from one measured value on.
-fn figure(trial: &Trial, record: &Record, u: &[f64], found: &Found) -> Figure {
+/// The measured current beside the response of the identified plant to the same voltage.
+fn figure(trial: &Trial, record: &Record, u: &[f64], found: &IdentifiedPlant) -> Figure {
     let axis = if trial.axis == Axis::D { "d" } else { "q" };
     let count = record.y.len().min(if trial.key == "steps" { usize::MAX } else { SHOWN });
     let mut modelled = Vec::with_capacity(count);

@@ -21,9 +21,9 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 /// The step.
 pub const TURNS: f64 = 5.0;
-/// One mechanical degree, in turns: what counts as arrived.
+/// Tolerance of the arrival: one mechanical degree, in turns.
 pub const ARRIVED: f64 = 1.0 / 360.0;
-/// With the encoder: the largest speed of section 4.1, and what 2.7 A accelerate by. Without it the
+/// With the encoder: the largest speed of section 4.1, and the acceleration by 2.7 A. Without it the
 /// drive's own, lower ones hold.
 const ENCODER_LIMIT_RPM: f64 = 1440.0;
 const ENCODER_RAMP_RPM_PER_S: f64 = 700.0;

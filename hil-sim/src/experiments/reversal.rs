@@ -1,12 +1,13 @@
 //! Steps and reversals of the torque current without a position sensor.
 
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State};
 
 use super::torque::{LOST_DEG, assumptions};
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::{Point, Rig};
+use crate::rig::{Point, Rig, means_over};
 use crate::stats::Stats;
 
 /// Section 5.2 asks for the response to disturbances.
@@ -58,10 +59,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("angle_error_max_deg", largest);
     outcome.metrics.set("lost", f64::from(u8::from(stopped || largest > LOST_DEG)));
     outcome.tables.push(table);
-    let line = |of: fn(&Point) -> f64| {
-        let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
-        points.chunks(10).map(|c| (c[0].t, mean(c))).collect::<Vec<_>>()
-    };
+    let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";
     outcome.figures.push(
         Figure::new("reversal", "Steps and reversals of the torque current", "section 5.2")

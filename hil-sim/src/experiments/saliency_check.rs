@@ -1,7 +1,6 @@
 //! Starts on motors with more and less saliency: which ones does the drive refuse?
 
 use drive_core::{Command, Fault, Mode, State};
-use rayon::prelude::*;
 
 use super::torque::assumptions;
 use super::{Context, Experiment};
@@ -25,21 +24,17 @@ const RUNS: u32 = 100;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = context.config.extent.runs.unwrap_or(RUNS);
-    let bar = context.progress.bar("saliency-check", SHARES.len() as u64 * u64::from(runs));
+    let seeds: Vec<u64> = (0..u64::from(runs))
+        .map(|n| context.seed.wrapping_mul(1_000_003).wrapping_add(n))
+        .collect();
     let mut outcome = Outcome::default();
     let heads = ["share of the expected saliency", "starts", "accepted", "refused"];
     let mut table = Table::new("Starts", &heads);
     for (share, name) in SHARES {
         let mut config = context.config.clone();
         config.saliency.a_psi *= share;
-        let accepted: Vec<bool> = (0..u64::from(runs))
-            .into_par_iter()
-            .map(|n| {
-                let result = accepts(&config, context.seed.wrapping_mul(1_000_003).wrapping_add(n));
-                bar.advance(1);
-                result
-            })
-            .collect::<Result<_, _>>()?;
+        let accepted =
+            context.in_parallel("saliency-check", &seeds, |_, &seed| accepts(&config, seed))?;
         let count = accepted.iter().filter(|&&a| a).count() as f64;
         outcome.metrics.set(format!("accepted_{name}"), count);
         table.row([

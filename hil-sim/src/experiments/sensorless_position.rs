@@ -2,19 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Mode, State};
-use rayon::prelude::*;
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{Context, Experiment, learning};
 use crate::config::{AngleSource, Config, LoadMode};
 use crate::error::Error;
-use crate::learn;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, drive_settings, plant_settings};
-use crate::stats::Stats;
+use crate::rig::{Point, Rig, drive_settings, means_over, plant_settings};
+use crate::stats::{Stats, StraightLine};
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -36,7 +35,7 @@ const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
 /// A position held under a load.
-struct Held {
+struct HeldPosition {
     load_nm: f64,
     belief: (f64, bool),
     /// Time and mechanical degrees, ten a second.
@@ -47,17 +46,13 @@ struct Held {
     stopped: bool,
 }
 
-impl Held {
+impl HeldPosition {
     /// Slope of a straight line through the track, degrees per minute.
     fn drift(&self) -> f64 {
-        let n = self.track.len() as f64;
-        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| self.track.iter().map(of).sum::<f64>() / n;
-        let (t, x) = (mean(&|p| p.0), mean(&|p| p.1));
-        let slope = mean(&|p| (p.0 - t) * (p.1 - x)) / mean(&|p| (p.0 - t).powi(2));
-        60.0 * slope
+        60.0 * StraightLine::through(&self.track).slope
     }
 
-    /// What is left beside the line, degrees rms.
+    /// Deviation from that line, degrees rms.
     fn wander(&self) -> f64 {
         let slope = self.drift() / 60.0;
         Stats::of(self.track.iter().map(|(t, x)| x - slope * t)).deviation()
@@ -71,7 +66,7 @@ fn hold(
     load_nm: f64,
     belief: (f64, bool),
     seconds: f64,
-) -> Result<Held, Error> {
+) -> Result<HeldPosition, Error> {
     let mut config = config.clone();
     config.angle.source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
@@ -81,7 +76,7 @@ fn hold(
     config.motor.rr = believed * belief.0;
     let mut drive = drive_settings(&config);
     if belief.1 {
-        drive.injection.synchronous.reference = learn::on(&config, seed)?.reference;
+        drive.injection.synchronous.reference = learning::learned(&config, seed)?.reference;
     }
     let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
     rig.start(Mode::Position)?;
@@ -89,7 +84,7 @@ fn hold(
     rig.run(3.0, |_| {});
     let start = rig.time();
     let origin = rig.plant.mechanical_angle() / TAU;
-    let mut held = Held {
+    let mut held = HeldPosition {
         load_nm,
         belief,
         track: Vec::new(),
@@ -121,16 +116,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let hold_s = context.seconds.unwrap_or(HOLD_S);
     let cases: Vec<(f64, (f64, bool))> =
         BELIEFS.iter().flat_map(|&b| LOADS_NM.iter().map(move |&l| (l, b))).collect();
-    let bar = context.progress.bar("sensorless-position", cases.len() as u64);
-    let held: Vec<Held> = cases
-        .par_iter()
-        .enumerate()
-        .map(|(n, &(load, belief))| {
-            let result = hold(config, seed.wrapping_add(n as u64), load, belief, hold_s);
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
+        hold(config, seed.wrapping_add(number), load, belief, hold_s)
+    })?;
 
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;
@@ -149,7 +137,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let drift = |belief| of(belief).map(|h| h.drift().abs()).fold(0.0, f64::max);
     m.set("drift_no_load_deg_per_min", held[0].drift());
     m.set("drift_max_deg_per_min", drift(BELIEFS[0]));
-    // Odd in the load: what the belief about the rotor is wrong by.
+    // Odd in the load: the error of the believed rotor resistance.
     let per_ampere = |belief| {
         let (mut xy, mut xx) = (0.0, 0.0);
         for h in of(belief) {
@@ -167,28 +155,19 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
     m.set("stopped_runs", held.iter().filter(|h| h.stopped).count() as f64);
 
-    let heads = [
-        "load (Nm)",
-        "r_r, true over believed",
-        "learned so",
-        "mean iq (A)",
-        "drift (°/min)",
-        "beside it (° rms)",
-        "angle error rms (°)",
-    ];
-    let mut table = Table::new("Drift of a position that is held", &heads).note(
+    let mut table = Table::new("Drift of a position that is held", &[]).note(
         "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \
          the load.",
     );
     for h in &held {
-        table.row([
-            Cell::fixed(h.load_nm, 1),
-            Cell::fixed(h.belief.0, 2),
-            Cell::from(if h.belief.1 { "yes" } else { "no" }),
-            Cell::fixed(h.iq, 2),
-            Cell::fixed(h.drift(), 1),
-            Cell::fixed(h.wander(), 2),
-            Cell::fixed(h.angle_error.rms(), 2),
+        table.record([
+            ("load (Nm)", Cell::fixed(h.load_nm, 1)),
+            ("r_r, true over believed", Cell::fixed(h.belief.0, 2)),
+            ("learned so", Cell::from(if h.belief.1 { "yes" } else { "no" })),
+            ("mean iq (A)", Cell::fixed(h.iq, 2)),
+            ("drift (°/min)", Cell::fixed(h.drift(), 1)),
+            ("beside it (° rms)", Cell::fixed(h.wander(), 2)),
+            ("angle error rms (°)", Cell::fixed(h.angle_error.rms(), 2)),
         ]);
     }
     outcome.tables.push(table);
@@ -216,10 +195,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn step_figure(without: &[Point], with: &[Point]) -> Figure {
     let x = "time (s)";
     let panel = |label: &str, of: fn(&Point) -> f64| {
-        let line = |points: &[Point]| {
-            let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
-            points.chunks(10).map(|c| (c[0].t, mean(c))).collect::<Vec<_>>()
-        };
+        let line = |points: &[Point]| means_over(CARRIER_SAMPLES, points, of);
         Panel::new(x, label)
             .with(Series::line("without encoder", line(without)))
             .with(Series::line("with encoder", line(with)))
@@ -234,7 +210,7 @@ fn step_figure(without: &[Point], with: &[Point]) -> Figure {
         .panel(panel("flux angle error (° electrical)", |p| p.angle_error_deg))
 }
 
-fn drift_figure(held: &[Held]) -> Figure {
+fn drift_figure(held: &[HeldPosition]) -> Figure {
     let title = "Rotor position while the drive holds what it takes for zero";
     let mut figure = Figure::new("drift", title, "");
     for belief in BELIEFS {

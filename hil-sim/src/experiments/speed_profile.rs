@@ -1,5 +1,6 @@
 //! The speed loop without a position sensor: a profile with a reversal and a load step.
 
+use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State};
 
 use super::torque::{LOST_DEG, assumptions};
@@ -8,7 +9,7 @@ use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
 use crate::plant::Load;
-use crate::rig::{Point, Rig};
+use crate::rig::{Point, Rig, means_over};
 use crate::stats::Stats;
 
 /// The aim of the source: motion without a sensor on the shaft.
@@ -75,10 +76,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("speed_max_rpm", points.iter().map(|p| p.speed_rpm).fold(0.0, f64::max));
     m.set("lost", f64::from(u8::from(stopped || error.largest() > LOST_DEG)));
 
-    let line = |of: fn(&Point) -> f64| {
-        let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
-        points.chunks(10).map(|c| (c[0].t, mean(c))).collect::<Vec<_>>()
-    };
+    let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";
     outcome.figures.push(
         Figure::new("profile", "Speed profile with a reversal and a load of 0.6 Nm", "section 5.2")

@@ -1,20 +1,20 @@
-//! One run at constant torque current and speed: what sweep and statistics are made of.
+//! One run at constant torque current and speed, of which sweep and statistics consist.
 
 use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode, Settings, State};
 
+use super::learning;
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
-use crate::learn;
 use crate::plant::Load;
 use crate::rig::{Rig, drive_settings, plant_settings};
 use crate::stats::Stats;
 
-/// Where, and with which noise.
+/// Operating point and seed of a run.
 #[derive(Clone, Copy, Debug)]
-pub struct Case {
+pub struct OperatingPoint {
     /// Speed, rpm.
     pub rpm: f64,
     /// Torque current, A.
@@ -23,7 +23,7 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// What came of it.
+/// Result of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct SteadyRun {
     /// Angle error, degrees.
@@ -41,20 +41,20 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 ///
 /// # Errors
 /// When the configuration is refused or the drive does not start.
-pub fn at_speed(config: &Config, case: Case) -> Result<Rig, Error> {
+pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
     let mut rig = without_torque(&drive_settings(config), config, case)?;
     rig.command(&Command::Torque(case.iq as f32))?;
     Ok(rig)
 }
 
 /// The same before it is given its torque; it may have stopped itself on the way.
-fn without_torque(drive: &Settings, config: &Config, case: Case) -> Result<Rig, Error> {
+fn without_torque(drive: &Settings, config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
     let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
     if config.drive.learn {
-        learn::with(&mut rig)?;
+        learning::learn(&mut rig)?;
     }
     rig.start(Mode::Torque)?;
     let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
@@ -71,7 +71,7 @@ fn without_torque(drive: &Settings, config: &Config, case: Case) -> Result<Rig, 
 ///
 /// # Errors
 /// When the configuration is refused or the drive does not start.
-pub fn steady_run(config: &Config, case: Case, seconds: f64) -> Result<SteadyRun, Error> {
+pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     steady_run_of(&drive_settings(config), config, case, seconds)
 }
 
@@ -82,7 +82,7 @@ pub fn steady_run(config: &Config, case: Case, seconds: f64) -> Result<SteadyRun
 pub fn steady_run_of(
     drive: &Settings,
     config: &Config,
-    case: Case,
+    case: OperatingPoint,
     seconds: f64,
 ) -> Result<SteadyRun, Error> {
     let mut rig = without_torque(drive, config, case)?;

@@ -1,8 +1,6 @@
 //! The angle error over torque current and speed.
 
-use rayon::prelude::*;
-
-use super::steady::{Case, SteadyRun, steady_run};
+use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -22,17 +20,10 @@ const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, -30.0, 150.0, -150.0, 300.0, 600.0];
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let grid: Vec<(f64, f64)> =
         SPEEDS_RPM.iter().flat_map(|&n| IQ_A.iter().map(move |&iq| (n, iq))).collect();
-    let bar = context.progress.bar("speed-torque-sweep", grid.len() as u64);
-    let runs: Vec<SteadyRun> = grid
-        .par_iter()
-        .enumerate()
-        .map(|(number, &(rpm, iq))| {
-            let case = Case { rpm, iq, seed: context.seed.wrapping_add(number as u64) };
-            let result = steady_run(context.config, case, context.seconds.unwrap_or(2.0));
-            bar.advance(1);
-            result
-        })
-        .collect::<Result<_, _>>()?;
+    let runs = context.in_parallel("speed-torque-sweep", &grid, |number, &(rpm, iq)| {
+        let case = OperatingPoint { rpm, iq, seed: context.seed.wrapping_add(number) };
+        steady_run(context.config, case, context.seconds.unwrap_or(2.0))
+    })?;
 
     let mut outcome = Outcome::default();
     let kept = || runs.iter().filter(|r| !r.lost);
@@ -46,15 +37,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("runs", runs.len() as f64);
     m.set("lost_runs", runs.iter().filter(|r| r.lost).count() as f64);
 
-    let heads: Vec<String> = std::iter::once("speed (rpm)".to_owned())
-        .chain(IQ_A.iter().map(|iq| format!("iq = {iq} A")))
-        .collect();
-    let mut table = Table {
-        title: "Angle error, mean ± rms about it (°)".into(),
-        ..Table::default()
-    }
-    .note("Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.");
-    table.columns = heads;
+    let mut table = Table::new("Angle error, mean ± rms about it (°)", &[]).note(
+        "Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.",
+    );
     for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
         let cell = |r: &SteadyRun| {
             if r.lost {
@@ -63,7 +48,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 Cell::from(format!("{:.1} ± {:.1}", r.error.mean(), r.error.deviation()))
             }
         };
-        table.row(std::iter::once(Cell::fixed(*rpm, 0)).chain(row.iter().map(cell)));
+        let cells = IQ_A.iter().zip(row).map(|(iq, run)| (format!("iq = {iq} A"), cell(run)));
+        table.record([("speed (rpm)".to_owned(), Cell::fixed(*rpm, 0))].into_iter().chain(cells));
     }
     outcome.tables.push(table);
 

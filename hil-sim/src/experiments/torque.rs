@@ -8,7 +8,7 @@ use crate::config::{Config, Demodulator};
 use crate::error::Error;
 use crate::experiments::{Context, Experiment};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
-use crate::rig::{Point, RATE_HZ, Rig};
+use crate::rig::{Point, RATE_HZ, Rig, means_over};
 use crate::stats::Stats;
 
 /// Figure 38.
@@ -71,7 +71,7 @@ fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// What was recorded of one run; times count from the first torque reference.
+/// Record of one run; times count from the first torque reference.
 struct Run {
     points: Vec<Point>,
     demodulator: Demodulator,
@@ -156,36 +156,35 @@ impl Run {
 
     fn figure(&self, name: &str, title: &str, source: &str) -> Figure {
         // Means over a carrier period: the injection's own ripple would hide everything else.
-        let line = |of: &dyn Fn(&Point) -> f64| {
-            let mean = |c: &[Point]| c.iter().map(of).sum::<f64>() / c.len() as f64;
-            self.points.chunks(CARRIER_SAMPLES).map(|c| (c[0].t, mean(c))).collect()
-        };
+        let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &self.points, of);
         let x = "time (s)";
         Figure::new(name, title, source)
             .panel(
                 Panel::new(x, "quadrature current (A)")
-                    .with(Series::line("measured", line(&|p| p.iq)))
-                    .with(Series::reference("reference", line(&|p| p.iq_ref))),
+                    .with(Series::line("measured", line(|p| p.iq)))
+                    .with(Series::reference("reference", line(|p| p.iq_ref))),
             )
             .panel(
-                Panel::new(x, "torque (Nm)").with(Series::line("motor", line(&|p| p.torque))).with(
-                    Series::line("by Eq. 4.4 from flux, current and angle error", line(&eq_4_4)),
+                Panel::new(x, "torque (Nm)").with(Series::line("motor", line(|p| p.torque))).with(
+                    Series::line("by Eq. 4.4 from flux, current and angle error", line(eq_4_4)),
                 ),
             )
-            .panel(Panel::new(x, "angle error (° electrical)").with(Series::line(
-                "true minus estimated flux angle",
-                line(&|p| p.angle_error_deg),
-            )))
+            .panel(
+                Panel::new(x, "angle error (° electrical)").with(Series::line(
+                    "true minus estimated flux angle",
+                    line(|p| p.angle_error_deg),
+                )),
+            )
             .panel(match self.demodulator {
                 Demodulator::Synchronous => Panel::new(x, "saliency (10^-3)")
-                    .with(Series::line("q, as demodulated", line(&|p| p.saliency * 1e3))),
+                    .with(Series::line("q, as demodulated", line(|p| p.saliency * 1e3))),
                 _ => Panel::new(x, "current difference (mA)")
-                    .with(Series::line("delta_i", line(&|p| p.delta_i * 1e3))),
+                    .with(Series::line("delta_i", line(|p| p.delta_i * 1e3))),
             })
     }
 }
 
-/// Torque by Eq. 4.4 with what the drive believes and the angle error: 3/2 P psi |i| sin(Delta
+/// Torque by Eq. 4.4 from the currents of the drive and the angle error: 3/2 P psi |i| sin(Delta
 /// alpha), times L_m/L_r since psi is the rotor flux; Delta alpha = gamma - e, gamma from the
 /// measured currents.
 fn eq_4_4(p: &Point) -> f64 {
@@ -194,7 +193,7 @@ fn eq_4_4(p: &Point) -> f64 {
     p.torque_per_flux_ampere * p.flux * length * (gamma - p.angle_error_deg.to_radians()).sin()
 }
 
-/// What the reader must know about the simulated plant.
+/// Assumptions of the simulated plant, for the remarks of an outcome.
 pub fn assumptions(config: &Config) -> Vec<String> {
     let s = &config.saliency;
     vec![format!(

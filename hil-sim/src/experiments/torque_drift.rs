@@ -1,8 +1,6 @@
 //! Torque over the torque current at standstill, and whether it or the angle drifts over a minute.
 
-use rayon::prelude::*;
-
-use super::steady::{Case, at_speed};
+use super::steady::{OperatingPoint, at_speed};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -23,7 +21,7 @@ const MEAN_S: f64 = 10.0;
 const MEANS: usize = 6;
 
 /// The means of one current.
-struct Held {
+struct HeldTorque {
     torque: Vec<f64>,
     angle_deg: Vec<f64>,
     /// Torque of that current at the right angle and nominal flux, Nm.
@@ -32,17 +30,13 @@ struct Held {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mean_s = context.seconds.map_or(MEAN_S, |s| s / MEANS as f64);
-    let bar = context.progress.bar("torque-drift", IQ_A.len() as u64);
-    let held: Vec<Held> = IQ_A
-        .par_iter()
-        .enumerate()
-        .map(|(n, &iq)| {
-            let case = Case { rpm: 0.0, iq, seed: context.seed.wrapping_add(n as u64) };
-            let held = hold(context, case, mean_s);
-            bar.advance(1);
-            held
-        })
-        .collect::<Result<_, _>>()?;
+    let held = context.in_parallel("torque-drift", &IQ_A, |number, &iq| {
+        hold(
+            context,
+            OperatingPoint { rpm: 0.0, iq, seed: context.seed.wrapping_add(number) },
+            mean_s,
+        )
+    })?;
 
     let mut table = Table::new(
         "A minute at standstill",
@@ -92,10 +86,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-fn hold(context: &Context<'_>, case: Case, mean_s: f64) -> Result<Held, Error> {
+fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<HeldTorque, Error> {
     let mut rig = at_speed(context.config, case)?;
     rig.run(1.0, |_| {});
-    let mut held = Held { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0 };
+    let mut held = HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0 };
     let (id, lm) = (context.config.reference.id_a, context.config.motor.lm);
     for _ in 0..MEANS {
         let (mut torque, mut angle) = (Stats::default(), Stats::default());

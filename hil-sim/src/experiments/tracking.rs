@@ -5,7 +5,7 @@ use super::{Context, Experiment, perturbation, reversal, speed_profile, sweep, t
 use crate::error::Error;
 use crate::outcome::Outcome;
 
-/// What section 5.2 asks for, of the drive as it is by default.
+/// The disturbances that section 5.2 names, with the default drive.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "tracking",
     stands_for: "Figure 38, section 5.2",

@@ -4,8 +4,8 @@
 //! y[k] = -a1 y[k-1] - ... - an y[k-n] + b1 u[k-d-1] + ... + bm u[k-d-m]
 //! ```
 //!
-//! The appendix prints the last row of Eq. A.4 and A.5 one sample too far and Eq. A.8 without the
-//! inverse; here all rows are those for which every term exists.
+//! The appendix prints the last row of Eq. A.4 and A.5 one sample too far; here all rows are those for
+//! which every term exists. The sentence below Eq. A.8 omits the inverse that the equation prints.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,7 +23,7 @@ pub struct Orders {
     pub delay: usize,
 }
 
-/// What least squares found.
+/// The fitted model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arx {
     /// a1 to an.
@@ -36,7 +36,10 @@ pub struct Arx {
     pub rms: f64,
 }
 
-/// Fits the model. Refuses data that do not excite it, judged by the condition number.
+/// Fits the model to the input `u` and the output `y`.
+///
+/// # Errors
+/// As [`least_squares`]: too few samples, numbers that are not finite, or poor excitation.
 pub fn fit(u: &[f64], y: &[f64], orders: Orders) -> Result<Arx, NotIdentifiable> {
     let Orders { outputs, inputs, delay } = orders;
     let first = outputs.max(inputs + delay);

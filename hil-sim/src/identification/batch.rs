@@ -4,7 +4,7 @@
 use nalgebra::{ComplexField, DMatrix, DVector, Matrix4, Vector4};
 
 use super::models::NotIdentifiable;
-use super::{Complex, Delta};
+use super::{Complex, Delta, FirstOrderTheta};
 
 /// Largest ratio of the singular values of a regression, its columns scaled to the same length,
 /// that still gives a result. Clean six-step data have up to 1e5, a constant signal above 6e9.
@@ -22,7 +22,7 @@ pub struct Data {
 /// A solved least-squares problem.
 #[derive(Clone, Debug)]
 pub struct Solution<T: ComplexField> {
-    /// What minimises the squared error.
+    /// The estimate with the least squared error.
     pub theta: DVector<T>,
     /// Upper triangular factor of the regression: its squared error rises from the minimum by
     /// |R (theta - minimum)|².
@@ -33,8 +33,11 @@ pub struct Solution<T: ComplexField> {
     pub residual: f64,
 }
 
-/// Minimises |A theta - y|² by QR factorisation. Refuses a regression that is not finite, has too
-/// few rows or a condition number above [`CONDITION_LIMIT`].
+/// Minimises |A theta - y|² by QR factorisation.
+///
+/// # Errors
+/// When a number is not finite, there are fewer rows than columns, or the condition number exceeds
+/// [`CONDITION_LIMIT`].
 pub fn least_squares<T: ComplexField<RealField = f64>>(
     mut a: DMatrix<T>,
     mut y: DVector<T>,
@@ -97,42 +100,6 @@ pub struct Regression {
     pub residual: f64,
 }
 
-/// The seven unknowns of Model B (Eq. 32), the first, third, fourth and sixth of them as the small
-/// differences and sums that Eq. 34 to 37 use.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FirstOrderTheta {
-    /// theta_1 - 1.
-    pub t1_minus_1: f64,
-    /// theta_2.
-    pub t2: f64,
-    /// theta_1 + theta_3 - 1.
-    pub t1_t3_minus_1: f64,
-    /// theta_2 + theta_4.
-    pub t2_t4: f64,
-    /// theta_5, S.
-    pub t5: f64,
-    /// theta_5 + theta_6, S.
-    pub t5_t6: f64,
-    /// theta_7, S.
-    pub t7: f64,
-}
-
-impl From<Delta> for FirstOrderTheta {
-    /// Reads Eq. 32 off the coefficients of Model A; what they hold of h_1b is left out.
-    fn from(delta: Delta) -> Self {
-        let Delta { g1, g0, h1, u0 } = delta;
-        Self {
-            t1_minus_1: g1.re,
-            t2: -g1.im,
-            t1_t3_minus_1: g0.re,
-            t2_t4: -g0.im,
-            t5: h1.re,
-            t5_t6: u0.re,
-            t7: h1.im - u0.im,
-        }
-    }
-}
-
 impl Data {
     /// Complex rows in differences: D i(t+h), and [D i(t), i(t-h), D v(t), v(t-h)].
     fn rows(&self) -> impl Iterator<Item = (Complex, [Complex; 4])> {
@@ -143,6 +110,9 @@ impl Data {
 
     /// Model A (Eq. 22 to 24) with four complex unknowns. Same solution as the eight real unknowns
     /// of Eq. 24, to 1e-12.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn regression(&self) -> Result<Regression, NotIdentifiable> {
         let (y, rows): (Vec<_>, Vec<_>) = self.rows().unzip();
         let a = DMatrix::from_fn(rows.len(), 4, |row, column| rows[row][column]);
@@ -157,6 +127,9 @@ impl Data {
     }
 
     /// Model A with the eight real unknowns of Eq. 24, in that order.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn real_regression(&self) -> Result<[f64; 8], NotIdentifiable> {
         let (i, v) = (&self.i, &self.v);
         let count = self.i.len().min(self.v.len()).saturating_sub(2);
@@ -177,6 +150,9 @@ impl Data {
     }
 
     /// The regression of Model B (Eq. 31), in differences.
+    ///
+    /// # Errors
+    /// As [`least_squares`].
     pub fn first_order(&self) -> Result<FirstOrderTheta, NotIdentifiable> {
         let rows: Vec<_> = self.rows().collect();
         // Eq. 31 multiplies theta_2, theta_4 and theta_7 by -j times the signal.

@@ -5,11 +5,11 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use super::Complex;
 use crate::plant::{
-    Load, Machine, MachineSettings, Mechanics, MechanicsSettings, Motor, PlantError,
+    Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel, PlantError,
     SaliencySettings,
 };
 
-/// What the meters show. Voltages and currents of the two tests with alternating current are phase
+/// Readings of the meters. Voltages and currents of the two tests with alternating current are phase
 /// values, rms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readings {
@@ -106,7 +106,7 @@ const PERIODS: u32 = 10;
 /// How often the supply is set anew until it gives the wanted current: the saliency bends the line.
 const ADJUSTMENTS: u32 = 4;
 
-/// What turns the rotor in the no-load test.
+/// Drive of the rotor in the no-load test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shaft {
     /// Another machine, at synchronous speed: no slip, as section 3.6.3 takes it.
@@ -119,16 +119,16 @@ pub enum Shaft {
 /// [`Readings::PRINTED`].
 ///
 /// # Errors
-/// What the plant refuses of the settings.
+/// [`PlantError`] when the plant refuses the settings.
 pub fn measure(
     machine: &MachineSettings,
     saliency: &SaliencySettings,
     mechanics: &MechanicsSettings,
     shaft: Shaft,
 ) -> Result<Readings, PlantError> {
-    let bench = |load: Load| -> Result<Motor, PlantError> {
+    let bench = |load: Load| -> Result<MotorModel, PlantError> {
         let mechanics = Mechanics::new(&MechanicsSettings { load, ..*mechanics })?;
-        Ok(Motor::new(Machine::new(machine, saliency)?, mechanics))
+        Ok(MotorModel::new(Machine::new(machine, saliency)?, mechanics))
     };
     let printed = Readings::PRINTED;
 
@@ -164,7 +164,7 @@ fn adjusted((volts, amps): (f64, f64), current: impl Fn(f64) -> f64) -> (f64, f6
 }
 
 /// Direct current through phases b and c in series, A, phase a open: that is a voltage along beta.
-fn dc_current(mut motor: Motor, volts: f64) -> f64 {
+fn dc_current(mut motor: MotorModel, volts: f64) -> f64 {
     const H: f64 = 1e-4;
     for _ in 0..(DC_S / H) as u32 {
         motor.step(Complex::new(0.0, volts / 3f64.sqrt()), H);
@@ -173,7 +173,7 @@ fn dc_current(mut motor: Motor, volts: f64) -> f64 {
 }
 
 /// Steady current vector (A peak) at `volts` rms per phase: its fundamental seen from the voltage.
-fn steady(mut motor: Motor, hz: f64, volts: f64) -> Complex {
+fn steady(mut motor: MotorModel, hz: f64, volts: f64) -> Complex {
     let h = 1.0 / (hz * f64::from(STEPS));
     let settle = (SETTLE_S * hz) as u32;
     let mut sum = Complex::ZERO;

@@ -26,8 +26,8 @@ pub mod structured;
 pub mod study;
 pub mod trial;
 
-pub use batch::{Data, FirstOrderTheta, Regression};
-pub use model::{Continuous, CurrentVoltage, Delta, Parameters, Step};
+pub use batch::{Data, Regression};
+pub use model::{Continuous, CurrentVoltage, Delta, FirstOrderTheta, Parameters, Step};
 pub use models::{Estimate, NotIdentifiable};
 pub use trial::{Signal, Trial};
 

@@ -3,7 +3,7 @@
 
 use super::Complex;
 
-/// What the terminals show of a symmetric machine: all that Eq. 9 needs.
+/// The parameters of a symmetric machine that its terminals determine, as Eq. 9 needs them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// Stator resistance, ohm.
@@ -133,7 +133,7 @@ impl Continuous {
     }
 }
 
-/// x(t+h) = F x(t) + H v(t) (Eq. 10). F - I is kept instead of F, so that what a short period
+/// x(t+h) = F x(t) + H v(t) (Eq. 10). F - I is kept instead of F, so that the part that a short period
 /// changes keeps its digits.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
@@ -265,5 +265,41 @@ impl Delta {
     /// From the four, in the order of the fields.
     pub fn from_array([g1, g0, h1, u0]: [Complex; 4]) -> Self {
         Self { g1, g0, h1, u0 }
+    }
+}
+
+/// The seven unknowns of Model B (Eq. 32), the first, third, fourth and sixth of them as the small
+/// differences and sums that Eq. 34 to 37 use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstOrderTheta {
+    /// theta_1 - 1.
+    pub t1_minus_1: f64,
+    /// theta_2.
+    pub t2: f64,
+    /// theta_1 + theta_3 - 1.
+    pub t1_t3_minus_1: f64,
+    /// theta_2 + theta_4.
+    pub t2_t4: f64,
+    /// theta_5, S.
+    pub t5: f64,
+    /// theta_5 + theta_6, S.
+    pub t5_t6: f64,
+    /// theta_7, S.
+    pub t7: f64,
+}
+
+impl From<Delta> for FirstOrderTheta {
+    /// Reads Eq. 32 off the coefficients of Model A; their part of h_1b is left out.
+    fn from(delta: Delta) -> Self {
+        let Delta { g1, g0, h1, u0 } = delta;
+        Self {
+            t1_minus_1: g1.re,
+            t2: -g1.im,
+            t1_t3_minus_1: g0.re,
+            t2_t4: -g0.im,
+            t5: h1.re,
+            t5_t6: u0.re,
+            t7: h1.im - u0.im,
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! From the sampled equation back to the machine: Models B and C of the paper, and Model D, the
 //! exact algebraic inverse.
 //!
-//! What they lose without any noise, in % of (r_s, tau_r, sigma_l_s, l_s, omega_m), machine
+//! Bias without any noise, in % of (r_s, tau_r, sigma_l_s, l_s, omega_m), machine
 //! [`Parameters::PX`](super::Parameters::PX) at 375 rad/s:
 //!
 //! | h (µs) | B | C | D |

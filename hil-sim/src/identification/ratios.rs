@@ -5,10 +5,10 @@ use super::models::model_b;
 use super::printed::{PERIODS, TABLE_1, TABLE_4, TABLES_2_3_B, TABLES_2_3_C};
 use super::{CurrentVoltage, FirstOrderTheta, Parameters};
 
-/// One such number.
+/// A number that does not depend on the noise, as printed and for two machines.
 #[derive(Clone, Copy, Debug)]
 pub struct Ratio {
-    /// What it is.
+    /// Its name.
     pub quantity: &'static str,
     /// Sampling period, s.
     pub h: f64,
@@ -33,8 +33,8 @@ fn gains(period: usize) -> f64 {
     (all[0] * all[1]).powf(0.25)
 }
 
-/// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and see the same h_1a: what remains of the
-/// difference of their errors is (1 - f_11) / 2. Mean of both signals, where B is biased upwards.
+/// Eq. 34 and 38 differ by the factor (1 + f_11)/2 and use the same h_1a: their errors differ by
+/// (1 - f_11) / 2. Mean of both signals, where B is biased upwards.
 fn inductances(period: usize) -> f64 {
     let b_minus_c = |k: usize| TABLES_2_3_B[2][k] - TABLES_2_3_C[2][k];
     // The larger: absolute values in the tables can only shrink the difference.

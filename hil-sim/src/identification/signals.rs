@@ -34,46 +34,20 @@ pub fn schroeder(period: f64, t: f64) -> f64 {
 /// Six-step plus Schroeder voltage S_s: the same r(t) on either axis, its period two periods of the
 /// fundamental.
 ///
-/// The paper prints neither the phases nor the period nor how r(t) is laid on the axes; of what was
-/// tried, this comes nearest to its tables.
+/// The paper prints neither the phases nor the period nor how r(t) is laid on the axes; this choice
+/// comes nearest to its tables of those that were tried.
 pub fn six_step_and_schroeder(amplitude: f64, hz: f64, t: f64) -> Complex {
     let r = TONE_AMPLITUDE * amplitude * schroeder(2.0 / hz, t);
     six_step(amplitude, hz, t) + Complex::new(r, r)
 }
 
 /// Feedback taps of registers of 2 to 32 bits with the longest possible period.
+#[rustfmt::skip] // a table
 const TAPS: [u32; 31] = [
-    0x3,
-    0x6,
-    0xC,
-    0x14,
-    0x30,
-    0x60,
-    0xB8,
-    0x110,
-    0x240,
-    0x500,
-    0xE08,
-    0x1C80,
-    0x3802,
-    0x6000,
-    0xD008,
-    0x12000,
-    0x20400,
-    0x72000,
-    0x9_0000,
-    0x14_0000,
-    0x30_0000,
-    0x42_0000,
-    0xE1_0000,
-    0x120_0000,
-    0x200_0023,
-    0x400_0013,
-    0x900_0000,
-    0x1400_0000,
-    0x2000_0029,
-    0x4800_0000,
-    0x8020_0003,
+    0x3, 0x6, 0xC, 0x14, 0x30, 0x60, 0xB8, 0x110,
+    0x240, 0x500, 0xE08, 0x1C80, 0x3802, 0x6000, 0xD008, 0x12000,
+    0x20400, 0x72000, 0x9_0000, 0x14_0000, 0x30_0000, 0x42_0000, 0xE1_0000, 0x120_0000,
+    0x200_0023, 0x400_0013, 0x900_0000, 0x1400_0000, 0x2000_0029, 0x4800_0000, 0x8020_0003,
 ];
 
 /// A pseudo-random binary sequence of a shift register with linear feedback: +1 or -1 with a period

@@ -15,13 +15,13 @@ use super::{Complex, Delta, Parameters, Regression};
 const STEPS: u32 = 200;
 /// Below this relative change of the unknowns a fit has converged.
 const TOLERANCE: f64 = 1e-9;
-/// Nor is there more to gain below this cosine between residual and what an unknown changes.
+/// A fit has also converged below this cosine between the residual and its derivative.
 const FLAT: f64 = 1e-7;
 /// A speed well below this many rad/s counts in proportion, one well above in decades.
 const SLOW: f64 = 10.0;
 /// Unknowns beyond e^±30 end a fit.
 const LARGEST: f64 = 30.0;
-/// What counts as a machine: tau_r / h, sigma_l_s / (r_s h) and l_s / sigma_l_s - 1. A fit that
+/// Plausible ranges: tau_r / h, sigma_l_s / (r_s h) and l_s / sigma_l_s - 1. A fit that
 /// goes astray runs one of them to zero or infinity.
 const MACHINE: [std::ops::Range<f64>; 3] = [1.0..1e7, 1.0..1e7, 0.01..1e3];
 
@@ -33,7 +33,7 @@ type Residual = SVector<f64, 8>;
 pub struct Fit {
     /// The machine.
     pub parameters: Parameters,
-    /// |R (theta - theta(p))|², what Model S leaves beyond Model A, A².
+    /// |R (theta - theta(p))|², the squared error of Model S above that of Model A, A².
     pub cost: f64,
     /// Times the exact map was computed.
     pub evaluations: u32,
@@ -122,7 +122,7 @@ fn descend(regression: &Regression, h: f64, start: &Parameters) -> Result<Fit, N
         let normal = jacobian.transpose() * jacobian;
         let gradient = jacobian.transpose() * residual;
         let scale = normal.diagonal();
-        // Cosine of the angle between the residual and what an unknown changes.
+        // Cosine of the angle between the residual and its derivative by an unknown.
         let flat = |limit: f64| {
             (0..5).all(|k| gradient[k].abs() <= limit * (scale[k] * residual.norm_squared()).sqrt())
         };

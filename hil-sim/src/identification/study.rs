@@ -1,4 +1,4 @@
-//! The mean errors of many simulated measurements (Eq. 45), beside what the paper prints.
+//! Mean errors of many simulated measurements (Eq. 45), beside the printed ones.
 
 use rayon::prelude::*;
 
@@ -9,6 +9,7 @@ use super::printed::{
 use super::structured::model_s;
 use super::trial::Noise;
 use super::{CurrentVoltage, Estimate, Parameters, Signal, Trial};
+use crate::outcome::Entry;
 
 /// One column of the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,37 +61,6 @@ pub struct Errors {
     pub discrete: [Mean; 8],
     /// [`MODELS`], each in the order of [`Parameters::NAMES`].
     pub continuous: [[Mean; 5]; 4],
-}
-
-/// A number of the tables: what it is, what is printed, if it is, and what came out here.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Entry {
-    /// `A` to `D` or `S`.
-    pub model: &'static str,
-    /// `Sg` or `Ss`.
-    pub signal: &'static str,
-    /// Electrical rad/s.
-    pub speed_rad_s: f64,
-    /// Sampling period, µs.
-    pub h_us: f64,
-    /// `r_s`, `tau_r`, `sigma_l_s`, `l_s`, `omega_m`, or a coefficient like `f_1a`.
-    pub parameter: &'static str,
-    /// Printed error, %.
-    pub printed_pct: Option<f64>,
-    /// Our error, %.
-    pub ours_pct: f64,
-}
-
-impl Entry {
-    /// Ours over printed.
-    pub fn ratio(&self) -> Option<f64> {
-        self.printed_pct.map(|printed| self.ours_pct / printed)
-    }
-
-    /// Whether ours and printed differ by no more than this factor.
-    pub fn within(&self, factor: f64) -> bool {
-        self.ratio().is_some_and(|ratio| ratio <= factor && ratio * factor >= 1.0)
-    }
 }
 
 fn mean(errors: impl Iterator<Item = Option<f64>>) -> Mean {

@@ -74,7 +74,7 @@ pub fn peaks(samples: impl Iterator<Item = (Complex, Complex)>) -> [f64; 2] {
     samples.fold([0.0; 2], |[peak_v, peak_i], (v, i)| [larger(peak_v, v), larger(peak_i, i)])
 }
 
-/// What is simulated.
+/// A simulated measurement.
 #[derive(Clone, Copy, Debug)]
 pub struct Trial {
     /// The machine and its speed.

@@ -5,9 +5,9 @@
 pub struct Figure {
     /// Short name, unique in the experiment, used in JSON: `step`, `bode`.
     pub name: String,
-    /// What it shows.
+    /// Title.
     pub title: String,
-    /// What of the source it stands for: `Figure 38`.
+    /// The part of the source that it reproduces: `Figure 38`.
     pub source: String,
     /// Panels from top to bottom; those with the same x label share the x axis.
     pub panels: Vec<Panel>,
@@ -38,7 +38,7 @@ pub struct Panel {
     pub x_label: String,
     /// Vertical quantity and unit.
     pub y_label: String,
-    /// What is drawn.
+    /// The series to draw.
     pub series: Vec<Series>,
     /// Logarithmic horizontal axis.
     pub log_x: bool,
@@ -85,7 +85,7 @@ pub enum Style {
     /// A line in a colour of its own.
     #[default]
     Line,
-    /// A dashed dark line: what something should be.
+    /// A dashed dark line: a reference value.
     Reference,
     /// A thin dashed grey line: a limit or a level to compare with.
     Limit,
@@ -96,7 +96,7 @@ pub enum Style {
 /// Points that belong together.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
-    /// What the legend says.
+    /// Name in the legend; unnamed series are not listed.
     pub name: String,
     /// Points; one that is not finite interrupts the line.
     pub points: Vec<(f64, f64)>,

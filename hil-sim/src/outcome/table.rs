@@ -7,7 +7,7 @@ use super::Step;
 /// A table.
 #[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Table {
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Heads of the columns, with units.
     pub columns: Vec<String>,
@@ -27,6 +27,15 @@ impl Table {
     /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.rows.push(cells.into_iter().collect());
+    }
+
+    /// Adds a row of cells, each with the head of its column; the first row sets the heads.
+    pub fn record<H: Into<String>>(&mut self, row: impl IntoIterator<Item = (H, Cell)>) {
+        let (heads, cells): (Vec<_>, Vec<_>) = row.into_iter().unzip();
+        if self.rows.is_empty() {
+            self.columns = heads.into_iter().map(Into::into).collect();
+        }
+        self.rows.push(cells);
     }
 
     /// With this note below it.

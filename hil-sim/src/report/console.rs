@@ -73,7 +73,7 @@ fn write_table(text: &mut String, table: &Table) {
     text.push('\n');
 }
 
-/// A paragraph in lines of at most 100 characters, indented by so many columns.
+/// A paragraph in lines of at most 100 characters, indented by `indent` columns.
 pub fn paragraph(text: &str, indent: usize) -> String {
     let indent = " ".repeat(indent);
     wrap(text, &indent, &indent)

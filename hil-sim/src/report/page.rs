@@ -6,21 +6,24 @@ use super::plot;
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 
-/// An experiment and what came out of it.
+/// An experiment and its outcome.
 pub struct Section<'a> {
     /// Name of the experiment.
     pub name: &'a str,
-    /// What of the source it stands for.
+    /// The part of the source that it reproduces.
     pub stands_for: &'a str,
-    /// What it does.
+    /// Description of the experiment.
     pub about: &'a str,
-    /// What has to be typed to repeat it.
+    /// The command line that repeats it.
     pub command: String,
-    /// What came out.
+    /// The outcome.
     pub outcome: &'a Outcome,
 }
 
 /// The page with these sections.
+///
+/// # Errors
+/// [`Error::Internal`] when a figure cannot be drawn.
 pub fn page(title: &str, sections: &[Section<'_>]) -> Result<String, Error> {
     let mut body = String::new();
     if sections.len() > 1 {

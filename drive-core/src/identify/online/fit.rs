@@ -3,8 +3,9 @@
 //! Everything here is inlined so that it is compiled for size with what calls it: it runs ten times a
 //! second.
 
+use crate::identify::rls::Rls;
 use crate::identify::rls::ud::N;
-use crate::identify::rls::{Complex32, Rls};
+use num_complex::Complex32;
 
 /// What is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +51,6 @@ impl Machine {
     /// With the trace t and the determinant d of A h, A² = t A - d (Cayley and Hamilton), so that the
     /// series X = 1 + A h/2 + (A h)²/6 + ... is p A h + q. F - 1 is A h X, and H is X b in its first
     /// column; what Eq. 16 and 18 subtract cancels on paper and leaves the determinant of X.
-    #[inline]
     pub fn coefficients(&self, x: &Unknowns) -> Column {
         let h = self.period;
         let rotor = Complex32::new(x.rate * h, -x.omega_m * h);
@@ -70,7 +70,6 @@ impl Machine {
 
     /// A step from `from`; `scale` are sizes of the unknowns, and `free_speed` says whether the speed
     /// is one. Nothing where the data do not fix the unknowns.
-    #[inline]
     pub fn step(
         &self,
         rls: &Rls,
@@ -137,7 +136,6 @@ struct Solution {
 
 /// Solves for the unknowns from `first` on by Cholesky's method: the slopes by each, then what they are to
 /// explain.
-#[inline]
 #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
 fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
     // Its last row is what is to be explained, seen from the others.
@@ -173,7 +171,6 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
 }
 
 // Not inlined: it is called twice.
-#[inline(never)]
 fn dot(a: &Column, b: &Column) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.re * b.re + a.im * b.im).sum()
 }

@@ -1,7 +1,7 @@
 //! The filter in front of the estimation, omega_n³ / (s + omega_n)³ (Eq. 44), as three first-order
 //! sections by Tustin's rule, which also gives its own increment.
 
-use super::Complex32;
+use num_complex::Complex32;
 
 /// Filter of one vector. The increment of the output is computed as such and not as a difference of
 /// two rounded outputs: at 10 Hz and 20 kHz it is 0.3 % of the output.
@@ -28,7 +28,6 @@ impl Filter {
     }
 
     /// One sample: no more than 18 multiplications and additions per axis, no division.
-    #[inline]
     pub fn step(&mut self, x: Complex32) -> Filtered {
         let (mut now, mut before) = (x, self.input);
         self.input = x;

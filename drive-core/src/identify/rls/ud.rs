@@ -5,7 +5,7 @@
 //! The plain recursion on P fails with the settings of the paper: P loses its symmetry and then its
 //! sign, in `f32` after 42 to 87 samples, in `f64` after 62 to 385, and ends as NaN.
 
-use super::Complex32;
+use num_complex::Complex32;
 
 /// Unknowns.
 pub const N: usize = 4;
@@ -38,14 +38,12 @@ impl Ud {
     }
 
     /// Largest element of D: how uncertain the least certain direction is.
-    #[inline]
     pub fn largest(&self) -> f32 {
         self.largest
     }
 
     /// D^-1/2 U^-1 x: where P is the covariance of x, numbers of size one that know nothing of each
     /// other. Where P is large, x counts for little. Not for the control step: it takes roots.
-    #[inline]
     pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
         for j in (1..N).rev() {
             for i in 0..j {
@@ -59,7 +57,6 @@ impl Ud {
     /// prediction; nothing if estimate or P are no longer finite and positive.
     ///
     /// About 290 multiplications and additions and 4 divisions.
-    #[inline]
     pub fn update(
         &mut self,
         x: [Complex32; N],
@@ -97,7 +94,6 @@ impl Ud {
     }
 
     /// Column `J` of U: of one function, so that its loops are known to the compiler and unrolled.
-    #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
     fn column<const J: usize>(&mut self, x: &[Complex32; N], forget: f32, pass: &mut Pass) {
         let mut w = x[J];

@@ -172,7 +172,7 @@ mod tests {
         assert!((held / leak - 1.0).abs() < 0.03, "{held} {leak}");
         assert!(slow.abs() < 0.05 * leak, "{slow}");
 
-        // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and what dead time
+        // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and the part that dead time
         // and noise leave take some tenths.
         let [held, slow] = gains(Demodulator::Synchronous, 2.0);
         let cos_2_gamma = (4.0 - 0.49) / (4.0 + 0.49);

@@ -5,6 +5,7 @@ use drive_core::tuning::roots;
 
 use super::measure::Record;
 use crate::error::Error;
+use crate::experiments::bode::largest_pole;
 use crate::identification::arx::{Orders, fit};
 
 /// k / ((z - p1)(z - p2)) = k / (z^2 + a1 z + a2).
@@ -25,7 +26,7 @@ pub struct Pii {
     pub z_s: f64,
 }
 
-/// What section 3.11 uses.
+/// As used in section 3.11.
 pub const PRINTED_PII: Pii = Pii { k_s: 0.132_546, z_s: 0.90 };
 
 /// Table 6: i_q in A, k_phi, real and imaginary part of the poles.
@@ -136,7 +137,7 @@ impl Model {
             (Pii { k_s: sign / open.abs(), z_s: 1.0 - crossover / LEAD }, crossover)
         });
         let fits = |pii: Pii| {
-            largest(self.closed_loop(pii)) < 1.0
+            largest_pole(self.closed_loop(pii)) < 1.0
                 && (1..300).all(|n| {
                     let w = std::f64::consts::PI * 0.97_f64.powi(n);
                     (Complex::ONE + self.open_loop(pii, w)).abs() > 1.0 / MS
@@ -159,11 +160,6 @@ const LEAD: f64 = 4.0;
 /// Largest sensitivity peak of the design.
 const MS: f64 = 2.0;
 
-/// Largest magnitude.
-pub fn largest(poles: Option<[Complex; 4]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,11 +178,11 @@ mod tests {
             assert!(model.fit(&record).1 > 99.99);
         }
         let (pii, crossover) = plant.design().unwrap();
-        assert!(largest(plant.closed_loop(pii)) < 0.9999);
+        assert!(largest_pole(plant.closed_loop(pii)) < 0.9999);
         assert!((plant.open_loop(pii, crossover).abs() - 1.0).abs() < 1e-9);
         // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
         let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
-        assert!(largest(plant.closed_loop(more)) < 1.0);
+        assert!(largest_pole(plant.closed_loop(more)) < 1.0);
     }
 
     #[test]
@@ -194,7 +190,7 @@ mod tests {
         // Of an independent study: .99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021.
         let expected = [0.99992, 1.00016, 1.00015, 1.00032, 1.00049, 1.00021];
         for (row, expected) in expected.into_iter().enumerate() {
-            let found = largest(Model::printed(row).closed_loop(PRINTED_PII));
+            let found = largest_pole(Model::printed(row).closed_loop(PRINTED_PII));
             assert!((found - expected).abs() < 2e-5, "{row}: {found}");
         }
     }

@@ -1,9 +1,9 @@
-//! What the drive makes of it without a position sensor.
+//! Angle error of a drive without a position sensor, with each demodulation.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, Settings, State};
 
-use super::super::steady::{Case, SteadyRun, steady_run_of};
+use super::super::steady::{OperatingPoint, SteadyRun, steady_run_of};
 use super::super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -18,7 +18,7 @@ const SETTLING_S: f64 = 0.5;
 
 /// A run through the torque steps.
 #[derive(Clone, Debug)]
-pub struct Steps {
+pub struct StepsRun {
     /// Angle error, degrees, over time, s: means over a carrier period.
     pub error: Vec<(f64, f64)>,
     /// Angle error after settling, degrees.
@@ -28,7 +28,7 @@ pub struct Steps {
 }
 
 /// Torque steps with the shaft locked.
-pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<Steps, Error> {
+pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
     let mut rig = Rig::new(&plant_settings(&config), drive, seed)?;
@@ -53,7 +53,7 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<Steps, Erro
         }
     }
     let lost = stats.largest() > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
-    Ok(Steps { error, stats, lost })
+    Ok(StepsRun { error, stats, lost })
 }
 
 /// One second at constant speed and torque.
@@ -64,7 +64,7 @@ pub fn turning(
     iq: f64,
     seed: u64,
 ) -> Result<Option<SteadyRun>, Error> {
-    match steady_run_of(drive, config, Case { rpm, iq, seed }, 1.0) {
+    match steady_run_of(drive, config, OperatingPoint { rpm, iq, seed }, 1.0) {
         Ok(run) => Ok((!run.lost).then_some(run)),
         Err(error) => Err(error),
     }

@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use rayon::prelude::*;
 
-use super::subject::{SECTIONS_F32, Subject};
+use super::compared::{ComparedFilter, SECTIONS_F32};
 use crate::experiments::Context;
 use crate::experiments::bode::omega_t;
 use crate::outcome::{Cell, Outcome, Table};
@@ -28,7 +28,7 @@ fn input(number: usize, seed: u64) -> Box<dyn FnMut() -> f64> {
 
 /// Feeds each filter with each input; adds the metrics and returns the table.
 pub fn errors(
-    subjects: &[Box<dyn Subject + Send>],
+    filters: &[Box<dyn ComparedFilter + Send>],
     samples: u64,
     context: &Context<'_>,
     outcome: &mut Outcome,
@@ -37,8 +37,8 @@ pub fn errors(
     let cases: Vec<(usize, usize)> = (0..3).flat_map(|s| (0..3).map(move |i| (s, i))).collect();
     let measured: Vec<_> = cases
         .par_iter()
-        .map(|&(subject, number)| {
-            let errors = subjects[subject].errors(&mut *input(number, context.seed), samples);
+        .map(|&(filter, number)| {
+            let errors = filters[filter].errors(&mut *input(number, context.seed), samples);
             bar.advance(1);
             errors
         })
@@ -46,13 +46,13 @@ pub fn errors(
     let heads = ["filter", "form", INPUTS[0], INPUTS[1], INPUTS[2], "largest of all"];
     let mut table =
         Table::new("Error against double precision, mA rms, and the largest error, mA", &heads);
-    for (subject, inputs) in subjects.iter().zip(measured.chunks(3)) {
+    for (filter, inputs) in filters.iter().zip(measured.chunks(3)) {
         for form in 0..inputs[0].len() {
             let name = inputs[0][form].0;
             let rms = inputs.iter().map(|input| input[form].1.rms());
             let largest = inputs.iter().map(|input| input[form].1.largest()).fold(0.0, f64::max);
             let worst = rms.clone().fold(0.0, f64::max);
-            let key = subject.name().to_lowercase();
+            let key = filter.name().to_lowercase();
             let suffix = if name == SECTIONS_F32 {
                 "sections"
             } else {
@@ -61,7 +61,7 @@ pub fn errors(
             outcome.metrics.set(format!("{key}_{suffix}_error_rms_a"), worst);
             outcome.metrics.set(format!("{key}_{suffix}_error_max_a"), largest);
             let rms = rms.map(|rms| Cell::significant(1e3 * rms, 2));
-            let cells = [Cell::from(subject.name()), Cell::from(name)].into_iter().chain(rms);
+            let cells = [Cell::from(filter.name()), Cell::from(name)].into_iter().chain(rms);
             table.row(cells.chain([Cell::significant(1e3 * largest, 2)]));
         }
     }

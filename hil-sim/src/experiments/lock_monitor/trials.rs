@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
-use crate::experiments::steady::{Case, at_speed};
+use crate::experiments::steady::{OperatingPoint, at_speed};
 use crate::plant::Load;
 use crate::rig::{Point, Rig};
 
@@ -28,30 +28,30 @@ pub fn fault(rig: &Rig) -> Option<Fault> {
 }
 
 /// A random operating point: speeds within ±`bound` rpm.
-pub fn case(seed: u64, bound: f64) -> Case {
+pub fn case(seed: u64, bound: f64) -> OperatingPoint {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
     // Every fifth at the least current, where the torque that a wrong angle makes is least.
     let least = random.random_range(0..5) == 0;
     let length = if least { IQ_A.0 } else { random.random_range(IQ_A.0..=IQ_A.1) };
-    Case { rpm: random.random_range(-bound..=bound), iq: sign * length, seed }
+    OperatingPoint { rpm: random.random_range(-bound..=bound), iq: sign * length, seed }
 }
 
 /// A trial with the angle forced off.
 #[derive(Clone, Debug)]
-pub struct Forced {
+pub struct ForcedTrial {
     /// Where.
-    pub case: Case,
+    pub case: OperatingPoint,
     /// The last moment, s after the angle was forced off, at which the drive was on with an error of
     /// 15° or more.
     pub wrong_s: f64,
-    /// What it stopped with.
+    /// The fault with which the drive stopped.
     pub fault: Option<Fault>,
     /// Loss of saliency over time.
     pub loss: Vec<(f64, f64)>,
 }
 
-impl Forced {
+impl ForcedTrial {
     /// Time within which the drive must be right or off, s.
     pub fn deadline(&self) -> f64 {
         if self.case.iq.abs() > IQ_A.0 { 0.5 } else { 1.5 }
@@ -64,7 +64,7 @@ impl Forced {
 }
 
 /// Turns the rotor flux by `degrees` at a random moment.
-pub fn forced(config: &Config, case: Case, degrees: f64) -> Result<Forced, Error> {
+pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<ForcedTrial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
     rig.run(0.8 + random.random_range(0.0..0.2), |_| {});
@@ -78,7 +78,7 @@ pub fn forced(config: &Config, case: Case, degrees: f64) -> Result<Forced, Error
     rig.plant.turn_rotor_flux(degrees.to_radians());
     let (start, mut wrong_s, mut loss) = (rig.time(), 0.0, Vec::new());
     while rig.time() < start + WATCH_S && fault(&rig).is_none() {
-        // As long as a carrier period: what the drive does of its own is no finer.
+        // One carrier period: the drive itself acts no more often.
         rig.run(1.0 / 600.0, |p| {
             if p.angle_error_deg.abs() >= LOCKED_DEG {
                 wrong_s = p.t - start;
@@ -88,12 +88,12 @@ pub fn forced(config: &Config, case: Case, degrees: f64) -> Result<Forced, Error
     }
     loss.truncate(loss.len() - loss.len() % 10);
     let loss = loss.chunks(10).map(|c| c[9]).collect();
-    Ok(Forced { case, wrong_s, fault: fault(&rig), loss })
+    Ok(ForcedTrial { case, wrong_s, fault: fault(&rig), loss })
 }
 
-/// What happens in a run that the drive must not stop.
+/// Disturbance in a run that the drive must not stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum HealthyKind {
     /// Nothing, within 150 rpm.
     Slow,
     /// Nothing, within 300 rpm.
@@ -105,37 +105,38 @@ pub enum Kind {
 }
 
 /// All of them.
-pub const KINDS: [Kind; 4] = [Kind::Slow, Kind::Fast, Kind::Reversal, Kind::LoadStep];
+pub const KINDS: [HealthyKind; 4] =
+    [HealthyKind::Slow, HealthyKind::Fast, HealthyKind::Reversal, HealthyKind::LoadStep];
 
 /// A run that the drive must not stop.
 #[derive(Clone, Copy, Debug)]
-pub struct Healthy {
+pub struct HealthyRun {
     /// Where.
-    pub case: Case,
-    /// What happened in it.
-    pub kind: Kind,
+    pub case: OperatingPoint,
+    /// Its disturbance.
+    pub kind: HealthyKind,
     /// Largest loss that the monitor saw.
     pub largest_loss: f64,
     /// Largest angle error, degrees.
     pub largest_error: f64,
-    /// What it stopped with nevertheless.
+    /// The fault with which the drive stopped nevertheless.
     pub fault: Option<Fault>,
 }
 
 /// Two seconds, after 0.3 s to settle, in which something happens after one.
-pub fn healthy(config: &Config, seed: u64, kind: Kind) -> Result<Healthy, Error> {
-    let case = case(seed, if kind == Kind::Fast { 300.0 } else { 150.0 });
-    let mut result = Healthy { case, kind, largest_loss: 0.0, largest_error: 0.0, fault: None };
+pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<HealthyRun, Error> {
+    let case = case(seed, if kind == HealthyKind::Fast { 300.0 } else { 150.0 });
+    let mut result = HealthyRun { case, kind, largest_loss: 0.0, largest_error: 0.0, fault: None };
     let mut look = |p: &Point| {
         result.largest_loss = result.largest_loss.max(p.loss);
         result.largest_error = result.largest_error.max(p.angle_error_deg.abs());
     };
-    let mut rig = if kind == Kind::LoadStep {
+    let mut rig = if kind == HealthyKind::LoadStep {
         load_step(config, case, &mut look)?
     } else {
         let mut rig = at_speed(config, case)?;
         rig.run(1.3, &mut look);
-        if kind == Kind::Reversal && fault(&rig).is_none() {
+        if kind == HealthyKind::Reversal && fault(&rig).is_none() {
             rig.command(&Command::Torque(-case.iq as f32))?;
         }
         rig
@@ -151,8 +152,12 @@ const SPEED_LOOP: f64 = 4.4;
 const LOAD_NM: f64 = 0.6;
 
 /// Speed regulated on the estimate of the drive, the load coming on after one second of two.
-fn load_step(config: &Config, case: Case, look: &mut impl FnMut(&Point)) -> Result<Rig, Error> {
-    let mut rig = at_speed(config, Case { iq: 0.0, ..case })?;
+fn load_step(
+    config: &Config,
+    case: OperatingPoint,
+    look: &mut impl FnMut(&Point),
+) -> Result<Rig, Error> {
+    let mut rig = at_speed(config, OperatingPoint { iq: 0.0, ..case })?;
     let motor = &crate::rig::drive_settings(config).motor;
     let per_ampere = f64::from(motor.torque_per_ampere(config.reference.id_a as f32));
     let k_p = f64::from(motor.inertia) * SPEED_LOOP / per_ampere;
@@ -180,14 +185,14 @@ fn load_step(config: &Config, case: Case, look: &mut impl FnMut(&Point)) -> Resu
 
 /// A shaft that is driven past the limit.
 #[derive(Clone, Copy, Debug)]
-pub struct OverSpeed {
+pub struct OverSpeedTrial {
     /// Where it began.
-    pub case: Case,
+    pub case: OperatingPoint,
     /// Acceleration, rpm/s.
     pub rpm_per_s: f64,
     /// Time from the limit to off, s; not more than zero when it stopped before.
     pub late_s: f64,
-    /// What it stopped with.
+    /// The fault with which the drive stopped.
     pub fault: Option<Fault>,
 }
 
@@ -195,7 +200,7 @@ pub struct OverSpeed {
 pub const OVER_SPEED_S: f64 = 0.5;
 
 /// From 70 % of `limit` rpm at a random acceleration past it.
-pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeed, Error> {
+pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeedTrial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x0ff);
     let mut case = case(seed, limit);
     case.rpm = 0.7 * limit.copysign(case.rpm);
@@ -209,19 +214,19 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeed, E
         rig.run(0.001, |_| {});
         late_s = (rpm - limit) / rpm_per_s;
     }
-    Ok(OverSpeed { case, rpm_per_s, late_s, fault: fault(&rig) })
+    Ok(OverSpeedTrial { case, rpm_per_s, late_s, fault: fault(&rig) })
 }
 
 /// A start on a shaft that turns.
 #[derive(Clone, Copy, Debug)]
-pub struct Start {
+pub struct StartTrial {
     /// Whether the drive went on.
     pub accepted: bool,
     /// Largest angle error in the half second after that, degrees.
     pub error_deg: f64,
 }
 
-impl Start {
+impl StartTrial {
     /// Whether it was refused, or right.
     pub fn is_honest(&self) -> bool {
         !self.accepted || self.error_deg < LOCKED_DEG
@@ -229,10 +234,10 @@ impl Start {
 }
 
 /// A start, or a relock of a drive that runs, at `rpm`.
-pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start, Error> {
-    let mut result = Start { accepted: false, error_deg: 0.0 };
+pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<StartTrial, Error> {
+    let mut result = StartTrial { accepted: false, error_deg: 0.0 };
     let mut rig = if relock {
-        let mut rig = at_speed(config, Case { rpm, iq: 1.0, seed })?;
+        let mut rig = at_speed(config, OperatingPoint { rpm, iq: 1.0, seed })?;
         rig.run(0.5, |_| {});
         rig.command(&Command::Relock)?;
         while !matches!(rig.drive.state(), State::Torque | State::Fault(_)) {

@@ -25,8 +25,8 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     let signal = signal(context.seed);
     let carrier = |k: usize| (omega_t(CARRIER_HZ) * k as f64).cos();
     let product: Vec<f64> = signal.iter().enumerate().map(|(k, a)| a * carrier(k)).collect();
-    let mut state = SosState::ZERO;
-    // The signal repeats every second: what comes out in the second one is settled.
+    let mut state = SosState::default();
+    // The signal repeats every second; from the second one on the output is settled.
     let filtered: Vec<f64> = (product.iter().chain(&product))
         .map(|&x| f64::from(BPF.step(&mut state, x as f32)))
         .skip(SAMPLES)

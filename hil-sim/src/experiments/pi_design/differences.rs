@@ -3,10 +3,10 @@
 use drive_core::tuning::{FirstOrder, IntegratorLag, Motor};
 
 use super::PERIOD_S;
-use crate::experiments::bode::RATE;
+use crate::experiments::bode::{RATE, largest_pole};
 use crate::outcome::{Cell, Table};
 
-/// What the source prints, and what its own parameters give.
+/// The printed values beside those that the printed parameters give.
 pub fn table(motor: &Motor, physical: FirstOrder) -> Table {
     let l_r = motor.l_m + motor.l_lr;
     let l_s = motor.l_m + motor.l_ls;
@@ -15,9 +15,7 @@ pub fn table(motor: &Motor, physical: FirstOrder) -> Table {
     let sigma = 1.0 - motor.l_m * motor.l_m / (l_s * l_r);
     let time_constant = sigma * l_s / resistance;
     let position = IntegratorLag { k: 0.01716, p: 0.95782 };
-    let position_pole = position.closed_loop_poles(6.466, 0.974);
-    let position_pole =
-        position_pole.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max));
+    let position_pole = largest_pole(position.closed_loop_poles(6.466, 0.974));
     // A pole p in the w plane: v = 2/T (1 - p)/(1 + p), rad/s.
     let in_w = |p: f64| 2.0 * RATE * (1.0 - p) / (1.0 + p);
 
@@ -35,7 +33,7 @@ pub fn table(motor: &Motor, physical: FirstOrder) -> Table {
             "gain with an exact hold (A/V)",
             f64::NAN,
             physical.k,
-            "Eq. 3.24 is the forward difference",
+            "Eq. 3.25 is the forward difference",
         ),
         ("pole with an exact hold", f64::NAN, physical.p, ""),
         ("pole of 3.33, fictitious (Hz)", 1073.0, in_w(0.8359), "printed as Hz, is rad/s"),

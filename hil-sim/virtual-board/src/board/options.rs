@@ -25,9 +25,8 @@ impl Options {
     pub fn plant(config: &Config) -> PlantSettings {
         let mut plant = hil_sim::rig::plant_settings(config);
         // The converters have another reference than the source's.
-        let gain = f64::from(
-            firmware_board::CURRENT_A.gain / drive_core::current::sensing::Line::CHANNEL_A.gain,
-        );
+        let gain =
+            f64::from(firmware_board::CURRENT_A.gain / drive_core::settings::Line::CHANNEL_A.gain);
         plant.measurement.lsb_a = MeasurementSettings::default().lsb_a * gain;
         plant.inverter.dead_time_us =
             f64::from(firmware_board::dead_time(firmware_board::DEAD_TIME_S).1) * 1e6;

@@ -9,7 +9,7 @@
 //! rotor                        T_r dm/dt = i_d' - m      slip = (i_q' - i_q/i_d m) / (T_r i_d)
 //! shaft                        J/P dw/dt = 3/2 P L_m^2/L_r (i_d i_q' + i_q m) - T_L - B w/P
 //! slip fed forward             s_ff = r / (T_r,believed i_d)     r: filtered reference of i_q
-//! seen                         x = MA20 MA20 ( e + c (r - di_q) )   c = dq/di_q over 2 |a_psi|
+//! observed                     x = MA20 MA20 ( e + c (r - di_q) )   c = dq/di_q over 2 |a_psi|
 //! tracking                     da/dt = c w_n^3 x      dw_i/dt = a + (1 + 2 c) w_n^2 x
 //! angle                        de/dt = w + slip - w_i - s_ff - (2 + c) w_n g x
 //! ```
@@ -41,7 +41,7 @@ pub enum Disturbance {
 
 /// The model about one operating point.
 #[derive(Clone, Debug)]
-pub struct Linear {
+pub struct LinearModel {
     i_d: f64,
     i_q: f64,
     /// True and believed rotor time constant, s.
@@ -57,43 +57,34 @@ pub struct Linear {
     w_n: f64,
     /// Share of its proportional part.
     share: f64,
-    /// Angle error that a difference of the torque current looks like, rad/A.
-    looks_like: f64,
+    /// Apparent angle error per difference of the torque current, rad/A.
+    apparent_angle: f64,
 }
 
-/// What the model gives, one value a control period.
+/// Response of the model, one value per control period.
 #[derive(Clone, Debug, Default)]
-pub struct Response {
+pub struct LinearResponse {
     /// Angle error, electrical degrees.
     pub angle_deg: Vec<f64>,
     /// Speed of the rotor, rpm.
     pub speed_rpm: Vec<f64>,
 }
 
-impl Linear {
+impl LinearModel {
     /// About the torque current `i_q`, for a drive with these settings on this machine.
     ///
     /// # Errors
-    /// When the settings are refused.
+    /// [`Error::Refused`] when the drive or the design refuses the settings.
     pub fn new(
         machine: &MachineSettings,
         mechanics: &MechanicsSettings,
         settings: &Settings,
         i_q: f64,
     ) -> Result<Self, Error> {
-        let refused = |e: &dyn std::fmt::Display| Error::Refused(e.to_string());
-        let built: Coefficients = settings.build().map_err(|e| refused(&e))?;
-        let plant = tuning::motor_plant(
-            &tuning::Motor {
-                r_s: machine.rs,
-                r_r: machine.rr,
-                l_m: machine.lm,
-                l_ls: machine.lls,
-                l_lr: machine.llr,
-            },
-            f64::from(PERIOD_S),
-        )
-        .map_err(|e| refused(&e))?;
+        let built: Coefficients = settings.build().map_err(Error::refused)?;
+        let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
+        let circuit = tuning::Motor { r_s, r_r, l_m, l_ls, l_lr };
+        let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
         let tracking = &settings.injection.synchronous;
         let schedule = GainSchedule::new(
             &tracking.reference,
@@ -117,19 +108,19 @@ impl Linear {
             speed: built.motion_design,
             w_n: TAU * f64::from(tracking.bandwidth_hz),
             share: schedule.at(i_q as f32).1.into(),
-            looks_like: f64::from(schedule.per_saliency * (after.0 - before.0)) / 0.25,
+            apparent_angle: f64::from(schedule.per_saliency * (after.0 - before.0)) / 0.25,
         })
     }
 
     /// The response to a disturbance over some seconds.
-    pub fn response(&self, disturbance: Disturbance, seconds: f64) -> Response {
+    pub fn response(&self, disturbance: Disturbance, seconds: f64) -> LinearResponse {
         let t = f64::from(PERIOD_S);
         let (i_d, i_q, [t_r, believed_t_r]) = (self.i_d, self.i_q, self.t_r);
         let (mut reference, free, load) = match disturbance {
             Disturbance::TorqueCurrent(step) => (step, false, 0.0),
             Disturbance::Load(torque) => (0.0, true, torque),
         };
-        let mut response = Response::default();
+        let mut response = LinearResponse::default();
         let (mut low_pass, mut seen) = (LpfState::default(), [MovingAverage::default(); 2]);
         let (mut filtered, mut current, mut error) = (0.0, 0.0, 0.0);
         let (mut voltage, mut acting) = (0.0, 0.0);
@@ -150,14 +141,13 @@ impl Linear {
             // Current loop.
             let r = filtered;
             filtered += (1.0 - self.current.p_f) * (reference - r);
-            let measured =
-                LPF.step_alpha_beta(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha;
+            let measured = LPF.step(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha;
             let now = r - f64::from(measured);
             voltage += self.current.k_c * (now - self.current.z_c * error);
             error = now;
 
-            // What is seen, and the tracking loop.
-            let x = e + self.looks_like * (r - current);
+            // Observed angle error, and the tracking loop.
+            let x = e + self.apparent_angle * (r - current);
             let x = seen.iter_mut().fold(x, |x, average| average.step(x));
             let (c, w_n) = (tuning::THIRD_POLE, self.w_n);
             acceleration += t * c * w_n.powi(3) * x;
@@ -204,9 +194,9 @@ mod tests {
     use super::*;
     use drive_core::settings::table::ReferenceTable;
 
-    fn linear(i_q: f64, settings: &Settings) -> Linear {
+    fn linear(i_q: f64, settings: &Settings) -> LinearModel {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());
-        Linear::new(&machine, &mechanics, settings, i_q).unwrap()
+        LinearModel::new(&machine, &mechanics, settings, i_q).unwrap()
     }
 
     /// Without slip of its own the tracking loop leaves a step of its frequency d with the error

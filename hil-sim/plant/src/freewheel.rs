@@ -5,8 +5,8 @@
 //! current, exactly, unless its potential leaves the range between the rails. When all three float
 //! the terminals show the back-emf of the decaying rotor flux, which turns with the rotor.
 
-use super::complex::{Complex, clarke, dot, phases};
-use super::integrate::{Motor, MotorState};
+use crate::complex::{Complex, clarke, dot, phases};
+use crate::integrate::{MotorModel, MotorState};
 
 /// Current below which a phase counts as without, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -24,8 +24,8 @@ const CHANGES: usize = 8;
 /// rail), 0 not at all.
 type Conduction = [i8; 3];
 
-/// Goes on by `h` seconds; returns the terminal voltage integrated over them, V s.
-pub(crate) fn step(motor: &mut Motor, vdc: f64, h: f64) -> Complex {
+/// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
+pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
     // Phases that began to conduct and were found not to: they float for the rest of the step.
@@ -48,7 +48,7 @@ pub(crate) fn step(motor: &mut Motor, vdc: f64, h: f64) -> Complex {
         motor.state.electrical.i = without(motor.state.electrical.i, phase);
         rest -= done;
     }
-    // Rounding has us going round in circles: the currents are next to nothing.
+    // Rounding keeps the conduction changing: the currents are practically zero.
     motor.state.electrical.i = Complex::ZERO;
     let (state, v) = advanced(motor, [0; 3], vdc, rest);
     motor.state = state;
@@ -56,7 +56,7 @@ pub(crate) fn step(motor: &mut Motor, vdc: f64, h: f64) -> Complex {
 }
 
 /// Which diodes conduct in the present state.
-fn conduction(motor: &Motor, vdc: f64, blocked: [bool; 3]) -> Conduction {
+fn conduction(motor: &MotorModel, vdc: f64, blocked: [bool; 3]) -> Conduction {
     let x = &motor.state.electrical;
     let w = motor.machine.pole_pairs * motor.state.speed;
     let mut flow = phases(x.i).map(sign);
@@ -101,7 +101,7 @@ fn line(k: usize, flow: Conduction, vdc: f64) -> (Complex, f64) {
 }
 
 /// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
-fn advanced(motor: &Motor, flow: Conduction, vdc: f64, h: f64) -> (MotorState, Complex) {
+fn advanced(motor: &MotorModel, flow: Conduction, vdc: f64, h: f64) -> (MotorState, Complex) {
     let machine = &motor.machine;
     match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
         (3, _) => {
@@ -124,7 +124,7 @@ fn advanced(motor: &Motor, flow: Conduction, vdc: f64, h: f64) -> (MotorState, C
 }
 
 /// The phase whose current first goes against its diode, and at which fraction of the step.
-fn first_reversal(motor: &Motor, next: &MotorState, flow: Conduction) -> Option<(usize, f64)> {
+fn first_reversal(motor: &MotorModel, next: &MotorState, flow: Conduction) -> Option<(usize, f64)> {
     let (before, after) = (phases(motor.state.electrical.i), phases(next.electrical.i));
     (0..3)
         .filter(|&k| f64::from(flow[k]) * after[k] < 0.0)

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{PlantError, check};
+use crate::error::{PlantError, check};
 
 /// Resolution of the encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,10 +20,10 @@ impl Default for EncoderSettings {
     }
 }
 
-/// What is wrong with the encoder.
+/// Fault of the encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum EncoderFault {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
     /// The counter stands still: cable off, or one channel dead.
@@ -35,7 +35,7 @@ pub enum EncoderFault {
 /// The encoder and its counter: starts at zero, counts upwards with positive speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
-    /// What is wrong with it.
+    /// Its fault.
     pub fault: EncoderFault,
     counts_per_radian: f64,
     position: f64,
@@ -44,6 +44,9 @@ pub struct Encoder {
 
 impl Encoder {
     /// The encoder with these settings.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(settings: &EncoderSettings) -> Result<Self, PlantError> {
         let lines = f64::from(settings.lines);
         check("encoder.lines", lines, 1.0..=100_000.0, "")?;

@@ -2,7 +2,7 @@
 
 /// A space vector in the stator frame: the real part is alpha (along the axis of phase a), the
 /// imaginary part beta. Amplitude-invariant, so its length is a peak phase value.
-pub use rustfft::num_complex::Complex64 as Complex;
+pub use num_complex::Complex64 as Complex;
 
 const FRAC_1_SQRT_3: f64 = 0.577_350_269_189_625_8;
 const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;

@@ -21,8 +21,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::complex::{Complex, dot, square};
-use super::error::{PlantError, check};
+use crate::complex::{Complex, dot, square};
+use crate::error::{PlantError, check};
 
 /// Current up to which the current part of the saliency grows, A peak.
 pub const SALIENCY_CURRENT_A: f64 = 5.0;
@@ -123,6 +123,9 @@ impl Machine {
     /// saliency that could reach `|s| > 0.5` with any current up to 5 A and any flux up to
     /// `lm` 5 A. (The largest `|s|` is the sum of the largest lengths of its two parts, as their
     /// directions are independent; the flux part grows with the flux.)
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
         check("machine.rs", m.rs, 0.01..=1000.0, "ohm")?;
         check("machine.rr", m.rr, 0.01..=1000.0, "ohm")?;
@@ -245,7 +248,7 @@ impl Machine {
         MachineState { i: (y + s * y.conj()) * scale, ..self.rest(x, decay) }
     }
 
-    /// The same while the current is confined to the line through zero along the unit vector
+    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit vector
     /// `axis`, where the terminal voltage has the component `v_axis`. Also returns the terminal
     /// voltage, whose other component follows from the machine.
     pub(crate) fn derivative_on_line(
@@ -265,7 +268,7 @@ impl Machine {
         (rates, column * rate - internal)
     }
 
-    /// The same with open terminals, where the current is zero. Also returns the terminal voltage.
+    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the terminal voltage.
     pub(crate) fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
         let decay = self.decay(x.psi, w);
         (self.rest(x, decay), -self.drive_voltage(x, decay))

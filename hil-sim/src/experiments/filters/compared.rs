@@ -7,8 +7,8 @@ use drive_core::math::complex::Complex;
 use super::direct;
 use crate::stats::Stats;
 
-/// A filter by name: the error of each form, and the responses.
-pub trait Subject: Sync {
+/// A filter whose forms are compared: responses, and the error of each form.
+pub trait ComparedFilter: Sync {
     /// Its name in the source.
     fn name(&self) -> &'static str;
     /// Frequency response of the sections the drive runs.
@@ -32,7 +32,7 @@ struct Filter<const SECTIONS: usize, const TAPS: usize> {
     largest_pole: fn(&[[f64; TAPS]; 2]) -> f64,
 }
 
-impl<const SECTIONS: usize, const TAPS: usize> Subject for Filter<SECTIONS, TAPS> {
+impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTIONS, TAPS> {
     fn name(&self) -> &'static str {
         self.name
     }
@@ -52,14 +52,14 @@ impl<const SECTIONS: usize, const TAPS: usize> Subject for Filter<SECTIONS, TAPS
         self.sections.group_delay(omega_t)
     }
     fn errors(&self, input: &mut dyn FnMut() -> f64, samples: u64) -> Vec<(&'static str, Stats)> {
-        let (sections, mut state) = (self.sections, SosState::ZERO);
+        let (sections, mut state) = (self.sections, SosState::default());
         let sections = Box::new(move |x: f32| sections.step(&mut state, x));
         let mut forms: Vec<direct::Form> = vec![(SECTIONS_F32, sections)];
         forms.extend(direct::f32_forms(self.direct));
         let mut reference = direct::reference(self.direct);
         let mut errors = vec![Stats::default(); forms.len()];
         for _ in 0..samples {
-            // What the forms get is what the converter could give: an f32.
+            // All forms get the same f32 input.
             let x = input() as f32;
             let exact = reference(f64::from(x));
             for ((_, form), error) in forms.iter_mut().zip(&mut errors) {
@@ -74,7 +74,7 @@ impl<const SECTIONS: usize, const TAPS: usize> Subject for Filter<SECTIONS, TAPS
 pub const SECTIONS_F32: &str = "sections, f32 (the drive)";
 
 /// The three filters.
-pub fn subjects() -> [Box<dyn Subject + Send>; 3] {
+pub fn filters() -> [Box<dyn ComparedFilter + Send>; 3] {
     [
         Box::new(Filter {
             name: "LPF",

@@ -1,7 +1,7 @@
-//! Lines: fewer points that draw the same picture, and the parts inside the axes.
+//! Reduces the points of a line without changing its picture.
 
-/// The envelope of a line for a plot that is `columns` pixels wide: of the points in one column,
-/// the lowest and the highest, in their order. Both ends stay as they are.
+/// The envelope of a line for a plot that is `columns` pixels wide: the lowest and the highest point
+/// of each column, in their order, and both ends.
 ///
 /// A line with few points, or one whose x does not increase, is returned as it is.
 pub fn envelope(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
@@ -26,42 +26,6 @@ pub fn envelope(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
     kept.push(last);
     kept.dedup();
     kept
-}
-
-/// The parts of a line that lie between `low` and `high`. A point that is not finite ends a part.
-pub fn clip(points: &[(f64, f64)], low: f64, high: f64) -> Vec<Vec<(f64, f64)>> {
-    let mut parts = Vec::new();
-    let mut part: Vec<(f64, f64)> = Vec::new();
-    for pair in points.windows(2) {
-        match clip_segment(pair[0], pair[1], low, high) {
-            Some((a, b)) => {
-                if part.last() != Some(&a) {
-                    parts.push(std::mem::replace(&mut part, vec![a]));
-                }
-                part.push(b);
-            }
-            None => parts.push(std::mem::take(&mut part)),
-        }
-    }
-    parts.push(part);
-    parts.retain(|part| !part.is_empty());
-    parts
-}
-
-type Point = (f64, f64);
-
-fn clip_segment(a: Point, b: Point, low: f64, high: f64) -> Option<(Point, Point)> {
-    let finite = [a.0, a.1, b.0, b.1].iter().all(|v| v.is_finite());
-    let outside = (a.1 < low && b.1 < low) || (a.1 > high && b.1 > high);
-    if !finite || outside {
-        return None;
-    }
-    let bring_in = |p: Point| {
-        let y = p.1.clamp(low, high);
-        let x = if y == p.1 { p.0 } else { a.0 + (b.0 - a.0) * (y - a.1) / (b.1 - a.1) };
-        (x, y)
-    };
-    Some((bring_in(a), bring_in(b)))
 }
 
 #[cfg(test)]
@@ -102,15 +66,5 @@ mod tests {
         let circle: Vec<_> = (0..10_000).map(|k| (k as f64 * 1e-2).sin_cos()).collect();
         assert_eq!(envelope(&circle, 100), circle);
         assert_eq!(envelope(&[], 100), []);
-    }
-
-    #[test]
-    fn lines_end_where_they_leave_the_axes() {
-        let peak = [(0.0, 0.0), (1.0, 2.0), (2.0, 0.0), (3.0, 0.0)];
-        let parts = clip(&peak, -1.0, 1.0);
-        assert_eq!(parts, [vec![(0.0, 0.0), (0.5, 1.0)], vec![(1.5, 1.0), (2.0, 0.0), (3.0, 0.0)]]);
-        let hole = [(0.0, 0.0), (1.0, f64::NAN), (2.0, 0.0), (3.0, 0.5)];
-        assert_eq!(clip(&hole, -1.0, 1.0), [[(2.0, 0.0), (3.0, 0.5)]]);
-        assert!(clip(&[(0.0, 5.0), (1.0, 6.0)], -1.0, 1.0).is_empty());
     }
 }

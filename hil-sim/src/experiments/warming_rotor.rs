@@ -17,16 +17,16 @@ const REFINES_PER_S: f64 = 10.0;
 /// How fast the dynamometer gets to its speed, rpm/s: the sensorless angle can follow.
 const RAMP_RPM_PER_S: f64 = 150.0;
 
-/// What is run.
+/// A run with a rotor that warms up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
+pub struct WarmingCase {
     /// Speed that the dynamometer holds, rpm.
     pub speed_rpm: f64,
     /// Torque current, A.
     pub iq_a: f64,
     /// Amplitude of the magnetising current's movement, A, and its frequency, Hz.
     pub excitation: (f64, f64),
-    /// Whether what is found is given to the drive.
+    /// Whether the drive uses the estimate.
     pub used: bool,
     /// When the rotor begins to warm up and when it has done so, s; and how much r_r has grown then.
     pub warming: (f64, f64, f64),
@@ -34,18 +34,18 @@ pub struct Case {
     pub seconds: f64,
 }
 
-/// A tenth of a second of it.
+/// State of the run, one every tenth of a second.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment {
+pub struct WarmingMoment {
     /// Time, s.
     pub t: f64,
     /// True rotor time constant, s.
     pub tau_r: f64,
     /// True speed, electrical rad/s.
     pub omega_m: f64,
-    /// What the estimate says.
+    /// The online estimate.
     pub estimate: Result<Tracked, Doubt>,
-    /// What Model D makes of the same least squares.
+    /// Model D from the same least squares.
     pub model_d: Estimate,
     /// Mean of the flux angle error, degrees.
     pub angle_error_deg: f64,
@@ -55,9 +55,8 @@ pub struct Moment {
 /// its speed.
 ///
 /// # Errors
-/// What the plant or the drive refuse, or how the drive stopped.
-pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error> {
-    let refused = |text: String| Error::Refused(text);
+/// [`Error::Refused`] when the plant or the drive refuses the case, or the drive stops.
+pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<WarmingMoment>, Error> {
     let settings = drive_core::Settings { track_rotor: case.used, ..drive_settings(config) };
     let plant = plant_settings(config);
     let start = PlantSettings {
@@ -65,7 +64,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
         ..plant
     };
     let mut rig = Rig::new(&start, &settings, seed)?;
-    let mut online = Online::new(&settings).map_err(|e| refused(format!("{e:?}")))?;
+    let mut online = Online::new(&settings).map_err(|e| Error::Refused(format!("{e:?}")))?;
     rig.start(Mode::Torque)?;
     rig.command(&Command::Torque(case.iq_a as f32))?;
     let steps = 1 + (100.0 * case.speed_rpm.abs() / RAMP_RPM_PER_S) as u32;
@@ -86,7 +85,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
         let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
         let mut machine = plant.machine;
         machine.rr *= 1.0 + growth * share;
-        rig.plant.set_machine(&machine, &plant.saliency).map_err(|e| refused(e.to_string()))?;
+        rig.plant.set_machine(&machine, &plant.saliency).map_err(Error::refused)?;
 
         let mut angle_error = 0.0;
         for k in 0..block {
@@ -106,7 +105,7 @@ pub fn run(config: &Config, case: &Case, seed: u64) -> Result<Vec<Moment>, Error
         if let (true, Ok(tracked)) = (case.used, &estimate) {
             rig.command(&Command::RotorTimeConstant(tracked.tau_r))?;
         }
-        moments.push(Moment {
+        moments.push(WarmingMoment {
             t: (n + 1) as f64 / REFINES_PER_S,
             tau_r: rig.plant.motor().machine.tau_r(),
             omega_m: rig.plant.mechanical_speed() * pole_pairs,

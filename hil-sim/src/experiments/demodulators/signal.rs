@@ -1,8 +1,8 @@
-//! What a demodulation sees while the encoder holds the angle: signal, slope, noise, delay.
+//! Signal of a demodulation while the encoder holds the angle: mean, slope, noise, delay.
 
 use drive_core::Command;
 
-use super::subject::Subject;
+use super::demodulation::Demodulation;
 use crate::config::Config;
 use crate::error::Error;
 use crate::rig::{Rig, plant_settings};
@@ -14,9 +14,9 @@ const TURN_DEG: f64 = 4.0;
 const SETTLE_S: f64 = 0.1;
 const AVERAGE_S: f64 = 0.4;
 
-/// At the right angle.
+/// Signal of a demodulation at the true flux angle.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct SignalQuality {
     /// Signal, A or 1.
     pub signal: f64,
     /// Change of the signal with the angle error, per rad: the current held, the axis turned.
@@ -26,16 +26,26 @@ pub struct Seen {
 }
 
 /// A drive that the encoder orients, with the shaft locked and the injection beside it.
-fn oriented(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Rig, Error> {
-    let mut rig = Rig::oriented(&subject.config(config), seed)?;
+fn oriented(
+    demodulation: &Demodulation,
+    config: &Config,
+    iq: f64,
+    seed: u64,
+) -> Result<Rig, Error> {
+    let mut rig = Rig::oriented(&demodulation.config(config), seed)?;
     rig.command(&Command::Torque(iq as f32))?;
     rig.run(0.5, |_| {});
     Ok(rig)
 }
 
-/// Looks at the right angle and a little beside it.
-pub fn seen(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Seen, Error> {
-    let mut rig = oriented(subject, config, iq, seed)?;
+/// Measures at the true flux angle and 4° to either side.
+pub fn signal_quality(
+    demodulation: &Demodulation,
+    config: &Config,
+    iq: f64,
+    seed: u64,
+) -> Result<SignalQuality, Error> {
+    let mut rig = oriented(demodulation, config, iq, seed)?;
     let mut at = |turn: f64| -> Result<(Stats, f64), Error> {
         rig.command(&Command::TurnInjection(turn as f32))?;
         rig.run(SETTLE_S, |_| {});
@@ -47,7 +57,7 @@ pub fn seen(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<Se
         Ok((signal, error.mean().to_radians()))
     };
     let [behind, here, ahead] = [at(-TURN_DEG)?, at(0.0)?, at(TURN_DEG)?];
-    Ok(Seen {
+    Ok(SignalQuality {
         signal: here.0.mean(),
         slope: (ahead.0.mean() - behind.0.mean()) / (ahead.1 - behind.1),
         noise: here.0.deviation(),
@@ -63,20 +73,23 @@ const AFTER: usize = 603;
 
 /// Mean delay, samples, from a change of the motor's saliency to the signal: the area above the step
 /// response, measured without noise.
-pub fn delay(subject: &Subject, config: &Config, iq: f64, seed: u64) -> Result<f64, Error> {
+pub fn delay(
+    demodulation: &Demodulation,
+    config: &Config,
+    iq: f64,
+    seed: u64,
+) -> Result<f64, Error> {
     let mut config = config.clone();
     config.measurement.noise_a = 0.0;
     config.measurement.lsb_a = 0.000_14;
-    let mut rig = oriented(subject, &config, iq, seed)?;
+    let mut rig = oriented(demodulation, &config, iq, seed)?;
     let plant = plant_settings(&config);
     let mut response = [0.0; AFTER];
     for n in 0..CHANGES {
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
         let mut saliency = plant.saliency;
         saliency.b1 += 0.5 * sign * CHANGE;
-        rig.plant
-            .set_machine(&plant.machine, &saliency)
-            .map_err(|error| Error::Refused(error.to_string()))?;
+        rig.plant.set_machine(&plant.machine, &saliency).map_err(Error::refused)?;
         let mut k = 0;
         rig.run(AFTER as f64 / crate::rig::RATE_HZ, |p| {
             // The first change comes from the middle.

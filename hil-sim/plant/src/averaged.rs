@@ -4,9 +4,9 @@
 //! smooth and few integration steps are enough; a step across a kink would cost accuracy. So a step
 //! that is about to take a phase across one is cut there.
 
-use super::complex::{Complex, clarke, phases};
-use super::integrate::Motor;
-use super::machine::MachineState;
+use crate::complex::{Complex, clarke, phases};
+use crate::integrate::MotorModel;
+use crate::machine::MachineState;
 
 /// Current, A, beyond which the sign of a phase current counts fully.
 const KINK: f64 = 0.020;
@@ -24,9 +24,9 @@ pub(crate) fn smooth_sign(i: f64) -> f64 {
 pub(crate) struct Averaged {
     /// Line-to-neutral voltage without errors.
     pub v: Complex,
-    /// What each leg loses with a positive current, V.
+    /// Voltage that each leg loses with a positive current, V.
     pub lost: [f64; 3],
-    /// What each leg gains with a negative current, V.
+    /// Voltage that each leg gains with a negative current, V.
     pub gained: [f64; 3],
 }
 
@@ -42,9 +42,9 @@ impl Averaged {
         self.v - clarke([error(0), error(1), error(2)])
     }
 
-    /// Goes on by `h` seconds; returns the terminal voltage integrated over them, V s.
+    /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
     #[inline]
-    pub(crate) fn step(&self, motor: &mut Motor, h: f64) -> Complex {
+    pub(crate) fn step(&self, motor: &mut MotorModel, h: f64) -> Complex {
         let mut rest = h;
         let mut volt_seconds = Complex::ZERO;
         loop {

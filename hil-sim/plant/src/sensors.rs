@@ -9,11 +9,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use super::complex::{Complex, phases};
-use super::error::{PlantError, check};
+use crate::complex::{Complex, phases};
+use crate::error::{PlantError, check};
 
 /// Eq. 3.5, channel A and B: A per code, and the current of code zero in A.
-const LINES: [(f64, f64); 2] = [(0.002_212_0, -4.472_713_4), (0.002_231_4, -4.496_623_8)];
+const CALIBRATION: [(f64, f64); 2] = [(0.002_212_0, -4.472_713_4), (0.002_231_4, -4.496_623_8)];
 /// Largest code of the source's converter.
 const FULL_SCALE: f64 = 4095.0;
 
@@ -44,26 +44,16 @@ pub struct MeasurementSettings {
 
 impl Default for MeasurementSettings {
     fn default() -> Self {
-        Self {
-            noise_a: 0.005,
-            lsb_a: LINES[0].0,
-            filter_hz: 5305.0,
-            gain_error_a: 0.0,
-            gain_error_b: 0.0,
-            offset_a: 0.0,
-            offset_b: 0.0,
-            dc_link_v: 0.11,
-            heat_sink_code: 1000,
-        }
+        Self::REFERENCE
     }
 }
 
 impl MeasurementSettings {
-    /// No noise, no filter, 16 bits.
-    pub const IDEAL: Self = Self {
-        noise_a: 0.0,
-        lsb_a: 0.000_14,
-        filter_hz: 0.0,
+    /// The measurement of the reference board.
+    const REFERENCE: Self = Self {
+        noise_a: 0.005,
+        lsb_a: CALIBRATION[0].0,
+        filter_hz: 5305.0,
         gain_error_a: 0.0,
         gain_error_b: 0.0,
         offset_a: 0.0,
@@ -72,11 +62,14 @@ impl MeasurementSettings {
         heat_sink_code: 1000,
     };
 
-    /// The lines along which channels A and B code a current, without their errors: what the drive
-    /// is to be calibrated with.
+    /// No noise, no filter, 16 bits.
+    pub const IDEAL: Self =
+        Self { noise_a: 0.0, lsb_a: 0.000_14, filter_hz: 0.0, ..Self::REFERENCE };
+
+    /// The calibration of channels A and B without their gain and offset errors, as the drive is set.
     pub fn calibration(&self) -> [CalibrationLine; 2] {
-        let finer = LINES[0].0 / self.lsb_a;
-        LINES.map(|(a_per_code, a_at_zero)| CalibrationLine {
+        let finer = CALIBRATION[0].0 / self.lsb_a;
+        CALIBRATION.map(|(a_per_code, a_at_zero)| CalibrationLine {
             a_per_code: a_per_code / finer,
             a_at_zero,
             full_scale: (FULL_SCALE * finer).round() as u16,
@@ -104,10 +97,10 @@ pub enum Channel {
     B,
 }
 
-/// What is wrong with a current channel.
+/// Fault of a current channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CurrentFault {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
     /// The code does not change.
@@ -122,7 +115,7 @@ pub enum CurrentFault {
 
 /// One channel, current to code.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Line {
+struct CurrentChannel {
     gain: f64,
     offset: f64,
     codes_per_a: f64,
@@ -131,7 +124,7 @@ struct Line {
     fault: CurrentFault,
 }
 
-impl Line {
+impl CurrentChannel {
     fn new(line: &CalibrationLine, gain_error: f64, offset: f64) -> Self {
         Self {
             gain: 1.0 + gain_error,
@@ -163,7 +156,7 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     noise: f64,
-    lines: [Line; 2],
+    channels: [CurrentChannel; 2],
     corner: f64,
     filtered: Complex,
     /// Coefficients of the filter and the time step, s, they are for.
@@ -177,6 +170,9 @@ pub struct Sensors {
 
 impl Sensors {
     /// The sensors with these settings, at zero current.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(s: &MeasurementSettings) -> Result<Self, PlantError> {
         check("measurement.noise_a", s.noise_a, 0.0..=10.0, "A")?;
         check("measurement.lsb_a", s.lsb_a, 0.000_14..=0.05, "A")?;
@@ -189,9 +185,9 @@ impl Sensors {
         let [a, b] = s.calibration();
         Ok(Self {
             noise: s.noise_a,
-            lines: [
-                Line::new(&a, s.gain_error_a, s.offset_a),
-                Line::new(&b, s.gain_error_b, s.offset_b),
+            channels: [
+                CurrentChannel::new(&a, s.gain_error_a, s.offset_a),
+                CurrentChannel::new(&b, s.gain_error_b, s.offset_b),
             ],
             corner: TAU * s.filter_hz,
             filtered: Complex::ZERO,
@@ -228,9 +224,9 @@ impl Sensors {
         self.from_new = 1.0 - mean;
     }
 
-    /// Makes a channel faulty, or sound again.
+    /// Sets the fault of a channel.
     pub fn set_fault(&mut self, channel: Channel, fault: CurrentFault) {
-        self.lines[channel as usize].fault = fault;
+        self.channels[channel as usize].fault = fault;
     }
 
     /// The codes of channels A and B now.
@@ -238,13 +234,13 @@ impl Sensors {
     pub fn currents(&self, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let [a, b, _] = phases(self.filtered);
         if self.noise == 0.0 {
-            return [self.lines[0].code(a, 0.0), self.lines[1].code(b, 0.0)];
+            return [self.channels[0].code(a, 0.0), self.channels[1].code(b, 0.0)];
         }
         let mut noise = || -> f64 {
             let unit: f64 = StandardNormal.sample(rng);
             unit * self.noise
         };
-        [self.lines[0].code(a, noise()), self.lines[1].code(b, noise())]
+        [self.channels[0].code(a, noise()), self.channels[1].code(b, noise())]
     }
 
     /// The code of the dc-link voltage, V.
@@ -258,7 +254,7 @@ impl Sensors {
         self.heat_sink
     }
 
-    /// Another code of the heat-sink temperature.
+    /// Changes the code of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
         self.heat_sink = code;
     }

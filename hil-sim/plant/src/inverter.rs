@@ -13,9 +13,9 @@
 use drive_core::Compare;
 use serde::{Deserialize, Serialize};
 
-use super::averaged::{Averaged, smooth_sign};
-use super::complex::{Complex, clarke, phases};
-use super::error::{PlantError, check};
+use crate::averaged::{Averaged, smooth_sign};
+use crate::complex::{Complex, clarke, phases};
+use crate::error::{PlantError, check};
 
 /// Settings of the inverter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,27 +37,24 @@ pub struct InverterSettings {
 
 impl Default for InverterSettings {
     fn default() -> Self {
-        Self {
-            vdc: 311.0,
-            timer_top: 14_167,
-            dead_time_us: 2.2,
-            propagation_us: 2.2,
-            residual_v: 1.64,
-            switched: false,
-        }
+        Self::REFERENCE
     }
 }
 
 impl InverterSettings {
-    /// No dead time, no delay, no drop.
-    pub const IDEAL: Self = Self {
+    /// The inverter of section 3.9.
+    const REFERENCE: Self = Self {
         vdc: 311.0,
         timer_top: 14_167,
-        dead_time_us: 0.0,
-        propagation_us: 0.0,
-        residual_v: 0.0,
+        dead_time_us: 2.2,
+        propagation_us: 2.2,
+        residual_v: 1.64,
         switched: false,
     };
+
+    /// No dead time, no delay, no drop.
+    pub const IDEAL: Self =
+        Self { dead_time_us: 0.0, propagation_us: 0.0, residual_v: 0.0, ..Self::REFERENCE };
 }
 
 /// The inverter.
@@ -72,12 +69,15 @@ pub struct Inverter {
     pub(crate) propagation: f64,
     pub(crate) residual: f64,
     pub(crate) switched: bool,
-    /// What was applied in the period before.
+    /// Compare values of the period before.
     pub(crate) previous: Compare,
 }
 
 impl Inverter {
     /// The inverter with these settings, off.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
         let s = settings;
         check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
@@ -97,7 +97,10 @@ impl Inverter {
         Ok(inverter)
     }
 
-    /// Another dc-link voltage, V, from now on.
+    /// Changes the dc-link voltage, V.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
         self.vdc = vdc;

@@ -1,10 +1,10 @@
-//! The shaft: inertia, friction and what is coupled to it.
+//! The shaft: inertia, friction and load.
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{PlantError, check};
+use crate::error::{PlantError, check};
 
-/// What is coupled to the shaft.
+/// Load on the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, tag = "mode", rename_all = "snake_case")]
 pub enum Load {
@@ -30,7 +30,7 @@ pub struct MechanicsSettings {
     pub inertia: f64,
     /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
     pub friction: f64,
-    /// What is coupled at the start.
+    /// Load at the start.
     pub load: Load,
 }
 
@@ -53,6 +53,9 @@ pub struct Mechanics {
 
 impl Mechanics {
     /// The shaft with these settings.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
     pub fn new(settings: &MechanicsSettings) -> Result<Self, PlantError> {
         check("mechanics.inertia", settings.inertia, 1e-6..=1000.0, "kg m^2")?;
         check("mechanics.friction", settings.friction, 0.0..=10.0, "N m s/rad")?;
@@ -68,6 +71,9 @@ impl Mechanics {
     }
 
     /// Couples another load.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] for its torque or speed.
     pub fn set_load(&mut self, load: Load) -> Result<(), PlantError> {
         match load {
             Load::Free { torque } => {
@@ -85,12 +91,12 @@ impl Mechanics {
         Ok(())
     }
 
-    /// What is coupled.
+    /// The present load.
     pub fn load(&self) -> Load {
         self.load
     }
 
-    /// The speed that the load imposes, mechanical rad/s, if it does.
+    /// The speed that the load imposes, mechanical rad/s; none with a free shaft.
     pub fn held_speed(&self) -> Option<f64> {
         match self.load {
             Load::Free { .. } => None,

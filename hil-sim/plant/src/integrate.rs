@@ -1,8 +1,8 @@
 //! The machine and its shaft, integrated by the classical Runge-Kutta rule.
 
-use super::complex::Complex;
-use super::machine::{Machine, MachineState};
-use super::mechanics::Mechanics;
+use crate::complex::Complex;
+use crate::machine::{Machine, MachineState};
+use crate::mechanics::Mechanics;
 
 /// State of the machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,7 +17,7 @@ pub struct MotorState {
 
 /// A machine on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motor {
+pub struct MotorModel {
     /// The machine.
     pub machine: Machine,
     /// The shaft and its load.
@@ -26,7 +26,7 @@ pub struct Motor {
     pub state: MotorState,
 }
 
-impl Motor {
+impl MotorModel {
     /// At rest, without current and flux; turning already where the load holds a speed.
     pub fn new(machine: Machine, mechanics: Mechanics) -> Self {
         let mut motor = Self { machine, mechanics, state: MotorState::default() };
@@ -34,14 +34,14 @@ impl Motor {
         motor
     }
 
-    /// Takes over the speed that the load imposes. To be called when the load has changed.
+    /// Sets the speed that the load imposes, if it imposes one. To be called after a change of load.
     pub fn hold_speed(&mut self) {
         if let Some(speed) = self.mechanics.held_speed() {
             self.state.speed = speed;
         }
     }
 
-    /// Goes on by `h` seconds at the constant terminal voltage `v` (V).
+    /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
         self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
     }
@@ -58,7 +58,7 @@ impl Motor {
         self.stepped_from(rates(&self.state.electrical, w), h, rates)
     }
 
-    /// The same, where `first` is what `rates` gives at the present state.
+    /// As [`Self::stepped`]; `first` is the value of `rates` at the present state.
     #[inline]
     pub(crate) fn stepped_from(
         &self,

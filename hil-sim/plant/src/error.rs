@@ -1,4 +1,4 @@
-//! Why a plant cannot be built from its settings.
+//! The errors of settings that the plant refuses.
 
 use std::ops::RangeInclusive;
 

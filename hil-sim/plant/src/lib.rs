@@ -1,12 +1,12 @@
-//! The plant: motor, shaft, inverter, sensors and encoder, in `f64`.
+//! The plant that the drive is connected to: motor, shaft, inverter, sensors and encoder, in `f64`.
 //!
 //! One call of [`Plant::advance`] is one PWM period. The caller keeps the delay convention of
-//! [`drive_core::io`]: what the drive computes from the sample at `k T` is applied from
+//! [`drive_core::io`]: the output computed from the sample at `k T` is applied from
 //! `(k + 1) T` on, except that outputs that go off do so at once:
 //!
 //! ```no_run
 //! use drive_core::Compare;
-//! use hil_sim::plant::{Plant, PlantSettings};
+//! use motor_plant::{Plant, PlantSettings};
 //! # fn step(_: &drive_core::Sample) -> Compare { Compare::OFF }
 //!
 //! let mut plant = Plant::new(&PlantSettings::default(), 1)?;
@@ -17,7 +17,7 @@
 //!     plant.advance(&applied, 1.0 / 6000.0);
 //!     applied = next;
 //! }
-//! # Ok::<(), hil_sim::plant::PlantError>(())
+//! # Ok::<(), motor_plant::PlantError>(())
 //! ```
 
 mod averaged;
@@ -40,7 +40,7 @@ use serde::{Deserialize, Serialize};
 pub use complex::{Complex, clarke, phases};
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
 pub use error::PlantError;
-pub use integrate::{Motor, MotorState};
+pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
 pub use machine::{Machine, MachineSettings, MachineState, SALIENCY_CURRENT_A, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
@@ -49,7 +49,7 @@ pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, S
 /// Integration steps per period while the outputs are off: at most this fraction of the period.
 const FREEWHEEL_SUBSTEPS: u32 = 8;
 
-/// Everything there is to set about the plant.
+/// Settings of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlantSettings {
@@ -87,7 +87,7 @@ impl Default for PlantSettings {
 /// The plant.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    motor: Motor,
+    motor: MotorModel,
     inverter: Inverter,
     sensors: Sensors,
     encoder: Encoder,
@@ -100,12 +100,15 @@ pub struct Plant {
 impl Plant {
     /// The plant at rest, without currents and flux. Equal settings and seeds give equal plants, to
     /// the bit.
+    ///
+    /// # Errors
+    /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
         error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
         let machine = Machine::new(&settings.machine, &settings.saliency)?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
         Ok(Self {
-            motor: Motor::new(machine, mechanics),
+            motor: MotorModel::new(machine, mechanics),
             inverter: Inverter::new(&settings.inverter)?,
             sensors: Sensors::new(&settings.measurement)?,
             encoder: Encoder::new(&settings.encoder)?,
@@ -116,8 +119,8 @@ impl Plant {
         })
     }
 
-    /// What the converters, the counter and the hardware report now. Each call draws new noise, and
-    /// takes the reported hardware events.
+    /// The present readings of converters, counter and hardware. Each call draws new noise and clears the
+    /// reported hardware events.
     #[inline]
     pub fn sample(&mut self) -> Sample {
         let [current_a, current_b] = self.sensors.currents(&mut self.rng);
@@ -195,7 +198,7 @@ impl Plant {
     }
 
     /// The motor: machine, shaft and their state.
-    pub fn motor(&self) -> &Motor {
+    pub fn motor(&self) -> &MotorModel {
         &self.motor
     }
 
@@ -244,19 +247,28 @@ impl Plant {
         self.inverter.vdc
     }
 
-    /// Another dc-link voltage, V, from now on.
+    /// Changes the dc-link voltage, V.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         self.inverter.set_dc_link(vdc)
     }
 
-    /// Couples another load. A held speed holds at once; from there a free shaft goes on.
+    /// Couples another load. A held speed holds at once; a free shaft continues from there.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] for its torque or speed.
     pub fn set_load(&mut self, load: Load) -> Result<(), PlantError> {
         self.motor.mechanics.set_load(load)?;
         self.motor.hold_speed();
         Ok(())
     }
 
-    /// Other parameters of the machine, in its present state (a warmer rotor, for example).
+    /// Changes the parameters of the machine and keeps its state (a warmer rotor, for example).
+    ///
+    /// # Errors
+    /// As [`Machine::new`].
     pub fn set_machine(
         &mut self,
         machine: &MachineSettings,
@@ -266,30 +278,30 @@ impl Plant {
         Ok(())
     }
 
-    /// Turns the rotor flux by an angle, electrical rad, at once: from then on everything that follows
-    /// the flux is off by as much.
+    /// Turns the rotor flux by an angle, electrical rad, at once: an estimate of the flux angle is then
+    /// wrong by as much.
     pub fn turn_rotor_flux(&mut self, angle: f64) {
         let turn = Complex::new(angle.cos(), angle.sin());
         let electrical = &mut self.motor.state.electrical;
         electrical.psi *= turn;
     }
 
-    /// Makes a current channel faulty, or sound again.
+    /// Sets the fault of a current channel.
     pub fn set_current_fault(&mut self, channel: Channel, fault: CurrentFault) {
         self.sensors.set_fault(channel, fault);
     }
 
-    /// Makes the encoder faulty, or sound again.
+    /// Sets the fault of the encoder.
     pub fn set_encoder_fault(&mut self, fault: EncoderFault) {
         self.encoder.fault = fault;
     }
 
-    /// Another code of the heat-sink temperature.
+    /// Changes the code of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
         self.sensors.set_heat_sink(code);
     }
 
-    /// Events that the next sample reports.
+    /// Adds events to those that the next sample reports.
     pub fn report(&mut self, events: Hardware) {
         self.hardware = self.hardware.union(events);
     }

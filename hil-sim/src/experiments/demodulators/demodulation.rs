@@ -5,16 +5,14 @@ use drive_core::settings::table::ReferenceTable;
 
 use crate::config::{Config, Demodulator};
 use crate::error::Error;
-use crate::learn;
+use crate::experiments::learning;
 use crate::rig::drive_settings;
 
 /// A demodulation.
 #[derive(Clone, Copy, Debug)]
-pub struct Subject {
+pub struct Demodulation {
     /// How the configuration names it.
     pub name: &'static str,
-    /// How a key or a metric names it.
-    pub key: &'static str,
     /// Which.
     pub demodulator: Demodulator,
     /// How much larger its signal is than that of the rectified chain for the same saliency, by the
@@ -33,45 +31,45 @@ const RECTIFIED: f64 = BPF * RECTIFIER * PP;
 const PRINTED_REFERENCE_A: f64 = 0.010;
 
 /// All of them.
-pub const SUBJECTS: [Subject; 5] = [
-    Subject {
+pub const DEMODULATIONS: [Demodulation; 5] = [
+    Demodulation {
         name: "literal",
-        key: "literal",
         demodulator: Demodulator::Literal,
         gain: 1.0,
         constant_a: PRINTED_REFERENCE_A,
     },
-    Subject {
+    Demodulation {
         name: "rectified",
-        key: "rectified",
         demodulator: Demodulator::Rectified,
         gain: 1.0,
         constant_a: PRINTED_REFERENCE_A,
     },
-    Subject {
+    Demodulation {
         name: "rms-impedance",
-        key: "rms_impedance",
         demodulator: Demodulator::RmsImpedance,
         gain: PP / BPF / RECTIFIED,
         constant_a: 0.0,
     },
-    Subject {
+    Demodulation {
         name: "envelope",
-        key: "envelope",
         demodulator: Demodulator::Envelope,
         gain: BPF / RECTIFIED,
         constant_a: PRINTED_REFERENCE_A * BPF / RECTIFIED,
     },
-    Subject {
+    Demodulation {
         name: "synchronous",
-        key: "synchronous",
         demodulator: Demodulator::Synchronous,
         gain: 1.0,
         constant_a: 0.0,
     },
 ];
 
-impl Subject {
+impl Demodulation {
+    /// The name in metrics and file names.
+    pub fn key(&self) -> String {
+        self.name.replace('-', "_")
+    }
+
     /// The configuration with this demodulation.
     pub fn config(&self, config: &Config) -> Config {
         let mut config = config.clone();
@@ -81,7 +79,7 @@ impl Subject {
         config
     }
 
-    /// Unit of what it gives, a thousand times.
+    /// Unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
         if self.demodulator == Demodulator::Synchronous { "10^-3" } else { "mA" }
     }
@@ -89,26 +87,31 @@ impl Subject {
     /// The reference that it learns on this motor.
     ///
     /// # Errors
-    /// When the learning drive is refused, or stops.
+    /// As [`learning::reference_of`].
     pub fn learn(&self, config: &Config, seed: u64) -> Result<ReferenceTable, Error> {
         let config = self.config(config);
-        learn::table(&learn::reference_of(self.demodulator, &config, seed)?)
+        learning::reference_of(self.demodulator, &config, seed)
     }
 
     /// The drive of this kind, if the demodulation has one.
-    pub fn drive(&self, kind: Kind, config: &Config, learned: ReferenceTable) -> Option<Settings> {
+    pub fn drive(
+        &self,
+        kind: ReferenceKind,
+        config: &Config,
+        learned: ReferenceTable,
+    ) -> Option<Settings> {
         let mut drive = drive_settings(&self.config(config));
         if self.demodulator == Demodulator::Synchronous {
             drive.injection.synchronous.reference = learned;
-            return (kind == Kind::Retuned).then_some(drive);
+            return (kind == ReferenceKind::Retuned).then_some(drive);
         }
         let printed = &mut drive.injection.printed;
-        if kind == Kind::Constant {
+        if kind == ReferenceKind::Constant {
             printed.reference_a = self.constant_a as f32;
         } else {
             printed.learned = Some(learned);
         }
-        if kind == Kind::Retuned {
+        if kind == ReferenceKind::Retuned {
             (printed.k_s, printed.z_s) = RETUNED;
         }
         printed.k_s /= self.gain as f32;
@@ -116,9 +119,9 @@ impl Subject {
     }
 }
 
-/// What the signal is compared with, and the controller behind it.
+/// Reference of the signal, and the controller behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ReferenceKind {
     /// A constant and the gains of the configuration (as printed).
     Constant,
     /// A learned table and the same gains.
@@ -128,9 +131,12 @@ pub enum Kind {
     Retuned,
 }
 
-/// All kinds, and what tables and metrics call them.
-pub const KINDS: [(Kind, &str); 3] =
-    [(Kind::Constant, "constant"), (Kind::Learned, "learned"), (Kind::Retuned, "retuned")];
+/// All kinds with their names in tables and metrics.
+pub const KINDS: [(ReferenceKind, &str); 3] = [
+    (ReferenceKind::Constant, "constant"),
+    (ReferenceKind::Learned, "learned"),
+    (ReferenceKind::Retuned, "retuned"),
+];
 
 /// k_s in rad/A of the rectified chain's current difference, and z_s: a zero at 5 Hz, below the
 /// crossover, where the printed one has none.

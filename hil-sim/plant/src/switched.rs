@@ -1,4 +1,4 @@
-//! The inverter with its edges: what each leg does at every instant of a PWM period.
+//! The inverter with its switching edges: the state of each leg at every instant of a PWM period.
 //!
 //! The counter starts at its top and a leg is commanded high while the counter is below its
 //! compare value, so a pulse of width `T c/top` sits in the middle of the period. An edge takes
@@ -9,8 +9,8 @@
 
 use drive_core::Compare;
 
-use super::complex::{Complex, phases};
-use super::inverter::Inverter;
+use crate::complex::{Complex, phases};
+use crate::inverter::Inverter;
 
 /// Current below which a leg without a switch on has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -20,7 +20,7 @@ const EDGES: usize = 5;
 /// Times at which anything changes: two per edge and leg, and the end.
 const INSTANTS: usize = 3 * 2 * EDGES + 1;
 
-/// What a leg is doing.
+/// State of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Level {
     /// Low side on.
@@ -119,7 +119,7 @@ impl Pattern {
         Self { legs, instants, count, delay: inverter.propagation, dead_time: inverter.dead_time }
     }
 
-    /// The pieces of the period: duration (s), and what the legs do in it.
+    /// The pieces of the period: duration (s), and the state of the legs.
     pub(crate) fn pieces(&self) -> impl Iterator<Item = (f64, [Level; 3])> + '_ {
         let mut start = 0.0;
         self.instants[..self.count].iter().filter_map(move |&end| {

@@ -1,0 +1,80 @@
+//! A drive that learns its tracking reference on a simulated motor with the shaft locked.
+
+use drive_core::identify::learning::Learned;
+use drive_core::settings::table::ReferenceTable;
+use drive_core::{Command, Mode, State};
+
+use crate::config::{Config, Demodulator, LoadMode};
+use crate::error::Error;
+use crate::rig::Rig;
+use crate::stats::Stats;
+
+/// Longest learning run, s: 30 points of 31 s at most, and the start.
+const LONGEST_S: u32 = 1000;
+
+/// Lets the drive of a rig learn; the shaft must be locked. The drive is off afterwards and uses the
+/// learned values.
+///
+/// # Errors
+/// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
+pub fn learn(rig: &mut Rig) -> Result<Learned, Error> {
+    rig.command(&Command::Start(Mode::Learning))?;
+    for _ in 0..LONGEST_S {
+        rig.run(1.0, |_| {});
+        match (rig.drive.state(), rig.drive.learned()) {
+            (State::Off, Some(learned)) => return Ok(*learned),
+            (State::Fault(fault), _) => {
+                return Err(Error::Refused(format!("the drive does not learn: {fault}")));
+            }
+            _ => {}
+        }
+    }
+    Err(Error::Refused(format!("the drive does not learn: it is {}", rig.drive.state())))
+}
+
+/// The values that the drive of the configuration learns.
+///
+/// # Errors
+/// As [`Rig::from_config`] and [`learn`].
+pub fn learned(config: &Config, seed: u64) -> Result<Learned, Error> {
+    let mut config = config.clone();
+    config.load.mode = LoadMode::Locked;
+    learn(&mut Rig::from_config(&config, seed)?)
+}
+
+/// Distance of the points of [`reference_of`], A.
+const STEP_A: f64 = 0.25;
+/// Last point, A: the largest torque current that the drive allows beside the magnetising current.
+const LAST_A: f64 = 3.25;
+/// Time for flux and averages to settle at each point, and to average, s.
+const SETTLE_S: f64 = 0.6;
+const AVERAGE_S: f64 = 0.5;
+
+/// The signal of a demodulation over the torque current at the true flux angle, as a reference table:
+/// shaft locked, field orientation by the slip alone (a locked encoder counts nothing), injection beside
+/// it. It covers the literal demodulation too, for which the drive does not learn.
+///
+/// # Errors
+/// [`Error::Refused`] when the configuration or a value of the table is refused, or the drive stops.
+pub fn reference_of(
+    demodulator: Demodulator,
+    config: &Config,
+    seed: u64,
+) -> Result<ReferenceTable, Error> {
+    let mut config = config.clone();
+    config.injection.demodulator = demodulator;
+    let mut rig = Rig::oriented(&config, seed)?;
+    // The table is odd.
+    let mut points = vec![(0.0, 0.0)];
+    for n in 0..=(LAST_A / STEP_A).round() as usize {
+        let i_q = (n as f64 * STEP_A) as f32;
+        rig.command(&Command::Torque(i_q))?;
+        rig.run(SETTLE_S, |_| {});
+        let mut signal = Stats::default();
+        rig.run(AVERAGE_S, |p| signal.push(p.signal()));
+        if n > 0 {
+            points.push((i_q, signal.mean() as f32));
+        }
+    }
+    ReferenceTable::new(&points).map_err(Error::refused)
+}

@@ -1,0 +1,51 @@
+//! The options that all simulating commands share.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::config::{Config, Value};
+use crate::error::Error;
+
+/// The options that describe a simulation.
+#[derive(Args, Default)]
+pub struct Input {
+    /// Configuration file, TOML
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Sets one key, after the configuration file; can be given many times
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub assignments: Vec<String>,
+    /// Seed of all that is random
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    pub seed: u64,
+    /// Simulated time, s; the same as --set seconds=S
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub seconds: Option<f64>,
+}
+
+/// Default folder of the pages.
+pub const OUT: &str = "out";
+
+impl Input {
+    /// The configuration that these options describe.
+    ///
+    /// # Errors
+    /// As [`Config::load`] and [`Config::set`].
+    pub fn config(&self) -> Result<Config, Error> {
+        let mut config = Config::load(self.config.as_deref(), &self.assignments)?;
+        if let Some(seconds) = self.seconds {
+            config.set("seconds", &Value::Number(seconds))?;
+        }
+        Ok(config)
+    }
+
+    /// The command line that repeats `cargo sim WHAT` with this configuration.
+    pub fn command(&self, what: &str, config: &Config) -> String {
+        let mut command = format!("cargo sim {what} --seed {}", self.seed);
+        for change in config.changes() {
+            command.push_str(&format!(" --set {change}"));
+        }
+        command
+    }
+}
