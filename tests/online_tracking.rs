@@ -9,9 +9,9 @@ use common::config;
 use drive_core::flux::indirect::LIMITS;
 use drive_core::identify::online::{Doubt, Online, Speed};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
+use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 use hil_sim::plant::Load;
 use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
-use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 
 /// r_r grows by 30 % between 3 and 6 s.
 const CASE: WarmingCase = WarmingCase {
@@ -64,7 +64,8 @@ fn without_a_sensor_it_takes_a_flux_that_moves() {
     for moment in &still {
         assert!(moment.estimate.is_err(), "speed and tau_r cannot be told apart: {moment:?}");
     }
-    let moved = run(&config, &WarmingCase { used: false, excitation: (0.1, 2.0), ..CASE }, 3).unwrap();
+    let moved =
+        run(&config, &WarmingCase { used: false, excitation: (0.1, 2.0), ..CASE }, 3).unwrap();
     let (error, count, _) = end(&moved);
     assert!(error < 0.06 && count == 30, "{error} {count}");
     for moment in &moved[moved.len() - 30..] {

@@ -3,12 +3,13 @@
 use std::f64::consts::TAU;
 
 use drive_core::AlphaBeta;
-use drive_core::identify::rls::{Complex32, Rls, RlsSettings};
+use drive_core::identify::rls::{Rls, RlsSettings};
 use hil_sim::identification::models::model_c;
 use hil_sim::identification::recursive::{Plain, Reference};
 use hil_sim::identification::signals::{Filter, noise};
 use hil_sim::identification::trial::{Noise, VOLTAGE, peaks};
 use hil_sim::identification::{Complex, Delta, Parameters, Signal, Trial};
+use num_complex::Complex32;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;

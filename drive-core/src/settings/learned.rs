@@ -8,8 +8,8 @@ impl Settings {
         self.learning_depends_on() == other.learning_depends_on()
     }
 
-    /// All that the reference, the carrier current and the gains depend on when they are learned, and all
-    /// that they take the place of.
+    /// The settings that the learned reference, carrier current and gains depend on, and those that they
+    /// replace.
     fn learning_depends_on(&self) -> [f32; 25] {
         let (m, i, s) = (&self.motor, &self.inverter, &self.scales);
         let j = &self.injection;

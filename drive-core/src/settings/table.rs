@@ -142,13 +142,13 @@ pub struct CarrierTable {
 }
 
 impl CarrierTable {
-    /// From its values at multiples of [`STEP_A`](crate::flux::schedule::STEP_A); none when the first is not 1 or any is out of range.
+    /// From its values at multiples of [`STEP_A`]; none when the first is not 1 or any is out of range.
     pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
 
-    /// Its values at multiples of [`STEP_A`](crate::flux::schedule::STEP_A).
+    /// Its values at multiples of [`STEP_A`].
     pub fn points(&self) -> &[f32; POINTS] {
         &self.ratio
     }
@@ -156,7 +156,7 @@ impl CarrierTable {
 
 impl Default for CarrierTable {
     /// Learned on the simulated motor of Table 5 together with the default
-    /// [`ReferenceTable`](crate::flux::schedule::ReferenceTable): it belongs to that motor.
+    /// [`ReferenceTable`]: it belongs to that motor.
     fn default() -> Self {
         const LEARNED: [f32; POINTS] = [
             1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,

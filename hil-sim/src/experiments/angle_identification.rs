@@ -13,6 +13,7 @@ use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::RATE_HZ;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, PRINTED_PII, Pii, TABLE_6};
+use num_complex::Complex64;
 
 /// Section 3.11.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -110,7 +111,7 @@ fn metrics(outcome: &mut Outcome, demodulation: &Demodulation, points: &[Identif
     }
 }
 
-fn complex(pole: drive_core::math::complex::Complex) -> String {
+fn complex(pole: Complex64) -> String {
     format!("{:.4} {} j{:.4}", pole.re, if pole.im < 0.0 { '-' } else { '+' }, pole.im.abs())
 }
 
@@ -289,7 +290,7 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         .collect();
     let responses: Vec<_> =
         models.iter().map(|(name, model)| (name.as_str(), |w: f64| model.response(w))).collect();
-    let as_functions: Vec<(&str, &dyn Fn(f64) -> drive_core::math::complex::Complex)> =
+    let as_functions: Vec<(&str, &dyn Fn(f64) -> Complex64)> =
         responses.iter().map(|(name, response)| (*name, response as _)).collect();
     let (gain, phase) = bode.panels(&as_functions);
     let title = format!("{}: identified, gain in {} per rad", demodulation.name, demodulation.unit);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::math::complex::Complex;
+use num_complex::Complex64;
 
 use crate::outcome::{Panel, Series};
 
@@ -33,12 +33,12 @@ pub struct Bode<'a> {
 
 impl Bode<'_> {
     /// The panels of gain and phase.
-    pub fn panels(&self, responses: &[(&str, &dyn Fn(f64) -> Complex)]) -> (Panel, Panel) {
+    pub fn panels(&self, responses: &[(&str, &dyn Fn(f64) -> Complex64)]) -> (Panel, Panel) {
         let mut gain = Panel::new(self.label, "gain (dB)").log_x();
         let mut phase = Panel::new(self.label, "phase (°)").log_x();
         for (name, response) in responses {
-            let values: Vec<Complex> = self.hz.iter().map(|&hz| response(omega_t(hz))).collect();
-            gain = gain.with(Series::line(*name, self.along(values.iter().map(|h| h.db()))));
+            let values: Vec<Complex64> = self.hz.iter().map(|&hz| response(omega_t(hz))).collect();
+            gain = gain.with(Series::line(*name, self.along(values.iter().map(|h| decibels(*h)))));
             phase = phase.with(Series::line(*name, self.along(unwrapped(&values).into_iter())));
         }
         (gain, phase)
@@ -49,12 +49,17 @@ impl Bode<'_> {
     }
 }
 
+/// Magnitude of a response in dB.
+pub fn decibels(response: Complex64) -> f64 {
+    20.0 * response.norm().log10()
+}
+
 /// Phases in degrees, each within 180° of the one before.
-pub fn unwrapped(values: &[Complex]) -> Vec<f64> {
+pub fn unwrapped(values: &[Complex64]) -> Vec<f64> {
     let mut before = 0.0;
     let mut phases = Vec::with_capacity(values.len());
     for value in values {
-        let phase = value.arg_deg();
+        let phase = value.arg().to_degrees();
         before = phase - 360.0 * ((phase - before) / 360.0).round();
         phases.push(before);
     }
@@ -62,8 +67,8 @@ pub fn unwrapped(values: &[Complex]) -> Vec<f64> {
 }
 
 /// Largest magnitude of some poles; not a number without them.
-pub fn largest_pole<const N: usize>(poles: Option<[Complex; N]>) -> f64 {
-    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.abs()).fold(0.0, f64::max))
+pub fn largest_pole<const N: usize>(poles: Option<[Complex64; N]>) -> f64 {
+    poles.map_or(f64::NAN, |poles| poles.iter().map(|p| p.norm()).fold(0.0, f64::max))
 }
 
 /// Fictitious frequency of the w plane (Eq. 2.18), Hz, of a real one.

@@ -5,9 +5,9 @@ mod direct;
 mod precision;
 
 use drive_core::filter::dissertation::LPF;
-use drive_core::math::complex::Complex;
+use num_complex::Complex64;
 
-use super::bode::{Bode, RATE, frequencies, omega_t};
+use super::bode::{Bode, RATE, decibels, frequencies, omega_t};
 use super::{Context, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -70,8 +70,8 @@ fn bode(filters: &[Box<dyn ComparedFilter + Send>]) -> Figure {
         .iter()
         .map(|filter| (filter.name(), |omega_t: f64| filter.sections(omega_t)))
         .collect();
-    let responses: Vec<(&str, &dyn Fn(f64) -> Complex)> =
-        responses.iter().map(|(name, f)| (*name, f as &dyn Fn(f64) -> Complex)).collect();
+    let responses: Vec<(&str, &dyn Fn(f64) -> Complex64)> =
+        responses.iter().map(|(name, f)| (*name, f as &dyn Fn(f64) -> Complex64)).collect();
     let (gain, phase) = bode.panels(&responses);
     Figure::new("bode", "The digital filters, as the drive computes them", "Figure 30")
         .panel(gain.y_range(-100.0, 5.0))
@@ -79,10 +79,10 @@ fn bode(filters: &[Box<dyn ComparedFilter + Send>]) -> Figure {
 }
 
 fn stop_band(lpf: &dyn ComparedFilter) -> Figure {
-    let along = |response: &dyn Fn(f64) -> Complex| {
+    let along = |response: &dyn Fn(f64) -> Complex64| {
         (0..=900)
             .map(|k| 440.0 + f64::from(k) * 0.25)
-            .map(|hz| (hz, response(omega_t(hz)).db()))
+            .map(|hz| (hz, decibels(response(omega_t(hz)))))
             .collect()
     };
     let panel = Panel::new("frequency (Hz)", "gain (dB)")
@@ -105,14 +105,14 @@ fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Out
         let w = omega_t(600.0);
         let [pole, pole_rounded] = filter.largest_poles();
         let delay = Cell::fixed(filter.group_delay(0.0), 2);
-        let (printed, sections) = (filter.direct(w).db(), filter.sections(w).db());
+        let (printed, sections) = (decibels(filter.direct(w)), decibels(filter.sections(w)));
         let rows = [
             ("Tables 7, 8, f64", filter.direct(0.0), printed, Cell::from(""), Cell::fixed(pole, 6)),
             ("sections, f32", filter.sections(0.0), sections, delay, Cell::from("")),
             (
                 "direct form, f32",
                 filter.direct_rounded(0.0),
-                filter.direct_rounded(w).db(),
+                decibels(filter.direct_rounded(w)),
                 Cell::from(""),
                 Cell::fixed(pole_rounded, 6),
             ),
@@ -133,10 +133,10 @@ fn characteristics(filters: &[Box<dyn ComparedFilter + Send>], outcome: &mut Out
         outcome.metrics.set(format!("{key}_gain_600hz_db"), sections);
         outcome
             .metrics
-            .set(format!("{key}_gain_600hz_f32_direct_db"), filter.direct_rounded(w).db());
+            .set(format!("{key}_gain_600hz_f32_direct_db"), decibels(filter.direct_rounded(w)));
         outcome.metrics.set(format!("{key}_group_delay_dc_samples"), filter.group_delay(0.0));
     }
-    let divided = LPF.response(omega_t(600.0)).db();
+    let divided = decibels(LPF.response(omega_t(600.0)));
     table.note(format!(
         "Divided by its gain at dc, as the drive uses it, LPF has {divided:.2} dB at 600 Hz."
     ))
@@ -148,7 +148,7 @@ fn edges(filters: &[Box<dyn ComparedFilter + Send>]) -> Table {
     let mut table = Table::new("Edges", &heads);
     for filter in filters {
         let crossings = levels.map(|level| {
-            let found = crossings(|hz| filter.sections(omega_t(hz)).db() - level);
+            let found = crossings(|hz| decibels(filter.sections(omega_t(hz))) - level);
             Cell::from(found.iter().map(|hz| format!("{hz:.1}")).collect::<Vec<_>>().join(", "))
         });
         table.row([Cell::from(filter.name())].into_iter().chain(crossings));

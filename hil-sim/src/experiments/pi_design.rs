@@ -4,11 +4,11 @@
 mod differences;
 
 use drive_core::filter::dissertation::LPF;
-use drive_core::math::complex::Complex;
 use drive_core::tuning::{
     CurrentLoopDesign, DELAY, FirstOrder, Rule, design_current_loop, motor_plant, pi_response,
     rule_3_8,
 };
+use num_complex::Complex64;
 
 use super::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use super::{Context, Experiment};
@@ -99,9 +99,9 @@ fn hz(v: f64) -> f64 {
 }
 
 fn w_plane(plant: FirstOrder, rule: Rule) -> Figure {
-    let one = Complex::ONE;
+    let one = Complex64::ONE;
     let g = |w: f64| plant.response(w);
-    let integrated = |w: f64| plant.response(w) / (Complex::unit(w) - one);
+    let integrated = |w: f64| plant.response(w) / (Complex64::cis(w) - one);
     let with_zero = |w: f64| plant.response(w) * pi_response(1.0, rule.z_c, w);
     let grid = frequencies(1.0, 2800.0, 800);
     let bode = Bode { hz: &grid, label: "fictitious frequency v (Hz)", shown: fictitious };
@@ -124,7 +124,7 @@ fn rule_table(rules: &[(Identified, Rule)]) -> Table {
     for (Identified { name, plant, printed, .. }, rule) in rules {
         let phase = |v_hz: f64, z_c: f64| {
             let w = 2.0 * (v_hz * std::f64::consts::PI * PERIOD_S).atan();
-            (pi_response(1.0, z_c, w) * plant.response(w)).arg_deg()
+            (pi_response(1.0, z_c, w) * plant.response(w)).arg().to_degrees()
         };
         table.row([
             Cell::from(*name),
@@ -183,7 +183,7 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
             pi_response(k_c, design.z_c, w)
                 * physical.response(w)
                 * LPF.response(w)
-                * Complex::unit(-DELAY * w)
+                * Complex64::cis(-DELAY * w)
         }
     };
     let (rule, used) = (open_loop(design.rule_k_c), open_loop(design.k_c));
@@ -194,8 +194,8 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         format!("used, kc = {:.1}", design.k_c),
     ];
     let (gain, phase) = bode.panels(&[(&names[0], &rule), (&names[1], &used)]);
-    let sensitivity = |l: &dyn Fn(f64) -> Complex| {
-        grid.iter().map(|&hz| (hz, 1.0 / (Complex::ONE + l(omega_t(hz))).abs())).collect()
+    let sensitivity = |l: &dyn Fn(f64) -> Complex64| {
+        grid.iter().map(|&hz| (hz, 1.0 / (Complex64::ONE + l(omega_t(hz))).norm())).collect()
     };
     let ends = |level: f64| vec![(grid[0], level), (grid[grid.len() - 1], level)];
     let sensitivity = Panel::new("frequency (Hz)", "|1/(1 + L)|")

@@ -1,7 +1,7 @@
 //! Eq. 3.43 from data, and the controller of Eq. 3.44 for it.
 
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
+use num_complex::Complex64;
 
 use super::measure::Record;
 use crate::error::Error;
@@ -103,7 +103,7 @@ impl Model {
     }
 
     /// Both poles, the one with the larger imaginary part (or the larger one) first.
-    pub fn poles(&self) -> Option<[Complex; 2]> {
+    pub fn poles(&self) -> Option<[Complex64; 2]> {
         roots(self.a).map(|[p, q]| if (p.im, p.re) < (q.im, q.re) { [q, p] } else { [p, q] })
     }
 
@@ -113,15 +113,15 @@ impl Model {
     }
 
     /// Frequency response at rad/sample.
-    pub fn response(&self, omega_t: f64) -> Complex {
-        let z = Complex::new(omega_t.cos(), omega_t.sin());
-        let [a1, a2] = self.a.map(|a| Complex::new(a, 0.0));
-        Complex::new(self.k, 0.0) / (z * z + a1 * z + a2)
+    pub fn response(&self, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let [a1, a2] = self.a.map(|a| Complex64::new(a, 0.0));
+        Complex64::new(self.k, 0.0) / (z * z + a1 * z + a2)
     }
 
     /// Poles of the loop of this plant and a controller:
     /// (z - 1)^2 (z^2 + a1 z + a2) + k_s k (z - z_s).
-    pub fn closed_loop(&self, pii: Pii) -> Option<[Complex; 4]> {
+    pub fn closed_loop(&self, pii: Pii) -> Option<[Complex64; 4]> {
         let [a1, a2] = self.a;
         let gain = pii.k_s * self.k;
         roots([a1 - 2.0, a2 - 2.0 * a1 + 1.0, a1 - 2.0 * a2 + gain, a2 - gain * pii.z_s])
@@ -134,24 +134,24 @@ impl Model {
         let sign = self.static_gain().signum();
         let candidates = (0..200).map(|n| 0.3 * 0.97_f64.powi(n)).map(|crossover| {
             let open = self.open_loop(Pii { k_s: 1.0, z_s: 1.0 - crossover / LEAD }, crossover);
-            (Pii { k_s: sign / open.abs(), z_s: 1.0 - crossover / LEAD }, crossover)
+            (Pii { k_s: sign / open.norm(), z_s: 1.0 - crossover / LEAD }, crossover)
         });
         let fits = |pii: Pii| {
             largest_pole(self.closed_loop(pii)) < 1.0
                 && (1..300).all(|n| {
                     let w = std::f64::consts::PI * 0.97_f64.powi(n);
-                    (Complex::ONE + self.open_loop(pii, w)).abs() > 1.0 / MS
+                    (Complex64::ONE + self.open_loop(pii, w)).norm() > 1.0 / MS
                 })
         };
         candidates.into_iter().find(|&(pii, _)| fits(pii))
     }
 
     /// Controller and plant at rad/sample.
-    fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex {
-        let z = Complex::new(omega_t.cos(), omega_t.sin());
-        let integrator = z - Complex::ONE;
-        let controller = (z - Complex::new(pii.z_s, 0.0)) / (integrator * integrator);
-        controller * Complex::new(pii.k_s, 0.0) * self.response(omega_t)
+    fn open_loop(&self, pii: Pii, omega_t: f64) -> Complex64 {
+        let z = Complex64::new(omega_t.cos(), omega_t.sin());
+        let integrator = z - Complex64::ONE;
+        let controller = (z - Complex64::new(pii.z_s, 0.0)) / (integrator * integrator);
+        controller * Complex64::new(pii.k_s, 0.0) * self.response(omega_t)
     }
 }
 
@@ -179,7 +179,7 @@ mod tests {
         }
         let (pii, crossover) = plant.design().unwrap();
         assert!(largest_pole(plant.closed_loop(pii)) < 0.9999);
-        assert!((plant.open_loop(pii, crossover).abs() - 1.0).abs() < 1e-9);
+        assert!((plant.open_loop(pii, crossover).norm() - 1.0).abs() < 1e-9);
         // A little more gain and phase lag than the margin of that peak (1/Ms away) must be borne.
         let more = Pii { k_s: 1.4 * pii.k_s, ..pii };
         assert!(largest_pole(plant.closed_loop(more)) < 1.0);

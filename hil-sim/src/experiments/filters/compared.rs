@@ -2,7 +2,7 @@
 
 use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
 use drive_core::filter::sos::{Sos, SosState};
-use drive_core::math::complex::Complex;
+use num_complex::Complex64;
 
 use super::direct;
 use crate::stats::Stats;
@@ -12,11 +12,11 @@ pub trait ComparedFilter: Sync {
     /// Its name in the source.
     fn name(&self) -> &'static str;
     /// Frequency response of the sections the drive runs.
-    fn sections(&self, omega_t: f64) -> Complex;
+    fn sections(&self, omega_t: f64) -> Complex64;
     /// Frequency response by Tables 7 and 8.
-    fn direct(&self, omega_t: f64) -> Complex;
+    fn direct(&self, omega_t: f64) -> Complex64;
     /// Likewise, with coefficients rounded to `f32`.
-    fn direct_rounded(&self, omega_t: f64) -> Complex;
+    fn direct_rounded(&self, omega_t: f64) -> Complex64;
     /// Largest pole of the direct form: as printed, rounded to `f32`.
     fn largest_poles(&self) -> [f64; 2];
     /// Group delay in samples.
@@ -36,13 +36,13 @@ impl<const SECTIONS: usize, const TAPS: usize> ComparedFilter for Filter<SECTION
     fn name(&self) -> &'static str {
         self.name
     }
-    fn sections(&self, omega_t: f64) -> Complex {
+    fn sections(&self, omega_t: f64) -> Complex64 {
         self.sections.response(omega_t)
     }
-    fn direct(&self, omega_t: f64) -> Complex {
+    fn direct(&self, omega_t: f64) -> Complex64 {
         direct::response(&self.direct, omega_t)
     }
-    fn direct_rounded(&self, omega_t: f64) -> Complex {
+    fn direct_rounded(&self, omega_t: f64) -> Complex64 {
         direct::response(&direct::rounded(&self.direct), omega_t)
     }
     fn largest_poles(&self) -> [f64; 2] {

@@ -1,8 +1,8 @@
 //! The filters in direct form (Eq. C.1) with the printed coefficients, to compare with.
 #![expect(clippy::excessive_precision, reason = "the digits are those of the source")]
 
-use drive_core::math::complex::Complex;
 use drive_core::tuning::roots;
+use num_complex::Complex64;
 
 use crate::experiments::bode::largest_pole;
 
@@ -53,11 +53,11 @@ pub fn rounded<const N: usize>(filter: &[[f64; N]; 2]) -> [[f64; N]; 2] {
 }
 
 /// Frequency response, Eq. C.2.
-pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex {
-    let delay = Complex::unit(-omega_t);
+pub fn response<const N: usize>(filter: &[[f64; N]; 2], omega_t: f64) -> Complex64 {
+    let delay = Complex64::cis(-omega_t);
     let value = |part: &[f64; N]| {
-        let zero = Complex::new(0.0, 0.0);
-        part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex::new(c, 0.0))
+        let zero = Complex64::new(0.0, 0.0);
+        part.iter().rev().fold(zero, |sum, &c| sum * delay + Complex64::new(c, 0.0))
     };
     value(&filter[0]) / value(&filter[1])
 }

@@ -61,7 +61,7 @@ pub fn add(context: &Context<'_>, outcome: &mut Outcome) {
     );
     outcome.remarks.push(remark);
 
-    let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).abs())).collect();
+    let gain = (0..=1000).map(f64::from).map(|hz| (hz, BPF.response(omega_t(hz)).norm())).collect();
     let shown = |spectrum: Vec<(f64, f64)>| spectrum.into_iter().take(1001).collect::<Vec<_>>();
     let panel = || Panel::new("frequency (Hz)", "amplitude").y_range(0.0, 1.1);
     outcome.figures.push(
