@@ -29,6 +29,14 @@ const PANIC: &str = "rust_begin_unwind";
 const MAIN: &str = "main";
 /// Functions that only the processor calls, and that never return or have a stack of their own.
 const BY_PROCESSOR: [&str; 3] = ["Reset", "HardFault", "DefaultHandler"];
+/// Parts of the names of the functions of core that print numbers and padding. They call nothing through a register
+/// but the text's output.
+const PRINTERS: [&str; 3] =
+    ["4core3fmtNtB5_9Formatter", "4core3fmtNtB5_11PostPadding", "float_to_decimal"];
+/// Parts of the names of the outputs' functions.
+const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write_char"];
+/// Part of the name of a veneer, which ends with the name of its target.
+const VENEER: &str = "LongThunk_";
 /// Sections with code.
 const SECTIONS: [&str; 2] = [".text", ".ccm"];
 
@@ -143,22 +151,43 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
         .map(|(at, _)| *at)
         .collect();
     // How deep a call through a register may get, with none inside it, one, and so on.
-    let mut through = 0;
-    for _ in 0..NESTED {
+    let deepest = |through: Through, which: &dyn Fn(u32) -> bool| {
         let mut known = BTreeMap::new();
-        let mut deepest = 0;
-        for &at in &by_pointer {
-            deepest = deepest.max(depth(functions, at, through, &mut known, &mut Vec::new())?);
-        }
-        through = deepest;
+        functions.keys().filter(|at| which(**at)).try_fold(0, |deepest: u32, &at| {
+            Ok::<_, anyhow::Error>(deepest.max(depth(
+                functions,
+                at,
+                through,
+                &mut known,
+                &mut Vec::new(),
+            )?))
+        })
+    };
+    let mut through = Through::default();
+    through.output = deepest(through, &|at| is_named(&functions[&at], &OUTPUTS))?;
+    for _ in 0..NESTED {
+        through.any = deepest(through, &|at| by_pointer.contains(&at))?;
     }
     depth(functions, start, through, &mut BTreeMap::new(), &mut Vec::new())
+}
+
+/// The deepest the stack gets below a call through a register.
+#[derive(Clone, Copy, Default)]
+struct Through {
+    /// To an output of text.
+    output: u32,
+    /// To any function.
+    any: u32,
+}
+
+fn is_named(function: &Function, parts: &[&str]) -> bool {
+    parts.iter().any(|part| function.name.contains(part))
 }
 
 fn depth(
     functions: &Functions,
     at: u32,
-    through: u32,
+    through: Through,
     known: &mut BTreeMap<u32, u32>,
     path: &mut Vec<u32>,
 ) -> Result<u32> {
@@ -174,7 +203,14 @@ fn depth(
         bail!("{} calls itself", function.name);
     }
     path.push(at);
-    let mut below = if function.calls_through_register { through } else { 0 };
+    let veneer = function.name.split_once(VENEER);
+    let target = veneer.and_then(|(_, name)| functions.iter().find(|(_, f)| f.name == name));
+    let mut below = match target {
+        _ if !function.calls_through_register => 0,
+        Some((&target, _)) => depth(functions, target, through, known, path)?,
+        None if is_named(function, &PRINTERS) => through.output,
+        None => through.any,
+    };
     for &target in &function.calls {
         below = below.max(depth(functions, target, through, known, path)?);
     }
