@@ -1,7 +1,6 @@
 //! Angles, vectors and their frames.
 
 pub mod angle;
-pub mod decimal;
 pub mod frames;
 
 /// `value` within ±`largest`.

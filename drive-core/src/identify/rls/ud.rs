@@ -47,7 +47,7 @@ impl Ud {
     pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
         for j in (1..N).rev() {
             for i in 0..j {
-                x[i] = x[i] - self.u[above(i, j)] * x[j];
+                x[i] -= self.u[above(i, j)] * x[j];
             }
         }
         core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
@@ -71,7 +71,7 @@ impl Ud {
         // (Before the columns, it would hold registers that they need.)
         let mut error = y;
         for (x, theta) in x.iter().zip(&self.theta) {
-            error = error - *x * *theta;
+            error -= *x * *theta;
         }
         let step = error * pass.inverse;
         // Of one that is infinite or not a number, the sum is neither finite.
