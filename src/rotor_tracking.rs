@@ -4,7 +4,7 @@
 use core::f32::consts::TAU;
 use core::fmt;
 
-use drive_core::identify::online::{Doubt, Online, Speed, Tracked};
+use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use drive_core::io::PERIOD_S;
 use drive_core::math::decimal::Fixed;
 use drive_core::settings::AngleSource;
@@ -51,7 +51,7 @@ pub struct Tracking {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The estimate, or why there is none.
-    pub found: Result<Tracked, Doubt>,
+    pub found: Result<RotorEstimate, NoEstimate>,
     /// Rotor time constant that the drive uses, s.
     pub used: f32,
 }
@@ -67,7 +67,7 @@ impl Tracking {
             source: settings.angle_source,
             next: 0,
             wait: PERIODS_PER_FIT,
-            report: Report { found: Err(Doubt::Settling), used: settings.motor.tau_r() },
+            report: Report { found: Err(NoEstimate::Settling), used: settings.motor.tau_r() },
         })
     }
 
@@ -78,7 +78,7 @@ impl Tracking {
             // The drive did not regulate, or the main loop came too late.
             self.online.restart();
             self.wait = PERIODS_PER_FIT;
-            self.report.found = Err(Doubt::Settling);
+            self.report.found = Err(NoEstimate::Settling);
         }
         self.next = seen.number.wrapping_add(1);
         self.online.push(seen.measured, seen.realised);
@@ -89,8 +89,8 @@ impl Tracking {
         self.wait = PERIODS_PER_FIT;
         let omega_m = seen.rotor_freq * (TAU / PERIOD_S);
         let speed = match self.source {
-            AngleSource::Encoder => Speed::Known(omega_m),
-            AngleSource::Injection => Speed::Guess(omega_m),
+            AngleSource::Encoder => SpeedInput::Known(omega_m),
+            AngleSource::Injection => SpeedInput::Guess(omega_m),
         };
         self.report.found = self.online.refine(seen.reference, speed);
         self.report.found.ok().map(|tracked| tracked.tau_r)
@@ -200,7 +200,7 @@ mod tests {
                 }
             }
             if n == 30_200 {
-                assert_eq!(tracking.report().found, Err(Doubt::Settling));
+                assert_eq!(tracking.report().found, Err(NoEstimate::Settling));
             }
         }
         assert!((30..60).contains(&lost), "{lost}");

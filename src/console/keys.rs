@@ -51,7 +51,7 @@ impl FirmwareSettings {
 
     /// Forgets what was learned, if it was learned with other settings than these.
     pub fn forget_unless_as(&mut self, before: &Self) {
-        if !self.drive.learns_as(&before.drive) {
+        if !self.drive.shares_learning_with(&before.drive) {
             self.learned = None;
         }
     }

@@ -75,7 +75,7 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
 /// What was kept, if a learning can have found it.
 #[inline(never)]
 pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
-    let carrier = CarrierTable::of_points(table(words, CARRIER, 1.0));
+    let carrier = CarrierTable::from_points(table(words, CARRIER, 1.0));
     let value = |place: usize| f32::from_bits(words[place]);
     let flags = words[FLAGS];
     let fitted = |place, bit| Fitted {
@@ -84,7 +84,7 @@ pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
         accepted: flags & bit != 0,
     };
     let learned = Learned {
-        reference: ReferenceTable::of_points(table(words, REFERENCE, 0.0))?,
+        reference: ReferenceTable::from_points(table(words, REFERENCE, 0.0))?,
         carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
         points: (flags & 0xff) as usize,
         asymmetry: value(FITS),

@@ -121,7 +121,7 @@ impl LockMonitor {
     }
 
     /// Compares with what was learned from now on.
-    pub fn take(&mut self, table: &CarrierTable) {
+    pub fn set_carrier_table(&mut self, table: &CarrierTable) {
         self.inverse_square = inverse_square(table);
     }
 
@@ -167,7 +167,7 @@ impl LockMonitor {
     }
 
     /// Whether the shaft stands by an electrical speed, turns per control period.
-    pub fn stands(&self, rotor_freq: f32) -> bool {
+    pub fn is_standstill(&self, rotor_freq: f32) -> bool {
         rotor_freq.abs() <= self.standing
     }
 }

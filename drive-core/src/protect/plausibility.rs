@@ -180,7 +180,7 @@ impl PredictionState {
 
     /// Two samples before it is judged: what is computed in a sample acts between the next one and the one
     /// after that, and so explains the current two samples later.
-    pub fn take(&mut self) {
+    pub fn latch_voltage(&mut self) {
         self.taken = core::mem::replace(&mut self.voltages, AlphaBeta::ZERO);
     }
 }

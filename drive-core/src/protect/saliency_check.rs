@@ -39,7 +39,7 @@ pub struct SaliencyCheckState {
 
 /// What the drive is to do in this period of the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
+pub enum SaliencyCheckAction {
     /// No current, the injection turned to 60° from the flux.
     Look,
     /// The magnetising current again, the injection where it belongs.
@@ -85,22 +85,27 @@ impl SaliencyCheck {
     pub const LOOK_AXIS: UnitVector = UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 };
 
     /// Period `elapsed` of the check, with the saliency seen in it.
-    pub fn step(&self, state: &mut SaliencyCheckState, elapsed: u32, q: f32) -> Phase {
+    pub fn step(
+        &self,
+        state: &mut SaliencyCheckState,
+        elapsed: u32,
+        q: f32,
+    ) -> SaliencyCheckAction {
         let looked = self.settle + self.average;
         if elapsed < self.settle {
             state.sum = 0.0;
-            Phase::Look
+            SaliencyCheckAction::Look
         } else if elapsed < looked {
             state.sum += q;
-            Phase::Look
+            SaliencyCheckAction::Look
         } else if elapsed < looked + self.restore {
             let mean = state.sum * self.per_average;
             // Beyond the least, on its side of zero. Not-a-number is not.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
             state.share = mean * self.per_expected;
-            if enough { Phase::Restore } else { Phase::Failed }
+            if enough { SaliencyCheckAction::Restore } else { SaliencyCheckAction::Failed }
         } else {
-            Phase::Passed
+            SaliencyCheckAction::Passed
         }
     }
 }

@@ -69,7 +69,7 @@ pub struct WiringCheckState {
 
 /// What the drive is to do in the next period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Next {
+pub enum WiringAction {
     /// Put this voltage out, V, while this current flows, A.
     Apply(AlphaBeta, AlphaBeta),
     /// Go on: the wiring is right.
@@ -97,7 +97,7 @@ impl WiringCheck {
     ///
     /// # Errors
     /// What is wrong with the wiring.
-    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<Next, Fault> {
+    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<WiringAction, Fault> {
         // Of the voltage computed in period n, the sample n + 1 is the first that could know, and the
         // sample n + 2 does.
         let risen = state.period.saturating_sub(1);
@@ -128,11 +128,11 @@ impl WiringCheck {
             state.period = 0;
             state.pulse += 1;
             if state.pulse >= PULSES_PER_ROUND * ROUNDS {
-                return judge(&state.answers).map_or(Ok(Next::Passed), Err);
+                return judge(&state.answers).map_or(Ok(WiringAction::Passed), Err);
             }
         }
         let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
-        Ok(Next::Apply(axis * volts, axis * flowing))
+        Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
     }
 }
 
@@ -172,7 +172,7 @@ mod tests {
             let ends = (0..longest).any(|n| {
                 let current = |k: usize| f32::from_bits(bits[(n as usize + k) % 16]);
                 match check.step(&mut state, Abc::new(current(0), current(1), 0.0)) {
-                    Ok(Next::Apply(voltage, _)) => {
+                    Ok(WiringAction::Apply { voltage, .. }) => {
                         assert!(voltage.length_squared() <= HIGHEST_V * HIGHEST_V * 1.000_1);
                         false
                     }

@@ -2,7 +2,7 @@
 
 use super::{AngleSource, Settings, SettingsError};
 use crate::carrier::DemodulatorKind;
-use crate::carrier::demodulator::{LONGEST, SHORTEST};
+use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
 use crate::io::PERIOD_S;
 
 /// The first value outside its range.
@@ -62,7 +62,7 @@ impl Settings {
         check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0);
         check("injection.k_s", t.k_s, 0.0, 100.0);
         check("injection.z_s", t.z_s, 0.0, 1.0);
-        let (shortest, longest) = (f32::from(SHORTEST), f32::from(LONGEST));
+        let (shortest, longest) = (f32::from(MIN_RMS_SAMPLES), f32::from(MAX_RMS_SAMPLES));
         check("injection.rms_samples", f32::from(t.rms_samples), shortest, longest);
         let t = &inj.synchronous;
         check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0);

@@ -4,7 +4,7 @@ use super::Settings;
 
 impl Settings {
     /// Whether what was learned with `other` set would be learned with these as well.
-    pub fn learns_as(&self, other: &Self) -> bool {
+    pub fn shares_learning_with(&self, other: &Self) -> bool {
         self.learning_depends_on() == other.learning_depends_on()
     }
 
@@ -54,7 +54,7 @@ mod tests {
         let changed = |change: fn(&mut Settings)| {
             let mut settings = Settings::default();
             change(&mut settings);
-            settings.learns_as(&Settings::default())
+            settings.shares_learning_with(&Settings::default())
         };
         let same: [fn(&mut Settings); 6] = [
             |_| {},

@@ -73,7 +73,7 @@ impl ReferenceTable {
     }
 
     /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
-    pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
+    pub fn from_points(q: [f32; POINTS]) -> Option<Self> {
         let believable = q.iter().all(|q| (-LARGEST..=LARGEST).contains(q));
         (q[0] == 0.0 && believable).then_some(Self { q })
     }
@@ -143,7 +143,7 @@ pub struct CarrierTable {
 
 impl CarrierTable {
     /// From its values at multiples of [`STEP_A`](crate::flux::schedule::STEP_A); none when the first is not 1 or any is out of range.
-    pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
+    pub fn from_points(ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
@@ -185,12 +185,12 @@ mod tests {
     #[test]
     fn a_carrier_table_begins_with_one_and_has_believable_ratios() {
         let mut ratio = [1.1; POINTS];
-        assert_eq!(CarrierTable::of_points(ratio), None);
+        assert_eq!(CarrierTable::from_points(ratio), None);
         ratio[0] = 1.0;
-        assert_eq!(CarrierTable::of_points(ratio).map(|t| *t.points()), Some(ratio));
+        assert_eq!(CarrierTable::from_points(ratio).map(|t| *t.points()), Some(ratio));
         for wrong in [0.49, 2.1, f32::NAN] {
             ratio[15] = wrong;
-            assert_eq!(CarrierTable::of_points(ratio), None, "{wrong}");
+            assert_eq!(CarrierTable::from_points(ratio), None, "{wrong}");
         }
     }
 }
