@@ -1,4 +1,4 @@
-//! The peripherals of the microcontroller; numbers come from the board.
+//! The peripherals of the microcontroller. Their numbers come from the board.
 
 pub mod adc;
 pub mod clocks;
@@ -9,3 +9,4 @@ pub mod over_voltage;
 pub mod pwm;
 pub mod serial;
 pub mod stop;
+pub mod watchdog;

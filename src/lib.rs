@@ -2,12 +2,18 @@
 //!
 //! Start reading at `main.rs`.
 #![cfg_attr(not(test), no_std)]
-// They are made in constants, which `Default` cannot be.
+// Used in constants, where `Default` is not available.
 #![allow(clippy::new_without_default)]
 
 pub mod board;
 pub mod console;
+mod hash;
 pub mod link;
 pub mod monitor;
 pub mod rotor_tracking;
+pub mod settings;
 pub mod store;
+
+// The fuzz targets share a file of the tests, which names the library from outside.
+#[cfg(test)]
+extern crate self as induction_drive;

@@ -1,7 +1,6 @@
-//! What goes between the main loop and the control interrupt.
+//! Communication between the main loop and the control interrupt.
 
 pub mod mailbox;
-pub mod ring;
 pub mod trace;
 
 use drive_core::{Accepted, Hardware, Refused, Sample, State, Telemetry};
@@ -9,16 +8,17 @@ use drive_core::{Accepted, Hardware, Refused, Sample, State, Telemetry};
 /// The drive's answer to a command.
 pub type Answer = Result<Accepted, Refused>;
 
-/// What the main loop hears from the interrupt, `board::PERIODS_PER_STATUS` apart.
+/// Report of the control interrupt to the main loop, every `board::PERIODS_PER_STATUS` periods and at a change of
+/// state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Status {
     /// Control periods since the start, wrapping.
     pub periods: u32,
-    /// What the drive is doing.
+    /// State of the drive.
     pub state: State,
-    /// What the drive was last given.
+    /// Last input of the drive.
     pub sample: Sample,
-    /// What the drive made of it.
+    /// Signals of the drive in the same period.
     pub telemetry: Telemetry,
     /// Core cycles of the longest control period so far.
     pub worst_cycles: u32,

@@ -1,21 +1,21 @@
 //! The firmware of the drive.
 //!
-//! What runs when:
+//! Order of events:
 //!
 //! * [`main`], once: clocks, serial port, encoder, power stage with all switches off, converters, the
 //!   drive (`task/bring_up.rs`).
-//! * the control interrupt (`task/control.rs`), 6000 times a second, before all others: samples in,
-//!   `Drive::step`, compare values out, then one order from the console if there is one.
+//! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,
+//!   `Drive::step`, compare values out, then one command from the console if there is one.
 //! * the interrupt of the serial port (`chip/serial.rs`): a byte in, a byte out.
-//! * the loop at the end of `main`, between interrupts: console, the log ten times a second, the
-//!   rotor time constant where it is tracked (`task/supervisor.rs`), and the check of the control's memory
+//! * the loop at the end of `main`, between interrupts: console (`console.rs`), the log ten times a second, the
+//!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory
 //!   (`monitor/memory_check.rs`).
-//! * `chip/stop.rs`, when it cannot go on: outputs off, the reason kept for the next boot, reset.
-//! * the watchdog (`monitor/watchdog.rs`), when the loop or the control interrupt does not come round.
+//! * `chip/stop.rs`, when the firmware cannot go on: outputs off, the reason kept for the next boot, reset.
+//! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls.
 //!
-//! The drive starts off; `start` at the console is what switches the outputs on.
+//! The drive starts off; `start` at the console switches the outputs on.
 //!
-//! On a host this is a program that says how to flash.
+//! On a host this is a program that explains how to flash.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -28,10 +28,15 @@ mod task;
 #[cortex_m_rt::entry]
 fn main() -> ! {
     use defmt_rtt as _; // the log goes to the debug probe
+    use induction_drive::monitor::record::Reason;
 
     chip::memory::paint_stack();
     defmt::info!("induction-drive {}", task::supervisor::VERSION);
-    let task::bring_up::Board { settings, mut port, mut supervisor } = task::bring_up::bring_up();
+    let Ok(task::bring_up::Board { settings, mut port, mut supervisor }) =
+        task::bring_up::bring_up()
+    else {
+        chip::stop::end(Reason::Panic, [line!(), 0, 0, 0])
+    };
     let mut console = induction_drive::console::Console::new(settings);
     console.greet(&supervisor);
 
@@ -40,13 +45,13 @@ fn main() -> ! {
         console.poll(&mut port, &mut supervisor, now_ms);
         supervisor.check_memory();
         supervisor.feed_watchdog();
-        // Until an interrupt. At the end: without the control's, what is to be said wakes nobody before it
-        // is begun.
+        // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
+        // greeting is sent.
         cortex_m::asm::wfi();
     }
 }
 
-/// Says how to flash.
+/// Explains how to flash.
 #[cfg(not(target_os = "none"))]
 fn main() {
     println!(

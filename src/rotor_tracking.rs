@@ -1,4 +1,4 @@
-//! The rotor time constant while the drive runs: [`Online`] in the main loop, fed by the control
+//! Online identification of the rotor time constant: [`Online`] in the main loop, fed by the control
 //! interrupt period by period.
 
 use core::f32::consts::TAU;
@@ -6,7 +6,6 @@ use core::fmt;
 
 use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use drive_core::io::PERIOD_S;
-use drive_core::math::decimal::Fixed;
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, AlphaBeta, Dq, Settings, Telemetry};
 
@@ -15,10 +14,9 @@ use crate::board;
 /// Control periods from one fit of the machine to the next: ten a second.
 const PERIODS_PER_FIT: u32 = board::PWM_HZ / 10;
 
-/// What a control period shows of the motor. The numbers count up while the drive regulates: where
-/// one is missing there is a gap.
+/// Signals of one control period. The numbers count up while the drive regulates; a missing number is a gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct Observation {
     number: u32,
     measured: AlphaBeta,
     realised: AlphaBeta,
@@ -26,38 +24,37 @@ pub struct Seen {
     rotor_freq: f32,
 }
 
-impl Seen {
-    /// What control period `number` has seen and done.
-    #[inline]
+impl Observation {
+    /// The signals of control period `number`.
     pub fn new(number: u32, t: &Telemetry) -> Self {
         let Telemetry { measured, realised, reference, rotor_freq, .. } = *t;
         Self { number, measured, realised, reference, rotor_freq }
     }
 }
 
-/// The estimate and what becomes of it.
+/// The estimate, and the value that the drive uses.
 #[derive(Clone, Copy, Debug)]
 pub struct Tracking {
     online: Online,
     source: AngleSource,
-    /// Number of the period that comes next, if there is no gap.
+    /// Number of the next period, if there is no gap.
     next: u32,
     /// Periods until the next fit.
     wait: u32,
     report: Report,
 }
 
-/// For the console.
+/// State of the tracking, for the console.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// The estimate, or why there is none.
-    pub found: Result<RotorEstimate, NoEstimate>,
-    /// Rotor time constant that the drive uses, s.
+    /// The estimate, or the reason why there is none.
+    pub estimate: Result<RotorEstimate, NoEstimate>,
+    /// Rotor time constant in use, s.
     pub used: f32,
 }
 
 impl Tracking {
-    /// For a drive that has just taken these settings; nothing if they do not want it.
+    /// For a drive that has just taken these settings; `None` if they do not enable it.
     pub fn new(settings: &Settings) -> Option<Self> {
         if !settings.track_rotor {
             return None;
@@ -67,18 +64,18 @@ impl Tracking {
             source: settings.angle_source,
             next: 0,
             wait: PERIODS_PER_FIT,
-            report: Report { found: Err(NoEstimate::Settling), used: settings.motor.tau_r() },
+            report: Report { estimate: Err(NoEstimate::Settling), used: settings.motor.tau_r() },
         })
     }
 
-    /// Takes what the next period has seen. Ten times a second it gives a rotor time constant to be
-    /// ordered, s, if there is an estimate.
-    pub fn take(&mut self, seen: &Seen) -> Option<f32> {
+    /// Takes the next period. Ten times a second it returns the estimated rotor time constant, s, for
+    /// [`Command::RotorTimeConstant`](drive_core::Command::RotorTimeConstant), if there is one.
+    pub fn take(&mut self, seen: &Observation) -> Option<f32> {
         if seen.number != self.next {
             // The drive did not regulate, or the main loop came too late.
             self.online.restart();
             self.wait = PERIODS_PER_FIT;
-            self.report.found = Err(NoEstimate::Settling);
+            self.report.estimate = Err(NoEstimate::Settling);
         }
         self.next = seen.number.wrapping_add(1);
         self.online.push(seen.measured, seen.realised);
@@ -92,19 +89,19 @@ impl Tracking {
             AngleSource::Encoder => SpeedInput::Known(omega_m),
             AngleSource::Injection => SpeedInput::Guess(omega_m),
         };
-        self.report.found = self.online.refine(seen.reference, speed);
-        self.report.found.ok().map(|tracked| tracked.tau_r)
+        self.report.estimate = self.online.refine(seen.reference, speed);
+        self.report.estimate.ok().map(|tracked| tracked.tau_r)
     }
 
-    /// What the drive makes of the time constant `tau_r` that it was ordered, s.
-    pub fn taken(&mut self, tau_r: f32, taken: Accepted) {
-        self.report.used = match taken {
+    /// Notes the drive's answer to the time constant `tau_r`, s.
+    pub fn taken(&mut self, tau_r: f32, answer: Accepted) {
+        self.report.used = match answer {
             Accepted::AsGiven => tau_r,
             Accepted::Limited(used) => used,
         };
     }
 
-    /// For the console.
+    /// The present state.
     pub fn report(&self) -> Report {
         self.report
     }
@@ -112,14 +109,11 @@ impl Tracking {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ms = |s: f32| Fixed::<1>(1e3 * s);
-        match &self.found {
-            Ok(t) => {
-                write!(f, "tau_r {} ms +-{} %", ms(t.tau_r), Fixed::<1>(100.0 * t.uncertainty))?;
-            }
+        match &self.estimate {
+            Ok(t) => write!(f, "tau_r {:.1} ms +-{:.1} %", 1e3 * t.tau_r, 100.0 * t.uncertainty)?,
             Err(doubt) => write!(f, "tau_r not found: {doubt}")?,
         }
-        write!(f, "; used {} ms", ms(self.used))
+        write!(f, "; used {:.1} ms", 1e3 * self.used)
     }
 }
 
@@ -131,7 +125,7 @@ mod tests {
     use hil_sim::rig::{Rig, drive_settings, plant_settings};
 
     use super::*;
-    use crate::link::ring::Ring;
+    use heapless::spsc::Queue;
 
     /// A drive at 2 A on a locked shaft whose rotor has 30 % more resistance than it believes, and its
     /// tracking.
@@ -148,9 +142,9 @@ mod tests {
         (rig, Tracking::new(&settings).unwrap())
     }
 
-    fn seen(rig: &mut Rig, number: u32) -> Seen {
+    fn observe(rig: &mut Rig, number: u32) -> Observation {
         rig.step();
-        Seen::new(number, &rig.drive.telemetry())
+        Observation::new(number, &rig.drive.telemetry())
     }
 
     #[test]
@@ -168,7 +162,7 @@ mod tests {
         // The numbers wrap on the way.
         for n in 0..60_000_u32 {
             let number = (u32::MAX - 9).wrapping_add(n);
-            if let Some(tau_r) = tracking.take(&seen(&mut rig, number)) {
+            if let Some(tau_r) = tracking.take(&observe(&mut rig, number)) {
                 assert_eq!((n + 1) % PERIODS_PER_FIT, 0);
                 let taken = rig.drive.command(&Command::RotorTimeConstant(tau_r)).unwrap();
                 tracking.taken(tau_r, taken);
@@ -186,21 +180,21 @@ mod tests {
     #[test]
     fn a_main_loop_that_comes_too_late_begins_anew() {
         let (mut rig, mut tracking) = tracked();
-        let mut ring = Ring::<Seen, { board::SEEN_PERIODS }>::new();
-        let (mut write, mut read) = ring.split();
+        let mut queue = Queue::<Observation, { board::OBSERVED_PERIODS }>::new();
+        let (mut write, mut read) = queue.split();
         let (mut orders, mut lost) = (Vec::new(), 0);
         for n in 0..60_000_u32 {
-            if !write.push(seen(&mut rig, n)) {
+            if write.enqueue(observe(&mut rig, n)).is_err() {
                 lost += 1;
             }
             // It hangs for 100 periods once, and else comes every 20.
             if n % 20 == 19 && !(30_000..30_100).contains(&n) {
-                while let Some(seen) = read.pop() {
+                while let Some(seen) = read.dequeue() {
                     orders.extend(tracking.take(&seen).map(|_| n));
                 }
             }
             if n == 30_200 {
-                assert_eq!(tracking.report().found, Err(NoEstimate::Settling));
+                assert_eq!(tracking.report().estimate, Err(NoEstimate::Settling));
             }
         }
         assert!((30..60).contains(&lost), "{lost}");

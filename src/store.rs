@@ -1,136 +1,56 @@
-//! Settings that outlast a reset: two places in the flash, written in turn.
+//! Settings that outlast a reset: two slots in the flash, written in turn.
 //!
-//! One holds the set that counts, the other is written by the next `save`: erased, then the record,
-//! the double word with sequence number and checksum last. Wherever the power fails, that double word
-//! is missing, torn or whole, so that the set before counts, or the new one; there is no instant with
-//! none. A double word torn by a power failure is read as an error of the flash, never as data.
+//! One slot holds the valid set; the next `save` writes the other: it is erased, then the record is programmed, the
+//! double word with sequence number and checksum last. Wherever the power fails, that double word is missing, torn or
+//! whole, so that either the old or the new set is valid, at every instant. A double word torn by a power failure is
+//! read as an error of the flash, never as data.
 //!
-//! (Not `sequential-storage`, which moves what it holds through one page that it erases: it tells a page
-//! in use by 4 bits of its first and last word. With a page half erased it takes what is left of it for
-//! the source, and erases the good copy.)
+//! Own code instead of `sequential-storage` (8.0.2), which moves its contents through one page that it erases: that
+//! crate recognises a page in use by four bits of its first and last word. With a page half erased it takes the rest
+//! of it for the source, and erases the good copy.
 
 pub mod codec;
+mod flash;
 pub mod learned;
 
-use core::fmt;
+use codec::{COMMIT, Rejected, SlotContent};
+pub use flash::{Flash, FlashError, SLOT_WORDS, SLOTS};
 
-use crate::board;
-use crate::console::keys::FirmwareSettings;
-use codec::{COMMIT, Found, WORDS};
+use crate::settings::FirmwareSettings;
 
-/// How many places there are.
-pub const SLOTS: usize = 2;
-/// Double words in one.
-pub const SLOT_WORDS: usize = board::SETTINGS_SLOT_BYTES as usize / 8;
-const _: () = assert!(WORDS <= SLOT_WORDS);
-
-/// The flash behind the settings, in slots of [`SLOT_WORDS`] double words.
-pub trait Flash {
-    /// A double word, or nothing if the flash cannot correct it.
-    fn read(&mut self, slot: usize, word: usize) -> Option<u64>;
-    /// Erases a slot: all bits set.
-    ///
-    /// # Errors
-    /// The flash says so, or takes too long.
-    fn erase(&mut self, slot: usize) -> Result<(), Failed>;
-    /// Programs a double word that is erased.
-    ///
-    /// # Errors
-    /// The flash says so, or takes too long.
-    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed>;
-}
-
-/// The flash did not do what it was told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failed {
-    /// An erasure, with the status register.
-    Erase(u32),
-    /// A programming, with the status register.
-    Program(u32),
-    /// What was programmed is read back differently: at this double word.
-    Verify(usize),
-}
-
-impl fmt::Display for Failed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Erase(status) => write!(f, "the flash was not erased, status {status:#x}"),
-            Self::Program(status) => write!(f, "the flash was not programmed, status {status:#x}"),
-            Self::Verify(word) => write!(f, "double word {word} is read back differently"),
-        }
-    }
-}
-
-/// Why what is in the flash is not used; numbered like the faults (see `record.rs`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotUsed {
-    /// There is something, but no whole record.
-    Broken,
-    /// Written by a later version of the firmware: the version of its record.
-    Newer(u16),
-    /// The value of this setting is none that the firmware knows.
-    Value(&'static str),
-    /// The design rules do not take the settings.
-    Refused,
-}
-
-impl NotUsed {
-    /// Its number.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Broken => 70,
-            Self::Newer(_) => 71,
-            Self::Value(_) => 72,
-            Self::Refused => 73,
-        }
-    }
-}
-
-impl fmt::Display for NotUsed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} saved settings not used, defaults hold: ", self.code())?;
-        match self {
-            Self::Broken => f.write_str("no whole record"),
-            Self::Newer(version) => write!(f, "version {version}, known is {}", codec::VERSION),
-            Self::Value(key) => write!(f, "unknown value of {key}"),
-            Self::Refused => f.write_str("out of range"),
-        }
-    }
-}
-
-/// What was found at start.
+/// Contents of the flash at start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-// There is one at a time.
+// Exists once at a time.
 #[allow(clippy::large_enum_variant)]
 pub enum Loaded {
     /// Nothing was ever saved.
     Nothing,
-    /// The settings.
+    /// The saved settings.
     Settings(FirmwareSettings),
-    /// Something that is left as it is until the next `save`.
-    NotUsed(NotUsed),
+    /// A record that cannot be used; it stays in the flash at least until the next save.
+    Rejected(Rejected),
 }
 
-/// The flash, and which slot the next `save` must not touch.
+/// The saved settings: the flash, and the slot that the next `save` must not touch.
 #[derive(Debug)]
 pub struct Saved<F> {
     flash: F,
-    /// The slot that counts, and its sequence number.
+    /// The slot with the valid set, and its sequence number.
     newest: Option<(usize, u32)>,
-    /// Where the next one goes if none counts.
+    /// The slot for the next set if none is valid.
     free: usize,
 }
 
 impl<F: Flash> Saved<F> {
-    /// Looks at both slots. Settings that were saved before a key existed leave it as in `defaults`.
+    /// Reads both slots. Keys that the record does not hold keep their value of `defaults`.
     pub fn load(mut flash: F, defaults: &FirmwareSettings) -> (Self, Loaded) {
-        let found = [0, 1].map(|slot| codec::find(&mut |word| flash.read(slot, word)));
-        let sequence = |slot: usize| match found.get(slot) {
-            Some(Found::Whole { sequence, .. }) => Some(*sequence),
+        let contents = [0, 1].map(|slot| codec::inspect(&mut |word| flash.read(slot, word)));
+        let sequence = |slot: usize| match contents.get(slot) {
+            Some(SlotContent::Whole { sequence }) => Some(*sequence),
             _ => None,
         };
         let newest = match (sequence(0), sequence(1)) {
-            // Numbers wrap; the two are next to each other.
+            // The numbers wrap; those of the two slots are adjacent.
             (Some(a), Some(b)) if (b.wrapping_sub(a) as i32) < 0 => Some((0, a)),
             (_, Some(b)) => Some((1, b)),
             (Some(a), None) => Some((0, a)),
@@ -138,32 +58,33 @@ impl<F: Flash> Saved<F> {
         };
         let loaded = match newest {
             Some((slot, _)) => codec::settings(&mut |word| flash.read(slot, word), defaults)
-                .map_or_else(Loaded::NotUsed, Loaded::Settings),
-            None if found == [Found::Blank; SLOTS] => Loaded::Nothing,
-            None => Loaded::NotUsed(NotUsed::Broken),
+                .map_or_else(Loaded::Rejected, Loaded::Settings),
+            None if contents == [SlotContent::Blank; SLOTS] => Loaded::Nothing,
+            None => Loaded::Rejected(Rejected::Broken),
         };
-        let free = usize::from(found[0] != Found::Blank && found[1] == Found::Blank);
+        let blank = contents.map(|content| content == SlotContent::Blank);
+        let free = usize::from(!blank[0] && blank[1]);
         (Self { flash, newest, free }, loaded)
     }
 
-    /// Writes the settings. Takes long; only with the outputs off.
+    /// Writes the settings. Takes up to two erasures; only with the outputs off.
     ///
     /// # Errors
-    /// Why not; the set before still counts then.
-    pub fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
+    /// The flash failed; the previous set stays valid.
+    pub fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
         let (slot, sequence) = match self.newest {
             Some((newest, sequence)) => (1 - newest, sequence.wrapping_add(1)),
             None => (self.free, 0),
         };
         let record = codec::record(settings, sequence);
         self.flash.erase(slot)?;
-        // The one that makes it whole comes last.
+        // The double word that makes the record valid comes last.
         let others = (0..codec::length(&record)).filter(|word| *word != COMMIT);
         for word in others.chain([COMMIT]) {
             let Some(value) = record.get(word) else { continue };
             self.flash.program(slot, word, *value)?;
             if self.flash.read(slot, word) != Some(*value) {
-                return Err(Failed::Verify(word));
+                return Err(FlashError::Verify(word));
             }
         }
         self.newest = Some((slot, sequence));

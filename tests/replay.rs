@@ -7,7 +7,7 @@ use std::fs;
 
 use drive_core::{Command, Compare, Drive, Sample};
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::console::keys::FirmwareSettings;
+use induction_drive::settings::FirmwareSettings;
 
 /// Interrupts to a hash, so that a difference is located.
 const BLOCK: usize = 6000;
@@ -50,10 +50,6 @@ fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
         Some(Request::Stop) => drive.command(&Command::Stop),
         Some(Request::Torque(i_q)) => drive.command(&Command::Torque(i_q)),
         Some(Request::Position(turns)) => drive.command(&Command::Position(turns)),
-        Some(Request::Angle(source)) => {
-            settings.drive.angle_source = source;
-            drive.command(&Command::Configure(settings.build().unwrap()))
-        }
         Some(Request::Set(key, value)) => {
             key.set(settings, value);
             drive.command(&Command::Configure(settings.build().unwrap()))

@@ -41,7 +41,7 @@ use crate::settings::AngleSource;
 use axes::Axes;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused};
-use in_turn::Seen;
+use in_turn::StepResults;
 pub use layout::Layout;
 use observed::Observed;
 pub use observed::Telemetry;
@@ -64,7 +64,7 @@ pub use state::{Mode, State};
 #[derive(Clone, Debug)]
 pub struct Drive {
     c: Coefficients,
-    /// How often `c` was changed, wrapping.
+    /// Changes of `c`, counted, wrapping.
     changes: u32,
     control: ControlState,
     state: State,
@@ -77,7 +77,7 @@ pub struct Drive {
     learned: Option<Learned>,
 }
 
-/// What was asked for.
+/// References of the running mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct References {
     current: Dq,
@@ -103,9 +103,9 @@ impl Default for References {
     }
 }
 
-/// Everything that moves while the drive regulates; fresh at every start.
-// In this order: what every step needs lies together, within the 1020 bytes that a floating-point load
-// of the core reaches from one base. Without that every sixth instruction of a step computes an address.
+/// State of the control, fresh at every start.
+// In this order: the fields of every step lie within the 1020 bytes that a floating-point load of the core
+// reaches from one base address; otherwise every sixth instruction of a step computes an address.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 struct ControlState {
@@ -126,7 +126,7 @@ struct ControlState {
     lock: LockMonitorState,
     noise: NoiseWatchState,
     inverter_drop: InverterDropState,
-    /// Those demodulations that are not the usual one are large: at its end.
+    /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
 }
@@ -154,7 +154,7 @@ impl Drive {
         }
     }
 
-    /// What it is doing.
+    /// The present state.
     pub fn state(&self) -> State {
         self.state
     }
@@ -179,7 +179,7 @@ impl Drive {
         })
     }
 
-    /// Regulates the current. This is the control law, top to bottom.
+    /// Regulates the current: the control law, top to bottom.
     ///
     /// # Errors
     /// The state to go to with the outputs off: a fault, or off where it has stopped.
@@ -203,7 +203,7 @@ impl Drive {
 
         // Flux angle at the sample.
         let flux = if counts {
-            // (While it learns the shaft is locked.)
+            // While it learns, the shaft is locked.
             let count = if self.mode == Mode::Learning { 0 } else { sample.encoder };
             c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?
         } else {
@@ -213,8 +213,8 @@ impl Drive {
         let phi = flux.phi.unit_vector();
         let axes = &s.axes;
 
-        // The carrier's current is taken out by what is known of it; the low-pass takes the rest. (Its
-        // notch is 6 Hz wide: alone it would let the sidebands of a turning carrier through.)
+        // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
+        // alone it would let the sidebands of a turning carrier through.)
         let carrier =
             if c.inject { s.carrier.at(&c.injection, index) } else { CarrierPeriod::default() };
         let carrier_axis = phi.turned_by(axes.carrier);
@@ -232,7 +232,7 @@ impl Drive {
         let applied = phi.turned_by(axes.applied);
         let total = (voltage + axes.injection * carrier.voltage).to_alpha_beta(applied);
 
-        // Dead time: the sign of the current that is going to flow decides.
+        // Dead-time compensation, by the signs of the currents that will flow.
         let expected = (current + axes.injection * carrier.mean_current).to_alpha_beta(applied);
         let signs = c.dead_time.signs(expected.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
@@ -263,25 +263,25 @@ impl Drive {
             c.indirect.slip(&mut s.indirect, current.q);
             s.indirect.rotor_freq
         } else {
-            // The slip of what is asked for: that of the measured current would feed the angle error back.
+            // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            // The flux is held still until it stands.
+            // While the flux builds up, its angle is held.
             if !held && c.estimator.track(&mut s.estimator, reference.q, slip_freq).is_err() {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
         };
 
-        // What was computed must make sense before it is put out. (The current and the reference of the step
-        // before are in the voltage, and what the demodulation sees is in the speed.)
+        // No output from a state that is not finite. (The voltage contains current and reference of the step
+        // before, the speed contains the demodulated signal.)
         if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
         }
 
-        // Does the current follow the voltage? That, and what else is not asked in every period:
+        // Checks and slow tasks, one a sample.
         s.prediction.collect(measured.current, modulated.realised);
-        let step = Seen {
+        let results = StepResults {
             sample,
             measured: &measured,
             flux_current: if counts { current } else { reference },
@@ -294,7 +294,7 @@ impl Drive {
             held,
             learning: self.mode == Mode::Learning,
         };
-        c.in_turn(s, index, &step)?;
+        c.in_turn(s, index, &results)?;
         Ok(Compare::on(modulated.compare))
     }
 
@@ -333,8 +333,8 @@ impl Drive {
         Ok(Dq { d: self.control.references.current.d, q: i_q })
     }
 
-    /// Whether the flux is where the rotor is counted to be, and the slip ahead of it: by the encoder, or where
-    /// the shaft is locked.
+    /// Whether the flux angle is the counted rotor angle plus the slip: with the encoder, or while the drive
+    /// learns with the shaft locked.
     fn counts(&self) -> bool {
         self.c.source == AngleSource::Encoder || self.mode == Mode::Learning
     }
@@ -346,7 +346,7 @@ impl Drive {
 }
 
 impl ControlState {
-    /// Where the rotor is, counted as by an encoder, by the flux less the slip.
+    /// Angle of the rotor, flux less slip, counted as by an encoder.
     fn count_by_flux(&mut self) -> u32 {
         self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
     }

@@ -1,4 +1,4 @@
-//! What goes into the drive and what comes out: [`Sample`], [`Command`], [`Compare`].
+//! Input and output of the control step: [`Sample`] and [`Compare`].
 //!
 //! # The delay convention
 //!
@@ -20,7 +20,7 @@ pub(crate) fn periods(seconds: f32) -> u32 {
     libm::roundf(seconds / PERIOD_S) as u32
 }
 
-/// What the converters and the encoder read at the instant `k T` of one PWM period.
+/// The readings of converters and encoder at the instant `k T` of one PWM period.
 ///
 /// Plain register values: scaling is the drive's work, so that there is one place for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub struct Sample {
     /// Position counter of the quadrature encoder, four counts a line, wrapping, upwards when the
     /// rotor turns from phase a towards phase b.
     pub encoder: u32,
-    /// What the hardware has noticed since the last sample.
+    /// Events since the last sample.
     pub hardware: Hardware,
 }
 
@@ -57,7 +57,7 @@ bitflags! {
     }
 }
 
-/// What the timer is to do during the period from `(k + 1) T` to `(k + 2) T`.
+/// The compare values of the timer for the period from `(k + 1) T` to `(k + 2) T`.
 ///
 /// The counter runs up and down between 0 and [`Inverter::top`](crate::settings::Inverter::top)
 /// and the high side of a leg is on while it is below the compare value; the period starts at the

@@ -4,14 +4,28 @@
 //! The whole drive is one type, [`Drive`], and the whole control one function, [`Drive::step`]:
 //! converter codes go in as a [`Sample`], timer values come out as a [`Compare`]. The same code runs
 //! in the control interrupt of the firmware and against the simulated motor on a host, and gives the
-//! same bits on both: angles are integers, sine and cosine come from one integer table, no function
-//! of a maths library is called in the step, and no multiplication is fused with an addition.
+//! same bits on both: angles are integers, sine and cosine come from one integer table, the step calls no
+//! transcendental function (its square roots are those of libm, in software on both), and no
+//! multiplication is fused with an addition.
 //!
 //! Inside, one direction only:
 //!
 //! ```text
 //! sensing -> frames -> filters -> flux angle -> current loop -> injection -> dead time -> modulation
 //! ```
+//!
+//! | room | contents |
+//! |---|---|
+//! | [`io`], [`fault`] | sample and compare values; the numbered faults |
+//! | [`math`], [`filter`] | angles and frames; second-order sections |
+//! | [`current`] | sensing, PI, modulation, dead time and drop of the inverter |
+//! | [`carrier`] | the injected voltage and the demodulation of its current |
+//! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
+//! | [`motion`] | speed and position loop |
+//! | [`protect`] | checks of sensors, wiring, saliency and lock |
+//! | [`identify`] | learning of the tracking reference; rotor time constant while running |
+//! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
+//! | `drive` | [`Drive`], its [`Coefficients`], states and commands |
 //!
 //! Each block is a small pair of coefficients (made from settings in SI units, outside the
 //! interrupt) and state, with one step function. Equation, table, figure and section numbers are
@@ -22,7 +36,7 @@
 //!
 //! * Amplitude-invariant Clarke transformation: currents and voltages are peak phase values.
 //! * `phi` is the angle of the rotor flux, `theta = phi + 90°` the injection axis; electrical.
-//! * A speed inside is a `step`: electrical turns per control period of 1/6000 s.
+//! * A frequency or speed inside (`*_freq`) is normalised: electrical turns per control period of 1/6000 s.
 //! * The machine is the T-equivalent circuit: r_s, r_r, L_m and the two leakages.
 //! * Sample `k` acts in period `k + 1`: see [`io`].
 #![cfg_attr(not(test), no_std)]

@@ -2,10 +2,15 @@
 //! save after it is loaded again.
 #![no_main]
 
-use induction_drive::console::doubles::found;
-use induction_drive::console::keys::FirmwareSettings;
-use induction_drive::saved::{Failed, Flash, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::{Flash, FlashError, Loaded, SLOT_WORDS, SLOTS, Saved, codec};
 use libfuzzer_sys::fuzz_target;
+
+// The stand-ins for drive and port are for the other target.
+#[allow(dead_code)]
+#[path = "../../src/console/tests/doubles.rs"]
+mod doubles;
+use doubles::found;
 
 struct Fake([[Option<u64>; SLOT_WORDS]; SLOTS]);
 
@@ -13,11 +18,11 @@ impl Flash for &mut Fake {
     fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
         self.0[slot][word]
     }
-    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+    fn erase(&mut self, slot: usize) -> Result<(), FlashError> {
         self.0[slot] = [Some(u64::MAX); SLOT_WORDS];
         Ok(())
     }
-    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), FlashError> {
         assert_eq!(self.0[slot][word], Some(u64::MAX), "not erased");
         self.0[slot][word] = Some(value);
         Ok(())

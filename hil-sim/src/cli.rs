@@ -165,7 +165,7 @@ fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
     say(&format!("Report: {}\n", path.display()))
 }
 
-/// Prints on standard output. A reader that has gone away, like `head`, is no error.
+/// Prints on standard output. A closed pipe, as behind `head`, is no error.
 fn say(text: &str) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -34,7 +34,7 @@ impl Progress {
     }
 }
 
-/// A progress bar; gone when dropped. Can be used from many threads at once.
+/// A progress bar; removed when dropped. Can be used from many threads at once.
 pub struct Bar(ProgressBar);
 
 impl Bar {

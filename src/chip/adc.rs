@@ -1,5 +1,5 @@
 //! The converters: ADC1 and ADC2 sample both phase currents at the same instant, then dc link and
-//! heat sink, started by TIM1 once per period. The end of the sequence is the control interrupt.
+//! heat sink, started by TIM1 once per period. The end of the sequence raises the control interrupt.
 
 use cortex_m::asm;
 use stm32g4xx_hal::gpio::{Analog, PA0, PA1, PC1, PC2};
@@ -21,12 +21,12 @@ pub struct Pins {
     pub heat_sink: PC2<Analog>,
 }
 
-/// What a converter did not do in time.
+/// A step that a converter did not finish in time.
 #[derive(Clone, Copy, defmt::Format)]
-pub enum Stuck {
-    /// Calibrate itself.
-    Calibrating,
-    /// Get ready.
+pub enum AdcTimeout {
+    /// Its calibration.
+    Calibration,
+    /// Its start.
     Enabling,
 }
 
@@ -43,14 +43,14 @@ pub struct Codes {
     pub heat_sink: u16,
 }
 
-/// What the converters have to tell.
+/// Events of the converters.
 #[derive(Clone, Copy)]
-pub struct Events {
-    /// A current was outside its window since the last look.
+pub struct AdcEvents {
+    /// A current was outside its window since the last call.
     pub over_current: bool,
-    /// The sequence of the first has ended: the interrupt may have come for a watchdog.
+    /// The sequence of ADC1 has ended. An interrupt without it comes from an analog watchdog.
     pub ended: bool,
-    /// That of the second, too.
+    /// The sequences of both have ended.
     pub complete: bool,
 }
 
@@ -61,14 +61,17 @@ pub struct Adc {
 }
 
 impl Adc {
-    /// Sets both converters up and leaves them waiting for the trigger.
+    /// Sets both converters up; they wait for the trigger.
+    ///
+    /// # Errors
+    /// A converter did not finish a step in time.
     pub fn new(
         one: pac::ADC1,
         two: pac::ADC2,
         common: &pac::ADC12_COMMON,
         pins: Pins,
         rcc: &mut Rcc,
-    ) -> Result<Self, Stuck> {
+    ) -> Result<Self, AdcTimeout> {
         pins.current_a.into_analog();
         pins.current_b.into_analog();
         pins.dc_link.into_analog();
@@ -79,8 +82,8 @@ impl Adc {
         common.ccr().write(|w| w.ckmode().sync_div4());
         prepare(&one, board::ADC1_CHANNELS, board::ANALOG_WINDOW_A)?;
         prepare(&two, board::ADC2_CHANNELS, board::ANALOG_WINDOW_B)?;
-        // Both sequences take the same time, so one interrupt at their end is enough. The watchdogs
-        // ask earlier, when the current is converted.
+        // Both sequences take the same time, so one interrupt at their end is enough. The analog watchdogs
+        // interrupt earlier, when the current is converted.
         one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
         two.ier().write(|w| w.awd1ie().enabled());
         for converter in [&*one, &*two] {
@@ -89,9 +92,8 @@ impl Adc {
         Ok(Self { one, two })
     }
 
-    /// What both converters have to tell; takes back what is only told once.
-    #[inline(always)]
-    pub fn look(&mut self) -> Events {
+    /// The events of both converters; clears those of the analog watchdogs.
+    pub fn take_events(&mut self) -> AdcEvents {
         let (one, two) = (self.one.isr().read(), self.two.isr().read());
         let over_current = one.awd1().bit() || two.awd1().bit();
         if over_current {
@@ -99,13 +101,12 @@ impl Adc {
             self.two.isr().write(|w| w.awd1().clear());
         }
         let ended = one.jeos().bit();
-        Events { over_current, ended, complete: ended && two.jeos().bit() }
+        AdcEvents { over_current, ended, complete: ended && two.jeos().bit() }
     }
 
-    /// The codes of the sequence that has just ended; takes the interrupt request back.
-    #[inline(always)]
+    /// The codes of the sequence that has just ended; clears the interrupt request.
     pub fn read(&mut self) -> Codes {
-        // Before the data are read: a sequence that ends from here on asks again.
+        // Before the data are read: a sequence that ends from here on raises a new request.
         self.one.isr().write(|w| w.jeoc().clear().jeos().clear());
         self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
         Codes {
@@ -117,41 +118,41 @@ impl Adc {
     }
 }
 
-/// Power, calibration, sequence; in the order of RM0440.
+/// Sets a converter up: power, calibration, sequence, in the order of RM0440.
 fn prepare(
     adc: &RegisterBlock,
     (current, slow): (u8, u8),
     (low, high): (u16, u16),
-) -> Result<(), Stuck> {
+) -> Result<(), AdcTimeout> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
 
     adc.cr().modify(|_, w| w.adcaldif().single_ended().adcal().start_calibration());
-    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(Stuck::Calibrating)?;
+    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(AdcTimeout::Calibration)?;
     // At least four converter clocks between the calibration and the next step.
     asm::delay(8 * board::ADC_CLOCK_DIVIDER);
 
     adc.isr().write(|w| w.adrdy().clear());
     adc.cr().modify(|_, w| w.aden().enabled());
-    wait_for(|| adc.isr().read().adrdy().bit()).ok_or(Stuck::Enabling)?;
+    wait_for(|| adc.isr().read().adrdy().bit()).ok_or(AdcTimeout::Enabling)?;
 
     for (channel, time) in [(current, board::CURRENT_SAMPLING), (slow, board::SLOW_SAMPLING)] {
         // Channels 0 to 9: all that are used.
         adc.smpr1().modify(|_, w| w.smp(channel).set(time.code));
     }
-    // The watchdog asks at the first code outside the window.
+    // The analog watchdog interrupts at the first code outside the window.
     // SAFETY: twelve bits each, from codes of twelve bits.
     adc.tr1().write(|w| unsafe { w.lt1().bits(low).ht1().bits(high) });
-    // It looks at the current alone. No queue of sequences: the one below holds for good.
-    // SAFETY: five bits, a channel that exists.
+    // It checks the current alone. No queue of sequences: the one below never changes.
+    // SAFETY: five bits, an existing channel.
     adc.cfgr().modify(|_, w| unsafe {
         w.awd1ch().bits(current).awd1sgl().set_bit().jawd1en().set_bit().jqdis().set_bit()
     });
     adc.jsqr().write(|w| {
-        // SAFETY: five bits each, channels that exist.
+        // SAFETY: five bits each, existing channels.
         unsafe { w.jsq1().bits(current).jsq2().bits(slow) };
-        // Length 2, which the register writes as 1; a rising trigger output 2 of TIM1.
+        // Length 2, coded as 1; trigger: rising edge of trigger output 2 of TIM1.
         w.jl().set(1).jextsel().tim1_trgo2().jexten().rising_edge()
     });
     Ok(())

@@ -1,4 +1,4 @@
-//! Clocks: 170 MHz from the crystal, or from the internal oscillator where the crystal is dead.
+//! Clocks: 170 MHz from the crystal, or from the internal oscillator if the crystal does not start.
 
 use cortex_m::asm;
 use stm32g4xx_hal::pac;
@@ -10,7 +10,7 @@ use stm32g4xx_hal::time::RateExtU32;
 
 use induction_drive::board;
 
-/// What the core runs from.
+/// Source of the core's clock.
 #[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]
 pub enum Source {
     /// The crystal.
@@ -42,7 +42,7 @@ pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) 
         (Source::Internal, PllSrc::HSI, INTERNAL_DIVIDER)
     };
 
-    // The supply is watched; what comes of it goes to the break of TIM1 (`pwm.rs`).
+    // The supply monitor; its output goes to the break of TIM1 (`pwm.rs`).
     // SAFETY: three bits, all of them levels.
     pwr.cr2().modify(|_, w| unsafe { w.pvdls().bits(board::SUPPLY_LEVEL) }.pvde().set_bit());
 
@@ -62,7 +62,7 @@ pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) 
     (rcc, source)
 }
 
-/// Switches the crystal on and waits for it, not for ever.
+/// Switches the crystal on and waits for it, with a limit.
 fn crystal_starts(rcc: &Rcc) -> bool {
     rcc.cr().modify(|_, w| w.hseon().on());
     for _ in 0..board::HSE_START_MS * 10 {

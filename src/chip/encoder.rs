@@ -1,7 +1,7 @@
 //! The encoder: TIM2 counts both edges of both tracks, 32 bits, wrapping.
 //!
-//! The index is left out: the flux angle needs no absolute position, and the drive finds a count that
-//! runs away by itself (`Fault::Encoder`, and by the current that does not follow the voltage).
+//! The index is not used: the flux angle needs no absolute position, and the drive detects lost counts
+//! by itself (`Fault::Encoder`, and by the current that does not follow the voltage).
 
 use stm32g4xx_hal::gpio::{Debugger, PA15, PB3, Pull};
 use stm32g4xx_hal::pac;
@@ -36,8 +36,7 @@ impl Encoder {
         Self { timer }
     }
 
-    /// Counts, four a line.
-    #[inline(always)]
+    /// The count, four per line.
     pub fn count(&self) -> u32 {
         self.timer.cnt().read().bits()
     }

@@ -1,8 +1,12 @@
 //! The flash pages of the settings: reading past torn double words, erasing, programming.
 //!
 //! Erasing and programming follow RM0440 (FLASH main memory erase and programming sequences). With two
-//! banks the code, in the first, goes on while the second is written; with one, the core waits for as
-//! long as an erasure takes (22 ms), which is why the outputs must be off.
+//! banks the code, in the first, continues while the second is written; with one, the core waits for
+//! an erasure (22 ms), so the outputs must be off.
+//!
+//! Own code instead of `stm32g4xx_hal::flash` (0.1.0), which does not suit the second bank nor torn data: it never sets
+//! the bank (BKER), waits without a limit, checks one error flag of an erasure, accepts a double word of which one half
+//! reads back, leaves the data cache as it is, and reads without regard to errors that the flash cannot correct.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,7 +15,7 @@ use cortex_m::peripheral::DWT;
 use stm32g4xx_hal::pac;
 
 use induction_drive::board;
-use induction_drive::store::{Failed, Flash};
+use induction_drive::store::{Flash, FlashError};
 
 /// The pages of the settings.
 pub struct Pages {
@@ -19,23 +23,23 @@ pub struct Pages {
     dual_bank: bool,
 }
 
-/// Whether a double word of the settings is being read, which may be torn.
+/// Whether a double word of the settings, which may be torn, is being read.
 static READING: AtomicBool = AtomicBool::new(false);
-/// Whether it was.
+/// Whether that double word was torn.
 static TORN: AtomicBool = AtomicBool::new(false);
 
 /// The two keys that unlock the flash (RM0440, FLASH_KEYR).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 /// All error flags and the end flag of FLASH_SR; written back they are cleared.
 const STATUS_FLAGS: u32 = 0xc3fb;
-/// Of these, the end of an operation.
+/// The end flag among them.
 const STATUS_END: u32 = 1;
 
-/// Takes an error that the flash cannot correct back, if it is one of a read in here: for the
+/// Clears an uncorrectable error of the flash if it belongs to a read of the settings; `false` if it does not. For the
 /// non-maskable interrupt.
 ///
-/// While a double word of the settings is read, an error in the code that reads it would be taken for
-/// one of the settings; the code is read again without that, and the error comes again.
+/// An error in the code that reads the settings would be taken for one of the settings. The code is fetched again
+/// later, and the error is raised again.
 pub fn forgive_torn() -> bool {
     // SAFETY: FLASH exists for as long as the chip does; only its error flags are touched.
     let registers = unsafe { &*pac::FLASH::ptr() };
@@ -56,6 +60,7 @@ impl Pages {
         Self { registers, dual_bank }
     }
 
+    /// Does `work` with the flash unlocked; returns its status.
     fn unlocked(&mut self, work: impl FnOnce(&mut Self) -> u32) -> u32 {
         if self.registers.cr().read().lock().bit() {
             for key in KEYS {
@@ -68,7 +73,7 @@ impl Pages {
         let status = work(self);
         self.registers.cr().modify(|_, w| w.per().clear_bit().pg().clear_bit());
         self.registers.cr().modify(|_, w| w.lock().set_bit());
-        // The data cache does not notice. It is emptied, which it only is while it is off.
+        // The data cache does not follow changes of the flash. It can be cleared only while it is off.
         self.registers.acr().modify(|_, w| w.dcen().clear_bit());
         self.registers.acr().modify(|_, w| w.dcrst().set_bit());
         self.registers.acr().modify(|_, w| w.dcrst().clear_bit());
@@ -76,7 +81,7 @@ impl Pages {
         status
     }
 
-    /// Waits for the end of the operation; gives the errors, or all bits if it does not end.
+    /// Waits for the end of the operation; returns its error flags, or all bits if it does not end.
     fn finished(&self) -> u32 {
         let began = DWT::cycle_count();
         while self.registers.sr().read().bsy().bit() {
@@ -94,10 +99,10 @@ impl Flash for Pages {
         let address = board::settings_address(slot, word) as *const u32;
         TORN.store(false, Ordering::Relaxed);
         READING.store(true, Ordering::SeqCst);
-        // SAFETY: the pages of the settings, aligned, which nothing else uses; volatile, because they
-        // change without the compiler's knowledge.
+        // SAFETY: an aligned address in the pages of the settings, which nothing else uses; volatile, because they
+        // change unknown to the compiler.
         let (low, high) = unsafe { (address.read_volatile(), address.add(1).read_volatile()) };
-        // The interrupt comes with the read, not some instructions later.
+        // The interrupt comes before the next line.
         asm::dsb();
         asm::isb();
         forgive_torn();
@@ -106,7 +111,7 @@ impl Flash for Pages {
         (!torn).then_some(u64::from(low) | u64::from(high) << 32)
     }
 
-    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+    fn erase(&mut self, slot: usize) -> Result<(), FlashError> {
         let (second_bank, page) = board::settings_page(slot, self.dual_bank);
         let status = self.unlocked(|pages| {
             pages.registers.cr().modify(|_, w| {
@@ -117,10 +122,10 @@ impl Flash for Pages {
             pages.registers.cr().modify(|_, w| w.strt().set_bit());
             pages.finished()
         });
-        if status == 0 { Ok(()) } else { Err(Failed::Erase(status)) }
+        if status == 0 { Ok(()) } else { Err(FlashError::Erase(status)) }
     }
 
-    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), FlashError> {
         let address = board::settings_address(slot, word) as *mut u32;
         let status = self.unlocked(|pages| {
             pages.registers.cr().modify(|_, w| w.pg().set_bit());
@@ -134,6 +139,6 @@ impl Flash for Pages {
             asm::dsb();
             pages.finished()
         });
-        if status == 0 { Ok(()) } else { Err(Failed::Program(status)) }
+        if status == 0 { Ok(()) } else { Err(FlashError::Program(status)) }
     }
 }

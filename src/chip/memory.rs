@@ -1,10 +1,10 @@
-//! What the linker script lays out: the control code in CCM, and the stack, with nothing below it.
+//! Memory laid out by the linker script: the control code in CCM, and the stack, with nothing below it.
 
 use core::ptr;
 
 use cortex_m::register::msp;
 
-use induction_drive::monitor::memory_check::Part;
+use induction_drive::monitor::memory_check::MemoryRange;
 
 unsafe extern "C" {
     static mut _stack_start: u32;
@@ -29,15 +29,15 @@ unsafe extern "C" fn copy_control_code() {
         "stm r0!, {{r3}}",
         "b 2b",
         "3:",
-        // What was written must be what is fetched.
+        // The writes end before the code is fetched.
         "dsb",
         "isb",
         "bx lr",
     )
 }
 
-/// Where the code in CCM is, and where it was copied from.
-pub fn control_code() -> (Part, u32) {
+/// The code in CCM, and the address it was copied from.
+pub fn control_code() -> (MemoryRange, u32) {
     unsafe extern "C" {
         static __sccm: u32;
         static __eccm: u32;
@@ -45,15 +45,15 @@ pub fn control_code() -> (Part, u32) {
     }
     let [begin, end, source] =
         [&raw const __sccm, &raw const __eccm, &raw const __siccm].map(|at| at as u32);
-    (Part { address: begin, words: (end - begin) / size_of::<u32>() as u32 }, source)
+    (MemoryRange { address: begin, words: (end - begin) / size_of::<u32>() as u32 }, source)
 }
 
 /// The word at an address that is a multiple of 4, in the flash or in RAM.
 pub fn word(address: u32) -> u32 {
     let word;
-    // SAFETY: all callers' addresses are those of statics, and reading memory changes nothing. By an
-    // instruction that the compiler does not look into: the word may be padding or the interrupt's own,
-    // which no read of Rust's may touch. A word is read whole, before the interrupt wrote it or after.
+    // SAFETY: all callers pass addresses of statics, and reading memory changes nothing. In assembler, because the
+    // word may be padding or the interrupt's own, which no read in Rust may touch. A word is read whole, before or
+    // after a write of the interrupt.
     unsafe {
         core::arch::asm!(
             "ldr {word}, [{address}]",
@@ -65,8 +65,8 @@ pub fn word(address: u32) -> u32 {
     word
 }
 
-/// The build id: a hash that the linker makes of the image, so that what runs can be told from what was
-/// built. Behind the note's header (12 bytes) and its name, `GNU`.
+/// The build id: the linker's hash of the image, which identifies the running build. It lies behind the note's header
+/// (12 bytes) and its name, `GNU`.
 pub fn build_id() -> [u8; 8] {
     const BEHIND: usize = 16;
     unsafe extern "C" {
@@ -76,12 +76,12 @@ pub fn build_id() -> [u8; 8] {
     unsafe { (&raw const _build_id).add(BEHIND).cast::<[u8; 8]>().read() }
 }
 
-/// What unused stack holds.
+/// Contents of unused stack.
 const PAINT: u32 = 0xc5c5_c5c5;
-/// Words above the stack pointer's next use that are left alone, for what calls `paint_stack`.
+/// Words below the stack pointer that are not painted: room for `paint_stack` itself.
 const MARGIN_WORDS: usize = 16;
 
-/// Paints the unused stack. Once, first thing in `main`.
+/// Paints the unused stack; called once, first in `main`.
 pub fn paint_stack() {
     let end = &raw mut _stack_end;
     let used_from = msp::read() as usize;
@@ -92,7 +92,7 @@ pub fn paint_stack() {
     }
 }
 
-/// Most bytes of the stack that were ever used.
+/// Most bytes of the stack used so far.
 pub fn stack_used() -> usize {
     let end = &raw const _stack_end;
     let words = stack_size() / size_of::<u32>();

@@ -1,4 +1,4 @@
-//! The power stage: TIM1 makes the six gate signals, with dead time and break input.
+//! The power stage: TIM1 generates the six gate signals, with dead time and break input.
 //!
 //! The counter runs up to [`board::PWM_TOP`] and down to 0 once per period. A high side is on while
 //! the counter is below the compare value of its leg, so all low sides are on around the top. There
@@ -23,17 +23,22 @@ pub struct Pins {
     pub fault: PA6<Analog>,
 }
 
-/// The timer does not take over its compare values where all low sides are on, or does not run.
+/// Reason why the timer was not set up or started.
 #[derive(Clone, Copy, defmt::Format)]
-pub struct NotInStep;
+pub enum PwmError {
+    /// The address of its break register is not [`board::TIM1_BDTR`], which the fault handler writes.
+    WrongAddress,
+    /// It does not take over its compare values where all low sides are on, or does not run.
+    NotInStep,
+}
 
-/// What the timer has to tell.
+/// Events of the timer.
 #[derive(Clone, Copy)]
-pub struct Events {
-    /// It has taken over compare values since the last look.
+pub struct TimerEvents {
+    /// It has taken over compare values since the last call.
     pub updated: bool,
-    /// The power stage, the comparator or a fault inside the chip has pulled the break since the last look,
-    /// or still pulls it.
+    /// The power stage, the comparator or a fault inside the chip has pulled the break since the last
+    /// call, or still pulls it.
     pub pulled: bool,
 }
 
@@ -45,6 +50,9 @@ pub struct Pwm {
 
 impl Pwm {
     /// Sets up the timer, with all six switches off and the counter at rest.
+    ///
+    /// # Errors
+    /// [`PwmError::WrongAddress`].
     pub fn new(
         timer: pac::TIM1,
         pins: Pins,
@@ -52,9 +60,10 @@ impl Pwm {
         debug: &pac::DBGMCU,
         system: &pac::SYSCFG,
         dead_time_code: u8,
-    ) -> Self {
-        // Both names of one register: see board.rs.
-        assert!(timer.bdtr().as_ptr() as u32 == board::TIM1_BDTR);
+    ) -> Result<Self, PwmError> {
+        if timer.bdtr().as_ptr() as u32 != board::TIM1_BDTR {
+            return Err(PwmError::WrongAddress);
+        }
         rcc.apb2enr().modify(|_, w| w.tim1en().enabled());
         // Halted by a debugger, the counter stops and the outputs go off.
         debug.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
@@ -94,14 +103,14 @@ impl Pwm {
             .modify(|_, w| w.cll().set_bit().spl().set_bit().pvdl().set_bit().eccl().set_bit());
 
         // The break inputs: pin PA6, low trips, so inverted; the comparator of the dc link, high trips.
-        // All of them go through one OR gate, so behind their own polarity each must be low while all is
-        // well, and the break itself is active high (BKP below).
+        // One OR gate combines them, so each must be low behind its own polarity in normal operation, and the break
+        // itself is active high (BKP below).
         timer.af1().write(|w| w.bkine().set_bit().bkinp().set_bit().bkcmp1e().set_bit());
         timer.bdtr().write(|w| {
             w.dtg().set(dead_time_code);
             // Off means driven to the idle level, which is low (CR2.OISx = 0): not floating.
             w.ossi().idle_level().ossr().idle_level();
-            // Nothing but software switches the outputs on again.
+            // Only software switches the outputs on again.
             w.bke().enabled().bkp().active_high().aoe().manual();
             // SAFETY: BKF is four bits wide; every value is one of the filters.
             unsafe { w.bkf().bits(board::BREAK_FILTER) };
@@ -117,12 +126,11 @@ impl Pwm {
         timer.egr().write(|w| w.ug().update());
         timer.rcr().write(|w| w.rep().set(board::PWM_UPDATES_LEFT_OUT));
 
-        // From here to the next reset nobody changes dead time, polarity, break, idle level or
-        // output mode any more.
+        // Locks dead time, polarity, break, idle level and output mode until the next reset.
         timer.bdtr().modify(|_, w| w.lock().level3());
 
-        // Only now the pins: they are driven low. The resistor holds them low as well, should the
-        // timer ever let go.
+        // The pins follow last: they are driven low. The resistors hold them low as well, should the timer ever
+        // release them.
         let Pins { high, low, fault } = pins;
         high.0.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
         high.1.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
@@ -130,69 +138,64 @@ impl Pwm {
         low.0.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
         low.1.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
         low.2.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        // Pulled down, so that a wire that came off trips. The power stage must pull it up (10 kOhm
-        // or less against the 40 kOhm in here).
+        // Pulled down, so that a broken wire trips. The power stage must pull it up (10 kOhm or less against the
+        // 40 kOhm of the chip).
         Input::new(fault, Pull::Down).into_alternate::<{ board::PWM_AF }>();
 
-        Self { timer, on: false }
+        Ok(Self { timer, on: false })
     }
 
     /// Starts the counter and checks that the compare values are taken over at the top.
-    pub fn start(&mut self) -> Result<(), NotInStep> {
+    ///
+    /// # Errors
+    /// [`PwmError::NotInStep`].
+    pub fn start(&mut self) -> Result<(), PwmError> {
         self.timer.sr().write(|w| w.uif().clear().bif().clear());
         self.timer.cr1().modify(|_, w| w.cen().enabled());
         // The first update comes half a period later; a whole period is time enough.
         for _ in 0..2 * u32::from(board::PWM_TOP) / 16 {
             if self.updated() {
                 let near_the_top = self.timer.cnt().read().cnt().bits() > board::PWM_TOP / 2;
-                return if near_the_top { Ok(()) } else { Err(NotInStep) };
+                return if near_the_top { Ok(()) } else { Err(PwmError::NotInStep) };
             }
             asm::delay(16);
         }
-        Err(NotInStep)
+        Err(PwmError::NotInStep)
     }
 
-    /// Does what the drive wants: compare values for the period after this one, outputs on or off
-    /// now.
+    /// Applies the output of the drive: compare values for the next period, outputs on or off now.
     ///
-    /// Until the first compare values are taken over, the zeros from before hold: low sides on.
-    #[inline(always)]
+    /// Until the first compare values are taken over, the initial zeros hold: low sides on.
     pub fn apply(&mut self, compare: Compare) {
         if !compare.enabled {
-            // First of all.
             self.trip();
         }
         self.timer.ccr1().write(|w| w.ccr().set(u32::from(compare.a)));
         self.timer.ccr2().write(|w| w.ccr().set(u32::from(compare.b)));
         self.timer.ccr3().write(|w| w.ccr().set(u32::from(compare.c)));
-        // Once, when the drive switches on: written again in every period, it would undo a break
-        // that came since the sample.
+        // Once, when the drive switches on: written in every period, it would undo a break since the sample.
         if compare.enabled && !self.on {
             self.timer.bdtr().modify(|_, w| w.moe().enabled());
             self.on = true;
         }
     }
 
-    /// All six switches off, now.
-    #[inline(always)]
+    /// Switches all six switches off, now.
     pub fn trip(&mut self) {
         self.timer.bdtr().modify(|_, w| w.moe().disabled_idle());
         self.on = false;
     }
 
-    /// What the timer has to tell; takes back what is only told once.
-    #[inline(always)]
-    pub fn look(&mut self) -> Events {
+    /// The events since the last call; clears them.
+    pub fn take_events(&mut self) -> TimerEvents {
         let status = self.timer.sr().read();
         let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
         // The break stays set while its input is low.
         self.timer.sr().write(|w| w.uif().clear().bif().clear().sbif().clear());
-        Events { updated: status.uif().bit_is_set(), pulled }
+        TimerEvents { updated: status.uif().bit_is_set(), pulled }
     }
 
-    /// Ticks since the counter was at its top, if it is on its way down; else as much as half a
-    /// period, or more.
-    #[inline(always)]
+    /// Ticks since the counter was at its top while it counts down; half a period or more while it counts up.
     pub fn since_top(&self) -> u32 {
         let count = self.timer.cnt().read().cnt().bits();
         if self.timer.cr1().read().dir().is_down() {
@@ -202,17 +205,16 @@ impl Pwm {
         }
     }
 
-    /// Whether the timer has taken over compare values since the last look.
-    #[inline(always)]
+    /// Whether the timer has taken over compare values since the last call of [`take_events`](Self::take_events).
     pub fn updated(&self) -> bool {
         self.timer.sr().read().uif().bit_is_set()
     }
 }
 
-/// All six switches off, at once, from wherever: for handlers that do not return.
+/// Switches all six switches off, from any context: for handlers that do not return.
 pub fn outputs_off() {
-    // SAFETY: TIM1 exists for as long as the chip does. Whoever owns the timer may be interrupted
-    // anywhere by this; it only ever takes MOE away, and after it nothing else runs.
+    // SAFETY: TIM1 always exists. This may interrupt the owner of the timer anywhere; it only clears MOE, and nothing
+    // else runs after it.
     let timer = unsafe { &*pac::TIM1::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
 }

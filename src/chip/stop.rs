@@ -1,5 +1,5 @@
-//! What happens when the firmware cannot go on: outputs off first, then the reason into RAM that
-//! start-up does not clear, then a reset; the next boot reports it.
+//! The end of a run when the firmware cannot go on: outputs off first, then the reason into RAM that
+//! start-up does not clear, then a reset. The next boot reports the reason.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -20,13 +20,13 @@ use induction_drive::monitor::record::{Reason, Record, WORDS};
 struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 
 // SAFETY: plain words, only read and written volatile, by start-up code and by handlers that do not
-// return; the main loop writes, and a handler may interrupt it, which the check of the record finds.
+// return. A handler may interrupt a write of the main loop; the hash of the record detects that.
 unsafe impl<T> Sync for Kept<T> {}
 
 // SAFETY: the section that cortex-m-rt leaves as it is, which `MaybeUninit` allows for.
 #[unsafe(link_section = ".uninit.record")]
 static RECORD: Kept<[u32; WORDS]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
-/// Resets in a row that were no one's wish, and its complement.
+/// Number of consecutive unintended resets, and its complement.
 // SAFETY: as above.
 #[unsafe(link_section = ".uninit.resets")]
 static RESETS: Kept<[u32; 2]> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
@@ -41,12 +41,12 @@ impl<T: Copy> Kept<T> {
     where
         T: Words,
     {
-        // SAFETY: see `Kept`; whatever the RAM holds is a value of words.
+        // SAFETY: see `Kept`; any contents of the RAM are valid words.
         unsafe { ptr::read_volatile(self.0.get().cast()) }
     }
 }
 
-/// Types for which every content of the RAM is a value.
+/// Types for which any contents of the RAM are a valid value.
 trait Words {}
 impl<const N: usize> Words for [u32; N] {}
 
@@ -62,21 +62,21 @@ pub fn take_record() -> Option<Record> {
     record
 }
 
-/// Counts resets that nobody wished, without [`forget_resets`] between them.
-pub fn count_reset(unwished: bool) -> u32 {
+/// Counts consecutive unintended resets, without [`forget_resets`] between them.
+pub fn count_reset(unintended: bool) -> u32 {
     let [count, complement] = RESETS.read();
-    let before = if unwished && count == !complement { count } else { 0 };
-    let count = before.saturating_add(u32::from(unwished));
+    let before = if unintended && count == !complement { count } else { 0 };
+    let count = before.saturating_add(u32::from(unintended));
     RESETS.write([count, !count]);
     count
 }
 
-/// The firmware has run well for a while.
+/// Sets the count of unintended resets to zero, after a while without any.
 pub fn forget_resets() {
     RESETS.write([0, !0]);
 }
 
-/// Outputs off, the reason kept, and a reset.
+/// Switches the outputs off, keeps the reason, and resets the chip.
 pub fn end(reason: Reason, details: [u32; 4]) -> ! {
     pwm::outputs_off();
     keep(reason, details);
@@ -95,11 +95,11 @@ fn panic(info: &PanicInfo) -> ! {
     end(Reason::Panic, [info.location().map_or(0, |place| place.line()), 0, 0, 0])
 }
 
-/// A fault of the processor, maybe because the stack is at its end: clears MOE before anything else,
-/// and takes a fresh stack, both without a memory access to the old one.
+/// Handler of processor faults. The cause may be a stack overflow: clears MOE before anything else, and begins a fresh
+/// stack, both without a memory access to the old one.
 #[unsafe(naked)]
-#[unsafe(export_name = "HardFault")] // SAFETY: the name cortex-m-rt's vector table has.
-#[unsafe(link_section = ".HardFault.user")] // SAFETY: where cortex-m-rt wants its code.
+#[unsafe(export_name = "HardFault")] // SAFETY: the name in the vector table of cortex-m-rt.
+#[unsafe(link_section = ".HardFault.user")] // SAFETY: the section of cortex-m-rt for it.
 unsafe extern "C" fn hard_fault() -> ! {
     core::arch::naked_asm!(
         "ldr r0, ={bdtr}",
@@ -135,10 +135,10 @@ extern "C" fn after_hard_fault(program_counter: u32, link: u32) -> ! {
     end(Reason::HardFault, [program_counter, link, scb.cfsr.read(), scb.bfar.read()])
 }
 
-/// The crystal has stopped, or the flash has an error that cannot be corrected. After the reset the
-/// firmware runs from the internal oscillator, if the crystal does not come back.
+/// Handler of a stopped crystal, and of an error in the flash that cannot be corrected. If the crystal does not start
+/// again after the reset, the firmware runs from the internal oscillator.
 ///
-/// A double word of the settings that a power failure has torn is no reason to stop.
+/// A double word of the settings that a power failure has torn does not stop the firmware.
 #[exception]
 unsafe fn NonMaskableInt() {
     if flash::forgive_torn() {
@@ -150,7 +150,7 @@ unsafe fn NonMaskableInt() {
     end(Reason::NonMaskable, [rcc.cifr().read().bits(), flash.eccr().read().bits(), 0, 0])
 }
 
-/// FirmwareSettings nobody expects.
+/// Handler of interrupts without one of their own.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
     end(Reason::Unexpected, [number as u32, 0, 0, 0])

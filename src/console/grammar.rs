@@ -1,75 +1,75 @@
-//! What can be asked for: a line in, a [`Request`] or a reason why not out.
+//! The grammar: a line in, a [`Request`] or a [`ParseError`] out.
 
-use core::{fmt, str};
+use core::fmt;
 
 use drive_core::Mode;
-use drive_core::settings::AngleSource;
 
-use crate::link::trace::{self, Choice};
+use crate::board;
+use crate::link::trace::{self, SignalChoice};
+use crate::settings::keys::{self, Key};
+use crate::settings::value::{self, Value, ValueError};
 
-use super::keys::{self, Key, NotTaken};
+/// Most records of a trace.
+const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
+/// Largest divider of a trace.
+const LARGEST_DIVIDER: u16 = 1000;
 
-/// Most periods that a trace records.
-pub const LONGEST_TRACE: u16 = 1024;
-
-/// One understood line.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A valid line.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// All commands.
+    /// List all commands.
     Help,
-    /// What the drive is doing.
+    /// Show the state of the drive.
     Status,
     /// Start in a mode.
     Start(Mode),
     /// Torque to zero, then off.
     Stop,
-    /// Magnetise again and verify that the flux is tracked.
+    /// Magnetise again and check that the flux is tracked.
     Relock,
-    /// Current on the quadrature axis, A.
+    /// Set the current on the quadrature axis, A.
     Torque(f32),
-    /// Speed, rpm.
+    /// Set the speed, mechanical rpm.
     Speed(f32),
-    /// Position, turns from where it started.
+    /// Set the position, mechanical turns from the start.
     Position(f32),
-    /// Where the flux angle comes from.
-    Angle(AngleSource),
-    /// One setting, or all.
+    /// Show one setting, or all.
     Get(Option<&'static Key>),
     /// Change a setting.
-    Set(&'static Key, keys::Value),
-    /// What was learned on the motor.
+    Set(&'static Key, Value),
+    /// List the result of the last learning.
     Learned,
-    /// Keep the settings, and what was learned.
+    /// Save the settings, and what was learned.
     Save,
-    /// Back to the settings of the image.
+    /// Restore the settings of the image.
     Defaults,
-    /// The latched fault and the last reset.
+    /// Show the latched fault and the last reset.
     Faults,
-    /// Forget the latched fault.
+    /// Clear the latched fault.
     Clear,
-    /// Record this many periods, every `divider`-th.
+    /// Record a trace.
     Trace {
-        /// How many.
+        /// Number of records.
         records: u16,
-        /// One of how many periods.
+        /// Periods from one record to the next.
         divider: u16,
-        /// Of these signals.
-        choice: Choice,
+        /// Recorded signals.
+        choice: SignalChoice,
     },
-    /// How much is logged.
+    /// Set how much is logged.
     Log(Level),
-    /// Which firmware this is.
+    /// Show the version of the firmware.
     Version,
 }
 
-/// How much goes to the log.
+/// Level of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Nothing.
     Off,
     /// Faults.
     Error,
-    /// Whatever needs attention.
+    /// Events that need attention as well.
     Warn,
     /// State changes and ten status lines a second as well.
     Info,
@@ -79,12 +79,12 @@ pub enum Level {
 pub const LEVELS: [(&str, Level); 4] =
     [("off", Level::Off), ("error", Level::Error), ("warn", Level::Warn), ("info", Level::Info)];
 
-/// Why a line was not understood.
+/// Reason why a line is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Misunderstood {
+pub enum ParseError {
     /// No such command.
     Command,
-    /// A word is missing: which.
+    /// This word is missing.
     Missing(&'static str),
     /// More words than the command takes.
     TooMuch,
@@ -103,11 +103,11 @@ pub enum Misunderstood {
     Signal,
     /// No such setting.
     Key,
-    /// The value does not suit the setting.
-    Value(NotTaken),
+    /// Not a value of the setting.
+    Value(ValueError),
 }
 
-impl fmt::Display for Misunderstood {
+impl fmt::Display for ParseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Command => f.write_str("no such command; `help` lists them"),
@@ -150,14 +150,13 @@ pub const HELP: [&str; 20] = [
     "one line in, one line out; set command.timeout_s stops the drive when no line comes",
 ];
 
-/// Understands one line.
+/// Parses one line.
 ///
 /// # Errors
-/// Why not. A line is understood as a whole or not at all.
-#[inline(never)]
-pub fn parse(line: &str) -> Result<Request, Misunderstood> {
-    let mut words = Words(line.split_ascii_whitespace());
-    let mut word = |what| words.next().ok_or(Misunderstood::Missing(what));
+/// The first invalid or missing word. A line is valid as a whole or not at all.
+pub fn parse(line: &str) -> Result<Request, ParseError> {
+    let mut words = line.split_ascii_whitespace();
+    let mut word = |what| words.next().ok_or(ParseError::Missing(what));
     let request = match word("a command")? {
         "help" => Request::Help,
         "status" => Request::Status,
@@ -166,25 +165,26 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
             Ok("speed") => Mode::Speed,
             Ok("position") => Mode::Position,
             Ok("learning") => Mode::Learning,
-            Ok(_) => return Err(Misunderstood::OneOf("torque speed position learning")),
+            Ok(_) => return Err(ParseError::OneOf("torque speed position learning")),
         }),
         "stop" => Request::Stop,
         "relock" => Request::Relock,
         "torque" => Request::Torque(number(word("the current")?)?),
         "speed" => Request::Speed(number(word("the speed")?)?),
         "position" => Request::Position(number(word("the position")?)?),
-        "angle" => Request::Angle(match word("encoder or injection")? {
-            "encoder" => AngleSource::Encoder,
-            "injection" => AngleSource::Injection,
-            _ => return Err(Misunderstood::OneOf("encoder injection")),
-        }),
+        // An alias of `set angle_source`.
+        "angle" => {
+            let key = keys::find("angle_source").ok_or(ParseError::Key)?;
+            let value = key.parse(word("encoder or injection")?);
+            Request::Set(key, value.map_err(|_| ParseError::OneOf("encoder injection"))?)
+        }
         "get" => Request::Get(match word("") {
             Err(_) => None,
-            Ok(name) => Some(keys::find(name).ok_or(Misunderstood::Key)?),
+            Ok(name) => Some(keys::find(name).ok_or(ParseError::Key)?),
         }),
         "set" => {
-            let key = keys::find(word("the setting")?).ok_or(Misunderstood::Key)?;
-            let value = key.parse(word("the value")?).map_err(Misunderstood::Value)?;
+            let key = keys::find(word("the setting")?).ok_or(ParseError::Key)?;
+            let value = key.parse(word("the value")?).map_err(ParseError::Value)?;
             Request::Set(key, value)
         }
         "learned" => Request::Learned,
@@ -199,13 +199,14 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
             if let Some(text) = next
                 && text.starts_with(|c: char| c.is_ascii_digit() || c == '-')
             {
-                divider = whole(text, 1000)?;
+                divider = whole(text, LARGEST_DIVIDER)?;
                 next = word("").ok();
             }
-            let mut choice = if next.is_some() { Choice::NONE } else { Choice::USUAL };
+            let mut choice =
+                if next.is_some() { SignalChoice::none() } else { SignalChoice::usual() };
             while let Some(name) = next {
                 if !choice.add(name) {
-                    return Err(Misunderstood::Signal);
+                    return Err(ParseError::Signal);
                 }
                 next = word("").ok();
             }
@@ -214,70 +215,21 @@ pub fn parse(line: &str) -> Result<Request, Misunderstood> {
         "log" => {
             let name = word("the level")?;
             let level = LEVELS.iter().find(|(known, _)| *known == name);
-            Request::Log(level.ok_or(Misunderstood::OneOf("off error warn info"))?.1)
+            Request::Log(level.ok_or(ParseError::OneOf("off error warn info"))?.1)
         }
         "version" => Request::Version,
-        _ => return Err(Misunderstood::Command),
+        _ => return Err(ParseError::Command),
     };
-    if words.next().is_some() { Err(Misunderstood::TooMuch) } else { Ok(request) }
+    if words.next().is_some() { Err(ParseError::TooMuch) } else { Ok(request) }
 }
 
-/// The words of a line.
-struct Words<'a>(str::SplitAsciiWhitespace<'a>);
-
-impl<'a> Words<'a> {
-    /// Not inlined: it is asked for at twenty places, never in a hurry.
-    #[inline(never)]
-    fn next(&mut self) -> Option<&'a str> {
-        self.0.next()
-    }
+fn number(text: &str) -> Result<f32, ParseError> {
+    value::number(text).ok_or(ParseError::Number)
 }
 
-/// A number: digits with or without sign, point and power of ten (`-0.5`, `1e-3`).
-///
-/// At most 18 digits, not counting zeros in front, and a power of ten from -22 to 22 after the last
-/// of them. Up to nine digits it is the nearest `f32`: what the console prints is read back as it was.
-/// (The parser of the core library takes 10 KiB of tables for all the others.)
-pub fn number(text: &str) -> Result<f32, Misunderstood> {
-    read_number(text).ok_or(Misunderstood::Number)
-}
-
-fn read_number(text: &str) -> Option<f32> {
-    let (text, power) = match text.split_once(['e', 'E']) {
-        Some((text, power)) => (text, power.parse::<i8>().ok()?),
-        None => (text, 0),
-    };
-    let (text, negative) = match text.strip_prefix('-') {
-        Some(text) => (text, true),
-        None => (text.strip_prefix('+').unwrap_or(text), false),
-    };
-    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
-    if whole.is_empty() && fraction.is_empty() {
-        return None;
-    }
-    let mut digits: u64 = 0;
-    for digit in whole.bytes().chain(fraction.bytes()) {
-        if !digit.is_ascii_digit() || digits >= 10_u64.pow(17) {
-            return None;
-        }
-        digits = 10 * digits + u64::from(digit - b'0');
-    }
-    let power = i32::from(power) - i32::try_from(fraction.len()).ok()?;
-    // Exact up to 10^22; for digits below 2^53 there is one rounding here and one to f32.
-    let mut scale = 1.0_f64;
-    if power.unsigned_abs() > 22 {
-        return None;
-    }
-    for _ in 0..power.unsigned_abs() {
-        scale *= 10.0;
-    }
-    let value = if power < 0 { digits as f64 / scale } else { digits as f64 * scale } as f32;
-    value.is_finite().then_some(if negative { -value } else { value })
-}
-
-fn whole(text: &str, max: u16) -> Result<u16, Misunderstood> {
+fn whole(text: &str, max: u16) -> Result<u16, ParseError> {
     let value = text.parse().ok().filter(|value| (1..=max).contains(value));
-    value.ok_or(Misunderstood::Whole { min: 1, max })
+    value.ok_or(ParseError::Whole { min: 1, max })
 }
 
 #[cfg(test)]
@@ -290,14 +242,15 @@ mod tests {
     fn every_line_of_the_help_but_the_last_is_a_command() {
         for line in &HELP[..HELP.len() - 1] {
             let command = line.split(' ').next().unwrap();
-            assert_ne!(parse(command), Err(Misunderstood::Command), "{command}");
+            assert_ne!(parse(command), Err(ParseError::Command), "{command}");
         }
     }
 
     #[test]
     fn commands_are_understood() {
         let key = keys::find("motor.r_s").unwrap();
-        let mut two = Choice::NONE;
+        let source = keys::find("angle_source").unwrap();
+        let mut two = SignalChoice::none();
         assert!(two.add("i_q") && two.add("turns"));
         let table = [
             ("help", Request::Help),
@@ -311,13 +264,20 @@ mod tests {
             ("start speed", Request::Start(Mode::Speed)),
             ("speed -150", Request::Speed(-150.0)),
             ("position 5e1", Request::Position(50.0)),
-            ("angle encoder", Request::Angle(AngleSource::Encoder)),
+            ("angle encoder", Request::Set(source, Value::Word("encoder"))),
+            ("set angle_source encoder", Request::Set(source, Value::Word("encoder"))),
             ("get", Request::Get(None)),
             ("get motor.r_s", Request::Get(Some(key))),
-            ("set motor.r_s 5.5", Request::Set(key, keys::Value::Number(5.5))),
-            ("trace 100", Request::Trace { records: 100, divider: 1, choice: Choice::USUAL }),
-            ("trace 1024 10", Request::Trace { records: 1024, divider: 10, choice: Choice::USUAL }),
-            ("trace 5 i_q turns", Request::Trace { records: 5, divider: 1, choice: two }),
+            ("set motor.r_s 5.5", Request::Set(key, Value::Number(5.5))),
+            (
+                "trace 100",
+                Request::Trace { records: 100, divider: 1, choice: SignalChoice::usual() },
+            ),
+            (
+                "trace 1024 10",
+                Request::Trace { records: 1024, divider: 10, choice: SignalChoice::usual() },
+            ),
+            ("trace 5 i_q turns", Request::Trace { records: 5, divider: 1, choice: two.clone() }),
             ("trace 5 2 i_q turns", Request::Trace { records: 5, divider: 2, choice: two }),
             ("learned", Request::Learned),
             ("log warn", Request::Log(Level::Warn)),
@@ -330,13 +290,15 @@ mod tests {
 
     #[test]
     fn what_is_half_wrong_is_refused_whole() {
-        use Misunderstood::*;
+        use ParseError::*;
         let trace = Whole { min: 1, max: LONGEST_TRACE };
         let table = [
             ("", Missing("a command")),
             ("Stop", Command),
             ("stopp", Command),
             ("stop now", TooMuch),
+            ("angle", Missing("encoder or injection")),
+            ("angle guess", OneOf("encoder injection")),
             ("start backwards", OneOf("torque speed position learning")),
             ("torque", Missing("the current")),
             ("torque 1 2", TooMuch),
@@ -384,24 +346,5 @@ mod tests {
             prop_assert_eq!(parse(&format!("torque {value}")), Ok(Request::Torque(value)));
             prop_assert_eq!(parse(&format!("torque {value:e}")), Ok(Request::Torque(value)));
         }
-
-        #[test]
-        fn numbers_are_those_of_the_core_library(text in "[-+]?[0-9]{0,5}[.]?[0-9]{0,4}(e-?[0-9])?") {
-            if let Ok(value) = number(&text) {
-                prop_assert_eq!(Ok(value), text.parse());
-            } else {
-                prop_assert!(text.parse::<f32>().is_err());
-            }
-        }
-    }
-
-    #[test]
-    fn numbers_that_are_too_long_or_too_large_are_refused() {
-        for text in
-            ["", ".", "-", "e5", "1e", "1e23", "1e-23", "1e300", "1234567890123456789", "1e99999"]
-        {
-            assert_eq!(number(text), Err(Misunderstood::Number), "{text}");
-        }
-        assert_eq!(number("000000000000000000000000001.5"), Ok(1.5));
     }
 }

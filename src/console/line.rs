@@ -1,14 +1,15 @@
 //! Lines: bytes in, whole lines out; and a buffer for the line that goes out.
 
 use core::fmt;
-use core::str;
 
-/// Longest line that is taken, without its end.
+use heapless::String;
+
+/// Longest line that is taken, characters without its end.
 pub const LONGEST: usize = 80;
 
-/// Why a line was not taken.
+/// Reason why a line was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Garbled {
+pub enum LineError {
     /// Longer than [`LONGEST`].
     TooLong,
     /// Not printable text.
@@ -19,7 +20,7 @@ pub enum Garbled {
     Unfinished,
 }
 
-impl fmt::Display for Garbled {
+impl fmt::Display for LineError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooLong => write!(f, "the line is longer than {LONGEST} characters"),
@@ -31,120 +32,107 @@ impl fmt::Display for Garbled {
 }
 
 /// Collects bytes to lines.
-pub struct Lines {
-    bytes: [u8; LONGEST],
-    length: usize,
-    /// What is wrong with the line so far: it is thrown away at its end.
-    garbled: Option<Garbled>,
+pub struct LineReader {
+    text: String<LONGEST>,
+    /// First error in the line so far; the line is discarded at its end.
+    error: Option<LineError>,
 }
 
-impl Lines {
-    /// Nothing read yet.
+impl LineReader {
+    /// A reader without input so far.
     pub const fn new() -> Self {
-        Self { bytes: [0; LONGEST], length: 0, garbled: None }
+        Self { text: String::new(), error: None }
     }
 
-    /// Takes one byte. At the end of a line (carriage return or line feed) gives it; of an empty
-    /// line, nothing.
-    pub fn push(&mut self, byte: u8) -> Option<Result<&str, Garbled>> {
+    /// Takes one byte. Returns the line at its end (carriage return or line feed), unless it is empty.
+    ///
+    /// # Errors
+    /// The first error in the line, which is discarded.
+    pub fn push(&mut self, byte: u8) -> Result<Option<String<LONGEST>>, LineError> {
         match byte {
-            b'\r' | b'\n' => return self.end(),
+            b'\r' | b'\n' => {
+                let line = core::mem::replace(self, Self::new());
+                return match line.error {
+                    Some(error) => Err(error),
+                    None => Ok(Some(line.text).filter(|text| !text.is_empty())),
+                };
+            }
             // Backspace and delete, for people.
-            0x08 | 0x7f => self.length = self.length.saturating_sub(1),
-            b'\t' | b' '..=b'~' => match self.bytes.get_mut(self.length) {
-                Some(place) => {
-                    *place = byte;
-                    self.length += 1;
+            0x08 | 0x7f => {
+                self.text.pop();
+            }
+            b'\t' | b' '..=b'~' => {
+                if self.text.push(char::from(byte)).is_err() {
+                    self.spoil(LineError::TooLong);
                 }
-                None => self.spoil(Garbled::TooLong),
-            },
-            _ => self.spoil(Garbled::NotText),
+            }
+            _ => self.spoil(LineError::NotText),
         }
-        None
+        Ok(None)
     }
 
-    /// The line that is coming in is no good any more.
-    pub fn spoil(&mut self, why: Garbled) {
-        self.garbled.get_or_insert(why);
+    /// Marks the incoming line as unusable.
+    pub fn spoil(&mut self, why: LineError) {
+        self.error.get_or_insert(why);
     }
 
     /// Whether a line has begun.
     pub fn begun(&self) -> bool {
-        self.length > 0 || self.garbled.is_some()
+        !self.text.is_empty() || self.error.is_some()
     }
 
-    /// Throws away what has come of a line.
+    /// Discards the incoming line.
     pub fn forget(&mut self) {
         *self = Self::new();
     }
-
-    fn end(&mut self) -> Option<Result<&str, Garbled>> {
-        let length = core::mem::take(&mut self.length);
-        if let Some(why) = self.garbled.take() {
-            return Some(Err(why));
-        }
-        let line = self.bytes.get(..length)?;
-        (length > 0).then(|| str::from_utf8(line).map_err(|_| Garbled::NotText))
-    }
 }
 
-/// A line on its way out. What does not fit is cut off.
-#[derive(Clone, Copy)]
-pub struct Text<const N: usize = 240> {
-    bytes: [u8; N],
-    length: usize,
-}
+/// Room for a line that goes out, bytes. Text that does not fit is cut off, between characters.
+pub struct OutputLine<const N: usize = 240>(String<N>);
 
-impl<const N: usize> Text<N> {
-    /// Empty.
-    pub const fn new() -> Self {
-        Self { bytes: [0; N], length: 0 }
+impl<const N: usize> OutputLine<N> {
+    /// The line of this text.
+    pub fn new(text: fmt::Arguments<'_>) -> Self {
+        const END: &str = "\r\n";
+        let mut line = Self(String::new());
+        // Writing to it never fails.
+        let _ = fmt::Write::write_fmt(&mut line, text);
+        while line.0.len() + END.len() > N {
+            line.0.pop();
+        }
+        let _ = line.0.push_str(END);
+        line
     }
 
-    /// Ends the line, over its last characters if it is full.
-    pub fn end_line(&mut self) {
-        const END: &[u8] = b"\r\n";
-        let mut at = self.length.min(N.saturating_sub(END.len()));
-        while !self.as_str().is_char_boundary(at) {
-            at -= 1;
-        }
-        if let Some(place) = self.bytes.get_mut(at..at + END.len()) {
-            place.copy_from_slice(END);
-            self.length = at + END.len();
-        }
-    }
-
-    /// The text.
+    /// The line with its end.
     pub fn as_str(&self) -> &str {
-        // Whole characters only were written.
-        self.bytes.get(..self.length).and_then(|b| str::from_utf8(b).ok()).unwrap_or("")
+        &self.0
     }
 }
 
-impl<const N: usize> fmt::Write for Text<N> {
+impl<const N: usize> fmt::Write for OutputLine<N> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        let (bytes, room) = (text.as_bytes(), N.saturating_sub(self.length));
-        // Whole characters only.
-        let fits = text.floor_char_boundary(room);
-        for (place, byte) in self.bytes.iter_mut().skip(self.length).zip(bytes.iter().take(fits)) {
-            *place = *byte;
-        }
-        self.length += fits;
-        Ok(())
+        let fits = text.floor_char_boundary(N - self.0.len());
+        let fits = text.get(..fits).unwrap_or_default();
+        self.0.push_str(fits).map_err(|()| fmt::Error)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use core::fmt::Write;
-
     use proptest::prelude::*;
 
     use super::*;
 
-    fn read(bytes: &[u8]) -> Vec<Result<String, Garbled>> {
-        let mut lines = Lines::new();
-        bytes.iter().filter_map(|b| Some(lines.push(*b)?.map(str::to_owned))).collect()
+    type Line = Result<std::string::String, LineError>;
+
+    fn push(reader: &mut LineReader, byte: u8) -> Option<Line> {
+        reader.push(byte).map(|line| line.map(|text| text.to_string())).transpose()
+    }
+
+    fn read(bytes: &[u8]) -> Vec<Line> {
+        let mut reader = LineReader::new();
+        bytes.iter().filter_map(|byte| push(&mut reader, *byte)).collect()
     }
 
     #[test]
@@ -158,35 +146,35 @@ mod tests {
     fn what_is_no_line_is_one_error_and_the_next_line_is_whole() {
         let mut long = vec![b'x'; 1000];
         long.extend(b"\nok\n");
-        assert_eq!(read(&long), [Err(Garbled::TooLong), Ok("ok".to_owned())]);
-        assert_eq!(read(b"st\xffop\nok\n"), [Err(Garbled::NotText), Ok("ok".to_owned())]);
-        assert_eq!(read(b"st\0op\nok\n"), [Err(Garbled::NotText), Ok("ok".to_owned())]);
+        assert_eq!(read(&long), [Err(LineError::TooLong), Ok("ok".to_owned())]);
+        assert_eq!(read(b"st\xffop\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
+        assert_eq!(read(b"st\0op\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
         // A backspace does not heal.
-        assert_eq!(read(b"\xff\x08stop\n"), [Err(Garbled::NotText)]);
+        assert_eq!(read(b"\xff\x08stop\n"), [Err(LineError::NotText)]);
     }
 
     #[test]
     fn a_lost_character_spoils_its_line_only() {
-        let mut lines = Lines::new();
+        let mut reader = LineReader::new();
         for byte in *b"tor" {
-            assert!(lines.push(byte).is_none());
+            assert_eq!(push(&mut reader, byte), None);
         }
-        lines.spoil(Garbled::Lost);
-        assert!(lines.begun());
+        reader.spoil(LineError::Lost);
+        assert!(reader.begun());
         for byte in *b"e 3" {
-            assert!(lines.push(byte).is_none());
+            assert_eq!(push(&mut reader, byte), None);
         }
-        assert_eq!(lines.push(b'\n'), Some(Err(Garbled::Lost)));
-        assert!(!lines.begun());
+        assert_eq!(push(&mut reader, b'\n'), Some(Err(LineError::Lost)));
+        assert!(!reader.begun());
     }
 
     #[test]
     fn text_is_cut_between_characters() {
-        let mut text = Text::<5>::new();
-        write!(text, "ab°°").unwrap();
-        assert_eq!(text.as_str(), "ab°");
-        text.end_line();
-        assert_eq!(text.as_str(), "ab\r\n");
+        for (text, line) in
+            [("ab", "ab\r\n"), ("ab°", "ab\r\n"), ("ab°°", "ab\r\n"), ("a°cd", "a°\r\n")]
+        {
+            assert_eq!(OutputLine::<5>::new(format_args!("{text}")).as_str(), line);
+        }
     }
 
     proptest! {

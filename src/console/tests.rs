@@ -1,14 +1,18 @@
+mod doubles;
+
 use drive_core::identify::online::NoEstimate;
+use drive_core::io::PERIOD_S;
 use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
 
-use super::doubles::{Desk, Wire, found};
 use super::*;
+use crate::rotor_tracking::Report;
+use doubles::{FakeDrive, FakePort, found};
 
 struct Talk {
     console: Console,
-    desk: Desk,
-    wire: Wire,
+    drive: FakeDrive,
+    port: FakePort,
     now_ms: u32,
 }
 
@@ -18,24 +22,24 @@ impl Talk {
         settings.command.wiring_checked = true;
         Self {
             console: Console::new(settings),
-            desk: Desk::new(Drive::new(settings.build().unwrap())),
-            wire: Wire { room: usize::MAX, ..Wire::default() },
+            drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
+            port: FakePort { room: usize::MAX, ..FakePort::default() },
             now_ms: 0,
         }
     }
 
     fn poll(&mut self) {
-        self.console.poll(&mut self.wire, &mut self.desk, self.now_ms);
+        self.console.poll(&mut self.port, &mut self.drive, self.now_ms);
     }
 
     /// Sends bytes and gives the replies.
     fn say(&mut self, bytes: impl AsRef<[u8]>) -> Vec<String> {
-        self.wire.sent.extend(bytes.as_ref());
-        while !self.wire.sent.is_empty() {
+        self.port.sent.extend(bytes.as_ref());
+        while !self.port.sent.is_empty() {
             self.poll();
         }
         self.poll();
-        let text = std::mem::take(&mut self.wire.received);
+        let text = std::mem::take(&mut self.port.received);
         text.split_terminator("\r\n").map(str::to_owned).collect()
     }
 
@@ -50,7 +54,7 @@ impl Talk {
 #[test]
 fn says_at_the_start_who_it_is_and_what_ended_the_last_run() {
     let mut talk = Talk::new();
-    talk.console.greet(&talk.desk);
+    talk.console.greet(&talk.drive);
     assert_eq!(talk.say(""), ["induction-drive version; last run: power-on"]);
 }
 
@@ -72,14 +76,14 @@ fn a_session() {
     assert!(talk.ask("torque 100").starts_with("ok: limited to 3.4"));
     assert!(talk.ask("set motor.r_s 5.4").starts_with("error: the drive must be off"));
     assert!(talk.ask("save").starts_with("error: the drive must be off"));
-    talk.desk.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
+    talk.drive.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
     let status = talk.ask("status");
     assert!(status.starts_with("calibrating; i_d 0.00 A"), "{status}");
     assert!(status.contains("dc link 311 V, heat sink code 1200 of 4000;"), "{status}");
     assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("save"), "ok");
-    assert_eq!(talk.desk.saved.unwrap().drive.motor.r_s, 5.5);
-    talk.desk.worn_out = true;
+    assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.5);
+    talk.drive.worn_out = true;
     assert_eq!(talk.ask("save"), "error: the flash was not erased, status 0x10");
     assert_eq!(talk.ask("start position"), "ok");
     assert_eq!(talk.ask("position 2.5"), "ok");
@@ -99,16 +103,16 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
     assert_eq!(talk.ask("defaults"), "ok");
     assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    assert_eq!(talk.desk.orders[1..], [Command::CheckWiring, Command::Start(Mode::Torque)]);
+    assert_eq!(talk.drive.commands[1..], [Command::CheckWiring, Command::Start(Mode::Torque)]);
     assert_eq!(talk.ask("stop"), "ok");
     // It was not got past: it is checked again.
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
     // No current in it: a motor that is not there.
     let sample = Sample { current_a: 1838, current_b: 1832, dc_link: 2827, ..Sample::default() };
-    while !matches!(talk.desk.drive.state(), State::Fault(_)) {
-        talk.desk.drive.step(&sample);
+    while !matches!(talk.drive.drive.state(), State::Fault(_)) {
+        talk.drive.drive.step(&sample);
     }
-    assert_eq!(talk.desk.drive.state(), State::Fault(Fault::WiringNoCurrent));
+    assert_eq!(talk.drive.drive.state(), State::Fault(Fault::WiringNoCurrent));
     assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = no (one of: no yes)");
     // Without the check, past it.
     assert_eq!(talk.ask("clear"), "ok");
@@ -123,20 +127,20 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     settings.drive.scales = drive_core::settings::Scales::default();
     let mut talk = Talk::new();
     talk.console = Console::new(settings);
-    talk.desk.drive = Drive::new(settings.build().unwrap());
+    talk.drive.drive = Drive::new(settings.build().unwrap());
     let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
     let mut pending = drive_core::Compare::OFF;
-    while talk.desk.drive.state() != State::Magnetising {
-        assert!(talk.desk.drive.state() != State::Off, "{}", talk.desk.drive.state());
-        let compare = talk.desk.drive.step(&plant.sample());
+    while talk.drive.drive.state() != State::Magnetising {
+        assert!(talk.drive.drive.state() != State::Off, "{}", talk.drive.drive.state());
+        let compare = talk.drive.drive.step(&plant.sample());
         pending.enabled &= compare.enabled;
         plant.advance(&pending, f64::from(PERIOD_S));
         pending = compare;
     }
     assert_eq!(talk.ask("get wiring_checked"), "wiring_checked = yes (one of: no yes)");
     talk.ask("stop");
-    talk.desk.drive = Drive::new(settings.build().unwrap());
+    talk.drive.drive = Drive::new(settings.build().unwrap());
     assert_eq!(talk.ask("start"), "ok");
 }
 
@@ -145,14 +149,14 @@ fn settings_out_of_range_are_refused_with_the_range() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000");
     assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
-    assert!(talk.desk.orders.is_empty());
+    assert!(talk.drive.commands.is_empty());
 }
 
 #[test]
 fn a_latched_fault_is_shown_and_cleared() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("start"), "ok");
-    talk.desk.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
     let code = Fault::Break.code();
     assert!(talk.ask("faults").starts_with(&format!("latched: fault {code}, ")));
     assert!(talk.ask("start").starts_with(&format!("error: fault {code} is latched")));
@@ -174,14 +178,14 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let trace = talk.say("trace 1 5 i_q dc_link\n");
     assert_eq!(trace, ["record,i_q,dc_link", "0,0.0000,0.0000", "ok"]);
     // Nothing leaves, and meanwhile a line comes.
-    talk.wire.room = 0;
-    talk.wire.sent.extend(b"get\n");
+    talk.port.room = 0;
+    talk.port.sent.extend(b"get\n");
     talk.poll();
     talk.poll();
-    talk.wire.sent.extend(b"stop\n");
-    talk.wire.room = 1000;
+    talk.port.sent.extend(b"stop\n");
+    talk.port.room = 1000;
     talk.poll();
-    let lines: Vec<&str> = talk.wire.received.lines().collect();
+    let lines: Vec<&str> = talk.port.received.lines().collect();
     assert_eq!(lines, [lines[0], "ok"]);
 }
 
@@ -200,7 +204,7 @@ fn silence_stops_a_running_drive_once_and_only_if_asked_for() {
     talk.ask("rubbish");
     talk.now_ms += 200;
     assert_eq!(talk.say(""), ["stopped: no command for 2 s"]);
-    assert_eq!(talk.desk.drive.state(), State::Off);
+    assert_eq!(talk.drive.drive.state(), State::Off);
     talk.now_ms += 5000;
     assert!(talk.say("").is_empty());
 }
@@ -212,7 +216,7 @@ fn half_lines_are_dropped_in_time() {
     talk.now_ms += LINE_MS + 1;
     assert_eq!(talk.say(""), ["error: the line was not finished"]);
     assert_eq!(talk.say("\n"), [""; 0]);
-    assert!(talk.desk.orders.is_empty());
+    assert!(talk.drive.commands.is_empty());
 }
 
 #[test]
@@ -221,7 +225,7 @@ fn a_line_has_its_own_time_whatever_came_before() {
     assert!(talk.say("rubbish").is_empty());
     // Late, but whole, and the next line begins in the same breath.
     talk.now_ms += LINE_MS + 1;
-    talk.wire.sent.extend(b"\nst");
+    talk.port.sent.extend(b"\nst");
     talk.poll();
     assert_eq!(talk.say("op\n"), ["error: no such command; `help` lists them", "ok"]);
 }
@@ -230,16 +234,16 @@ fn a_line_has_its_own_time_whatever_came_before() {
 fn damage_on_the_wire_is_told_and_changes_nothing() {
     let mut talk = Talk::new();
     talk.say("sta");
-    talk.wire.damaged = true;
+    talk.port.damaged = true;
     assert_eq!(talk.say("rt\n"), ["error: characters were lost or damaged"]);
-    assert!(talk.desk.orders.is_empty());
+    assert!(talk.drive.commands.is_empty());
     assert_eq!(talk.ask("start"), "ok");
 }
 
 #[test]
 fn without_a_control_interrupt_nothing_is_promised() {
     let mut talk = Talk::new();
-    talk.desk.running = false;
+    talk.drive.running = false;
     for line in ["start", "torque 1", "set motor.r_s 5.5", "status"] {
         assert_eq!(talk.ask(line), "error: the control does not run");
     }
@@ -260,12 +264,12 @@ fn status_tells_what_is_known_of_the_rotor_time_constant() {
     config.angle.source = hil_sim::config::AngleSource::Encoder;
     let mut rig = hil_sim::rig::Rig::from_config(&config, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
-    talk.desk.drive = rig.drive;
+    talk.drive.drive = rig.drive;
     assert_eq!(of_the_rotor(&mut talk).unwrap(), "not found: settling; used 186.1 ms");
     // The longest is not cut off.
-    let tracking = talk.desk.tracking.as_ref().unwrap().report();
+    let tracking = talk.drive.tracking.as_ref().unwrap().report();
     for doubt in [NoEstimate::Transient, NoEstimate::PoorExcitation, NoEstimate::OutOfRange] {
-        let report = Report { found: Err(doubt), ..tracking };
+        let report = Report { estimate: Err(doubt), ..tracking };
         assert!(report.to_string().len() < 75, "{report}");
     }
     assert_eq!(talk.ask("stop"), "ok");
@@ -276,7 +280,7 @@ fn commands_reach_the_drive_as_they_were_given() {
     let mut talk = Talk::new();
     talk.say("start\ntorque 1.5\nstop\nclear\n");
     assert_eq!(
-        talk.desk.orders,
+        talk.drive.commands,
         [Command::Start(Mode::Torque), Command::Torque(1.5), Command::Stop, Command::Clear]
     );
 }
@@ -285,7 +289,7 @@ fn commands_reach_the_drive_as_they_were_given() {
 fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");
-    talk.desk.found = Some(found());
+    talk.drive.found = Some(found());
     let list = talk.say("learned\n");
     assert_eq!(
         list[..4],
@@ -299,10 +303,10 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     );
     assert_eq!((list.len(), list.last().unwrap().as_str()), (2 + 14 + 1, "ok"));
     assert_eq!(talk.ask("save"), "ok");
-    assert_eq!(talk.desk.saved.unwrap().learned, Some(found()));
+    assert_eq!(talk.drive.saved.unwrap().learned, Some(found()));
     // What it does not depend on leaves it, and the drive works with it.
     assert_eq!(talk.ask("set limits.dc_over_v 390"), "ok");
-    let Some(Command::Configure(with)) = talk.desk.orders.last() else { panic!("no order") };
+    let Some(Command::Configure(with)) = talk.drive.commands.last() else { panic!("no order") };
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.limits.dc_over_v = 390.0;
     assert_ne!(*with, settings.build().unwrap());
@@ -314,7 +318,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let forgotten = "ok: what was learned belonged to other settings and is forgotten";
     assert_eq!(talk.ask("set motor.r_r 1.2"), forgotten);
     assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");
-    talk.desk.found = Some(found());
+    talk.drive.found = Some(found());
     assert_eq!(talk.ask("defaults"), forgotten);
     assert_eq!(talk.ask("defaults"), "ok");
 }
@@ -322,11 +326,11 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
 #[test]
 fn what_is_not_believable_is_shown_and_not_used() {
     let mut talk = Talk::new();
-    talk.desk.found = Some(Learned { accepted: false, asymmetry: 0.02, ..found() });
+    talk.drive.found = Some(Learned { accepted: false, asymmetry: 0.02, ..found() });
     let list = talk.say("learned\n");
     assert!(list[0].starts_with("not believable, not used: asymmetry 0.02000; "), "{list:?}");
     assert_eq!(talk.ask("save"), "ok");
-    assert_eq!(talk.desk.saved.unwrap().learned, None);
+    assert_eq!(talk.drive.saved.unwrap().learned, None);
 }
 
 proptest! {
@@ -336,7 +340,7 @@ proptest! {
         for reply in talk.say(&bytes) {
             prop_assert!(reply.starts_with("error: "));
         }
-        prop_assert!(talk.desk.orders.is_empty());
+        prop_assert!(talk.drive.commands.is_empty());
         let replies = talk.say("\nstop\n");
         prop_assert_eq!(replies.last().unwrap(), "ok");
     }
@@ -346,12 +350,12 @@ proptest! {
         bytes: Vec<u8>, room in 0_usize..200,
     ) {
         let mut talk = Talk::new();
-        talk.wire.room = room;
-        talk.wire.sent.extend(&bytes);
+        talk.port.room = room;
+        talk.port.sent.extend(&bytes);
         for _ in 0..20 {
             talk.poll();
         }
-        talk.wire.room = usize::MAX;
+        talk.port.room = usize::MAX;
         talk.say("\n");
         let replies = talk.say("stop\n");
         prop_assert_eq!(replies.last().unwrap(), "ok");

@@ -1,7 +1,7 @@
-//! One place for one message between the control interrupt and the main loop.
+//! A place for one message between the control interrupt and the main loop.
 //!
-//! No queue of `heapless` here: its index arithmetic divides by a length known only at run time, and
-//! the check of that would be a panic reachable from the interrupt.
+//! Own code, because the control interrupt writes its report into the message in place: a queue of `heapless` (0.8 and
+//! 0.9.3) takes items by value, one copy more in every report, and so does `heapless::mpmc`.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -10,13 +10,13 @@ use core::sync::atomic::{AtomicBool, Ordering};
 ///
 /// Shared by one [`Sender`] and one [`Receiver`].
 pub struct Mailbox<T> {
-    /// Who may touch the message: the receiver if set, else the sender.
+    /// Owner of the message: the receiver if set, else the sender.
     full: AtomicBool,
     message: UnsafeCell<T>,
 }
 
-// SAFETY: sender and receiver take turns, as `full` says, so that they never touch the message at
-// the same time; there is one of each, because `split` borrows the mailbox mutably.
+// SAFETY: sender and receiver take turns by `full`, so they never touch the message at the same time; there is one of
+// each, because `split` borrows the mailbox mutably.
 unsafe impl<T: Send> Sync for Mailbox<T> {}
 
 /// The end that fills the mailbox.
@@ -29,26 +29,24 @@ impl<T> Mailbox<T> {
     /// Offset in a mailbox, bytes, of a byte that is 1 while there is a message.
     pub const FULL: usize = core::mem::offset_of!(Self, full);
 
-    /// An empty mailbox; in the place of the message lies what nobody reads.
-    #[inline(always)]
+    /// An empty mailbox. `unread` only initialises the storage; it is never received.
     pub const fn new(unread: T) -> Self {
         Self { full: AtomicBool::new(false), message: UnsafeCell::new(unread) }
     }
 
     /// Its two ends.
-    #[inline(always)]
     pub fn split(&mut self) -> (Sender<'_, T>, Receiver<'_, T>) {
         (Sender(self), Receiver(self))
     }
 }
 
 impl<T> Sender<'_, T> {
-    /// Sends `message`, if the last one has been taken out; says whether it did.
+    /// Sends `message`; `false`, and nothing sent, while the last one has not been received.
     pub fn send(&mut self, message: T) -> bool {
         self.send_with(|place| *place = message)
     }
 
-    /// The same with a message that is written where it is to lie, over one from before.
+    /// The same with a message that `write` writes in place, over an earlier one.
     pub fn send_with(&mut self, write: impl FnOnce(&mut T)) -> bool {
         if self.0.full.load(Ordering::Acquire) {
             return false;
@@ -63,12 +61,11 @@ impl<T> Sender<'_, T> {
 
 impl<T> Receiver<'_, T> {
     /// Whether there is a message.
-    #[inline]
     pub fn is_waiting(&self) -> bool {
         self.0.full.load(Ordering::Acquire)
     }
 
-    /// Lets `with` look at the message, if there is one, then empties the mailbox.
+    /// Passes the message to `with`, if there is one, then empties the mailbox.
     pub fn take_with<R>(&mut self, with: impl FnOnce(&T) -> R) -> Option<R> {
         if !self.0.full.load(Ordering::Acquire) {
             return None;
@@ -80,7 +77,7 @@ impl<T> Receiver<'_, T> {
         Some(result)
     }
 
-    /// Takes the message out, if there is one.
+    /// Receives the message, if there is one.
     pub fn take(&mut self) -> Option<T>
     where
         T: Copy,

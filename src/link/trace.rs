@@ -1,14 +1,15 @@
-//! The trace: what the drive saw, period by period, in RAM.
+//! The trace: signals of the drive, period by period, recorded in RAM.
 //!
-//! The main loop asks for it, the control interrupt writes it, the main loop reads it: the memory
-//! changes hands with `stage`.
+//! The main loop requests it, the control interrupt writes it, the main loop reads it; `stage` says who owns the
+//! memory.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
+use heapless::Vec;
 
-/// FirmwareSettings that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
+/// Signals that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
 pub const SIGNALS: [&str; 13] = [
     "phi_deg",
     "flux_step",
@@ -28,48 +29,44 @@ pub const SIGNALS: [&str; 13] = [
 /// Most signals in one record.
 pub const MOST: usize = 8;
 
-/// Which signals are recorded, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Choice {
-    /// Places among [`SIGNALS`].
-    signals: [u8; MOST],
-    count: usize,
+/// The signals of a trace, in their order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SignalChoice {
+    /// Indices into [`SIGNALS`].
+    signals: Vec<u8, MOST>,
 }
 
-impl Choice {
-    /// None yet.
-    pub const NONE: Self = Self { signals: [0; MOST], count: 0 };
-    /// What one mostly wants: angle, currents and their reference, voltages, position.
-    pub const USUAL: Self = Self { signals: [0, 5, 6, 4, 7, 8, 9, 12], count: MOST };
+impl SignalChoice {
+    /// No signal.
+    pub const fn none() -> Self {
+        Self { signals: Vec::new() }
+    }
 
-    /// Adds one by its name; says whether there is such a signal, and room for it.
+    /// The default: angle, currents and their reference, voltages, saliency, position.
+    pub fn usual() -> Self {
+        Self { signals: [0, 5, 6, 4, 7, 8, 9, 12].into_iter().collect() }
+    }
+
+    /// Adds the signal with this name; `false` if there is none, or no room for it.
     pub fn add(&mut self, name: &str) -> bool {
         let signal = SIGNALS.iter().position(|known| *known == name);
-        match (signal.and_then(|at| u8::try_from(at).ok()), self.signals.get_mut(self.count)) {
-            (Some(signal), Some(place)) => {
-                *place = signal;
-                self.count += 1;
-                true
-            }
-            _ => false,
-        }
+        signal.is_some_and(|index| self.signals.push(index as u8).is_ok())
     }
 
-    /// Their names.
+    /// Names of the signals.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        let known = |signal: &u8| SIGNALS.get(usize::from(*signal)).copied().unwrap_or("");
-        self.signals.iter().take(self.count).map(known)
+        self.signals.iter().filter_map(|signal| SIGNALS.get(usize::from(*signal)).copied())
     }
 
-    /// How many.
+    /// Number of signals.
     pub fn count(&self) -> usize {
-        self.count
+        self.signals.len()
     }
 
-    /// Their values.
-    fn of(&self, t: &Telemetry) -> Record {
+    /// Values of the signals.
+    fn values(&self, t: &Telemetry) -> Record {
         let mut record = [0.0; MOST];
-        for (value, signal) in record.iter_mut().zip(self.signals) {
+        for (value, signal) in record.iter_mut().zip(&self.signals) {
             *value = match signal {
                 0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
                 1 => t.flux_freq,
@@ -90,21 +87,21 @@ impl Choice {
     }
 }
 
-/// One record: the values of a [`Choice`], in its order.
+/// One record: the values of a [`SignalChoice`], in its order.
 pub type Record = [f32; MOST];
 
-/// Nothing asked for or all read: the main loop's.
+/// Before the first request: the memory is the main loop's.
 const IDLE: u8 = 0;
-/// Being written: the interrupt's.
+/// Being written: the memory is the interrupt's.
 const RECORDING: u8 = 1;
-/// Written: the main loop's.
+/// Written: the memory is the main loop's.
 const DONE: u8 = 2;
 
 struct Inner<const N: usize> {
     records: [Record; N],
     wanted: usize,
     divider: u16,
-    choice: Choice,
+    choice: SignalChoice,
     /// Next record to write.
     next: usize,
     /// Periods until the next record.
@@ -118,25 +115,25 @@ pub struct Trace<const N: usize> {
     inner: UnsafeCell<Inner<N>>,
 }
 
-// SAFETY: `stage` says whose the memory is, and there is one writer and one reader, because `take`
-// gives them once.
+// SAFETY: `stage` gives the memory one owner at a time, and there is one writer and one reader, because `take` hands
+// them out once.
 unsafe impl<const N: usize> Sync for Trace<N> {}
 
-/// The end of the control interrupt.
+/// The control interrupt's end.
 pub struct Recorder<'a, const N: usize>(&'a Trace<N>);
 
-/// The end of the main loop.
+/// The main loop's end.
 pub struct Reader<'a, const N: usize>(&'a Trace<N>);
 
 impl<const N: usize> Trace<N> {
-    /// Nothing recorded.
+    /// An empty trace.
     pub const fn new() -> Self {
-        // Zeros only: else 32 KiB of the flash would hold the first contents of the memory.
+        // Zeros only: otherwise 32 KiB of the flash would hold the initial contents.
         let inner = Inner {
             records: [[0.0; MOST]; N],
             wanted: 0,
             divider: 0,
-            choice: Choice::NONE,
+            choice: SignalChoice::none(),
             next: 0,
             wait: 0,
         };
@@ -155,18 +152,15 @@ impl<const N: usize> Trace<N> {
 }
 
 impl<const N: usize> Recorder<'_, N> {
-    /// One period.
-    #[inline]
+    /// Records the present control period, if one is due.
     pub fn step(&mut self, telemetry: impl FnOnce() -> Telemetry) {
         if self.0.stage.load(Ordering::Acquire) == RECORDING {
             self.record(telemetry);
         }
     }
 
-    // Not inlined: the interrupt would have to save registers for it in every period.
-    #[inline(never)]
     fn record(&mut self, telemetry: impl FnOnce() -> Telemetry) {
-        // SAFETY: the interrupt's while recording; `&mut self` keeps others out.
+        // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         if inner.wait > 0 {
             inner.wait -= 1;
@@ -174,7 +168,7 @@ impl<const N: usize> Recorder<'_, N> {
         }
         inner.wait = inner.divider.saturating_sub(1);
         if let Some(place) = inner.records.get_mut(inner.next) {
-            *place = inner.choice.of(&telemetry());
+            *place = inner.choice.values(&telemetry());
             inner.next += 1;
         }
         if inner.next >= inner.wanted {
@@ -184,34 +178,34 @@ impl<const N: usize> Recorder<'_, N> {
 }
 
 impl<const N: usize> Reader<'_, N> {
-    /// Asks for `records`, one in `divider` periods. Not while recording: says whether it did.
-    pub fn begin(&mut self, records: u16, divider: u16, choice: &Choice) -> bool {
+    /// Requests `records` records, one in `divider` periods; `false`, and nothing changed, while recording.
+    pub fn begin(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool {
         if self.0.stage.load(Ordering::Acquire) == RECORDING {
             return false;
         }
-        // SAFETY: the main loop's while not recording; `&mut self` keeps others out.
+        // SAFETY: the memory is the main loop's while not recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         inner.wanted = usize::from(records).min(N);
         inner.divider = divider;
-        inner.choice = *choice;
+        inner.choice = choice.clone();
         inner.next = 0;
         inner.wait = 0;
         self.0.stage.store(RECORDING, Ordering::Release);
         true
     }
 
-    /// Record number `i`, if it is recorded and the recording has ended.
+    /// Record number `i` of a finished recording.
     pub fn get(&self, i: u16) -> Option<Record> {
         if self.0.stage.load(Ordering::Acquire) != DONE {
             return None;
         }
-        // SAFETY: the main loop's when done.
+        // SAFETY: the memory is the main loop's when done.
         let inner = unsafe { &*self.0.inner.get() };
         let i = usize::from(i);
-        if i < inner.wanted { inner.records.get(i).copied() } else { None }
+        inner.records.get(..inner.wanted)?.get(i).copied()
     }
 
-    /// Whether a recording goes on.
+    /// Whether a recording is in progress.
     pub fn recording(&self) -> bool {
         self.0.stage.load(Ordering::Acquire) == RECORDING
     }
@@ -226,8 +220,8 @@ mod tests {
         let trace = Trace::<4>::new();
         let (mut recorder, mut reader) = trace.take().unwrap();
         assert_eq!(reader.get(0), None);
-        assert!(reader.begin(3, 2, &Choice::USUAL));
-        assert!(!reader.begin(1, 1, &Choice::USUAL));
+        assert!(reader.begin(3, 2, &SignalChoice::usual()));
+        assert!(!reader.begin(1, 1, &SignalChoice::usual()));
         for period in 0..5 {
             assert!(reader.recording());
             assert_eq!(reader.get(0), None);
@@ -245,7 +239,7 @@ mod tests {
     fn asks_for_no_more_than_there_is_room() {
         let trace = Trace::<4>::new();
         let (mut recorder, mut reader) = trace.take().unwrap();
-        assert!(reader.begin(100, 1, &Choice::USUAL));
+        assert!(reader.begin(100, 1, &SignalChoice::usual()));
         for _ in 0..4 {
             recorder.step(Telemetry::default);
         }
@@ -270,13 +264,13 @@ mod tests {
             ..Telemetry::default()
         };
         for (i, name) in SIGNALS.iter().enumerate() {
-            let mut choice = Choice::NONE;
+            let mut choice = SignalChoice::none();
             assert!(choice.add(name) && choice.add("turns"));
             let expected = if i == 0 { 90.0 } else { i as f32 };
-            assert_eq!(choice.of(&telemetry)[..2], [expected, 12.0], "{name}");
-            assert_eq!(choice.names().collect::<Vec<_>>(), [name, "turns"]);
+            assert_eq!(choice.values(&telemetry)[..2], [expected, 12.0], "{name}");
+            assert_eq!(choice.names().collect::<std::vec::Vec<_>>(), [name, "turns"]);
         }
-        let mut full = Choice::USUAL;
-        assert!(!full.add("turns") && !Choice::NONE.clone().add("speed"));
+        let mut full = SignalChoice::usual();
+        assert!(!full.add("turns") && !SignalChoice::none().add("speed"));
     }
 }

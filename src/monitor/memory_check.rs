@@ -1,53 +1,54 @@
-//! Has a bit of the control's memory flipped? Looked at in slices, one a pass of the main loop.
+//! Check of the control's memory for flipped bits, a slice in each pass of the main loop.
 //!
-//! What the control interrupt executes is compared with the flash it was copied from, which corrects
-//! itself. What it only reads, the coefficients of the drive above all, has no second copy: its hash must
-//! stay the same for as long as the drive counts no change of its coefficients. The first whole look
-//! after a change is what the later ones are compared with: a flip in the milliseconds between is taken
-//! for a part of the change.
+//! The code of the control interrupt is compared with the flash it was copied from, which corrects itself. The data
+//! that it only reads, mainly the coefficients of the drive, have no second copy: their hash must stay the same as
+//! long as the drive counts no change of its coefficients. The first whole pass after a change is the reference of the
+//! later ones, so a flip in the milliseconds between is taken for a part of the change.
 //!
-//! What the interrupt writes in every period cannot be judged in this way; the drive's own checks do.
+//! Data that the interrupt writes in every period cannot be checked in this way; the drive's own checks cover them.
+
+use crate::hash;
 
 /// Words of code compared in a pass of the main loop.
 const CODE_SLICE: u32 = 64;
 /// Words of constants hashed in one.
 const CONSTANTS_SLICE: u32 = 16;
 
-/// A stretch of memory.
+/// A range of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part {
-    /// Where it begins; a multiple of 4.
+pub struct MemoryRange {
+    /// First address; a multiple of 4.
     pub address: u32,
-    /// How long it is.
+    /// Length in words.
     pub words: u32,
 }
 
-/// Where everything is.
+/// The memory to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Places<const N: usize> {
-    /// The code that is executed.
-    pub code: Part,
-    /// Where it was copied from.
+pub struct CheckedMemory<const N: usize> {
+    /// The executed code.
+    pub code: MemoryRange,
+    /// Address it was copied from.
     pub source: u32,
-    /// What stays as it is until `changes` counts.
-    pub constants: [Part; N],
-    /// The count of changes.
+    /// Data that change only when `changes` counts.
+    pub constants: [MemoryRange; N],
+    /// Address of the count of changes.
     pub changes: u32,
 }
 
-/// What has flipped.
+/// A flipped bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flipped {
-    /// A word of the code: its address, what it holds, and what it should.
+pub enum BitFlip {
+    /// In a word of the code.
     Code {
         /// Address.
         address: u32,
-        /// What it holds.
+        /// Its contents.
         found: u32,
-        /// What the flash holds.
+        /// Contents of the flash.
         copied: u32,
     },
-    /// Something among the constants: their hash now, and before.
+    /// Among the constants.
     Constants {
         /// Hash now.
         found: u32,
@@ -56,76 +57,75 @@ pub enum Flipped {
     },
 }
 
-/// The check, and how far it has come.
+/// The check and its progress.
 #[derive(Clone, Debug)]
 pub struct MemoryCheck<const N: usize> {
-    places: Places<N>,
+    memory: CheckedMemory<N>,
     /// Next word of the code.
     code: u32,
-    /// Next part of the constants, and word in it.
-    part: usize,
+    /// Next range of the constants, and word in it.
+    range: usize,
     word: u32,
     hash: u32,
-    /// Count of changes as this look began.
+    /// Count of changes at the start of this pass.
     changes: u32,
-    /// Hash of the last whole look, and the count of changes then.
+    /// Hash of the last whole pass, and the count of changes then.
     sealed: Option<(u32, u32)>,
 }
 
 impl<const N: usize> MemoryCheck<N> {
-    /// From now on; `read` gives the word at an address.
-    pub fn new(places: Places<N>, read: impl Fn(u32) -> u32) -> Self {
-        let changes = read(places.changes);
-        Self { places, code: 0, part: 0, word: 0, hash: FNV_BASIS, changes, sealed: None }
+    /// A check that begins now; `read` reads the word at an address.
+    pub fn new(memory: CheckedMemory<N>, read: impl Fn(u32) -> u32) -> Self {
+        let changes = read(memory.changes);
+        Self { memory, code: 0, range: 0, word: 0, hash: hash::BASIS, changes, sealed: None }
     }
 
-    /// Looks at the next slices.
+    /// Checks the next slices.
     ///
     /// # Errors
-    /// What has flipped.
-    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Flipped> {
+    /// A flipped bit.
+    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), BitFlip> {
         self.compare_code(&read)?;
         self.hash_constants(&read)
     }
 
-    fn compare_code(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), Flipped> {
-        let Places { code, source, .. } = self.places;
+    fn compare_code(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), BitFlip> {
+        let CheckedMemory { code, source, .. } = self.memory;
         let end = (self.code + CODE_SLICE).min(code.words);
         for word in self.code..end {
             let (address, copied) = (code.address + 4 * word, read(source + 4 * word));
             let found = read(address);
             if found != copied {
-                return Err(Flipped::Code { address, found, copied });
+                return Err(BitFlip::Code { address, found, copied });
             }
         }
         self.code = if end == code.words { 0 } else { end };
         Ok(())
     }
 
-    fn hash_constants(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), Flipped> {
+    fn hash_constants(&mut self, read: &impl Fn(u32) -> u32) -> Result<(), BitFlip> {
         let mut left = CONSTANTS_SLICE;
-        while let Some(part) = self.places.constants.get(self.part) {
-            let end = (self.word + left).min(part.words);
+        while let Some(range) = self.memory.constants.get(self.range) {
+            let end = (self.word + left).min(range.words);
             for word in self.word..end {
-                self.hash = hashed(self.hash, read(part.address + 4 * word));
+                self.hash = hash::add(self.hash, read(range.address + 4 * word));
             }
             left -= end - self.word;
             self.word = end;
-            if end < part.words {
+            if end < range.words {
                 return Ok(());
             }
-            (self.part, self.word) = (self.part + 1, 0);
+            (self.range, self.word) = (self.range + 1, 0);
         }
-        // All were looked at.
-        let changes = read(self.places.changes);
-        let found = core::mem::replace(&mut self.hash, FNV_BASIS);
-        self.part = 0;
+        let changes = read(self.memory.changes);
+        let found = core::mem::replace(&mut self.hash, hash::BASIS);
+        self.range = 0;
         if core::mem::replace(&mut self.changes, changes) != changes {
-            return Ok(()); // changed meanwhile: the next look is the first
+            return Ok(()); // changed meanwhile: the next pass is the first
         }
         match self.sealed {
             Some((before, then)) if then == changes && before != found => {
-                Err(Flipped::Constants { found, before })
+                Err(BitFlip::Constants { found, before })
             }
             _ => {
                 self.sealed = Some((found, changes));
@@ -133,14 +133,6 @@ impl<const N: usize> MemoryCheck<N> {
             }
         }
     }
-}
-
-const FNV_BASIS: u32 = 0x811c_9dc5;
-
-/// FNV-1a, a word at a time. Each step is one-to-one in the hash and in the word: a change of one word
-/// always shows.
-fn hashed(hash: u32, word: u32) -> u32 {
-    (hash ^ word).wrapping_mul(0x0100_0193)
 }
 
 #[cfg(test)]
@@ -151,12 +143,12 @@ mod tests {
 
     use super::*;
 
-    const CODE: Part = Part { address: 0, words: 1000 };
+    const CODE: MemoryRange = MemoryRange { address: 0, words: 1000 };
     const SOURCE: u32 = 4 * 1000;
-    const CONSTANTS: [Part; 3] = [
-        Part { address: 8000, words: 300 },
-        Part { address: 9500, words: 1 },
-        Part { address: 9600, words: 17 },
+    const CONSTANTS: [MemoryRange; 3] = [
+        MemoryRange { address: 8000, words: 300 },
+        MemoryRange { address: 9500, words: 1 },
+        MemoryRange { address: 9600, words: 17 },
     ];
     const CHANGES: u32 = 9996;
     /// Passes in which everything is looked at: 1000 words of code, 318 of constants.
@@ -183,11 +175,12 @@ mod tests {
     }
 
     fn check(memory: &Memory) -> MemoryCheck<3> {
-        let places = Places { code: CODE, source: SOURCE, constants: CONSTANTS, changes: CHANGES };
-        MemoryCheck::new(places, |at| memory.read(at))
+        let memory_map =
+            CheckedMemory { code: CODE, source: SOURCE, constants: CONSTANTS, changes: CHANGES };
+        MemoryCheck::new(memory_map, |at| memory.read(at))
     }
 
-    fn run(check: &mut MemoryCheck<3>, memory: &Memory, passes: u32) -> Result<(), Flipped> {
+    fn run(check: &mut MemoryCheck<3>, memory: &Memory, passes: u32) -> Result<(), BitFlip> {
         (0..passes).try_for_each(|_| check.slice(|at| memory.read(at)))
     }
 
@@ -210,9 +203,9 @@ mod tests {
             if word < 1000 {
                 let copied = memory.read(SOURCE + address);
                 let found_word = memory.read(address);
-                prop_assert_eq!(found, Err(Flipped::Code { address, found: found_word, copied }));
+                prop_assert_eq!(found, Err(BitFlip::Code { address, found: found_word, copied }));
             } else {
-                prop_assert!(matches!(found, Err(Flipped::Constants { .. })), "{:?}", found);
+                prop_assert!(matches!(found, Err(BitFlip::Constants { .. })), "{:?}", found);
             }
         }
 

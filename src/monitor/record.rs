@@ -1,25 +1,27 @@
-//! Why the last run ended, in a form that survives a reset in RAM that nobody clears.
+//! The reason why the last run ended, as words that survive a reset in RAM that is not cleared.
 
 use core::fmt;
 
-/// Reasons to stop, with the numbers that follow those of the drive's faults (70 to 73 are those of settings
-/// that are not used, see `saved.rs`).
+use crate::hash;
+
+/// Reasons to stop. The numbers follow those of the drive's faults; 70 to 73 are those of rejected settings (see
+/// `store/codec.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Reason {
-    /// The firmware found itself wrong; details: the line.
+    /// An error in the firmware; details: the line.
     Panic = 64,
     /// A fault of the processor; details: program counter, link register, CFSR, BFAR.
     HardFault = 65,
     /// A non-maskable interrupt; details: RCC_CIFR, FLASH_ECCR.
     NonMaskable = 66,
-    /// An interrupt nobody expects; details: its number.
+    /// An interrupt without a handler; details: its number.
     Unexpected = 67,
     /// The watchdog was not fed; details: control periods, cycles, whether a deadline was missed.
     NotFed = 68,
     /// The drive's own fault; details: its number.
     Drive = 69,
-    /// A bit of the control's code has flipped; details: address, what it holds, what the flash holds.
+    /// A bit of the control's code has flipped; details: address, its contents, those of the flash.
     Code = 74,
     /// A bit of the coefficients has flipped; details: their hash now, and before.
     Coefficients = 75,
@@ -37,7 +39,7 @@ impl Reason {
         Self::Coefficients,
     ];
 
-    /// In a few words.
+    /// A short text.
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Panic => "panic",
@@ -52,23 +54,23 @@ impl Reason {
     }
 }
 
-/// One record.
+/// The record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// Why.
+    /// The reason.
     pub reason: Reason,
-    /// What [`Reason`] says.
+    /// See [`Reason`].
     pub details: [u32; 4],
 }
 
 /// Words of a record in memory.
 pub const WORDS: usize = 7;
 
-/// Tells a record from what RAM holds after power-on.
+/// Tells a record from the contents of RAM after power-on.
 const MAGIC: u32 = 0x7265_6331;
 
 impl Record {
-    /// As it is kept.
+    /// The words of the record.
     pub fn to_words(self) -> [u32; WORDS] {
         let [a, b, c, d] = self.details;
         let reason = self.reason as u32;
@@ -76,7 +78,7 @@ impl Record {
         [MAGIC, reason, a, b, c, d, check]
     }
 
-    /// What was kept, if it is whole.
+    /// The record of these words, if it is whole.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let [magic, reason, a, b, c, d, checked] = *words;
         if magic != MAGIC || checked != check(&[magic, reason, a, b, c, d]) {
@@ -94,10 +96,9 @@ impl fmt::Display for Record {
     }
 }
 
-/// FNV-1a over the bytes: finds what a reset in the middle of the writing leaves.
+/// The hash of the words, which detects a record that a reset interrupted.
 fn check(words: &[u32]) -> u32 {
-    let bytes = words.iter().flat_map(|word| word.to_le_bytes());
-    bytes.fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+    hash::of(words.iter().flat_map(|word| word.to_le_bytes()))
 }
 
 #[cfg(test)]

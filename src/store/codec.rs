@@ -1,49 +1,89 @@
-//! A set of settings as double words of the flash.
+//! The record: a set of settings as double words of the flash.
 //!
 //! | double word | bits 0 to 31 | 32 to 47 | 48 to 63 |
 //! |---|---|---|---|
 //! | 0 | magic | version | entries |
 //! | 1 | sequence number | checksum, 32 bits | |
-//! | 2 and on | number of the key | its value, 32 bits | |
+//! | 2 and on | id of the key | its value, 32 bits | |
 //!
-//! A key is known by a number made of its name, so that keys can come and go: what a record does not
-//! hold stays as it is by default, what no key has asked for is passed over. What was learned is behind
-//! the keys, if there is something, as entries with numbers of their own ([`learned`]). The version
-//! changes only with this layout. The checksum is that of Ethernet over everything but itself.
+//! The id of a key is the hash of its name, so keys can be added and removed: a key that the record does not hold
+//! keeps its default, an entry that no key claims is skipped. The result of a learning, if there is one, follows the
+//! keys as entries with ids of their own ([`learned`]). The version changes only with this layout. The checksum is
+//! the CRC-32 of Ethernet over everything but itself.
+
+use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use super::{NotUsed, SLOT_WORDS, learned};
-use crate::console::keys::{FirmwareSettings, KEYS, find_id};
+use super::flash::SLOT_WORDS;
+use super::learned;
+use crate::settings::FirmwareSettings;
+use crate::settings::keys::{KEYS, find_id};
 
 /// The layout that is written.
 pub const VERSION: u16 = 1;
 /// Double words of the longest record that is written.
 pub const WORDS: usize = FIRST + KEYS.len() + learned::WORDS;
+const _: () = assert!(WORDS <= SLOT_WORDS);
 /// The double word that is written last.
 pub const COMMIT: usize = 1;
 /// The first entry.
 const FIRST: usize = 2;
 
-/// "idrv", so that other contents are no record.
+/// "idrv": marks a record.
 const MAGIC: u32 = 0x7672_6469;
 const ERASED: u64 = u64::MAX;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// What a slot holds.
+/// Contents of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum SlotContent {
     /// Erased throughout.
     Blank,
-    /// Anything else that is no whole record.
+    /// Neither blank nor a whole record.
     Broken,
     /// A whole record.
     Whole {
-        /// Of its layout.
-        version: u16,
         /// Its sequence number.
         sequence: u32,
     },
+}
+
+/// Reason why saved settings are rejected; numbered like the faults (see `monitor/record.rs`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejected {
+    /// The flash is not blank, and holds no whole record.
+    Broken,
+    /// A later firmware wrote the record, in this version of the layout.
+    Newer(u16),
+    /// The value of this setting is unknown to the firmware.
+    Value(&'static str),
+    /// The design rules refuse the settings.
+    Refused,
+}
+
+impl Rejected {
+    /// Its number.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Broken => 70,
+            Self::Newer(_) => 71,
+            Self::Value(_) => 72,
+            Self::Refused => 73,
+        }
+    }
+}
+
+impl fmt::Display for Rejected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} saved settings not used, defaults hold: ", self.code())?;
+        match self {
+            Self::Broken => f.write_str("no whole record"),
+            Self::Newer(version) => write!(f, "version {version}, known is {VERSION}"),
+            Self::Value(key) => write!(f, "unknown value of {key}"),
+            Self::Refused => f.write_str("out of range"),
+        }
+    }
 }
 
 fn pair(low: u32, high: u32) -> u64 {
@@ -54,17 +94,17 @@ fn halves(word: u64) -> (u32, u32) {
     (word as u32, (word >> 32) as u32)
 }
 
-/// The record of `settings`, erased behind its [`length`].
+/// The record of `settings`; the double words behind its [`length`] are erased.
 pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
     for (key, word) in KEYS.iter().zip(words.iter_mut().skip(FIRST)) {
         *word = pair(key.id(), key.to_bits(settings));
     }
     let mut entries = KEYS.len();
-    if let Some(found) = &settings.learned {
-        let values = learned::to_words(found).into_iter().enumerate();
-        for ((n, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
-            *word = pair(learned::id(n), value);
+    if let Some(learned) = &settings.learned {
+        let values = learned::to_words(learned).into_iter().enumerate();
+        for ((index, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
+            *word = pair(learned::id(index), value);
         }
         entries += learned::WORDS;
     }
@@ -74,12 +114,11 @@ pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     words
 }
 
-/// Double words of a record that are written.
+/// Double words of a record in use.
 pub fn length(record: &[u64; WORDS]) -> usize {
     FIRST + header(record[0]).map_or(0, |(_, entries)| entries)
 }
 
-#[inline(never)]
 fn checksum(header: u64, sequence: u32, entries: impl Iterator<Item = u64>) -> u32 {
     let mut digest = CRC.digest();
     digest.update(&header.to_le_bytes());
@@ -88,31 +127,28 @@ fn checksum(header: u64, sequence: u32, entries: impl Iterator<Item = u64>) -> u
     digest.finalize()
 }
 
-/// Version and number of entries, if it is a header.
+/// Version and number of entries, if the double word is a header.
 fn header(word: u64) -> Option<(u16, usize)> {
     let (magic, rest) = halves(word);
     let (version, entries) = (rest as u16, (rest >> 16) as usize);
     (magic == MAGIC && entries <= SLOT_WORDS - FIRST).then_some((version, entries))
 }
 
-/// What a slot holds that is read by `read`. (Nothing here is inlined: it is called from several places,
-/// seldom.)
-#[inline(never)]
-pub fn find(read: &mut dyn FnMut(usize) -> Option<u64>) -> Found {
-    if let Some((version, sequence)) = whole(read) {
-        return Found::Whole { version, sequence };
-    }
-    if (0..SLOT_WORDS).all(|word| read(word) == Some(ERASED)) {
-        Found::Blank
+/// The contents of the slot that `read` reads.
+pub fn inspect(read: &mut dyn FnMut(usize) -> Option<u64>) -> SlotContent {
+    if let Some(sequence) = whole_record(read) {
+        SlotContent::Whole { sequence }
+    } else if (0..SLOT_WORDS).all(|word| read(word) == Some(ERASED)) {
+        SlotContent::Blank
     } else {
-        Found::Broken
+        SlotContent::Broken
     }
 }
 
-#[inline(never)]
-fn whole(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
+/// The sequence number, if the slot holds a record with the right checksum.
+fn whole_record(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<u32> {
     let first = read(0)?;
-    let (version, entries) = header(first)?;
+    let (_, entries) = header(first)?;
     let (sequence, written) = halves(read(COMMIT)?);
     let mut complete = true;
     let entries = (FIRST..FIRST + entries).map(|word| {
@@ -121,36 +157,35 @@ fn whole(read: &mut dyn FnMut(usize) -> Option<u64>) -> Option<(u16, u32)> {
         entry.unwrap_or(ERASED)
     });
     let checksum = checksum(first, sequence, entries);
-    (complete && checksum == written).then_some((version, sequence))
+    (complete && checksum == written).then_some(sequence)
 }
 
 /// The settings of a whole record.
 ///
 /// # Errors
-/// Why they are not used.
-#[inline(never)]
+/// The reason why they are rejected.
 pub fn settings(
     read: &mut dyn FnMut(usize) -> Option<u64>,
     defaults: &FirmwareSettings,
-) -> Result<FirmwareSettings, NotUsed> {
-    let (version, entries) = read(0).and_then(header).ok_or(NotUsed::Broken)?;
+) -> Result<FirmwareSettings, Rejected> {
+    let (version, entries) = read(0).and_then(header).ok_or(Rejected::Broken)?;
     if version > VERSION {
-        return Err(NotUsed::Newer(version));
+        return Err(Rejected::Newer(version));
     }
     let mut settings = *defaults;
-    let (mut words, mut found) = ([0; learned::WORDS], 0_u64);
+    let (mut words, mut present) = ([0; learned::WORDS], 0_u64);
     for word in FIRST..FIRST + entries {
-        let (id, bits) = halves(read(word).ok_or(NotUsed::Broken)?);
+        let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
         if let Some(key) = find_id(id) {
-            key.set_bits(&mut settings, bits).ok_or(NotUsed::Value(key.name))?;
-        } else if let Some(place) = learned::place(id) {
-            words[place] = bits;
-            found |= 1 << place;
+            key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name))?;
+        } else if let Some(index) = learned::index(id) {
+            words[index] = bits;
+            present |= 1 << index;
         }
     }
-    if found > 0 {
-        let whole = learned::from_words(&words).filter(|_| found == learned::ALL);
-        settings.learned = Some(whole.ok_or(NotUsed::Value(learned::NAME))?);
+    if present > 0 {
+        let learned = learned::from_words(&words).filter(|_| present == learned::ALL);
+        settings.learned = Some(learned.ok_or(Rejected::Value(learned::NAME))?);
     }
     Ok(settings)
 }

@@ -1,8 +1,8 @@
-//! What was learned as values of the flash: all of them, or none.
+//! The result of a learning as values in the flash. Either all of them are present or none.
 //!
-//! | value | what |
+//! | index | value |
 //! |---|---|
-//! | 0 to 14 | reference at the currents of its table, but for zero |
+//! | 0 to 14 | reference at the currents of its table, except at zero |
 //! | 15 to 29 | carrier current at the same, 0 where it was not learned |
 //! | 30 | asymmetry of the reference |
 //! | 31, 32 | gain mismatch, its misfit |
@@ -10,19 +10,19 @@
 //! | 35 | saliency of the flux |
 //! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier |
 //!
-//! But for the last all are of single precision.
+//! All but the last are in single precision.
 
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::settings::table::CarrierTable;
 use drive_core::settings::table::{POINTS, ReferenceTable};
 
-use crate::console::keys::number_of;
+use crate::hash;
 
-/// How many there are.
+/// Number of values.
 pub const WORDS: usize = FLAGS + 1;
-/// A bit for each.
+/// A bit for each value.
 pub const ALL: u64 = (1 << WORDS) - 1;
-/// The name by which their numbers are made, and by which they are refused.
+/// The name that their ids derive from, and that a rejection states.
 pub const NAME: &str = "learned";
 
 const REFERENCE: usize = 0;
@@ -34,19 +34,18 @@ const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
 const HAS_CARRIER: u32 = 1 << 10;
 
-/// The number of a value, made of the name and its place.
-pub fn id(place: usize) -> u32 {
-    number_of(NAME).wrapping_add(place as u32)
+/// The id of a value: the hash of the name plus its index.
+pub fn id(index: usize) -> u32 {
+    hash::of(NAME.bytes()).wrapping_add(index as u32)
 }
 
-/// The place of the value with this number.
-pub fn place(id: u32) -> Option<usize> {
-    let place = id.wrapping_sub(number_of(NAME)) as usize;
-    (place < WORDS).then_some(place)
+/// The index of the value with this id.
+pub fn index(id: u32) -> Option<usize> {
+    let index = id.wrapping_sub(hash::of(NAME.bytes())) as usize;
+    (index < WORDS).then_some(index)
 }
 
-/// What was learned, as it is kept.
-#[inline(never)]
+/// The values of a result.
 pub fn to_words(learned: &Learned) -> [u32; WORDS] {
     let (gains, current) = (learned.gain_mismatch, learned.current_saliency);
     let fits = [
@@ -72,15 +71,14 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
     words
 }
 
-/// What was kept, if a learning can have found it.
-#[inline(never)]
+/// The result with these values, if it is one that a learning accepts.
 pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
     let carrier = CarrierTable::from_points(table(words, CARRIER, 1.0));
-    let value = |place: usize| f32::from_bits(words[place]);
+    let value = |index: usize| f32::from_bits(words[index]);
     let flags = words[FLAGS];
-    let fitted = |place, bit| Fitted {
-        value: value(place),
-        misfit: value(place + 1),
+    let fitted = |index, bit| Fitted {
+        value: value(index),
+        misfit: value(index + 1),
         accepted: flags & bit != 0,
     };
     let learned = Learned {
@@ -97,7 +95,7 @@ pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
     (whole && learned.is_believable()).then_some(learned)
 }
 
-#[inline(never)]
+/// The points of a table whose values but the first, `at_zero`, begin at index `first`.
 fn table(words: &[u32; WORDS], first: usize, at_zero: f32) -> [f32; POINTS] {
     let mut points = [at_zero; POINTS];
     for (point, word) in points.iter_mut().skip(1).zip(words.iter().skip(first)) {

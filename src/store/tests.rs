@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use super::learned as learned_words;
 use super::*;
-use crate::console::keys::{KEYS, Value};
+use crate::settings::keys::{self, KEYS};
+use crate::settings::value::Value;
 
 /// Flash that loses power, with what a power failure leaves drawn from random bits.
 #[derive(Clone, Debug)]
@@ -63,21 +64,21 @@ impl Flash for &mut Fake {
     fn read(&mut self, slot: usize, word: usize) -> Option<u64> {
         self.words[slot][word]
     }
-    fn erase(&mut self, slot: usize) -> Result<(), Failed> {
+    fn erase(&mut self, slot: usize) -> Result<(), FlashError> {
         let fails = self.fails();
         for word in 0..SLOT_WORDS {
             let old = self.words[slot][word];
             self.words[slot][word] =
                 if fails { self.left_of(old, u64::MAX) } else { Some(u64::MAX) };
         }
-        if fails { Err(Failed::Erase(0)) } else { Ok(()) }
+        if fails { Err(FlashError::Erase(0)) } else { Ok(()) }
     }
-    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), Failed> {
+    fn program(&mut self, slot: usize, word: usize, value: u64) -> Result<(), FlashError> {
         let old = self.words[slot][word];
         assert_eq!(old, Some(u64::MAX), "double word {word} is not erased");
         let fails = self.fails();
         self.words[slot][word] = if fails { self.left_of(old, value) } else { Some(value) };
-        if fails { Err(Failed::Program(0)) } else { Ok(()) }
+        if fails { Err(FlashError::Program(0)) } else { Ok(()) }
     }
 }
 
@@ -117,7 +118,7 @@ fn load(fake: &mut Fake) -> Loaded {
     Saved::load(fake, &board()).1
 }
 
-fn save(fake: &mut Fake, settings: &FirmwareSettings) -> Result<(), Failed> {
+fn save(fake: &mut Fake, settings: &FirmwareSettings) -> Result<(), FlashError> {
     Saved::load(fake, &board()).0.save(settings)
 }
 
@@ -162,7 +163,7 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
     assert_eq!(codec::length(&new), codec::WORDS);
     // No key has a number that what was learned has: those who do not know it leave it alone.
     for word in &new[2 + KEYS.len()..] {
-        assert!(learned_words::place(*word as u32).is_some());
+        assert!(learned_words::index(*word as u32).is_some());
         assert!(KEYS.iter().all(|key| key.id() != *word as u32));
     }
 }
@@ -187,7 +188,7 @@ fn what_cannot_have_been_learned_is_refused() {
         spoil(&mut record[first + 3 * n]);
         let mut fake = Fake::new();
         fake.hold(0, resealed(record));
-        assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("learned")), "{n}");
+        assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")), "{n}");
     }
 }
 
@@ -239,7 +240,7 @@ fn a_failed_save_leaves_the_set_before_and_says_why() {
     let mut fake = Fake::new();
     save(&mut fake, &with_r_s(1.0)).unwrap();
     fake.left = Some(0);
-    assert_eq!(save(&mut fake, &with_r_s(2.0)), Err(Failed::Erase(0)));
+    assert_eq!(save(&mut fake, &with_r_s(2.0)), Err(FlashError::Erase(0)));
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
 }
 
@@ -252,7 +253,7 @@ fn what_a_later_firmware_wrote_is_kept_until_the_save_after_next() {
     // As a later firmware computes it.
     fake.hold(1, resealed(record));
     let kept = fake.words[1];
-    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Newer(2)));
+    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Newer(2)));
     save(&mut fake, &with_r_s(3.0)).unwrap();
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
     assert_eq!(fake.words[1], kept);
@@ -268,6 +269,43 @@ fn keys_may_come_and_go() {
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
 }
 
+/// The flash of a board that runs commit 1abee12 and has saved this record.
+fn board_of_1abee12(record: &[u8]) -> Fake {
+    let mut fake = Fake::new();
+    for (place, word) in fake.words[0].iter_mut().zip(record.chunks_exact(8)) {
+        *place = Some(u64::from_le_bytes(word.try_into().unwrap()));
+    }
+    fake
+}
+
+/// A key that is renamed must be found by the hash of its old name, too.
+#[test]
+fn records_saved_by_commit_1abee12_are_read() {
+    let defaults = include_bytes!("tests/defaults-1abee12.bin");
+    assert_eq!(load(&mut board_of_1abee12(defaults)), Loaded::Settings(board()));
+
+    let changed = include_bytes!("tests/changed-1abee12.bin");
+    let mut expected = board();
+    // The values that its console showed: none is the default.
+    for line in include_str!("tests/changed-1abee12.txt").lines() {
+        let (name, value) = line.split_once(' ').unwrap();
+        let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
+        key.set(&mut expected, key.parse(value).unwrap());
+    }
+    let fitted = |value, misfit| Fitted { value, misfit, accepted: true };
+    expected.learned = Some(Learned {
+        reference: ReferenceTable::default(),
+        carrier: Some(CarrierTable::default()),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: fitted(0.01, 0.0002),
+        current_saliency: fitted(0.03, 0.02),
+        flux_saliency: -0.035,
+        accepted: true,
+    });
+    assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
+}
+
 #[test]
 fn a_value_that_nobody_knows_is_named() {
     let place = KEYS.iter().position(|key| key.name == "angle_source").unwrap();
@@ -275,7 +313,7 @@ fn a_value_that_nobody_knows_is_named() {
     record[2 + place] ^= 1 << 40;
     let mut fake = Fake::new();
     fake.hold(0, resealed(record));
-    assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Value("angle_source")));
+    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("angle_source")));
 }
 
 /// The record with its checksum made right again.
@@ -290,8 +328,8 @@ fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
 
 #[test]
 fn numbers_of_settings_follow_those_of_the_records() {
-    let all = [NotUsed::Broken, NotUsed::Newer(2), NotUsed::Value("x"), NotUsed::Refused];
-    assert_eq!(all.map(NotUsed::code), [70, 71, 72, 73]);
+    let all = [Rejected::Broken, Rejected::Newer(2), Rejected::Value("x"), Rejected::Refused];
+    assert_eq!(all.map(Rejected::code), [70, 71, 72, 73]);
     assert!(all.iter().all(|why| why.to_string().starts_with("7")));
 }
 
@@ -334,7 +372,7 @@ proptest! {
         let text = match key.get(&settings) {
             Value::Number(_) => f32::from_bits(bits).to_string(),
             Value::Whole(_) => bits.to_string(),
-            Value::Word { .. } => key.words()[bits as usize % key.words().len()].to_owned(),
+            Value::Word(_) => key.words()[bits as usize % key.words().len()].to_owned(),
         };
         if let Ok(value) = key.parse(&text) {
             key.set(&mut settings, value);
@@ -355,7 +393,7 @@ proptest! {
         flip(&mut fake.words[1][word]);
         if both {
             flip(&mut fake.words[0][word]);
-            prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+            prop_assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Broken));
         } else {
             prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(1.0)));
         }
@@ -377,7 +415,7 @@ proptest! {
                 fake.words[slot][0] = Some(record[0] & 0xffff_ffff_ffff | u64::from(entries) << 48);
             }
         }
-        prop_assert_eq!(load(&mut fake), Loaded::NotUsed(NotUsed::Broken));
+        prop_assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Broken));
         save(&mut fake, &with_r_s(3.0)).unwrap();
         prop_assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(3.0)));
     }

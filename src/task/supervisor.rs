@@ -1,4 +1,4 @@
-//! The main loop's side of the drive: what the console talks about, and the log.
+//! The main loop's side of the drive: commands of the console, tracking, log, and watchdog.
 
 use core::fmt;
 use core::sync::atomic::Ordering;
@@ -8,80 +8,81 @@ use defmt::Display2Format;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Accepted, Coefficients, Command, Hardware, State};
+use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
-use crate::chip::memory;
-use crate::chip::{pwm, stop};
+use crate::chip::watchdog::Watchdog;
+use crate::chip::{memory, pwm, stop};
 use crate::task::control;
 use induction_drive::board;
 use induction_drive::console::grammar::Level;
-use induction_drive::console::keys::FirmwareSettings;
-use induction_drive::console::{DriveHandle, NotDone};
+use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::ring;
-use induction_drive::link::trace;
+use induction_drive::link::trace::{self, SignalChoice};
 use induction_drive::link::{Answer, Status};
-use induction_drive::monitor::memory_check::{Flipped, MemoryCheck, Places};
+use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
 use induction_drive::monitor::record::{Reason, Record};
-use induction_drive::monitor::watchdog::{Rule, Verdict, Watchdog};
-use induction_drive::rotor_tracking::{Report, Seen, Tracking};
-use induction_drive::store::{Failed, NotUsed, Saved};
+use induction_drive::monitor::watchdog::{FeedRule, Verdict};
+use induction_drive::rotor_tracking::{Observation, Report, Tracking};
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::codec::Rejected;
+use induction_drive::store::{FlashError, Saved};
 
-/// Which firmware this is, in the sources.
+/// Version and commit of the firmware.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), ", commit ", env!("GIT_HASH"));
 
-/// The ends of what goes to the control interrupt and comes from it.
-pub struct Ends {
-    /// Reports.
+/// The main loop's ends of the communication with the control interrupt.
+pub struct ControlLink {
+    /// Reports of the interrupt.
     pub status: Receiver<'static, Status>,
-    /// To the drive.
-    pub orders: Sender<'static, Command>,
-    /// From the drive.
+    /// Commands to the drive.
+    pub commands: Sender<'static, Command>,
+    /// Answers of the drive.
     pub answers: Receiver<'static, Answer>,
-    /// What a learning found.
+    /// Results of a learning.
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
-    /// What the identification sees.
-    pub seen: ring::Reader<'static, Seen, { board::SEEN_PERIODS }>,
+    /// Periods for the identification of the rotor time constant.
+    pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
 
 /// The main loop's side of the drive.
 pub struct Supervisor {
-    /// Nothing if the control does not run.
-    ends: Option<Ends>,
+    /// `None` if the control does not run.
+    link: Option<ControlLink>,
     status: Option<Status>,
     level: Level,
     clock: Clock,
-    guard: Option<(Watchdog, Rule)>,
-    /// Over a control that runs.
+    guard: Option<(Watchdog, FeedRule)>,
+    /// `None` if the control does not run.
     check: Option<MemoryCheck<5>>,
-    /// Whether it has run for a while.
+    /// Whether it has run long enough to forget earlier resets.
     well: bool,
     chip: Chip,
-    /// The rotor time constant, where the settings want it tracked. (Not on the stack: it is large.)
+    /// Tracking of the rotor time constant, if the settings enable it. (Large, so not on the stack.)
     tracking: &'static mut Option<Tracking>,
 }
 
-/// What the supervisor knows of the chip and of its own start.
+/// State of the chip at start, and the saved settings.
 pub struct Chip {
-    /// What reset it.
+    /// Cause of the reset.
     pub cause: &'static str,
-    /// What the firmware wrote before.
+    /// End of the last run.
     pub record: Option<Record>,
-    /// Its option bytes.
+    /// Option bytes.
     pub options: u32,
-    /// Whether its flash has two banks.
+    /// Whether the flash has two banks.
     pub dual_bank: bool,
-    /// The pages of the settings.
+    /// The saved settings.
     pub saved: Saved<Pages>,
-    /// Why what was saved is not used, if it is not.
-    pub not_used: Option<NotUsed>,
-    /// Dead time that the timer makes, s.
+    /// Reason why the saved settings were rejected, if they were.
+    pub rejected: Option<Rejected>,
+    /// Dead time of the timer, s.
     pub dead_time_s: f32,
 }
 
-/// Milliseconds, from the cycle counter, which wraps every 25 s: read it more often.
+/// Milliseconds from the cycle counter, which wraps every 25 s: to be updated more often.
 struct Clock {
     last: u32,
     cycles: u32,
@@ -100,60 +101,51 @@ impl Clock {
 }
 
 impl Supervisor {
-    /// A supervisor; without `ends`, one whose control does not run.
+    /// A supervisor; without `link`, one whose control does not run.
     pub fn new(
-        ends: Option<Ends>,
+        link: Option<ControlLink>,
         watchdog: Option<Watchdog>,
         chip: Chip,
         tracking: &'static mut Option<Tracking>,
     ) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
-        let guard = watchdog.map(|watchdog| (watchdog, Rule::new(clock.last, periods)));
-        let check = ends.is_some().then(|| {
-            let ((code, source), (constants, changes)) =
-                (memory::control_code(), control::constants());
-            MemoryCheck::new(Places { code, source, constants, changes }, memory::word)
+        let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(clock.last, periods)));
+        let check = link.is_some().then(|| {
+            let (code, source) = memory::control_code();
+            let (constants, changes) = control::constants();
+            MemoryCheck::new(CheckedMemory { code, source, constants, changes }, memory::word)
         });
-        Self {
-            ends,
-            status: None,
-            level: Level::Info,
-            clock,
-            guard,
-            check,
-            well: false,
-            chip,
-            tracking,
-        }
+        let (status, level, well) = (None, Level::Info, false);
+        Self { link, status, level, clock, guard, check, well, chip, tracking }
     }
 
-    /// Looks at a slice of the control's memory. What has flipped ends it: start-up copies and computes it
-    /// afresh.
+    /// Checks a slice of the control's memory. A flipped bit ends the run: start-up copies the code and computes the
+    /// coefficients afresh.
     pub fn check_memory(&mut self) {
         match self.check.as_mut().map(|check| check.slice(memory::word)) {
-            Some(Err(Flipped::Code { address, found, copied })) => {
+            Some(Err(BitFlip::Code { address, found, copied })) => {
                 stop::end(Reason::Code, [address, found, copied, 0]);
             }
-            Some(Err(Flipped::Constants { found, before })) => {
+            Some(Err(BitFlip::Constants { found, before })) => {
                 stop::end(Reason::Coefficients, [found, before, 0, 0]);
             }
             Some(Ok(())) | None => {}
         }
     }
 
-    /// Takes what the control reports, logs it, and tracks the rotor time constant by it. Gives the time
+    /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
     /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
         self.clock.update();
         self.track();
-        if let Some(status) = self.ends.as_mut().and_then(|ends| ends.status.take()) {
+        if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
             self.log(status);
         }
         self.clock.ms
     }
 
-    /// Feeds the watchdog, if the rule allows. Last thing in a pass of the main loop.
+    /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
     pub fn feed_watchdog(&mut self) {
         let Some((watchdog, rule)) = &mut self.guard else { return };
         let missed = control::MISSED.load(Ordering::Relaxed);
@@ -161,8 +153,7 @@ impl Supervisor {
         match rule.judge(DWT::cycle_count(), periods, missed) {
             Verdict::Wait => {}
             Verdict::Feed => watchdog.feed(),
-            // The watchdog resets the chip in a moment. Until then nothing is wrong with the loop, and
-            // what the console is asked for is still done.
+            // The watchdog resets the chip in a moment. The main loop itself works, and the console answers until then.
             Verdict::Refuse { periods, cycles } => {
                 pwm::outputs_off();
                 stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
@@ -174,14 +165,15 @@ impl Supervisor {
         }
     }
 
-    /// Comes to an end: a period takes less time here than it lasts.
+    /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
     fn track(&mut self) {
-        while let Some(seen) = self.ends.as_mut().and_then(|ends| ends.seen.pop()) {
-            let Some(tau_r) = self.tracking.as_mut().and_then(|t| t.take(&seen)) else { continue };
+        while let Some(period) = self.link.as_mut().and_then(|link| link.observations.dequeue()) {
+            let tau_r = self.tracking.as_mut().and_then(|tracking| tracking.take(&period));
+            let Some(tau_r) = tau_r else { continue };
             // Refused when the drive has just stopped.
-            let answer = self.order(Command::RotorTimeConstant(tau_r));
-            if let (Ok(taken), Some(tracking)) = (answer, self.tracking.as_mut()) {
-                tracking.taken(tau_r, taken);
+            let answer = self.command(Command::RotorTimeConstant(tau_r));
+            if let (Ok(accepted), Some(tracking)) = (answer, self.tracking.as_mut()) {
+                tracking.taken(tau_r, accepted);
             }
         }
     }
@@ -226,22 +218,22 @@ impl Supervisor {
 }
 
 impl DriveHandle for Supervisor {
-    fn order(&mut self, order: Command) -> Result<Accepted, NotDone> {
-        let ends = self.ends.as_mut().ok_or(NotDone::NoAnswer)?;
-        // An answer that came too late for its order.
-        ends.answers.take();
-        if !ends.orders.send(order) {
-            return Err(NotDone::NoAnswer);
+    fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
+        let link = self.link.as_mut().ok_or(CommandError::NoAnswer)?;
+        // Discards an answer that came too late for its command.
+        link.answers.take();
+        if !link.commands.send(command) {
+            return Err(CommandError::NoAnswer);
         }
         let began = DWT::cycle_count();
         while DWT::cycle_count().wrapping_sub(began)
             < board::ANSWER_TIMEOUT_US * board::CYCLES_PER_US
         {
-            if let Some(answer) = ends.answers.take() {
-                return answer.map_err(NotDone::Refused);
+            if let Some(answer) = link.answers.take() {
+                return answer.map_err(CommandError::Refused);
             }
         }
-        Err(NotDone::NoAnswer)
+        Err(CommandError::NoAnswer)
     }
 
     fn status(&self) -> Option<Status> {
@@ -253,7 +245,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError> {
-        stretched(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
+        extended(&mut self.guard, || settings.build_for(self.chip.dead_time_s))
     }
 
     fn configured(&mut self, settings: &FirmwareSettings) {
@@ -264,27 +256,27 @@ impl DriveHandle for Supervisor {
         self.tracking.as_ref().map(Tracking::report)
     }
 
-    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
-        stretched(&mut self.guard, || self.chip.saved.save(settings))?;
-        self.chip.not_used = None;
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
+        extended(&mut self.guard, || self.chip.saved.save(settings))?;
+        self.chip.rejected = None;
         Ok(())
     }
 
-    fn begin_trace(&mut self, records: u16, divider: u16, choice: &trace::Choice) -> bool {
-        self.ends.as_mut().is_some_and(|ends| ends.trace.begin(records, divider, choice))
+    fn begin_trace(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool {
+        self.link.as_mut().is_some_and(|link| link.trace.begin(records, divider, choice))
     }
 
     fn tracing(&self) -> bool {
-        self.ends.as_ref().is_some_and(|ends| ends.trace.recording())
+        self.link.as_ref().is_some_and(|link| link.trace.recording())
     }
 
     fn traced(&self, i: u16) -> Option<trace::Record> {
-        self.ends.as_ref()?.trace.get(i)
+        self.link.as_ref()?.trace.get(i)
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
-        if let Some(ends) = &mut self.ends {
-            ends.learned.take_with(|found| found.as_ref().map(show));
+        if let Some(link) = &mut self.link {
+            link.learned.take_with(|result| result.as_ref().map(show));
         }
     }
 
@@ -309,19 +301,19 @@ impl DriveHandle for Supervisor {
         if let Some(record) = &self.chip.record {
             write!(to, ", {record}")?;
         }
-        match &self.chip.not_used {
+        match &self.chip.rejected {
             Some(why) => write!(to, "; {why}"),
             None => Ok(()),
         }
     }
 }
 
-/// Does what takes long, with the time of the watchdog stretched, and lets it count from there: with
-/// one bank of flash the core, and the control with it, waits while the flash is written.
-fn stretched<R>(guard: &mut Option<(Watchdog, Rule)>, work: impl FnOnce() -> R) -> R {
+/// Does long work with the time of the watchdog extended, and restarts the feed rule after it: with one bank of flash the
+/// core, and the control with it, waits while the flash is written.
+fn extended<R>(guard: &mut Option<(Watchdog, FeedRule)>, work: impl FnOnce() -> R) -> R {
     match guard {
         Some((watchdog, rule)) => {
-            let result = watchdog.stretched(work);
+            let result = watchdog.extended(work);
             rule.restart(DWT::cycle_count(), control::PERIODS.load(Ordering::Relaxed));
             result
         }

@@ -1,62 +1,44 @@
-//! The virtual board: tests with the finished image on an emulated controller, and what its control
-//! interrupt costs.
+//! The virtual board: tests with the finished image on an emulated controller, faults, and the time that
+//! its control interrupt takes.
 
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::Result;
 
-use crate::run::{self, Step};
-use crate::toolchain;
+use crate::{run, toolchain};
 
 /// Environment variable by which the tests find the image.
 const ELF: &str = "INDUCTION_DRIVE_ELF";
-/// The table of cycles that must not rise.
-const TABLE: &str = "hil-sim/virtual-board/cycles.txt";
 
 /// Runs the tests of the virtual board with this image.
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    Step::new("the image on the virtual board")
-        .run(on_the_board(["test", "--release", "--package", "virtual-board"]).env(ELF, elf))
+    let mut command = run::cargo("test --release --package virtual-board");
+    run::step("the image on the virtual board", command.env(ELF, elf))
 }
 
-/// Prints what the control interrupt of this image costs; fails if it costs over 5 % more than the table
-/// that is checked in.
+/// Prints the estimated cycles of the control interrupt of this image; fails above the limits.
 pub fn cycles(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    Step::new("cycles of the control interrupt").run(
-        on_the_board(["run", "--release", "--package", "virtual-board"])
-            .args(["--", "cycles"])
-            .arg(elf)
-            .args(["--against", TABLE]),
-    )
+    run::step("cycles of the control interrupt", &mut program("cycles", elf))
 }
 
-/// Which faults.
-pub struct Faults<'a> {
-    /// How many.
-    pub count: u32,
-    /// Seed of the first.
-    pub seed: u32,
-    /// Only of the classes whose name contains this.
-    pub class: &'a str,
-}
-
-/// Injects faults into this image on the virtual board; fails if any is not dealt with in its time.
-pub fn campaign(elf: &Path, faults: &Faults) -> Result<()> {
+/// Injects faults into this image; fails if the outputs stay on with wrong control beyond a bound.
+pub fn campaign(elf: &Path, count: u32, seed: u32, class: &str) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    Step::new("campaign of faults").run(
-        on_the_board(["run", "--release", "--package", "virtual-board"])
-            .args(["--", "campaign"])
-            .arg(elf)
-            .args([faults.count.to_string(), faults.seed.to_string()])
-            .args(["--class", faults.class]),
-    )
+    run::step("campaign of faults", faults(elf, count, seed).args(["--class", class]))
 }
 
-fn on_the_board<const N: usize>(arguments: [&str; N]) -> Command {
-    let mut command = run::cargo()();
-    command.args(arguments);
+/// The command that injects `count` faults, the first with this seed.
+pub fn faults(elf: &Path, count: u32, seed: u32) -> Command {
+    let mut command = program("campaign", elf);
+    command.args([count.to_string(), seed.to_string()]);
+    command
+}
+
+fn program(task: &str, elf: &Path) -> Command {
+    let mut command = run::cargo("run --release --package virtual-board --");
+    command.arg(task).arg(elf);
     command
 }

@@ -1,73 +1,95 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
 
 mod board;
+mod budget;
 mod control;
+mod elf;
 mod fuzz;
 mod image;
+mod lines;
+mod map;
+mod modules;
 mod paths;
+mod prove;
+mod rooms;
 mod run;
+mod sections;
+mod size;
+mod sources;
 mod stack;
 mod toolchain;
+mod tools;
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Result;
+use clap::Parser;
 
-use run::Step;
-
-const HELP: &str = "\
-Usage: cargo xtask <task>
-
-  test      everything a change must pass: format, lints, host tests, documentation, firmware, the
-            firmware on the virtual board; gets what is missing from the system, or says what to type
-  firmware  builds the image for the board (also: cargo firmware)
-  flash     builds it, writes it through a debug probe, shows its log (also: cargo flash)
-  board     builds the image and tests it on the virtual board
-  cycles    counts what the control interrupt costs on the virtual board, and fails when it rises
-  campaign [N] [SEED] [CLASS]
-            injects N faults (2000) into the image on the virtual board, the first with SEED (1), only
-            of the classes whose name contains CLASS
-  fuzz [S]  fuzzes console and saved settings, S seconds each (300)
-  size      shows what the image takes of each memory, and fails above the limits";
+/// Developer tasks.
+#[derive(Parser)]
+#[command(bin_name = "cargo xtask")]
+enum Task {
+    /// Everything a change must pass: format, modules, lints, host tests, documentation, firmware, the
+    /// firmware on the virtual board. Installs missing programs, or prints the command to type
+    Test,
+    /// Builds and checks the image for the board (also: cargo firmware)
+    Firmware,
+    /// Builds the image, writes it through a debug probe and shows its log (also: cargo flash)
+    Flash,
+    /// Builds the image and tests it on the virtual board
+    Board,
+    /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
+    /// the worst path, and above 2500 to the last compare value
+    Cycles,
+    /// Injects faults into the image on the virtual board
+    Campaign {
+        /// Number of faults
+        #[arg(default_value_t = CAMPAIGN)]
+        count: u32,
+        /// Seed of the first fault
+        #[arg(default_value_t = 1)]
+        seed: u32,
+        /// Only classes of faults whose name contains this
+        #[arg(default_value = "")]
+        class: String,
+    },
+    /// Fuzzes the console and the saved settings
+    Fuzz {
+        /// Seconds for each of the two
+        #[arg(default_value_t = 300)]
+        seconds: u32,
+    },
+    /// Prints the use of each memory by the image; fails above the limits
+    Size,
+    /// Counts lines of code, documentation, comments and tests; fails above the limits
+    Lines,
+    /// Fails if modules of a crate refer to each other in a circle
+    Rooms,
+    /// Changes drive-core in many places and runs its tests on each change; fails if under 90 % are caught.
+    /// Gets cargo-mutants from crates.io
+    Mutants {
+        /// Share of the places, K/N with K from 0
+        #[arg(default_value = "7/45")]
+        shard: String,
+    },
+    /// Builds the pages in docs/. Gets mdbook from crates.io
+    Book,
+    /// Long proofs in shards, which a later call continues. Lists them, or does one
+    Prove {
+        /// Name of the proof
+        name: Option<String>,
+        /// Part of its shards, K/N with K from 1
+        #[arg(default_value = "1/1")]
+        part: String,
+    },
+}
 
 /// Faults of a whole campaign; `test` injects a twentieth.
 const CAMPAIGN: u32 = 2000;
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let result = match arguments[..] {
-        ["test"] => test(),
-        ["firmware"] => image::build().map(|elf| println!("{}", elf.display())),
-        ["fuzz"] => fuzz::fuzz(300),
-        ["fuzz", seconds] if seconds.parse::<u32>().is_ok() => {
-            fuzz::fuzz(seconds.parse().unwrap_or_default())
-        }
-        ["flash"] => image::flash(),
-        ["size"] => image::build().and_then(|elf| image::report_size(&elf)),
-        ["board"] => image::build().and_then(|elf| board::test(&elf)),
-        ["campaign", ref rest @ ..]
-            if rest.len() <= 3 && rest.iter().take(2).all(|n| n.parse::<u32>().is_ok()) =>
-        {
-            let number = |n: usize, default| {
-                rest.get(n).and_then(|text| text.parse().ok()).unwrap_or(default)
-            };
-            let class = rest.get(2).copied().unwrap_or("");
-            let faults = board::Faults { count: number(0, CAMPAIGN), seed: number(1, 1), class };
-            image::build().and_then(|elf| board::campaign(&elf, &faults))
-        }
-        ["cycles"] => image::build().and_then(|elf| board::cycles(&elf)),
-        [] | ["help" | "-h" | "--help"] => {
-            println!("{HELP}");
-            Ok(())
-        }
-        _ => {
-            eprintln!("unknown task: {}\n\n{HELP}", arguments.join(" "));
-            return ExitCode::from(2);
-        }
-    };
-    match result {
+    match run(Task::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("\nFAILED: {error:#}");
@@ -76,49 +98,52 @@ fn main() -> ExitCode {
     }
 }
 
+fn run(task: Task) -> Result<()> {
+    match task {
+        Task::Test => test(),
+        Task::Firmware => image::build().map(|elf| println!("{}", elf.display())),
+        Task::Flash => image::flash(),
+        Task::Board => board::test(&image::build()?),
+        Task::Cycles => board::cycles(&image::build()?),
+        Task::Campaign { count, seed, class } => {
+            board::campaign(&image::build()?, count, seed, &class)
+        }
+        Task::Fuzz { seconds } => fuzz::fuzz(seconds),
+        Task::Size => size::report(&image::build()?),
+        Task::Lines => lines::report(),
+        Task::Rooms => rooms::check(),
+        Task::Mutants { shard } => tools::mutants(&shard),
+        Task::Book => tools::book(),
+        Task::Prove { name: None, .. } => prove::list(),
+        Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
+    }
+}
+
 /// Everything a change must pass, the quick things first; stops at the first failure.
 fn test() -> Result<()> {
     let began = Instant::now();
     toolchain::ensure_format_and_lints()?;
     toolchain::ensure_c_compiler()?;
-    let host = run::cargo();
-
-    Step::new("format").run(host().args(["fmt", "--all", "--check"]))?;
-    Step::new("lints").run(host().args([
-        "clippy",
-        "--workspace",
-        "--all-targets",
-        "--",
-        "-D",
-        "warnings",
-    ]))?;
-    Step::new("host tests").run(host().args([
-        "test",
-        "--workspace",
-        // It needs the image.
-        "--exclude",
-        "virtual-board",
-    ]))?;
-    Step::new("documentation")
-        .run(host().args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
+    run::step("format", &mut run::cargo("fmt --all --check"))?;
+    run::timed("rooms", rooms::check)?;
+    run::step("lints", &mut run::cargo("clippy --workspace --all-targets -- -D warnings"))?;
+    // The virtual board needs the image.
+    run::step("host tests", &mut run::cargo("test --workspace --exclude virtual-board"))?;
+    let mut documentation = run::cargo("doc --workspace --no-deps");
+    run::step("documentation", documentation.env("RUSTDOCFLAGS", "-D warnings"))?;
 
     let target = toolchain::for_target()?;
-    Step::new("drive-core for the controller")
-        .run(target.cargo("build")?.args(["--package", "drive-core"]))?;
-    Step::new("lints of the firmware").run(target.cargo("clippy")?.args([
-        "--package",
-        "induction-drive",
-        "--no-deps",
-        "--",
-        "-D",
-        "warnings",
-    ]))?;
+    let core = ["--package", "drive-core"];
+    run::step("drive-core for the controller", target.cargo("build")?.args(core))?;
+    let lints = ["--package", "induction-drive", "--no-deps", "--", "-D", "warnings"];
+    run::step("lints of the firmware", target.cargo("clippy")?.args(lints))?;
     let elf = image::build_with(&target)?;
-    image::report_size(&elf)?;
+    size::report(&elf)?;
     board::test(&elf)?;
-    board::campaign(&elf, &board::Faults { count: CAMPAIGN / 20, seed: 1, class: "" })?;
+    board::campaign(&elf, CAMPAIGN / 20, 1, "")?;
     board::cycles(&elf)?;
 
+    budget::report(&run::times());
     println!("\nPASSED: everything, in {} s", began.elapsed().as_secs());
     Ok(())
 }

@@ -1,22 +1,21 @@
-//! Paths of this machine, and keeping them out of the image.
+//! Keeps the paths of this machine out of the image.
 //!
-//! A panic's location is in the flash, and the names of all source files are in the debug information,
-//! which the hash of the image covers: with short names instead, two machines build the same image.
+//! The location of a panic is in the flash, and the names of all source files are in the debug
+//! information, which the hash of the image covers. With short names for the directories of this machine,
+//! two machines build the same image.
 
 use std::env;
-use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 
-use crate::run;
-use crate::toolchain::TARGET;
+use crate::run::{self, TARGET};
 
-/// Directories of this machine, and what stands for them in the image. Where several fit, the last counts.
+/// Directories of this machine, and their short names in the image. Where several fit, the last counts.
 fn short_names() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut names = vec![(run::root().to_owned(), "."), (run::target_dir()?, "target")];
-    // One directory for each registry; it is there, since this program has dependencies too. What is
-    // under it begins with the name of the package.
+    // One directory for each registry, with a directory for each package. It exists, since this program
+    // has dependencies too.
     for registry in cargo_home()?.join("registry/src").read_dir().into_iter().flatten().flatten() {
         names.push((registry.path(), ""));
     }
@@ -30,29 +29,25 @@ fn cargo_home() -> Result<PathBuf> {
     }
 }
 
-/// An option of cargo by which the compiler writes the short names. It adds to the flags of the target in
-/// `.cargo/config.toml`; the variables of the environment would replace them.
-pub fn option() -> Result<String> {
-    let flag = |(long, short): (PathBuf, &str)| {
-        format!("{:?}", format!("--remap-path-prefix={}={short}", long.display()))
-    };
-    let flags: Vec<String> = short_names()?.into_iter().map(flag).collect();
-    Ok(format!("--config=target.{TARGET}.rustflags=[{}]", flags.join(", ")))
+/// An option of cargo that makes the compiler write the short names, and gives it one more flag. It adds
+/// to the flags of the target in `.cargo/config.toml`; the variables of the environment would replace them.
+pub fn option(flag: String) -> Result<String> {
+    let mut flags = vec![flag];
+    for (long, short) in short_names()? {
+        flags.push(format!("--remap-path-prefix={}={short}", long.display()));
+    }
+    // The debug format of a list of strings is TOML.
+    Ok(format!("--config=target.{TARGET}.rustflags={flags:?}"))
 }
 
-/// Fails if a file of an image has a path of this machine in it.
+/// Fails if an image contains a path of this machine.
 pub fn check(image: &[u8]) -> Result<()> {
     for (long, _) in short_names()? {
-        if contains(image, long.as_os_str()) {
-            bail!("{} is in the image: its hash is of this machine only", long.display());
-        }
+        let text = long.as_os_str().as_encoded_bytes();
+        let is_inside = image.windows(text.len()).any(|part| part == text);
+        ensure!(!is_inside, "{} is in the image: its hash is of this machine only", long.display());
     }
     Ok(())
-}
-
-fn contains(image: &[u8], text: &OsStr) -> bool {
-    let text = text.as_encoded_bytes();
-    image.windows(text.len()).any(|part| part == text)
 }
 
 #[cfg(test)]

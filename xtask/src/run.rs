@@ -1,12 +1,19 @@
-//! Running commands, and saying so.
+//! Commands: where they run, how they are shown, and how long they take.
 
 use std::env;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
+
+/// The microcontroller: Cortex-M4 with a single-precision floating-point unit.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// Profile of the image that is flashed.
+pub const PROFILE: &str = "firmware";
 
 /// The root of the workspace.
 pub fn root() -> &'static Path {
@@ -14,7 +21,7 @@ pub fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
-/// Where cargo puts what it builds.
+/// The directory of build results.
 pub fn target_dir() -> Result<PathBuf> {
     match env::var_os("CARGO_TARGET_DIR") {
         Some(dir) => std::path::absolute(dir).context("CARGO_TARGET_DIR"),
@@ -22,74 +29,67 @@ pub fn target_dir() -> Result<PathBuf> {
     }
 }
 
-/// The cargo that started us.
-pub fn cargo() -> impl Fn() -> Command {
-    let cargo = env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
-    move || command(&cargo)
+/// The cargo that started this program, with arguments that have no spaces inside.
+pub fn cargo(arguments: &str) -> Command {
+    let mut command = command(env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
+    command.args(arguments.split(' '));
+    command
 }
 
 /// A command that runs in the root of the workspace.
-pub fn command(program: impl AsRef<std::ffi::OsStr>) -> Command {
+pub fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root());
     command
 }
 
-/// One step of a task.
-pub struct Step<'a> {
-    what: &'a str,
-}
+/// Names of the steps so far, and how long each took.
+static TIMES: Mutex<Vec<(String, Duration)>> = Mutex::new(Vec::new());
 
-impl<'a> Step<'a> {
-    /// A step that does `what`.
-    pub fn new(what: &'a str) -> Self {
-        Self { what }
-    }
-
-    /// Says what it does, and does it.
-    pub fn run(self, command: &mut Command) -> Result<()> {
-        let line = shown(command);
-        println!("\n==> {}: {line}", self.what);
-        let began = Instant::now();
-        let status = command.status().with_context(|| format!("cannot run: {line}"))?;
-        if !status.success() {
-            bail!("{}, {status}\n    {line}", self.what);
-        }
-        println!("    {}: done in {:.0} s", self.what, began.elapsed().as_secs_f64());
+/// Prints and runs one step of a task.
+pub fn step(name: &str, command: &mut Command) -> Result<()> {
+    println!("\n==> {name}: {}", shown(command));
+    timed(name, || {
+        let status = command.status().with_context(|| format!("cannot run: {command:?}"))?;
+        ensure!(status.success(), "{name}, {status}\n    {command:?}");
         Ok(())
-    }
+    })
 }
 
-/// The command as one would type it.
+/// Runs one step of a task and notes its time.
+pub fn timed(name: &str, step: impl FnOnce() -> Result<()>) -> Result<()> {
+    let began = Instant::now();
+    step()?;
+    println!("    {name}: done in {:.0} s", began.elapsed().as_secs_f64());
+    TIMES.lock().unwrap_or_else(PoisonError::into_inner).push((name.to_owned(), began.elapsed()));
+    Ok(())
+}
+
+/// Names of the steps so far, and how long each took.
+pub fn times() -> Vec<(String, Duration)> {
+    TIMES.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// The program and its arguments, without paths and variables.
 fn shown(command: &Command) -> String {
-    let path = env::var("PATH").unwrap_or_default();
-    let mut words: Vec<String> = command
-        .get_envs()
-        .filter_map(|(name, value)| Some((name.to_string_lossy(), value?.to_string_lossy())))
-        .map(|(name, value)| match value.strip_suffix(&path) {
-            Some(front) if name == "PATH" => format!("PATH={front}$PATH"),
-            _ => format!("{name}={}", quoted(&value)),
-        })
-        .collect();
-    let program = Path::new(command.get_program());
-    // The rustup toolchain's own cargo is `cargo` to whoever types it.
-    let system = program.starts_with("/usr/bin");
-    let name = if system { program.as_os_str() } else { program.file_name().unwrap_or_default() };
-    words.push(name.to_string_lossy().into_owned());
-    words.extend(command.get_args().map(|argument| quoted(&argument.to_string_lossy())));
-    words.join(" ")
+    let program = Path::new(command.get_program()).file_name().unwrap_or_default();
+    let words: Vec<_> = [program].into_iter().chain(command.get_args()).collect();
+    words.join(OsStr::new(" ")).to_string_lossy().into_owned()
 }
 
-fn quoted(word: &str) -> String {
-    if word.contains(' ') { format!("'{word}'") } else { word.to_owned() }
+/// Prints how much of a limit is used; fails above it.
+pub fn limit<T: Display + PartialOrd>(what: &str, used: T, limit: T, unit: &str) -> Result<()> {
+    println!("{what}: {used} of {limit} {unit}");
+    ensure!(used <= limit, "{what}: {used} {unit}, {limit} are allowed");
+    Ok(())
 }
 
 /// Whether a command runs and succeeds; its output is not shown.
-pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
-    output(program, arguments).is_some()
+pub fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
 }
 
-/// What a command writes, if it runs and succeeds.
+/// The output of a command, if it runs and succeeds.
 pub fn output(program: &str, arguments: &[&str]) -> Option<String> {
     let output = command(program).args(arguments).stderr(Stdio::null()).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
@@ -101,15 +101,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_are_shown_as_one_would_type_them() {
+    fn commands_are_shown_without_paths_and_variables() {
         let mut command = Command::new("/some/toolchain/bin/cargo");
-        command.args(["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings").env_remove("GONE");
-        assert_eq!(shown(&command), "RUSTDOCFLAGS='-D warnings' cargo doc --no-deps");
+        command.args(["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings");
+        assert_eq!(shown(&command), "cargo doc --no-deps");
     }
 
     #[test]
-    fn a_failing_step_names_the_command() {
-        let error = Step::new("nothing").run(&mut Command::new("false")).unwrap_err();
-        assert!(error.to_string().ends_with("\n    false"), "{error}");
+    fn a_failing_step_names_the_whole_command() {
+        let error = step("nothing", Command::new("false").env("A", "b")).unwrap_err();
+        assert!(error.to_string().ends_with("\n    A=\"b\" \"false\""), "{error}");
     }
 }

@@ -1,32 +1,43 @@
 //! The most stack that the image can use, from its machine code.
 //!
-//! What each function takes is read off its instructions that move the stack pointer; who calls whom,
-//! off its calls. Calls through a register could go to any function that nobody calls by name, so the
+//! The frame of each function follows from its instructions that move the stack pointer; the call graph,
+//! from its calls. A call through a register could go to any function that nobody calls by name, so the
 //! deepest of those is taken; printing a line nests at most [`NESTED`] of them (text, value, part of
-//! the value, buffer). Recursion and a stack that grows by a register are refused: there would be no
-//! bound.
+//! the value, buffer). The nesting is an assumption about `core::fmt`: nothing here proves it.
+//! Recursion and a stack that grows by a register are refused: there would be no bound.
+//!
+//! Own code, since cargo-call-stack needs a nightly compiler.
 
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail};
-use object::Endianness;
-use object::elf::{FileHeader32, SHT_SYMTAB, STT_FUNC};
-use object::read::elf::{FileHeader, SectionHeader, Sym};
+use object::read::elf::ElfFile32;
+use object::{Object, ObjectSymbol, SymbolKind};
+
+use crate::elf::{self, Instruction};
 
 /// Calls through registers inside each other.
 const NESTED: usize = 4;
-/// What the core pushes for an interrupt, with floating point and alignment.
+/// Bytes that the core pushes for an interrupt, with floating point and alignment.
 const EXCEPTION: u32 = 104 + 4;
-/// What may interrupt what: each once, by rising priority.
+/// The interrupts by rising priority: each can interrupt main and those before it, once.
 const INTERRUPTS: [&str; 3] = ["LPUART", "ADC1_2", "NonMaskableInt"];
 /// Part of the name of the panic handler, which panics only once: it comes on top of everything else,
 /// once, and what it calls may call it without end only in appearance.
 const PANIC: &str = "rust_begin_unwind";
-/// Where it begins.
+/// The main program.
 const MAIN: &str = "main";
-/// What the processor alone calls, and what does not return from there or has a stack of its own.
+/// Functions that only the processor calls, and that never return or have a stack of their own.
 const BY_PROCESSOR: [&str; 3] = ["Reset", "HardFault", "DefaultHandler"];
-/// Code may be here.
+/// Parts of the names of the functions of core that print numbers and padding. They call nothing through a register
+/// but the text's output.
+const PRINTERS: [&str; 3] =
+    ["4core3fmtNtB5_9Formatter", "4core3fmtNtB5_11PostPadding", "float_to_decimal"];
+/// Parts of the names of the outputs' functions.
+const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write_char"];
+/// Part of the name of a veneer, which ends with the name of its target.
+const VENEER: &str = "LongThunk_";
+/// Sections with code.
 const SECTIONS: [&str; 2] = [".text", ".ccm"];
 
 /// One function.
@@ -43,8 +54,8 @@ struct Function {
 type Functions = BTreeMap<u32, Function>;
 
 /// The most bytes of stack in use at once.
-pub fn worst_case(elf: &[u8]) -> Result<u32> {
-    let functions = functions(elf)?;
+pub fn worst_case(image: &[u8]) -> Result<u32> {
+    let functions = functions(image)?;
     let main = depth_of(&functions, MAIN)?;
     let panic = functions.values().find(|function| function.name.contains(PANIC));
     let panic = panic.map_or(Ok(0), |function| depth_of(&functions, &function.name))?;
@@ -53,59 +64,23 @@ pub fn worst_case(elf: &[u8]) -> Result<u32> {
         .try_fold(main + panic, |sum, name| Ok(sum + EXCEPTION + depth_of(&functions, name)?))
 }
 
-fn functions(elf: &[u8]) -> Result<Functions> {
-    let header = FileHeader32::<Endianness>::parse(elf)?;
-    let endian = header.endian()?;
-    let sections = header.sections(endian, elf)?;
-    let symbols = sections.symbols(endian, elf, SHT_SYMTAB)?;
+fn functions(image: &[u8]) -> Result<Functions> {
+    let elf: ElfFile32 = ElfFile32::parse(image)?;
     let mut functions = Functions::new();
-    for name in SECTIONS {
-        let (_, section) = sections
-            .section_by_name(endian, name.as_bytes())
-            .with_context(|| format!("the image has no section {name}"))?;
-        let (begin, code) = (section.sh_addr(endian), section.data(endian, elf)?);
-        let end = begin + code.len() as u32;
-        // `$t` begins code, `$d` data (ABI for the Arm architecture).
-        let mut marks = BTreeMap::new();
-        for symbol in symbols.iter() {
-            let address = symbol.st_value(endian) & !1;
-            if !(begin..end).contains(&address) {
-                continue;
-            }
-            let name = String::from_utf8_lossy(symbol.name(endian, symbols.strings())?);
-            if name.starts_with("$t") || name.starts_with("$d") {
-                marks.insert(address, name.starts_with("$t"));
-            } else if symbol.st_type() == STT_FUNC && symbol.st_size(endian) > 0 {
-                let function = functions.entry(address).or_default();
-                function.end = address + symbol.st_size(endian);
-                // Of several names for one address, one that is asked for.
-                if function.name.is_empty() || is_entry(&name) {
-                    function.name = name.into_owned();
-                }
-            }
+    for symbol in elf.symbols().filter(|s| s.kind() == SymbolKind::Text && s.size() > 0) {
+        let address = elf::address(&symbol);
+        let function = functions.entry(address).or_default();
+        function.end = address + symbol.size() as u32;
+        // Several names can share an address. The names that are searched for are kept.
+        if function.name.is_empty() || is_entry(symbol.name()?) {
+            function.name = symbol.name()?.to_owned();
         }
-        for (&address, function) in functions.range_mut(begin..end) {
-            let mut is_code = true;
-            let mut at = address;
-            while at + 2 <= function.end {
-                is_code = marks.get(&at).copied().unwrap_or(is_code);
-                let half = |at: u32| {
-                    let i = (at - begin) as usize;
-                    code.get(i..i + 2).map_or(0, |b| u16::from_le_bytes([b[0], b[1]]))
-                };
-                if !is_code {
-                    at += 2;
-                    continue;
-                }
-                let (first, second) = (half(at), half(at + 2));
-                if first >> 11 >= 0b11101 {
-                    long(function, address, at, first, second)
-                        .with_context(|| function.name.clone())?;
-                    at += 4;
-                } else {
-                    short(function, first);
-                    at += 2;
-                }
+    }
+    for section in SECTIONS {
+        for instruction in elf::instructions(&elf, section)? {
+            let function = functions.range_mut(..=instruction.address).next_back();
+            if let Some((&begin, function)) = function.filter(|f| instruction.address < f.1.end) {
+                add(function, begin, instruction).with_context(|| function.name.clone())?;
             }
         }
     }
@@ -116,34 +91,32 @@ fn is_entry(name: &str) -> bool {
     name == MAIN || INTERRUPTS.contains(&name) || BY_PROCESSOR.contains(&name)
 }
 
-fn short(function: &mut Function, word: u16) {
-    if word & 0xfe00 == 0xb400 {
-        function.frame += 4 * (word & 0x1ff).count_ones(); // PUSH
-    } else if word & 0xff80 == 0xb080 {
-        function.frame += 4 * u32::from(word & 0x7f); // SUB SP, #
-    } else if word & 0xff87 == 0x4780 || (word & 0xff87 == 0x4700 && word >> 3 & 0xf != 14) {
-        function.calls_through_register = true; // BLX, BX
-    }
-}
-
-fn long(function: &mut Function, begin: u32, at: u32, first: u16, second: u16) -> Result<()> {
-    let (a, b) = (u32::from(first), u32::from(second));
+/// Adds the effect of an instruction to a function that begins at `begin`.
+fn add(function: &mut Function, begin: u32, instruction: Instruction) -> Result<()> {
+    let Instruction { address, first, second } = instruction;
+    let (a, b) = (u32::from(first), u32::from(second.unwrap_or(0)));
     let immediate = (a >> 10 & 1) << 11 | (b >> 12 & 7) << 8 | b & 0xff;
-    match first {
-        0xe92d => function.frame += 4 * b.count_ones(), // PUSH
-        0xed2d | 0xed6d => function.frame += 4 * (b & 0xff), // VPUSH
-        0xf84d if b & 0xf00 == 0xd00 => function.frame += b & 0xff, // STR, pre-indexed
-        0xe96d => function.frame += 4 * (b & 0xff),     // STRD, pre-indexed
-        0xf1ad | 0xf5ad if b & 0x8f00 == 0x0d00 => function.frame += expanded(immediate), // SUB
-        0xf2ad | 0xf6ad if b & 0x8f00 == 0x0d00 => function.frame += immediate, // SUBW
-        0xebad if b & 0xf00 == 0xd00 => bail!("the stack grows by a register at {at:#010x}"),
+    function.calls_through_register |= instruction.is_call_through_register();
+    match (first, second) {
+        (0xb400..=0xb5ff, None) => function.frame += 4 * (a & 0x1ff).count_ones(), // PUSH
+        (0xb080..=0xb0ff, None) => function.frame += 4 * (a & 0x7f),               // SUB SP, #
+        (_, None) => {}
+        (0xe92d, _) => function.frame += 4 * b.count_ones(), // PUSH
+        (0xed2d | 0xed6d, _) => function.frame += 4 * (b & 0xff), // VPUSH
+        (0xf84d, _) if b & 0xf00 == 0xd00 => function.frame += b & 0xff, // STR, pre-indexed
+        (0xe96d, _) => function.frame += 4 * (b & 0xff),     // STRD, pre-indexed
+        (0xf1ad | 0xf5ad, _) if b & 0x8f00 == 0x0d00 => function.frame += expanded(immediate), // SUB
+        (0xf2ad | 0xf6ad, _) if b & 0x8f00 == 0x0d00 => function.frame += immediate, // SUBW
+        (0xebad, _) if b & 0xf00 == 0xd00 => {
+            bail!("the stack grows by a register at {address:#010x}")
+        }
         _ if a & 0xf800 == 0xf000 && (b & 0xd000 == 0xd000 || b & 0xd000 == 0x9000) => {
             // BL, and B.W where it leaves the function.
             let (s, j1, j2) = (a >> 10 & 1, b >> 13 & 1, b >> 11 & 1);
             let (i1, i2) = (1 ^ j1 ^ s, 1 ^ j2 ^ s);
             let offset = s << 24 | i1 << 23 | i2 << 22 | (a & 0x3ff) << 12 | (b & 0x7ff) << 1;
             let offset = (offset << 7) as i32 >> 7;
-            let target = at.wrapping_add(4).wrapping_add_signed(offset);
+            let target = address.wrapping_add(4).wrapping_add_signed(offset);
             if !(begin..function.end).contains(&target) || b & 0xd000 == 0xd000 {
                 function.calls.push(target);
             }
@@ -178,22 +151,43 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
         .map(|(at, _)| *at)
         .collect();
     // How deep a call through a register may get, with none inside it, one, and so on.
-    let mut through = 0;
-    for _ in 0..NESTED {
+    let deepest = |through: Through, which: &dyn Fn(u32) -> bool| {
         let mut known = BTreeMap::new();
-        let mut deepest = 0;
-        for &at in &by_pointer {
-            deepest = deepest.max(depth(functions, at, through, &mut known, &mut Vec::new())?);
-        }
-        through = deepest;
+        functions.keys().filter(|at| which(**at)).try_fold(0, |deepest: u32, &at| {
+            Ok::<_, anyhow::Error>(deepest.max(depth(
+                functions,
+                at,
+                through,
+                &mut known,
+                &mut Vec::new(),
+            )?))
+        })
+    };
+    let mut through = Through::default();
+    through.output = deepest(through, &|at| is_named(&functions[&at], &OUTPUTS))?;
+    for _ in 0..NESTED {
+        through.any = deepest(through, &|at| by_pointer.contains(&at))?;
     }
     depth(functions, start, through, &mut BTreeMap::new(), &mut Vec::new())
+}
+
+/// The deepest the stack gets below a call through a register.
+#[derive(Clone, Copy, Default)]
+struct Through {
+    /// To an output of text.
+    output: u32,
+    /// To any function.
+    any: u32,
+}
+
+fn is_named(function: &Function, parts: &[&str]) -> bool {
+    parts.iter().any(|part| function.name.contains(part))
 }
 
 fn depth(
     functions: &Functions,
     at: u32,
-    through: u32,
+    through: Through,
     known: &mut BTreeMap<u32, u32>,
     path: &mut Vec<u32>,
 ) -> Result<u32> {
@@ -209,7 +203,14 @@ fn depth(
         bail!("{} calls itself", function.name);
     }
     path.push(at);
-    let mut below = if function.calls_through_register { through } else { 0 };
+    let veneer = function.name.split_once(VENEER);
+    let target = veneer.and_then(|(_, name)| functions.iter().find(|(_, f)| f.name == name));
+    let mut below = match target {
+        _ if !function.calls_through_register => 0,
+        Some((&target, _)) => depth(functions, target, through, known, path)?,
+        None if is_named(function, &PRINTERS) => through.output,
+        None => through.any,
+    };
     for &target in &function.calls {
         below = below.max(depth(functions, target, through, known, path)?);
     }
@@ -222,20 +223,20 @@ fn depth(
 mod tests {
     use super::*;
 
+    fn instruction(address: u32, first: u16, second: u16) -> Instruction {
+        Instruction { address, first, second: (first >> 11 >= 0b11101).then_some(second) }
+    }
+
     fn frame(words: &[(u16, u16)]) -> u32 {
         let mut function = Function { end: 100, ..Function::default() };
         for &(first, second) in words {
-            if first >> 11 >= 0b11101 {
-                long(&mut function, 0, 0, first, second).unwrap();
-            } else {
-                short(&mut function, first);
-            }
+            add(&mut function, 0, instruction(0, first, second)).unwrap();
         }
         function.frame
     }
 
     #[test]
-    fn what_moves_the_stack_pointer_is_counted() {
+    fn instructions_that_move_the_stack_pointer_count() {
         // push {r4-r7, lr}; sub sp, #16; push.w {r4-r11, lr}; vpush {d8, d9}
         assert_eq!(frame(&[(0xb5f0, 0), (0xb084, 0)]), 20 + 16);
         assert_eq!(frame(&[(0xe92d, 0x4ff0), (0xed2d, 0x8b04)]), 36 + 16);
@@ -249,7 +250,7 @@ mod tests {
     fn calls_and_recursion_are_found() {
         // bl +4 behind the instruction, from address 0
         let mut function = Function { end: 8, ..Function::default() };
-        long(&mut function, 0, 0, 0xf000, 0xf802).unwrap();
+        add(&mut function, 0, instruction(0, 0xf000, 0xf802)).unwrap();
         assert_eq!(function.calls, [8]);
         let leaf = Function { name: "leaf".into(), end: 20, frame: 24, ..Function::default() };
         let caller =

@@ -1,4 +1,4 @@
-//! The axes that are used beside that of the flux.
+//! The axes that turn slowly against the flux.
 
 use core::f32::consts::TAU;
 
@@ -6,13 +6,12 @@ use crate::drive::coefficients::Coefficients;
 use crate::filter::dissertation::lpf_lag_samples;
 use crate::math::angle::UnitVector;
 
-/// What turns slowly against the flux, as unit vectors seen from where it is at the sample; new once a
-/// carrier period.
+/// Unit vectors relative to the flux at the sample; computed once a carrier period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axes {
-    /// The injection axis, seen from the flux.
+    /// The injection axis.
     pub injection: UnitVector,
-    /// The same where the flux was when the carrier current flowed that is sampled now.
+    /// The injection axis when the carrier current flowed that is sampled now.
     pub carrier: UnitVector,
     /// The flux when the filtered current flowed.
     pub seen: UnitVector,
@@ -32,16 +31,16 @@ impl Default for Axes {
 const VOLTAGE_LEAD: f32 = 1.5;
 
 impl Coefficients {
-    /// The current is seen from where the flux was when the filtered current flowed; the voltage is put
-    /// where the flux will be when it acts. `step` is how far the flux turns in a period, turns.
-    pub(super) fn turn(&self, axes: &mut Axes, step: f32, injection: UnitVector) {
+    /// Turns the axes for a flux of frequency `freq`, turns per period: back by the delays of the measured
+    /// currents, ahead to the middle of the period in which the voltage acts.
+    pub(super) fn turn(&self, axes: &mut Axes, freq: f32, injection: UnitVector) {
         let along = UnitVector { cos: 1.0, sin: 0.0 };
-        let lag = self.lag_share * (lpf_lag_samples(step * TAU) + self.current_lag);
+        let lag = self.lag_share * (lpf_lag_samples(freq * TAU) + self.current_lag);
         *axes = Axes {
             injection,
-            carrier: injection.turned_slightly(-step * self.estimator.lag),
-            seen: along.turned_slightly(-step * lag),
-            applied: along.turned_slightly(step * VOLTAGE_LEAD),
+            carrier: injection.turned_slightly(-freq * self.estimator.lag),
+            seen: along.turned_slightly(-freq * lag),
+            applied: along.turned_slightly(freq * VOLTAGE_LEAD),
         };
     }
 }

@@ -1,4 +1,4 @@
-//! From settings to what the control step works with.
+//! The coefficients of the control step, and their design from settings.
 
 use core::f32::consts::TAU;
 
@@ -35,8 +35,8 @@ const VERIFY_S: f32 = 0.3;
 /// Speed up to which the shaft counts as standing when the lock is verified, rpm.
 const STANDING_RPM: f32 = 30.0;
 
-/// Everything the control step needs, made from [`Settings`] outside the interrupt.
-// In this order: what every step needs comes first and lies together; see the drive's state.
+/// The coefficients of the control step, designed from [`Settings`] outside the interrupt.
+// In this order: the fields of every step come first and lie together; see the state of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Coefficients {
@@ -76,14 +76,14 @@ pub struct Coefficients {
     pub(crate) wiring: WiringCheck,
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
-    /// What the design of the current controllers came to, d and q.
+    /// Result of the design of the current controllers, d and q.
     pub designs: [CurrentLoopDesign; 2],
-    /// What the design of the speed and the position loop came to.
+    /// Result of the design of the speed and the position loop.
     pub motion_design: MotionDesign,
 }
 
 impl Coefficients {
-    /// Whether what was set is still finite numbers: a flipped bit may have changed that.
+    /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
         let (s, l) = (&self.sensing, &self.current_loop);
         let sum = s.current_a.gain

@@ -6,7 +6,7 @@ use crate::fault::Fault;
 use crate::math::decimal::Shortest;
 use crate::math::frames::Dq;
 
-/// A command to the drive; see [`Drive::command`](crate::Drive::command) for what is refused when.
+/// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
 // The large variant is passed by reference and kept once, in a mailbox.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,24 +38,24 @@ pub enum Command {
     /// A voltage in the flux frame, V, added to that of the current loop from the next period on: to
     /// identify the plant of the loop. Up to 60 V a component; a start takes it back.
     TestVoltage(Dq),
-    /// Rotor time constant, s, as [`online`](crate::identify::online) finds it: what the slip is computed with.
+    /// Rotor time constant that the slip is computed with, s, as [`online`](crate::identify::online) finds it.
     /// Only with [`track_rotor`](crate::Settings::track_rotor); within
-    /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and approached by no more than 2 % with each command.
+    /// [`LIMITS`](crate::flux::indirect::LIMITS), and approached by no more than 2 % with each command.
     RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
     Configure(Coefficients),
 }
 
-/// How a command was taken.
+/// An accepted command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Accepted {
     /// As it was given.
     AsGiven,
-    /// Limited to what the machine can bear: the value that holds now.
+    /// Limited to the range of the machine; the value that holds now.
     Limited(f32),
 }
 
-/// Why a command was refused; nothing has changed then.
+/// The reason of a refusal. A refused command changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refused {
     /// The value is not a number or infinite.

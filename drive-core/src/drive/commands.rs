@@ -1,4 +1,4 @@
-//! The commands: what is taken, limited, or refused in which state.
+//! The commands: accepted, limited or refused, depending on the state.
 
 use super::{ControlState, Drive, References};
 
@@ -17,11 +17,11 @@ const LARGEST_TEST_V: f32 = 60.0;
 impl Drive {
     /// Takes a command; not from within [`step`](Self::step), but between two steps.
     ///
-    /// References are taken from the start command on, and a start sets them to zero: what was asked
-    /// for in an earlier run moves nothing.
+    /// References are accepted from the start command on, and a start sets them to zero: references of an
+    /// earlier run move nothing.
     ///
     /// # Errors
-    /// Why it was refused; nothing has changed then.
+    /// The reason of the refusal; nothing has changed then.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         match *command {
             Command::Start(mode) => self.start(mode),

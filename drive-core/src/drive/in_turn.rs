@@ -1,5 +1,22 @@
-//! What is done once a carrier period, in turn: in each of its ten samples something else, so that no step
+//! The tasks that are due once a carrier period: each of its ten samples does another one, so that no step
 //! takes much longer than another.
+//!
+//! | sample | task | needs before it |
+//! |---|---|---|
+//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux | averages (9) |
+//! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
+//! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
+//! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
+//! | 4 | lock monitor | saliency (0) |
+//! | 5 | reference current of the saliency; the slowly turning axes | - |
+//! | 6 | carrier current in both channels; voltages for the prediction at 8 | sums (9) |
+//! | 7 | rotor voltage for the prediction at 8 | magnetising current (0) |
+//! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
+//! | 9 | averages of the demodulation; the sums begin anew | ten samples mixed |
+//!
+//! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
+//! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
+//! averages of sample 9.
 
 use super::ControlState;
 use crate::carrier::synchronous::REFERENCE_AT;
@@ -12,8 +29,8 @@ use crate::math::frames::Dq;
 use crate::protect::plausibility::RotorFlux;
 use crate::settings::AngleSource;
 
-/// What it sees of the step, beside the state.
-pub(super) struct Seen<'a> {
+/// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
+pub(super) struct StepResults<'a> {
     pub sample: &'a Sample,
     pub measured: &'a Measured,
     /// Current that makes flux and slip, A.
@@ -22,27 +39,30 @@ pub(super) struct Seen<'a> {
     pub i_q: f32,
     /// Voltage without the carrier, V.
     pub voltage: Dq,
-    /// The injection axis where it was when the carrier current flowed that is sampled now.
+    /// Injection axis when the carrier current flowed that is sampled now.
     pub carrier_axis: UnitVector,
-    /// The flux when the filtered current flowed.
+    /// Flux axis when the filtered current flowed.
     pub flux_axis: UnitVector,
-    /// How fast it turns, turns per period.
+    /// Frequency of the flux.
     pub flux_freq: f32,
-    /// Electrical speed of the rotor, turns per period.
+    /// Electrical speed of the rotor.
     pub rotor_freq: f32,
     /// Whether the flux is held still.
     pub held: bool,
-    /// Whether the drive learns: then nothing is tracked, and what to compare with is not known yet.
+    /// Whether the drive learns: nothing is tracked then, and there is no reference yet.
     pub learning: bool,
 }
 
 impl Coefficients {
-    /// What is due in sample `index` of the carrier period, which counts with or without a carrier.
+    /// Does the task of sample `index` of the carrier period, which counts with or without a carrier.
+    ///
+    /// # Errors
+    /// The fault that a check finds.
     pub(super) fn in_turn(
         &self,
         s: &mut ControlState,
         index: usize,
-        step: &Seen,
+        step: &StepResults,
     ) -> Result<(), Fault> {
         match index {
             0 => {
@@ -51,17 +71,17 @@ impl Coefficients {
                 if self.source == AngleSource::Injection {
                     s.seen.rotor_count = s.count_by_flux();
                 }
-                self.listen(s, 0, step.sample)
+                self.watch_noise(s, 0, step.sample)
             }
             1 => {
                 let acceleration = self.freq_per_speed * s.motion.acceleration;
                 self.estimator.update_correction(&mut s.estimator, acceleration);
                 s.prediction.latch_voltage();
-                self.listen(s, 1, step.sample)
+                self.watch_noise(s, 1, step.sample)
             }
             2 => {
                 self.expect(s, step);
-                self.listen(s, 2, step.sample)
+                self.watch_noise(s, 2, step.sample)
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
@@ -79,32 +99,32 @@ impl Coefficients {
             }
             7 => {
                 self.expect(s, step);
-                self.listen(s, 3, step.sample)
+                self.watch_noise(s, 3, step.sample)
             }
             8 => {
                 if step.rotor_freq.abs() > self.protection.rotor_freq {
                     return Err(Fault::OverSpeed);
                 }
                 self.prediction.judge(&mut s.prediction, step.measured.current)?;
-                self.listen(s, 4, step.sample)
+                self.watch_noise(s, 4, step.sample)
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.listen(s, 5, step.sample)
+                self.watch_noise(s, 5, step.sample)
             }
         }
     }
 
-    /// For the noise of the sensors.
-    fn listen(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
+    /// Takes one of the six looks at the noise of the current sensors.
+    fn watch_noise(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, sample),
             None => Ok(()),
         }
     }
 
-    /// What the current will be compared with.
-    fn expect(&self, s: &mut ControlState, step: &Seen) {
+    /// Computes the rotor voltage that the next judgement of the current reckons with.
+    fn expect(&self, s: &mut ControlState, step: &StepResults) {
         let flux = RotorFlux {
             magnetising: s.indirect.magnetising,
             rotor_freq: step.rotor_freq,
@@ -114,7 +134,8 @@ impl Coefficients {
         self.prediction.expect(&mut s.prediction, &flux);
     }
 
-    fn check_lock(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+    /// Checks that the tracked angle is that of the flux.
+    fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
                 if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
@@ -126,7 +147,8 @@ impl Coefficients {
         }
     }
 
-    fn check_both_channels(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+    /// Checks that both current sensors see the carrier.
+    fn check_both_channels(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());
         }
@@ -135,8 +157,12 @@ impl Coefficients {
         s.carrier_watch.step(current, step.carrier_axis, amplitude)
     }
 
-    /// Beside the fundamental.
-    fn check_carrier_headroom(&self, s: &mut ControlState, step: &Seen) -> Result<(), Fault> {
+    /// Fits the carrier into the voltage that the fundamental leaves.
+    fn check_carrier_headroom(
+        &self,
+        s: &mut ControlState,
+        step: &StepResults,
+    ) -> Result<(), Fault> {
         if !self.inject {
             return Ok(());
         }

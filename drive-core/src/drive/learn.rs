@@ -10,7 +10,7 @@ use crate::identify::learning::{Learned, LearningAction, LearningSample};
 use crate::math::angle::Angle;
 
 impl Drive {
-    /// What the last learning found, used or not; none before the end of the first.
+    /// Result of the last learning, used or not; none before the first has ended.
     pub fn learned(&self) -> Option<&Learned> {
         self.learned.as_ref()
     }
@@ -20,8 +20,8 @@ impl Drive {
         self.c.inject && self.c.demodulate && !literal
     }
 
-    /// The torque current to regulate while learning, A. In the end what was found takes the place of
-    /// what was set, and the drive stops.
+    /// The torque current to regulate while learning, A. At the end an accepted result replaces the
+    /// settings, and the drive stops.
     pub(super) fn learn(&mut self) -> Result<f32, Fault> {
         let (c, s) = (&self.c, &mut self.control);
         let t = s.seen;
@@ -55,7 +55,7 @@ impl Drive {
 }
 
 impl Coefficients {
-    /// Puts what was learned and accepted in the place of what was set.
+    /// Replaces settings by an accepted result of a learning.
     pub fn take(&mut self, learned: &Learned) {
         if !learned.accepted {
             return;

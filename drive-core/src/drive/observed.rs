@@ -1,15 +1,15 @@
-//! What the drive shows of a step.
+//! The quantities of a step that the drive shows.
 
 use super::Drive;
 use crate::math::angle::Angle;
 use crate::math::frames::{AlphaBeta, Dq};
 
-/// What the drive saw and did in the last step.
+/// Measured, estimated and applied quantities of the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
     /// Estimated rotor-flux angle at the sample.
     pub phi: Angle,
-    /// How fast it turns, electrical turns per period.
+    /// Frequency of the flux, electrical turns per period.
     pub flux_freq: f32,
     /// Electrical speed of the rotor, turns per period.
     pub rotor_freq: f32,
@@ -19,7 +19,7 @@ pub struct Telemetry {
     pub current: Dq,
     /// Wanted voltage without the carrier, V.
     pub voltage: Dq,
-    /// Measured current in the stator frame, A: nothing filtered, the carrier's part in it.
+    /// Measured current in the stator frame, A, not filtered: it contains the carrier.
     pub measured: AlphaBeta,
     /// Voltage of the period that begins with the next sample, limited, dead-time compensation not
     /// counted, V.
@@ -43,7 +43,7 @@ pub struct Telemetry {
     pub turns: f32,
 }
 
-/// What of a step stands nowhere else in the state; see [`Telemetry`].
+/// The telemetry of a step that is not part of another state; see [`Telemetry`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Observed {
     pub phi: Angle,
@@ -58,7 +58,7 @@ pub(super) struct Observed {
 }
 
 impl Drive {
-    /// What it saw and did in the last step.
+    /// The telemetry of the last step.
     pub fn telemetry(&self) -> Telemetry {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::fault::Fault;
 
-/// What the drive is to regulate once it runs.
+/// The quantity that the drive regulates once it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Torque, by the current on the quadrature axis.
@@ -13,12 +13,12 @@ pub enum Mode {
     Speed,
     /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
     Position,
-    /// Learns, with the shaft locked, what the angle tracking needs (see [`crate::identify::learning`]), then
+    /// Learning of the reference of the angle tracking with the shaft locked (see [`crate::identify::learning`]), then
     /// stops.
     Learning,
 }
 
-/// What the drive is doing.
+/// The state of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
     /// Outputs off.

@@ -1,15 +1,15 @@
-//! The settings that what was learned on a motor depends on.
+//! The settings on which the results of a learning depend.
 
 use super::Settings;
 
 impl Settings {
-    /// Whether what was learned with `other` set would be learned with these as well.
+    /// Whether results learned with the settings `other` are valid for these settings, too.
     pub fn shares_learning_with(&self, other: &Self) -> bool {
         self.learning_depends_on() == other.learning_depends_on()
     }
 
-    /// All that the reference, the carrier current and the gains depend on when they are learned, and all
-    /// that they take the place of.
+    /// The settings that the learned reference, carrier current and gains depend on, and those that they
+    /// replace.
     fn learning_depends_on(&self) -> [f32; 25] {
         let (m, i, s) = (&self.motor, &self.inverter, &self.scales);
         let j = &self.injection;

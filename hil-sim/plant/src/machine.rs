@@ -209,7 +209,7 @@ impl Machine {
         (x.psi - x.i * self.lm) / self.lr
     }
 
-    /// `(alpha - j w) psi`, the flux decay seen from the stator.
+    /// `(alpha - j w) psi`, the flux decay in the stator frame.
     #[inline]
     fn decay(&self, psi: Complex, w: f64) -> Complex {
         Complex::new(self.alpha * psi.re + w * psi.im, self.alpha * psi.im - w * psi.re)

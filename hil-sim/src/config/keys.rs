@@ -231,9 +231,9 @@ keys! {
     }
     /// The speed and the position loop.
     "speed." speed: SpeedConfig {
-        /// Largest speed that is asked for; unset: 300, or the experiment's own.
+        /// Largest speed reference; unset: 300, or the experiment's own.
         limit_rpm: Option<f64> = None, [1 .. 2000], "rpm";
-        /// Largest acceleration that is asked for; unset: 300, or the experiment's own.
+        /// Largest acceleration of the speed reference; unset: 300, or the experiment's own.
         ramp_rpm_per_s: Option<f64> = None, [1 .. 100000], "rpm/s";
         /// Phase margin that the speed loop is designed for.
         phase_margin_deg: f64 = 60.0, [45 .. 70], "deg";

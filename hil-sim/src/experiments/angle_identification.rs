@@ -35,7 +35,7 @@ const LEAK: f64 = 0.0100 * 0.944_061;
 struct Demodulation {
     name: &'static str,
     demodulator: Demodulator,
-    /// Of a thousandth of the signal.
+    /// Unit of a thousandth of the signal.
     unit: &'static str,
 }
 

@@ -22,7 +22,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Held speed, rpm: the fundamental is at 5 Hz plus slip.
 const SPEED_RPM: f64 = 150.0;
 const IQ_A: f64 = 1.0;
-/// Turns of the flux that are looked at.
+/// Turns of the flux that are evaluated.
 const TURNS: f64 = 8.0;
 /// Harmonics of the current vector that six voltage steps a period make.
 const HARMONICS: [i32; 4] = [-5, 7, -11, 13];

@@ -45,10 +45,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let machine = ss.at(speed);
         let mut table = Table::new(title, &[]);
         let data = |signal| Trial::printed(machine, signal, H, LEVEL).run(context.seed, 0);
-        let refused = |e: crate::identification::NotIdentifiable| Error::Refused(e.to_string());
-        let regressions = Signal::ALL.map(|signal| data(signal).regression());
-        let [by_sg, by_ss] = regressions;
-        let (by_sg, by_ss) = (by_sg.map_err(refused)?, by_ss.map_err(refused)?);
+        let [by_sg, by_ss] = Signal::ALL.map(|signal| data(signal).regression());
+        let (by_sg, by_ss) = (by_sg.map_err(Error::refused)?, by_ss.map_err(Error::refused)?);
         let c = [&by_sg, &by_ss].map(|regression| model_c(&regression.delta, H).array());
         let s = model_s(&by_ss, H, None).map(|fit| fit.parameters.array());
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
@@ -72,7 +70,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ));
         if speed == SPEEDS[0] {
             // Figure 5 uses the estimate with S_s.
-            let estimated = model_c(&by_ss.delta, H).parameters().map_err(refused)?;
+            let estimated = model_c(&by_ss.delta, H).parameters().map_err(Error::refused)?;
             figure_5(&machine, &estimated.at(speed), &mut outcome);
         }
     }

@@ -15,7 +15,7 @@
 //! ```
 //!
 //! The current loop is the drive's: PI, filter, one period of delay, plant of first order. The speed
-//! loop, where there is one, sees the mean of `w_i + (2 + c) w_n g x` over its period.
+//! loop, where there is one, uses the mean of `w_i + (2 + c) w_n g x` over its period.
 
 use std::f64::consts::TAU;
 

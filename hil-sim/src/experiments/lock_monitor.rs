@@ -17,7 +17,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Trials of each forced offset; ten times as many runs are looked at for false alarms.
+/// Trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;
 const HEALTHY_PER_RUN: u64 = 10;
 /// Forced offsets, degrees, and their names in the metrics.
@@ -48,7 +48,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// All that the parts share.
+/// The trials of one run of the experiment.
 struct Trials<'a> {
     context: &'a Context<'a>,
     runs: u64,

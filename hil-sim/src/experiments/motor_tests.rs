@@ -18,8 +18,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let plant = plant_settings(context.config);
     let on_the_bench = |shaft| {
-        measure(&plant.machine, &plant.saliency, &plant.mechanics, shaft)
-            .map_err(|e| Error::Refused(e.to_string()))
+        measure(&plant.machine, &plant.saliency, &plant.mechanics, shaft).map_err(Error::refused)
     };
     let (readings, free) = (on_the_bench(Shaft::Driven)?, on_the_bench(Shaft::Free)?);
     let mut outcome = Outcome::default();

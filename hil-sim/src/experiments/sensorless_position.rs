@@ -29,9 +29,9 @@ const STEP_S: f64 = 6.0;
 const HOLD_S: f64 = 60.0;
 /// Loads under which it is held, Nm.
 const LOADS_NM: [f64; 5] = [0.0, 0.3, -0.3, 0.6, -0.6];
-/// True rotor resistance over the one the drive believes, and whether the reference of the saliency was
-/// learned like that, by the drive, with the shaft locked. Otherwise it is the drive's own, learned
-/// with the resistance known.
+/// True rotor resistance over the believed one, and whether the drive has learned the reference of the
+/// saliency with this wrong resistance, the shaft locked. Otherwise it uses its default, learned with
+/// the resistance known.
 const BELIEFS: [(f64, bool); 4] = [(1.0, false), (1.01, false), (1.1, false), (1.1, true)];
 
 /// A position held under a load.

@@ -172,7 +172,7 @@ fn dc_current(mut motor: MotorModel, volts: f64) -> f64 {
     motor.state.electrical.i.im * 0.5 * 3f64.sqrt()
 }
 
-/// Steady current vector (A peak) at `volts` rms per phase: its fundamental seen from the voltage.
+/// Steady current vector (A peak) at `volts` rms per phase: its fundamental, relative to the voltage.
 fn steady(mut motor: MotorModel, hz: f64, volts: f64) -> Complex {
     let h = 1.0 / (hz * f64::from(STEPS));
     let settle = (SETTLE_S * hz) as u32;

@@ -156,7 +156,7 @@ impl Step {
         Self { e, h: [0, 1].map(|k| self.h[k] + (h[k] + next.h[k])) }
     }
 
-    /// So many of these steps with the same voltage; at least one.
+    /// `count` of these steps with the same voltage; at least one.
     pub fn repeated(&self, count: u32) -> Self {
         (1..count).fold(*self, |step, _| step.then(self))
     }
@@ -186,13 +186,13 @@ impl Step {
 /// and h01 are misprints). Model A estimates these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentVoltage {
-    /// Of i(t).
+    /// Coefficient of i(t).
     pub f1: Complex,
-    /// Of i(t-h).
+    /// Coefficient of i(t-h).
     pub f0: Complex,
-    /// Of v(t), S.
+    /// Coefficient of v(t), S.
     pub h1: Complex,
-    /// Of v(t-h), S.
+    /// Coefficient of v(t-h), S.
     pub h0: Complex,
 }
 

@@ -14,7 +14,7 @@
 
 use super::{Complex, CurrentVoltage, Delta, FirstOrderTheta, Parameters};
 
-/// Why there is no estimate.
+/// The reason why a parameter cannot be estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotIdentifiable {
     /// Fewer rows than unknowns.
@@ -38,12 +38,12 @@ pub enum NotIdentifiable {
     /// Two poles coincide, or one lies at z = 1: the residues do not exist.
     #[error("two discrete poles coincide or one is at 1")]
     DegeneratePoles,
-    /// The nonlinear fit did not come to a minimum, or came to one that is no machine.
+    /// The nonlinear fit did not converge, or to parameters that are not those of a machine.
     #[error("the nonlinear fit did not converge to a machine")]
     NotConverged,
 }
 
-/// A number, or why there is none. Never an infinity or NaN.
+/// A finite number, or the reason why it cannot be estimated.
 pub type Value = Result<f64, NotIdentifiable>;
 
 /// An estimate of [`Parameters`], each on its own: noise can make one unidentifiable and leave the
@@ -63,7 +63,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Nothing, and why.
+    /// No estimate, for this reason.
     pub const fn none(reason: NotIdentifiable) -> Self {
         let none = Err(reason);
         Self { r_s: none, tau_r: none, sigma_l_s: none, l_s: none, omega_m: none }
@@ -74,7 +74,10 @@ impl Estimate {
         [self.r_s, self.tau_r, self.sigma_l_s, self.l_s, self.omega_m]
     }
 
-    /// All five, if there are all five.
+    /// All five, if all are identifiable.
+    ///
+    /// # Errors
+    /// The reason of the first that is not.
     pub fn parameters(&self) -> Result<Parameters, NotIdentifiable> {
         Ok(Parameters {
             r_s: self.r_s?,
@@ -123,7 +126,7 @@ pub fn model_b(theta: &FirstOrderTheta, h: f64) -> Estimate {
 /// Model C (Eq. 38 to 42): sigma_l_s and tau_r to second order in `h` s, the others to first, from
 /// the coefficients in differences, so that no small sum is left over from a cancellation.
 ///
-/// Of the two roots of Eq. 39 it takes the one with the minus sign; the other is about h/2. Eq. 42
+/// It takes the root of Eq. 39 with the minus sign; the other is about h/2. Eq. 42
 /// is low in the speed by about h (r_s/sigma_l_s + (l_s/sigma_l_s - 1)/tau_r) / 2 relative,
 /// 1.19 % at 50 µs for [`Parameters::PX`], which no amount of data takes away.
 pub fn model_c(delta: &Delta, h: f64) -> Estimate {
@@ -151,6 +154,9 @@ fn rotor_time_constant(u: Complex, fd: Complex, h: f64) -> Value {
 
 /// Both roots of Eq. 39: that with the plus sign, about h/2, and that with the minus sign, the
 /// time constant.
+///
+/// # Errors
+/// [`NotIdentifiable::NoSpeed`]; [`NotIdentifiable::NoPositiveRoot`].
 pub fn time_constant_roots(u: Complex, fd: Complex, h: f64) -> Result<[f64; 2], NotIdentifiable> {
     let a = -u.re + 0.5 * u.im * u.im;
     let b = h * (1.0 + ratio(fd.im, -2.0 * u.im, NotIdentifiable::NoSpeed)?);

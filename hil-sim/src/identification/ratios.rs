@@ -14,9 +14,9 @@ pub struct Ratio {
     pub h: f64,
     /// By the tables.
     pub printed: f64,
-    /// Of [`Parameters::PX`] at 375 rad/s.
+    /// Value for [`Parameters::PX`] at 375 rad/s.
     pub px: f64,
-    /// Of [`Parameters::RBV`].
+    /// Value for [`Parameters::RBV`].
     pub rbv: f64,
 }
 

@@ -100,6 +100,9 @@ impl Problem<'_> {
 /// Model S from one start. Of 500 starts with every parameter five times too large or too small
 /// (noisy data, 4000 samples), 477 came to the best fit and 23 failed and said so; [`model_s`] with
 /// the same starts came to it in 498, and in 2 there was none: the noise put r_s below zero.
+///
+/// # Errors
+/// [`NotIdentifiable::NotConverged`].
 pub fn fit_from(
     regression: &Regression,
     h: f64,
@@ -188,6 +191,9 @@ pub fn starts(delta: &Delta, h: f64) -> Vec<Parameters> {
 
 /// Model S: the best of the fits from `guess`, if there is one, and from [`starts`]. Speed error
 /// below 0.5 % on 4000 samples of S_s with the noise of section 5 halved, at all three periods.
+///
+/// # Errors
+/// [`NotIdentifiable::NotConverged`] when no start leads to a machine.
 pub fn model_s(
     regression: &Regression,
     h: f64,

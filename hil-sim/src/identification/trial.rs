@@ -52,9 +52,9 @@ impl Signal {
 /// Largest noise over the largest value of either axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Of the voltage.
+    /// Relative noise of the voltage.
     pub voltage: f64,
-    /// Of the current.
+    /// Relative noise of the current.
     pub current: f64,
 }
 

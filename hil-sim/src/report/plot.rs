@@ -54,7 +54,9 @@ pub fn svg(figure: &Figure) -> Result<String, Error> {
 
 fn draw(figure: &Figure) -> Result<String, Failure> {
     let panels: Vec<&Panel> = figure.panels.iter().collect();
-    let alike = |a: &Panel, b: &Panel| a.x_label == b.x_label && !a.equal_axes && !b.equal_axes;
+    let alike = |a: &Panel, b: &Panel| {
+        (&a.x_label, a.log_x) == (&b.x_label, b.log_x) && !a.equal_axes && !b.equal_axes
+    };
     let shared = panels.windows(2).all(|pair| alike(pair[0], pair[1]));
     let labelled = |k: usize| !shared || k + 1 == panels.len();
     // A legend is not repeated below one that says the same.
@@ -99,8 +101,9 @@ fn draw(figure: &Figure) -> Result<String, Failure> {
 fn ranges(panel: &Panel, sharing: &[&Panel]) -> (Range<f64>, Range<f64>) {
     let range = |panels: &[&Panel], coordinate: fn((f64, f64)) -> f64, air: f64| {
         let points = panels.iter().flat_map(|panel| &panel.series).flat_map(|s| &s.points);
-        let drawn = points.filter(|p| is_drawn(panel, **p)).map(|p| coordinate(*p));
-        let (low, high) = drawn
+        let (low, high) = points
+            .filter(|p| is_on_axes(panel, **p))
+            .map(|p| coordinate(*p))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         match high - low {
             none if none < 0.0 => 0.0..1.0,
@@ -121,9 +124,15 @@ fn ranges(panel: &Panel, sharing: &[&Panel]) -> (Range<f64>, Range<f64>) {
     (x, y)
 }
 
-fn is_drawn(panel: &Panel, (x, y): (f64, f64)) -> bool {
-    let inside = panel.y_range.is_none_or(|(low, high)| (low..=high).contains(&y));
-    x.is_finite() && y.is_finite() && inside && (!panel.log_x || x > 0.0)
+/// Whether the axes of a panel can show a point.
+fn is_on_axes(panel: &Panel, (x, y): (f64, f64)) -> bool {
+    x.is_finite() && y.is_finite() && (!panel.log_x || x > 0.0)
+}
+
+/// Whether a point is also within the range of the vertical axis.
+fn is_drawn(panel: &Panel, point: (f64, f64)) -> bool {
+    let inside = panel.y_range.is_none_or(|(low, high)| (low..=high).contains(&point.1));
+    is_on_axes(panel, point) && inside
 }
 
 /// The axes of a panel and its series.
@@ -303,6 +312,11 @@ mod tests {
         let svg = svg_of([panel(0.0), panel(1.0)]);
         let count = |wanted| texts(&svg).iter().filter(|text| **text == wanted).count();
         assert_eq!((count("time (s)"), count("a"), count("y")), (1, 1, 2));
+        // The range covers the points that one of them does not show.
+        let limited = Panel::new("time (s)", "z").y_range(0.0, 1.0);
+        let limited = limited.with(Series::line("a", vec![(0.0, 0.5), (80.0, 0.5), (90.0, 3.0)]));
+        let svg = svg_of([panel(0.0), limited]);
+        assert!(texts(&svg).contains(&"90"), "{:?}", texts(&svg));
     }
 
     #[test]

@@ -8,8 +8,8 @@ use drive_core::{Command, Drive, Settings, State};
 
 use crate::board::Period;
 use induction_drive::console::grammar::{self, Request};
-use induction_drive::console::keys::FirmwareSettings;
-use induction_drive::rotor_tracking::{Seen, Tracking};
+use induction_drive::rotor_tracking::{Observation, Tracking};
+use induction_drive::settings::FirmwareSettings;
 
 /// A drive with the settings of the board.
 pub struct Shadow {
@@ -64,9 +64,6 @@ impl Shadow {
             Ok(Request::Torque(i_q)) => Command::Torque(i_q),
             Ok(Request::Speed(rpm)) => Command::Speed(rpm),
             Ok(Request::Position(turns)) => Command::Position(turns),
-            Ok(Request::Angle(source)) => {
-                self.configure(|settings| settings.drive.angle_source = source)?
-            }
             Ok(Request::Set(key, value)) => self.configure(|settings| key.set(settings, value))?,
             Ok(Request::Defaults) => {
                 self.configure(|settings| *settings = FirmwareSettings::of_the_board())?
@@ -142,7 +139,7 @@ impl Shadow {
         if self.drive.tracks_rotor()
             && let Some(tracking) = &mut self.tracking
         {
-            let seen = Seen::new(self.compared as u32, &self.drive.telemetry());
+            let seen = Observation::new(self.compared as u32, &self.drive.telemetry());
             self.tau_r = tracking.take(&seen).or(self.tau_r);
         }
         Ok(())

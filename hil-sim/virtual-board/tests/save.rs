@@ -1,7 +1,7 @@
 //! The power goes while the settings are saved.
 
 use anyhow::Result;
-use induction_drive::console::keys::KEYS;
+use induction_drive::settings::keys::KEYS;
 use virtual_board::{Image, campaign};
 
 /// In every operation of the flash that a `save` takes, an erasure and the double words of the record, to each

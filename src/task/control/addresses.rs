@@ -20,14 +20,14 @@ struct Table {
     version: usize,
     /// The interrupt's own data, and their size. Written before the interrupt is unmasked.
     control: (*const u8, usize),
-    /// The coefficients of the drive, and their size. They change only with an order.
+    /// The coefficients of the drive, and their size. They change only with a command.
     coefficients: (*const u8, usize),
     /// The state of the drive that changes while it regulates, and its size.
     state: (*const u8, usize),
-    /// A pointer to the mailbox of orders.
-    orders: *const u8,
-    /// Offset in that mailbox of a byte that is 1 while an order waits for the interrupt.
-    order_waits: usize,
+    /// A pointer to the mailbox of commands.
+    commands: *const u8,
+    /// Offset in that mailbox of a byte that is 1 while a command waits for the interrupt.
+    command_waits: usize,
     /// Source of the flux angle, one byte: 0 is the encoder.
     angle_source: *const u8,
     /// Estimated rotor-flux angle at the last sample, a `u32` fraction of an electrical turn.
@@ -42,7 +42,7 @@ struct Table {
     dc_link: *const u8,
 }
 
-// SAFETY: only addresses, which nobody in the firmware follows.
+// SAFETY: only addresses, which the firmware itself never follows.
 unsafe impl Sync for Table {}
 
 /// The address at this offset in the drive.
@@ -50,7 +50,7 @@ const fn in_drive(offset: usize) -> *const u8 {
     in_control(offset_of!(Control, drive) + offset)
 }
 
-/// The address at this offset in what the interrupt works with.
+/// The address at this offset in [`Control`].
 const fn in_control(offset: usize) -> *const u8 {
     RUNNING.0.get().cast::<u8>().cast_const().wrapping_add(offset_of!(Running, control) + offset)
 }
@@ -69,8 +69,8 @@ static INDUCTION_DRIVE_ADDRESSES: Table = Table {
         in_drive(Drive::LAYOUT.state.start),
         Drive::LAYOUT.state.end - Drive::LAYOUT.state.start,
     ),
-    orders: in_control(offset_of!(Control, orders)),
-    order_waits: Mailbox::<Command>::FULL,
+    commands: in_control(offset_of!(Control, commands)),
+    command_waits: Mailbox::<Command>::FULL,
     angle_source: in_drive(Drive::LAYOUT.angle_source),
     phi: in_drive(Drive::LAYOUT.phi),
     rotor_freq: [

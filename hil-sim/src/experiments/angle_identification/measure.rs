@@ -48,7 +48,10 @@ fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
     rig.command(&Command::TurnInjection(radians.to_degrees() as f32)).map(|_| ())
 }
 
-/// The pseudo-random sequence on theta; the current stays where the encoder puts it.
+/// Measures with the pseudo-random sequence on theta; the encoder orients the current.
+///
+/// # Errors
+/// As [`Rig::oriented`].
 pub fn sequence(
     config: &Config,
     demodulator: Demodulator,
@@ -85,7 +88,10 @@ pub struct StepResponses {
     pub with_current: Vec<f64>,
 }
 
-/// Measures both.
+/// Measures both step responses.
+///
+/// # Errors
+/// As [`Rig::oriented`].
 pub fn steps(
     config: &Config,
     demodulator: Demodulator,

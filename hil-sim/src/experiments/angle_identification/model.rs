@@ -49,9 +49,12 @@ impl Model {
         Self { k, a: [-2.0 * re, re * re + im * im] }
     }
 
-    /// Least squares of Eq. 3.43 as in Appendix A, which makes the error of the equation smallest;
-    /// and again and again with the data filtered by the denominator found last (Steiglitz and
-    /// McBride), which makes the error of the output smallest.
+    /// Least squares of Eq. 3.43 as in Appendix A, which minimises the equation error; and the iteration
+    /// with the data filtered by the last denominator (Steiglitz and McBride), which minimises the
+    /// output error.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the data do not excite the model.
     pub fn identify(record: &Record) -> Result<[Self; 2], Error> {
         let refused = |error: crate::identification::NotIdentifiable| {
             Error::Refused(format!("the data do not give Eq. 3.43: {error}"))

@@ -26,7 +26,7 @@ pub struct Demodulation {
 const BPF: f64 = 0.9452;
 const PP: f64 = 0.944_061;
 const RECTIFIER: f64 = std::f64::consts::FRAC_2_PI;
-/// Of the rectified chain.
+/// Gain of the rectified chain.
 const RECTIFIED: f64 = BPF * RECTIFIER * PP;
 const PRINTED_REFERENCE_A: f64 = 0.010;
 
@@ -74,7 +74,7 @@ impl Demodulation {
     pub fn config(&self, config: &Config) -> Config {
         let mut config = config.clone();
         config.injection.demodulator = self.demodulator;
-        // A motor without saliency is to be looked at, not refused.
+        // A motor without saliency must be measured, not refused.
         config.injection.check = false;
         config
     }

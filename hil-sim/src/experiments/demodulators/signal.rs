@@ -39,6 +39,9 @@ fn oriented(
 }
 
 /// Measures at the true flux angle and 4° to either side.
+///
+/// # Errors
+/// As [`Rig::oriented`].
 pub fn signal_quality(
     demodulation: &Demodulation,
     config: &Config,
@@ -73,6 +76,9 @@ const AFTER: usize = 603;
 
 /// Mean delay, samples, from a change of the motor's saliency to the signal: the area above the step
 /// response, measured without noise.
+///
+/// # Errors
+/// As [`Rig::oriented`].
 pub fn delay(
     demodulation: &Demodulation,
     config: &Config,

@@ -28,6 +28,9 @@ pub struct StepsRun {
 }
 
 /// Torque steps with the shaft locked.
+///
+/// # Errors
+/// As [`Rig::new`] and [`Rig::start`].
 pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
@@ -56,7 +59,10 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, E
     Ok(StepsRun { error, stats, lost })
 }
 
-/// One second at constant speed and torque.
+/// One second at constant speed and torque; none where the angle is lost.
+///
+/// # Errors
+/// As [`Rig::new`] and [`Rig::start`].
 pub fn turning(
     drive: &Settings,
     config: &Config,
@@ -64,8 +70,6 @@ pub fn turning(
     iq: f64,
     seed: u64,
 ) -> Result<Option<SteadyRun>, Error> {
-    match steady_run_of(drive, config, OperatingPoint { rpm, iq, seed }, 1.0) {
-        Ok(run) => Ok((!run.lost).then_some(run)),
-        Err(error) => Err(error),
-    }
+    let run = steady_run_of(drive, config, OperatingPoint { rpm, iq, seed }, 1.0)?;
+    Ok((!run.lost).then_some(run))
 }

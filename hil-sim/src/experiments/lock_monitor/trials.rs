@@ -64,6 +64,9 @@ impl ForcedTrial {
 }
 
 /// Turns the rotor flux by `degrees` at a random moment.
+///
+/// # Errors
+/// As [`at_speed`], or when the drive stops before that moment.
 pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<ForcedTrial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(case.seed ^ 0x5eed);
     let mut rig = at_speed(config, case)?;
@@ -123,7 +126,10 @@ pub struct HealthyRun {
     pub fault: Option<Fault>,
 }
 
-/// Two seconds, after 0.3 s to settle, in which something happens after one.
+/// Two seconds, after 0.3 s to settle, with the disturbance after one.
+///
+/// # Errors
+/// As [`at_speed`].
 pub fn healthy(config: &Config, seed: u64, kind: HealthyKind) -> Result<HealthyRun, Error> {
     let case = case(seed, if kind == HealthyKind::Fast { 300.0 } else { 150.0 });
     let mut result = HealthyRun { case, kind, largest_loss: 0.0, largest_error: 0.0, fault: None };
@@ -200,6 +206,9 @@ pub struct OverSpeedTrial {
 pub const OVER_SPEED_S: f64 = 0.5;
 
 /// From 70 % of `limit` rpm at a random acceleration past it.
+///
+/// # Errors
+/// As [`at_speed`].
 pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeedTrial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x0ff);
     let mut case = case(seed, limit);
@@ -234,6 +243,9 @@ impl StartTrial {
 }
 
 /// A start, or a relock of a drive that runs, at `rpm`.
+///
+/// # Errors
+/// As [`Rig::from_config`] and [`at_speed`].
 pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<StartTrial, Error> {
     let mut result = StartTrial { accepted: false, error_deg: 0.0 };
     let mut rig = if relock {
@@ -258,7 +270,7 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start
     if fault(&rig).is_none() {
         result.accepted = true;
         rig.run(0.5, |p| result.error_deg = result.error_deg.max(p.angle_error_deg.abs()));
-        // One that notices by itself has not gone on.
+        // A drive that stops by itself in this time has not accepted the start.
         result.accepted = fault(&rig).is_none();
     }
     Ok(result)

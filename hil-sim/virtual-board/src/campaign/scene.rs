@@ -4,8 +4,8 @@ use anyhow::{Context, Result, ensure};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::plant::Load;
-use induction_drive::console::keys::FirmwareSettings;
-use induction_drive::store::{Failed, Flash, Loaded, Saved};
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::{Flash, FlashError, Loaded, Saved};
 
 use crate::addresses::Addresses;
 use crate::board::snapshot::Snapshot;
@@ -168,12 +168,12 @@ impl Flash for Bank<'_> {
         (!torn).then_some(u64::from(low) | u64::from(high) << 32)
     }
 
-    fn erase(&mut self, _: usize) -> Result<(), Failed> {
-        Err(Failed::Erase(0)) // looked at only
+    fn erase(&mut self, _: usize) -> Result<(), FlashError> {
+        Err(FlashError::Erase(0)) // looked at only
     }
 
-    fn program(&mut self, _: usize, _: usize, _: u64) -> Result<(), Failed> {
-        Err(Failed::Program(0))
+    fn program(&mut self, _: usize, _: usize, _: u64) -> Result<(), FlashError> {
+        Err(FlashError::Program(0))
     }
 }
 

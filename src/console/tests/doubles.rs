@@ -1,56 +1,52 @@
-//! A drive and a wire to talk about and over where there are none: for tests and fuzzing.
-extern crate std;
+//! Stand-ins for the drive and the serial port, for the tests of the console and for fuzzing.
 
-use core::fmt::{self, Write};
 use std::collections::VecDeque;
-use std::string::String;
-use std::vec::Vec;
+use std::fmt::{self, Write};
 
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::settings::SettingsError;
-use drive_core::settings::table::CarrierTable;
-use drive_core::settings::table::ReferenceTable;
+use drive_core::settings::table::{CarrierTable, ReferenceTable};
 use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State};
+use induction_drive::board;
+use induction_drive::console::grammar::Level;
+use induction_drive::console::handle::{CommandError, DriveHandle, Port};
+use induction_drive::link::Status;
+use induction_drive::link::trace::{self, SignalChoice};
+use induction_drive::rotor_tracking::{Report, Tracking};
+use induction_drive::settings::FirmwareSettings;
+use induction_drive::store::FlashError;
 
-use super::grammar::{LONGEST_TRACE, Level};
-use super::keys::FirmwareSettings;
-use super::{DriveHandle, NotDone, Port};
-use crate::link::Status;
-use crate::link::trace::{self, Choice};
-use crate::rotor_tracking::{Report, Tracking};
-use crate::store::Failed;
-
-/// A drive on the desk.
-pub struct Desk {
+/// A drive without hardware.
+pub struct FakeDrive {
     /// The drive.
     pub drive: Drive,
     /// Whether its control runs.
     pub running: bool,
-    /// What the converters read.
+    /// Last sample.
     pub sample: Sample,
-    /// How many records the trace has.
+    /// Number of records of the trace.
     pub records: u16,
-    /// What it was ordered.
-    pub orders: Vec<Command>,
-    /// What was saved last.
+    /// Commands so far.
+    pub commands: Vec<Command>,
+    /// Settings saved last.
     pub saved: Option<FirmwareSettings>,
     /// Whether the flash fails.
     pub worn_out: bool,
-    /// What a learning has found.
+    /// Result of a learning, not yet fetched.
     pub found: Option<Learned>,
-    /// What tracks the rotor time constant.
+    /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
 }
 
-impl Desk {
-    /// One with this drive.
+impl FakeDrive {
+    /// A running one.
     pub fn new(drive: Drive) -> Self {
         Self {
             drive,
             running: true,
             sample: Sample::default(),
             records: 0,
-            orders: Vec::new(),
+            commands: Vec::new(),
             saved: None,
             worn_out: false,
             found: None,
@@ -59,17 +55,17 @@ impl Desk {
     }
 }
 
-impl DriveHandle for Desk {
-    fn order(&mut self, order: Command) -> Result<Accepted, NotDone> {
+impl DriveHandle for FakeDrive {
+    fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         if !self.running {
-            return Err(NotDone::NoAnswer);
+            return Err(CommandError::NoAnswer);
         }
-        self.orders.push(order);
-        self.drive.command(&order).map_err(NotDone::Refused)
+        self.commands.push(command);
+        self.drive.command(&command).map_err(CommandError::Refused)
     }
     fn status(&self) -> Option<Status> {
         self.running.then(|| Status {
-            periods: self.orders.len() as u32,
+            periods: self.commands.len() as u32,
             state: self.drive.state(),
             sample: self.sample,
             telemetry: self.drive.telemetry(),
@@ -91,15 +87,15 @@ impl DriveHandle for Desk {
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
     }
-    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), Failed> {
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
         if self.worn_out {
-            return Err(Failed::Erase(0x10));
+            return Err(FlashError::Erase(0x10));
         }
         self.saved = Some(*settings);
         Ok(())
     }
-    fn begin_trace(&mut self, records: u16, _: u16, _: &Choice) -> bool {
-        assert!(records <= LONGEST_TRACE);
+    fn begin_trace(&mut self, records: u16, _: u16, _: &SignalChoice) -> bool {
+        assert!(usize::from(records) <= board::TRACE_RECORDS);
         self.records = records;
         true
     }
@@ -126,7 +122,7 @@ impl DriveHandle for Desk {
     }
 }
 
-/// What a learning finds.
+/// An accepted result of a learning.
 pub fn found() -> Learned {
     Learned {
         reference: ReferenceTable::default(),
@@ -140,25 +136,25 @@ pub fn found() -> Learned {
     }
 }
 
-/// A wire with only so much room for replies.
+/// A serial port with limited room for replies.
 #[derive(Default)]
-pub struct Wire {
+pub struct FakePort {
     /// Bytes on their way to the console.
     pub sent: VecDeque<u8>,
-    /// Whether some were damaged.
+    /// Whether bytes were damaged.
     pub damaged: bool,
     /// Bytes that still fit.
     pub room: usize,
-    /// What the console has said.
+    /// Replies of the console.
     pub received: String,
 }
 
-impl Port for Wire {
+impl Port for FakePort {
     fn read(&mut self) -> Option<u8> {
         self.sent.pop_front()
     }
     fn take_damage(&mut self) -> bool {
-        core::mem::take(&mut self.damaged)
+        std::mem::take(&mut self.damaged)
     }
     fn write(&mut self, text: &str) -> bool {
         let fits = text.len() <= self.room;

@@ -1,115 +1,20 @@
 //! The settings by name: one table.
 //!
-//! Ranges do not stand here: `Settings::build` knows them, and says them.
+//! Ranges do not stand here: `FirmwareSettings::build` knows them, and its error states them.
 
-use core::fmt;
-
-use drive_core::Settings;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::identify::learning::Learned;
-use drive_core::math::decimal::Shortest;
 use drive_core::settings::{AngleSource, CurrentPlant, SettingsError};
 
-use super::grammar::number;
+use super::FirmwareSettings;
+use super::value::{Value, ValueError, number};
+use crate::hash;
 
-/// FirmwareSettings that can be set at the console.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FirmwareSettings {
-    /// Of the drive.
-    pub drive: Settings,
-    /// Of the firmware around it.
-    pub command: Commands,
-    /// What was learned on the motor with these settings, and accepted; it comes on top of them.
-    pub learned: Option<Learned>,
-}
-
-/// What the firmware makes of commands.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Commands {
-    /// The drive is stopped when no line was understood for so long, s; 0 for never.
-    pub timeout_s: f32,
-    /// Whether a start has checked the wiring since the defaults were set.
-    pub wiring_checked: bool,
-}
-
-/// Longest time-out of commands, s.
-const LONGEST_TIMEOUT_S: f32 = 3600.0;
-
-impl FirmwareSettings {
-    /// What is set in the image. Not inlined: every number of it is an instruction or two.
-    #[inline(never)]
-    pub fn of_the_board() -> Self {
-        Self { drive: crate::board::settings(), command: Commands::default(), learned: None }
-    }
-
-    /// What a learning has found holds from now on, if it was accepted.
-    pub fn learn(&mut self, found: &Learned) {
-        if found.accepted {
-            self.learned = Some(found.on_top_of(self.learned.as_ref()));
-        }
-    }
-
-    /// Forgets what was learned, if it was learned with other settings than these.
-    pub fn forget_unless_as(&mut self, before: &Self) {
-        if !self.drive.shares_learning_with(&before.drive) {
-            self.learned = None;
-        }
-    }
-
-    /// Every value against its range; the coefficients if all are inside.
-    ///
-    /// # Errors
-    /// The first value outside, or the rule of design that cannot be met.
-    pub fn build(&self) -> Result<drive_core::Coefficients, SettingsError> {
-        self.build_for(crate::board::dead_time(self.drive.inverter.dead_time_s).1)
-    }
-
-    /// The drive's settings, for a timer that makes this dead time, s.
-    fn drive_with(&self, dead_time_s: f32) -> Settings {
-        // Copied whole and changed, which is a tenth of the code of fields one by one.
-        let mut drive = self.drive;
-        drive.inverter.dead_time_s = dead_time_s;
-        drive
-    }
-
-    /// The same as [`build`](Self::build) for a timer that makes another dead time than is set, because
-    /// it takes a new one at a reset only, s.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn build_for(&self, dead_time_s: f32) -> Result<drive_core::Coefficients, SettingsError> {
-        self.check()?;
-        let mut built = self.drive_with(dead_time_s).build();
-        if let (Ok(coefficients), Some(learned)) = (&mut built, &self.learned) {
-            coefficients.take(learned);
-        }
-        built
-    }
-
-    /// What the firmware asks of settings beside the drive.
-    ///
-    /// # Errors
-    /// The first value outside its range.
-    pub fn check(&self) -> Result<(), SettingsError> {
-        let (shortest, longest) = crate::board::DEAD_TIME_RANGE_S;
-        for (name, value, min, max) in [
-            ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
-            ("inverter.dead_time_s", self.drive.inverter.dead_time_s, shortest, longest),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(SettingsError::Range { name, value, min, max });
-            }
-        }
-        Ok(())
-    }
-}
-
-/// A setting.
+/// A setting of the table [`KEYS`].
 #[derive(Debug)]
 pub struct Key {
-    /// Its name.
+    /// Name at the console and, hashed, in the flash.
     pub name: &'static str,
-    /// Its unit, empty if it has none.
+    /// Unit; empty if there is none.
     pub unit: &'static str,
     access: Access,
 }
@@ -123,7 +28,7 @@ impl PartialEq for Key {
 #[derive(Debug)]
 enum Access {
     Number(fn(&mut FirmwareSettings) -> &mut f32),
-    /// `checked` says whether a range stands in the settings: 0 is in none of them.
+    /// `checked`: the value has a range, and 0 is outside it.
     Whole {
         get: fn(&FirmwareSettings) -> u32,
         set: fn(&mut FirmwareSettings, u32),
@@ -132,59 +37,9 @@ enum Access {
     },
     Word {
         words: &'static [&'static str],
-        get: fn(&FirmwareSettings) -> u8,
-        set: fn(&mut FirmwareSettings, u8),
+        get: fn(&FirmwareSettings) -> &'static str,
+        set: fn(&mut FirmwareSettings, &str),
     },
-}
-
-/// A value that suits a setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
-    /// A finite number.
-    Number(f32),
-    /// A whole number.
-    Whole(u32),
-    /// One of the setting's words, by its place among them.
-    Word {
-        /// Its place.
-        index: u8,
-        /// The word.
-        word: &'static str,
-    },
-}
-
-impl fmt::Display for Value {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(value) => Shortest(*value).fmt(f),
-            Self::Whole(value) => value.fmt(f),
-            Self::Word { word, .. } => f.write_str(word),
-        }
-    }
-}
-
-/// Why a text is no value for a setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum NotTaken {
-    /// Not a finite number.
-    Number,
-    /// Not a whole number up to this.
-    Whole(u32),
-    /// Not one of these words.
-    Word(&'static [&'static str]),
-}
-
-impl fmt::Display for NotTaken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number => f.write_str("not a number"),
-            Self::Whole(max) => write!(f, "not a whole number from 0 to {max}"),
-            Self::Word(words) => {
-                f.write_str("not one of:")?;
-                words.iter().try_for_each(|word| write!(f, " {word}"))
-            }
-        }
-    }
 }
 
 macro_rules! number {
@@ -200,7 +55,7 @@ macro_rules! whole {
             unit: "",
             access: Access::Whole {
                 get: |s| s.$($path).+ as u32,
-                // Never above the type's largest: see `parse`.
+                // At most `max`: see `parse`.
                 set: |s, value| s.$($path).+ = value as $type,
                 max: <$type>::MAX as u32,
                 checked: $checked,
@@ -210,37 +65,27 @@ macro_rules! whole {
 }
 
 macro_rules! word {
-    ($name:literal, |$s:ident| $place:expr, $($word:literal = $value:pat => $make:expr),+) => {{
-        const WORDS: &[&str] = &[$($word),+];
-        let get: fn(&FirmwareSettings) -> u8 =
-            |$s| match $place { $($value => const { place($word, WORDS) },)+ };
-        let set: fn(&mut FirmwareSettings, u8) =
-            |$s, index| { $(if index == const { place($word, WORDS) } { $place = $make; })+ };
-        Key { name: $name, unit: "", access: Access::Word { words: WORDS, get, set } }
-    }};
+    ($name:literal, |$s:ident| $place:expr, $($word:literal = $value:pat => $make:expr),+) => {
+        Key {
+            name: $name,
+            unit: "",
+            access: Access::Word {
+                words: &[$($word),+],
+                get: |$s| match $place { $($value => $word),+ },
+                set: |$s, word| match word {
+                    $($word => $place = $make,)+
+                    // Not one of `words`: see `parse`.
+                    _ => {}
+                },
+            },
+        }
+    };
 }
 
 macro_rules! yes_or_no {
     ($name:literal, $($path:ident).+) => {
         word!($name, |s| s.$($path).+, "no" = false => false, "yes" = true => true)
     };
-}
-
-/// The place of a word among words, when compiling.
-const fn place(word: &str, words: &[&str]) -> u8 {
-    let (word, mut place) = (word.as_bytes(), 0);
-    while place < words.len() {
-        let other = words[place].as_bytes();
-        let mut same = 0;
-        while same < word.len() && same < other.len() && word[same] == other[same] {
-            same += 1;
-        }
-        if same == word.len() && same == other.len() {
-            break;
-        }
-        place += 1;
-    }
-    place as u8
 }
 
 /// All settings, in the order in which they are shown.
@@ -310,98 +155,87 @@ pub static KEYS: [Key; 54] = [
     yes_or_no!("wiring_checked", command.wiring_checked),
 ];
 
-/// The setting with this [number](Key::id).
-pub fn find_id(id: u32) -> Option<&'static Key> {
-    KEYS.iter().find(|key| key.id() == id)
-}
-
-/// FNV-1a: a number for a word.
-pub(crate) fn number_of(word: &str) -> u32 {
-    word.bytes().fold(0x811c_9dc5, |hash, b| (hash ^ u32::from(b)).wrapping_mul(0x0100_0193))
-}
-
-/// The setting of this name.
+/// The setting with this name.
 pub fn find(name: &str) -> Option<&'static Key> {
     KEYS.iter().find(|key| key.name == name)
 }
 
+/// The setting with this [id](Key::id).
+pub fn find_id(id: u32) -> Option<&'static Key> {
+    KEYS.iter().find(|key| key.id() == id)
+}
+
 impl Key {
-    /// What is set.
+    /// The key's current value.
     pub fn get(&self, settings: &FirmwareSettings) -> Value {
         match self.access {
             Access::Number(place) => Value::Number(*place(&mut { *settings })),
             Access::Whole { get, .. } => Value::Whole(get(settings)),
-            Access::Word { words, get, .. } => {
-                let index = get(settings);
-                Value::Word { index, word: words.get(usize::from(index)).copied().unwrap_or("") }
-            }
+            Access::Word { get, .. } => Value::Word(get(settings)),
         }
     }
 
-    /// The value that a text stands for. Whether it is in range, [`FirmwareSettings::build`] says.
+    /// The value that a text stands for. Its range is checked by [`FirmwareSettings::build`].
     ///
     /// # Errors
-    /// The text is no value for this setting.
-    pub fn parse(&self, text: &str) -> Result<Value, NotTaken> {
+    /// The text is not a value of this setting.
+    pub fn parse(&self, text: &str) -> Result<Value, ValueError> {
         match self.access {
-            Access::Number(_) => number(text).map(Value::Number).map_err(|_| NotTaken::Number),
+            Access::Number(_) => number(text).map(Value::Number).ok_or(ValueError::Number),
             Access::Whole { max, .. } => {
                 let value = text.parse().ok().filter(|value| *value <= max);
-                value.map(Value::Whole).ok_or(NotTaken::Whole(max))
+                value.map(Value::Whole).ok_or(ValueError::Whole(max))
             }
             Access::Word { words, .. } => {
-                let index = words.iter().position(|word| *word == text);
-                let found = index.and_then(|i| Some((u8::try_from(i).ok()?, *words.get(i)?)));
-                found.map(|(index, word)| Value::Word { index, word }).ok_or(NotTaken::Word(words))
+                let word = words.iter().find(|word| **word == text);
+                word.map(|word| Value::Word(word)).ok_or(ValueError::Word(words))
             }
         }
     }
 
-    /// Sets a value that [`parse`](Self::parse) gave.
+    /// Sets a value from this key's [`parse`](Self::parse); a value of another type changes nothing.
     pub fn set(&self, settings: &mut FirmwareSettings, value: Value) {
         match (&self.access, value) {
             (Access::Number(place), Value::Number(value)) => *place(settings) = value,
             (Access::Whole { set, .. }, Value::Whole(value)) => set(settings, value),
-            (Access::Word { set, .. }, Value::Word { index, .. }) => set(settings, index),
-            // Not from this key.
+            (Access::Word { set, .. }, Value::Word(word)) => set(settings, word),
             _ => {}
         }
     }
 
-    /// A number made of its name, by which the flash knows it.
+    /// The id of the setting in the flash: the hash of its name.
     pub fn id(&self) -> u32 {
-        number_of(self.name)
+        hash::of(self.name.bytes())
     }
 
-    /// What is set, as it is kept in the flash.
+    /// The key's current value as 32 bits for the flash: the bits of a number, the hash of a word.
     pub fn to_bits(&self, settings: &FirmwareSettings) -> u32 {
         match self.get(settings) {
             Value::Number(value) => value.to_bits(),
             Value::Whole(value) => value,
-            Value::Word { word, .. } => number_of(word),
+            Value::Word(word) => hash::of(word.bytes()),
         }
     }
 
-    /// Sets what [`to_bits`](Self::to_bits) gave; `None` if it is no value of this setting. Whether it
-    /// is in range, [`FirmwareSettings::build`] says.
+    /// Sets a value from [`to_bits`](Self::to_bits); `None` if the bits are not a value of this setting. Its range
+    /// is checked by [`FirmwareSettings::build`].
     pub fn set_bits(&self, settings: &mut FirmwareSettings, bits: u32) -> Option<()> {
         let value = match self.access {
             Access::Number(_) => Value::Number(f32::from_bits(bits)),
             Access::Whole { max, .. } => Value::Whole(Some(bits).filter(|bits| *bits <= max)?),
             Access::Word { words, .. } => {
-                let index = words.iter().position(|word| number_of(word) == bits)?;
-                Value::Word { index: u8::try_from(index).ok()?, word: words.get(index)? }
+                Value::Word(words.iter().find(|word| hash::of(word.bytes()) == bits)?)
             }
         };
         self.set(settings, value);
         Some(())
     }
 
-    /// What may be set beside the present settings, where a range says it.
+    /// The values allowed beside the present settings, `(min, max)`, where the setting has a range.
     pub fn range(&self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let mut probe = *settings;
         match self.access {
-            // In no range.
+            // Outside every range.
             Access::Number(place) => *place(&mut probe) = f32::NAN,
             Access::Whole { set, checked: true, .. } => set(&mut probe, 0),
             Access::Whole { .. } | Access::Word { .. } => return None,
@@ -445,7 +279,7 @@ mod tests {
             let value = match key.get(&settings) {
                 Value::Number(value) => value,
                 Value::Whole(value) => value as f32,
-                Value::Word { .. } => continue,
+                Value::Word(_) => continue,
             };
             match key.range(&settings) {
                 Some((min, max)) => assert!(min <= value && value <= max, "{}", key.name),
@@ -463,9 +297,10 @@ mod tests {
             let value = match key.get(&before) {
                 Value::Number(value) => key.parse(&format!("{}", value * 1.5 + 1.0)),
                 Value::Whole(value) => key.parse(&format!("{}", value + 1)),
-                Value::Word { index, .. } => {
+                Value::Word(word) => {
                     let words = key.words();
-                    key.parse(words[(usize::from(index) + 1) % words.len()])
+                    let index = words.iter().position(|other| *other == word).unwrap();
+                    key.parse(words[(index + 1) % words.len()])
                 }
             };
             key.set(&mut after, value.unwrap());

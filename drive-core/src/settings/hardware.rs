@@ -1,0 +1,82 @@
+//! Timer, power stage, converters and encoder.
+
+/// The timer and the power stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inverter {
+    /// Value at which the counter turns round: 14167 at 170 MHz and 6 kHz.
+    pub top: u16,
+    /// Dead time, s.
+    pub dead_time_s: f32,
+    /// Whether the dead time is compensated.
+    pub compensate: bool,
+    /// Current from which on the compensation is full, A.
+    pub full_compensation_a: f32,
+}
+
+impl Default for Inverter {
+    /// Section 3.9; full compensation from 30 mA on: three times the spread of noise and prediction.
+    fn default() -> Self {
+        Self { top: 14_167, dead_time_s: 2.2e-6, compensate: true, full_compensation_a: 0.03 }
+    }
+}
+
+/// Calibration line of one channel: `value = gain * code + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Units per code.
+    pub gain: f32,
+    /// Value at code 0.
+    pub offset: f32,
+}
+
+impl Line {
+    /// Channel A of the dissertation's board, Eq. 3.5.
+    pub const CHANNEL_A: Self = Self { gain: 0.002_212_0, offset: -4.472_713_4 };
+    /// Channel B, Eq. 3.5, with all printed digits.
+    #[allow(clippy::excessive_precision)]
+    pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
+
+    /// The line times a factor.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self { gain: factor * self.gain, offset: factor * self.offset }
+    }
+
+    /// Value at a code.
+    pub fn at(self, code: u16) -> f32 {
+        self.gain * f32::from(code) + self.offset
+    }
+}
+
+/// Scales of the converters and of the encoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// Current a, A.
+    pub current_a: Line,
+    /// Current b, A.
+    pub current_b: Line,
+    /// Dc-link voltage, V.
+    pub dc_link: Line,
+    /// Largest code of the current channels.
+    pub full_scale: u16,
+    /// Heat-sink codes above this are too hot.
+    pub heat_sink_trip: u16,
+    /// Delay of the analog filters of the currents, s.
+    pub current_delay_s: f32,
+    /// Encoder counts per mechanical turn, four a line.
+    pub encoder_counts: u32,
+}
+
+impl Default for Scales {
+    /// Eq. 3.5; 0.11 V per code (451 V at full scale); the 5305 Hz filter of Figure 16; 2500 lines.
+    fn default() -> Self {
+        Self {
+            current_a: Line::CHANNEL_A,
+            current_b: Line::CHANNEL_B,
+            dc_link: Line { gain: 0.11, offset: 0.0 },
+            full_scale: 4095,
+            heat_sink_trip: 4000,
+            current_delay_s: 30e-6,
+            encoder_counts: 10_000,
+        }
+    }
+}

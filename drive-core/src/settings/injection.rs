@@ -1,0 +1,111 @@
+//! The injection and the tracking of the angle.
+
+use crate::carrier::DemodulatorKind;
+use crate::settings::table::{CarrierTable, ReferenceTable};
+
+/// The loop of sections 3.4 and 3.11: behind all demodulations but the synchronous one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrintedChain {
+    /// `ref_delta_i`, A (section 3.3): reference of the current difference from
+    /// [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it follows
+    /// the sign of i_q, and goes through zero linearly.
+    pub reference_a: f32,
+    /// Current on the quadrature axis from which on the reference is full, A.
+    pub full_reference_iq_a: f32,
+    /// Gain k_s of the tracker, rad/A (Eq. 3.44).
+    pub k_s: f32,
+    /// Zero z_s of the tracker (Eq. 3.44).
+    pub z_s: f32,
+    /// Reference of the current difference over the torque current, A, learned with the shaft locked;
+    /// takes the place of the constant one.
+    pub learned: Option<ReferenceTable>,
+    /// Length of the rms filters of [`DemodulatorKind::RmsImpedance`], samples.
+    pub rms_samples: u8,
+}
+
+impl Default for PrintedChain {
+    /// Sections 3.3 and 3.11; two carrier periods.
+    fn default() -> Self {
+        Self {
+            reference_a: 0.010,
+            full_reference_iq_a: 1.0,
+            k_s: 0.132_546,
+            z_s: 0.90,
+            learned: None,
+            rms_samples: 20,
+        }
+    }
+}
+
+/// Synchronous demodulation and its loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SynchronousTracking {
+    /// Natural frequency of the tracking loop, Hz.
+    pub bandwidth_hz: f32,
+    /// Saliency fixed to the flux at the nominal magnetising current. Negative: the inductance along
+    /// the flux is the larger one.
+    pub flux_saliency: f32,
+    /// Saliency by the stator current, 1/A; for the gain schedule.
+    pub current_saliency: f32,
+    /// Reference of the saliency over the torque current, learned with the shaft locked.
+    pub reference: ReferenceTable,
+    /// Whether a start checks that the motor has the saliency (see [`crate::protect::saliency_check`]). Without
+    /// it a start trusts that it has, and that the shaft stands still.
+    pub check: bool,
+    /// Whether the lock is verified at a start and watched (see [`crate::protect::lock_monitor`]).
+    pub monitor: bool,
+    /// Carrier current over the torque current, learned with the shaft locked; for the monitor.
+    pub carrier: CarrierTable,
+    /// Share of the flux-fixed saliency that may be missing; 1 is a flux that is gone.
+    pub allowed_loss: f32,
+    /// Time constant of the mean of that share, s.
+    pub loss_s: f32,
+    /// Speed of the rotor that trips, rpm: as far as the angle is tracked.
+    pub tracked_rpm: f32,
+}
+
+impl Default for SynchronousTracking {
+    /// For the simulated motor; see [`ReferenceTable::default`].
+    fn default() -> Self {
+        Self {
+            bandwidth_hz: 3.5,
+            flux_saliency: -0.035,
+            current_saliency: 0.0338,
+            reference: ReferenceTable::default(),
+            check: true,
+            monitor: true,
+            carrier: CarrierTable::default(),
+            allowed_loss: 0.55,
+            loss_s: 0.08,
+            tracked_rpm: 700.0,
+        }
+    }
+}
+
+/// The injection and the tracking of the angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InjectionSettings {
+    /// Amplitude of the injected voltage, V peak; 0 for none.
+    pub amplitude_v: f32,
+    /// Demodulation of the carrier current.
+    pub demodulator: DemodulatorKind,
+    /// Settings of the chain of the dissertation.
+    pub printed: PrintedChain,
+    /// Settings of the synchronous demodulation.
+    pub synchronous: SynchronousTracking,
+    /// Inject and demodulate also while the angle comes from the encoder.
+    pub beside_encoder: bool,
+}
+
+impl Default for InjectionSettings {
+    /// 50 V (28 % of what the dc link gives) is assumed, the dissertation does not say.
+    fn default() -> Self {
+        Self {
+            amplitude_v: 50.0,
+            demodulator: DemodulatorKind::default(),
+            printed: PrintedChain::default(),
+            synchronous: SynchronousTracking::default(),
+            beside_encoder: false,
+        }
+    }
+}

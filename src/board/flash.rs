@@ -1,0 +1,47 @@
+//! The flash pages of the settings: the last of the second bank.
+
+/// Size of the flash, bytes.
+const FLASH_BYTES: u32 = 512 * 1024;
+const FLASH_ADDRESS: u32 = 0x0800_0000;
+/// Size of a page with two banks, and with one, bytes (RM0440, flash module organization).
+const PAGE_BYTES: (u32, u32) = (2048, 4096);
+/// Room for a set of settings, bytes: a page of the smaller kind.
+pub const SETTINGS_SLOT_BYTES: u32 = PAGE_BYTES.0;
+/// Offsets of the two sets from the beginning of the flash: the last pages of the larger kind, so that they stay in
+/// place when the option bit DBANK changes.
+const SETTINGS_OFFSETS: [u32; 2] = [FLASH_BYTES - 2 * PAGE_BYTES.1, FLASH_BYTES - PAGE_BYTES.1];
+// In the second bank: the code, in the first, runs on while the second is written.
+const _: () = assert!(SETTINGS_OFFSETS[0] >= FLASH_BYTES / 2);
+
+const fn settings_offset(slot: usize) -> u32 {
+    if slot == 0 { SETTINGS_OFFSETS[0] } else { SETTINGS_OFFSETS[1] }
+}
+
+/// Address of a double word of a set of settings; always inside the set.
+pub const fn settings_address(slot: usize, word: usize) -> u32 {
+    let words = SETTINGS_SLOT_BYTES / 8;
+    FLASH_ADDRESS + settings_offset(slot) + 8 * (word as u32 % words)
+}
+
+/// The fields BKER (second bank) and PNB (page in the bank) of FLASH_CR for a set of settings.
+pub const fn settings_page(slot: usize, dual_bank: bool) -> (bool, u8) {
+    if dual_bank {
+        (true, ((settings_offset(slot) - FLASH_BYTES / 2) / PAGE_BYTES.0) as u8)
+    } else {
+        (false, (settings_offset(slot) / PAGE_BYTES.1) as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Erasing any other page would destroy the firmware.
+    #[test]
+    fn the_pages_of_the_settings_are_the_last_with_one_bank_and_with_two() {
+        assert_eq!([0, 1].map(|slot| settings_page(slot, true)), [(true, 124), (true, 126)]);
+        assert_eq!([0, 1].map(|slot| settings_page(slot, false)), [(false, 126), (false, 127)]);
+        let ends = [(0, 0), (0, 255), (1, 0), (1, 255)].map(|(s, w)| settings_address(s, w));
+        assert_eq!(ends, [0x0807_e000, 0x0807_e7f8, 0x0807_f000, 0x0807_f7f8]);
+    }
+}

@@ -1,0 +1,66 @@
+use super::*;
+
+#[test]
+fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
+    for ns in 500..=6000 {
+        let wanted = ns as f32 * 1e-9;
+        let made = dead_time(wanted).1;
+        assert!(made > wanted - 0.2e-9 && made < 1.04 * wanted + 12e-9, "{wanted}: {made}");
+        // What the timer makes, asked for again, is the same.
+        assert_eq!(dead_time(made), dead_time(wanted));
+    }
+    // Whatever else is asked for, there is a field.
+    for odd in [f32::NAN, f32::INFINITY, -1.0, 0.0] {
+        let _ = dead_time(odd);
+    }
+}
+
+#[test]
+fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
+    let trip = DC_LINK.at(OVER_VOLTAGE_CODE);
+    assert!(trip > settings().limits.dc_over_v && trip < DC_LINK.at(ADC_FULL_SCALE));
+}
+
+#[test]
+fn reaction_times_are_those_of_the_documentation() {
+    let times = [
+        format!("| {BREAK_REACTION_NS} ns |"),
+        format!("| ≤ {:.0} µs |", f64::from(WATCHDOG_REACTION_NS) / 1e3),
+        format!("| ≤ {:.0} µs |", f64::from(SOFTWARE_REACTION_NS) / 1e3),
+    ];
+    let causes = ["break input of the power stage", "analog watchdogs", "software: phase currents"];
+    for (cause, time) in causes.into_iter().zip(times) {
+        let mut rows = include_str!("../../docs/protections.md").lines();
+        let row = rows.find(|row| row.starts_with(&format!("| {cause}"))).unwrap();
+        assert!(row.ends_with(&time), "{row}: {time}");
+    }
+}
+
+#[test]
+fn the_numbers_are_those_of_the_design() {
+    assert_eq!(PWM_TOP, 14_167);
+    let (code, seconds) = dead_time(DEAD_TIME_S);
+    assert_eq!((code, (seconds * 170e6).round()), (0x9e, 376.0)); // 2.21 us
+    assert_eq!(SAMPLE_AT, 14_167 - 98);
+}
+
+/// 0 A gave 2024 with 3.0 V (Table 4): the same voltage is 1840 of 3.3 V.
+#[test]
+fn the_calibration_follows_the_reference() {
+    let zero = -CURRENT_A.offset / CURRENT_A.gain;
+    assert!((zero - 2022.0 / 1.1).abs() < 1.0, "zero at {zero}");
+}
+
+#[test]
+fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
+    for (line, (low, high)) in [(CURRENT_A, ANALOG_WINDOW_A), (CURRENT_B, ANALOG_WINDOW_B)] {
+        let software = settings().limits.trip_a;
+        assert!(line.at(high) > software && line.at(low) < -software);
+        assert!(line.at(high + 1) < 4.47 && line.at(low - 1) > -4.47);
+    }
+}
+
+#[test]
+fn the_drive_accepts_the_board() {
+    assert!(settings().build().is_ok());
+}

@@ -1,0 +1,62 @@
+//! The independent watchdog: resets the chip when it is not fed in time. Once started, only a reset stops it.
+
+use cortex_m::asm;
+use stm32g4xx_hal::pac::{DBGMCU, IWDG};
+
+use induction_drive::board;
+
+/// Keys of IWDG_KR: start the watchdog, unlock its registers, reload it.
+const START: u16 = 0xcccc;
+const UNLOCK: u16 = 0x5555;
+const RELOAD: u16 = 0xaaaa;
+
+/// The watchdog.
+pub struct Watchdog(IWDG);
+
+impl Watchdog {
+    /// Starts it, with [`board::WATCHDOG_US`].
+    pub fn start(timer: IWDG, debug: &DBGMCU) -> Self {
+        // Halted by a debugger, it stops too.
+        debug.apb1l_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+        let mut watchdog = Self(timer);
+        watchdog.key(START);
+        watchdog.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
+        watchdog
+    }
+
+    /// Feeds it.
+    pub fn feed(&mut self) {
+        self.key(RELOAD);
+    }
+
+    /// Does long `work` with the time of the watchdog extended to ten seconds: for work with the outputs off that ends
+    /// before they can be switched on.
+    pub fn extended<R>(&mut self, work: impl FnOnce() -> R) -> R {
+        self.set(board::WATCHDOG_LONG_PRESCALER, board::WATCHDOG_LONG_RELOAD);
+        let result = work();
+        self.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
+        result
+    }
+
+    fn key(&mut self, key: u16) {
+        // SAFETY: the three keys of the reference manual.
+        self.0.kr().write(|w| unsafe { w.bits(key) });
+    }
+
+    fn set(&mut self, prescaler: u8, reload: u16) {
+        self.key(UNLOCK);
+        // SAFETY: three bits and twelve bits; `board` keeps both inside.
+        unsafe {
+            self.0.pr().write(|w| w.bits(u16::from(prescaler)));
+            self.0.rlr().write(|w| w.bits(reload));
+        }
+        // The watchdog takes both within six of its clocks. The wait is limited in case its clock does not run.
+        for _ in 0..board::WATCHDOG_SET_US {
+            if self.0.sr().read().bits() == 0 {
+                break;
+            }
+            asm::delay(board::CYCLES_PER_US);
+        }
+        self.key(RELOAD);
+    }
+}

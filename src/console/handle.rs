@@ -1,0 +1,91 @@
+//! The two sides of the console: the drive that it commands, and the serial port.
+
+use core::fmt::{self, Write};
+
+use drive_core::identify::learning::Learned;
+use drive_core::settings::SettingsError;
+use drive_core::{Accepted, Coefficients, Command, Refused};
+
+use super::grammar::Level;
+use crate::link::Status;
+use crate::link::trace::{self, SignalChoice};
+use crate::rotor_tracking::Report;
+use crate::settings::FirmwareSettings;
+use crate::store::FlashError;
+
+/// Reason why a command was not carried out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CommandError {
+    /// The drive refuses it.
+    Refused(Refused),
+    /// The control interrupt does not run.
+    NoAnswer,
+}
+
+impl fmt::Display for CommandError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused(why) => why.fmt(f),
+            Self::NoAnswer => f.write_str("the control does not run"),
+        }
+    }
+}
+
+/// Access of the console to the drive and to the rest of the firmware.
+pub trait DriveHandle {
+    /// Gives the drive a command and waits for its answer, a few control periods at most.
+    ///
+    /// # Errors
+    /// The drive refuses it, or does not answer.
+    fn command(&mut self, command: Command) -> Result<Accepted, CommandError>;
+    /// The last report of the control interrupt; `None` if there was none.
+    fn status(&self) -> Option<Status>;
+    /// Whether the outputs are off and stay off until the next command.
+    fn is_off(&self) -> bool;
+    /// Computes coefficients from settings. Takes seconds: only while the outputs are off.
+    ///
+    /// # Errors
+    /// A value out of range, or a design rule that cannot be met.
+    fn build(&mut self, settings: &FirmwareSettings) -> Result<Coefficients, SettingsError>;
+    /// Notes that the drive has taken these settings.
+    fn configured(&mut self, settings: &FirmwareSettings);
+    /// State of the tracking of the rotor time constant, if it is enabled.
+    fn tracking(&self) -> Option<Report>;
+    /// Saves the settings. Takes up to two erasures: only while the outputs are off.
+    ///
+    /// # Errors
+    /// The flash failed.
+    fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError>;
+    /// Starts a trace; `false`, and nothing changed, while one is being recorded.
+    fn begin_trace(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool;
+    /// Whether a trace is being recorded.
+    fn tracing(&self) -> bool;
+    /// Record number `i` of the last trace.
+    fn traced(&self, i: u16) -> Option<trace::Record>;
+    /// Calls `show` with the result of a learning that ended since the last call, accepted or not.
+    fn learned(&mut self, show: &mut dyn FnMut(&Learned));
+    /// Sets how much is logged.
+    fn set_log_level(&mut self, level: Level);
+    /// Most bytes of the stack used so far, and its size.
+    fn stack(&self) -> (usize, usize);
+    /// Writes the version of the firmware.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    fn version(&self, to: &mut dyn Write) -> fmt::Result;
+    /// Writes the cause of the last reset and the end of the last run.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    fn last_run(&self, to: &mut dyn Write) -> fmt::Result;
+}
+
+/// The console's end of the serial port.
+pub trait Port {
+    /// The next received byte.
+    fn read(&mut self) -> Option<u8>;
+    /// Whether bytes were lost or damaged since the last call.
+    fn take_damage(&mut self) -> bool;
+    /// Sends the whole text; `false`, and nothing sent, if it does not fit now.
+    fn write(&mut self, text: &str) -> bool;
+}

@@ -1,0 +1,97 @@
+//! The settings of the firmware: those of the drive, those of the firmware around it, and what was learned on the
+//! motor. [`keys`] lists them by name.
+
+pub mod keys;
+pub mod value;
+
+use drive_core::identify::learning::Learned;
+use drive_core::settings::SettingsError;
+use drive_core::{Coefficients, Settings};
+
+use crate::board;
+
+/// All settings of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirmwareSettings {
+    /// Settings of the drive.
+    pub drive: Settings,
+    /// Settings of the firmware around it.
+    pub command: CommandSettings,
+    /// Accepted result of a learning with these settings; it overrides them where both give a value.
+    pub learned: Option<Learned>,
+}
+
+/// Settings for the handling of commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CommandSettings {
+    /// The drive is stopped when no valid line arrived for this long, s; 0 disables the time-out.
+    pub timeout_s: f32,
+    /// Whether a start has checked the wiring since the defaults were set.
+    pub wiring_checked: bool,
+}
+
+/// Longest time-out of commands, s.
+const LONGEST_TIMEOUT_S: f32 = 3600.0;
+
+impl FirmwareSettings {
+    /// The defaults: those of the drive with the numbers of this board.
+    pub fn of_the_board() -> Self {
+        Self { drive: board::settings(), command: CommandSettings::default(), learned: None }
+    }
+
+    /// Takes the result of a learning, if it was accepted.
+    pub fn learn(&mut self, result: &Learned) {
+        if result.accepted {
+            self.learned = Some(result.on_top_of(self.learned.as_ref()));
+        }
+    }
+
+    /// Drops what was learned, unless it would be the same with the settings `before`.
+    pub fn forget_unless_as(&mut self, before: &Self) {
+        if !self.drive.shares_learning_with(&before.drive) {
+            self.learned = None;
+        }
+    }
+
+    /// Checks every value against its range and computes the coefficients of the drive.
+    ///
+    /// # Errors
+    /// The first value out of range, or the design rule that cannot be met.
+    pub fn build(&self) -> Result<Coefficients, SettingsError> {
+        self.build_for(board::dead_time(self.drive.inverter.dead_time_s).1)
+    }
+
+    /// The same as [`build`](Self::build) for a timer whose dead time, s, differs from the setting: the timer takes
+    /// a new one only at a reset.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_for(&self, dead_time_s: f32) -> Result<Coefficients, SettingsError> {
+        self.check()?;
+        let mut drive = self.drive;
+        drive.inverter.dead_time_s = dead_time_s;
+        // Changed in place: a copy would take 2 KiB more of the stack.
+        let mut built = drive.build();
+        if let (Ok(coefficients), Some(learned)) = (&mut built, &self.learned) {
+            coefficients.take(learned);
+        }
+        built
+    }
+
+    /// Checks the values that the firmware itself uses; [`build`](Self::build) checks the drive's.
+    ///
+    /// # Errors
+    /// The first value out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let (shortest, longest) = board::DEAD_TIME_RANGE_S;
+        for (name, value, min, max) in [
+            ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
+            ("inverter.dead_time_s", self.drive.inverter.dead_time_s, shortest, longest),
+        ] {
+            if !(min..=max).contains(&value) {
+                return Err(SettingsError::Range { name, value, min, max });
+            }
+        }
+        Ok(())
+    }
+}

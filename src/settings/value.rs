@@ -1,0 +1,86 @@
+//! Values of settings and their text form.
+
+use core::fmt;
+
+/// A value of a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A finite number.
+    Number(f32),
+    /// A whole number.
+    Whole(u32),
+    /// One of the setting's words.
+    Word(&'static str),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) => value.fmt(f),
+            Self::Whole(value) => value.fmt(f),
+            Self::Word(word) => f.write_str(word),
+        }
+    }
+}
+
+/// Reason why a text is not a value of a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ValueError {
+    /// Not a finite number.
+    Number,
+    /// Not a whole number up to this one.
+    Whole(u32),
+    /// Not one of these words.
+    Word(&'static [&'static str]),
+}
+
+impl fmt::Display for ValueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number => f.write_str("not a number"),
+            Self::Whole(max) => write!(f, "not a whole number from 0 to {max}"),
+            Self::Word(words) => {
+                f.write_str("not one of:")?;
+                words.iter().try_for_each(|word| write!(f, " {word}"))
+            }
+        }
+    }
+}
+
+/// The finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
+pub fn number(text: &str) -> Option<f32> {
+    text.parse().ok().filter(|value: &f32| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn only_finite_numbers_are_taken() {
+        let refused = [
+            "", ".", "-", "e5", "1e", "1e300", "1e99999", "1,5", "1A", "1 ", "0x1", "nan", "NaN",
+            "inf", "-inf", "infinity",
+        ];
+        for text in refused {
+            assert_eq!(number(text), None, "{text}");
+        }
+        for (text, value) in
+            [("000000000000000000000000001.5", 1.5), ("+.5", 0.5), ("-2e-3", -2e-3)]
+        {
+            assert_eq!(number(text), Some(value));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_printed_is_read_back(bits: u32) {
+            let value = f32::from_bits(bits);
+            prop_assume!(value.is_finite());
+            prop_assert_eq!(number(&Value::Number(value).to_string()), Some(value));
+            prop_assert_eq!(number(&format!("{value:e}")), Some(value));
+        }
+    }
+}

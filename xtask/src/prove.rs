@@ -1,0 +1,171 @@
+//! `cargo xtask prove`: long proofs in shards, not part of the test.
+//!
+//! The output of each finished shard is kept in `target/prove/NAME/COMMIT/`. A later call goes on with
+//! the missing ones. With `K/N` it does the Kth of N parts, so that N machines share a proof.
+
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
+
+use crate::{board, fuzz, image, run};
+
+/// Faults of a shard of the campaign.
+const FAULTS: u32 = 100;
+/// Seconds of a shard of fuzzing.
+const FUZZ_S: u32 = 300;
+/// Runs of a shard of the lock monitor and of the saliency check.
+const RUNS: u32 = 100;
+const ALL: f64 = RUNS as f64;
+
+/// A proof in shards.
+struct Proof {
+    name: &'static str,
+    about: &'static str,
+    shards: u32,
+    /// The command of a shard, counted from 0.
+    command: fn(u32) -> Result<Command>,
+    /// Metrics in its `--json` output, by names with spaces between, and the least and the largest value.
+    bounds: &'static [(&'static str, f64, f64)],
+}
+
+const PROOFS: [Proof; 5] = [
+    Proof {
+        name: "monte-carlo",
+        about: "1000 random operating points each within 150, 300 and 600 rpm: angle error, none lost",
+        shards: 3,
+        command: |shard| {
+            let speed = format!("load.speed_rpm={}", [150, 300, 600][shard as usize]);
+            Ok(simulation("monte-carlo", 1000, 19_322, &["--set", &speed]))
+        },
+        bounds: &[("lost_runs", 0.0, 0.0), ("angle_error_rms_deg", 1.6, 1.8)],
+    },
+    Proof {
+        name: "campaign",
+        about: "2000 faults on the virtual board: outputs off in time, or control correct",
+        shards: 20,
+        command: |shard| Ok(board::faults(&image::build()?, FAULTS, 1 + shard * FAULTS)),
+        bounds: &[],
+    },
+    Proof {
+        name: "lock-monitor",
+        about: "5 forced angles 1000 times each, 10 000 sound runs: found in time, no false alarm",
+        shards: 10,
+        command: |shard| Ok(simulation("lock-monitor", RUNS, 1 + shard, &[])),
+        bounds: &[
+            ("not_in_time_p90 not_in_time_m90 not_in_time_p120 not_in_time_m120", 0.0, 0.0),
+            ("not_in_time_180 false_alarms over_speed_late wrong_starts refused_at_rest", 0.0, 0.0),
+        ],
+    },
+    Proof {
+        name: "saliency-check",
+        about: "1000 starts each: accepted with half of the saliency, refused with a tenth or none",
+        shards: 10,
+        command: |shard| Ok(simulation("saliency-check", RUNS, 1 + shard, &[])),
+        bounds: &[
+            ("accepted_none accepted_a_tenth", 0.0, 0.0),
+            ("accepted_half accepted_all accepted_one_and_a_half", ALL, ALL),
+        ],
+    },
+    Proof {
+        name: "fuzz",
+        about: "console and saved settings: one hour each, from the inputs found before",
+        shards: 24,
+        command: |shard| fuzz::command(fuzz::TARGETS[shard as usize % 2], FUZZ_S),
+        bounds: &[],
+    },
+];
+
+fn simulation(experiment: &str, runs: u32, seed: u32, more: &[&str]) -> Command {
+    let mut command = run::cargo("run --release --package hil-sim -- run --json");
+    let runs = format!("runs={runs}");
+    command.args([experiment, "--seed", &seed.to_string(), "--set", &runs]).args(more);
+    command
+}
+
+/// Prints the proofs and how many of their shards are done.
+pub fn list() -> Result<()> {
+    for proof in &PROOFS {
+        let Proof { name, about, shards, .. } = proof;
+        let results = results(proof)?;
+        let done = results.iter().filter(|file| file.is_file()).count();
+        println!("{name:<16}{done:>3} of {shards:>2} shards done   {about}");
+    }
+    Ok(())
+}
+
+/// Runs the missing shards of a part (`K/N`) of a proof; fails if one fails.
+pub fn prove(name: &str, part: &str) -> Result<()> {
+    let proof = PROOFS.iter().find(|proof| proof.name == name);
+    let proof = proof.with_context(|| format!("no proof is named {name}: cargo xtask prove"))?;
+    let changes = run::output("git", &["status", "--porcelain", "--untracked-files=no"]);
+    ensure!(changes.is_some_and(|list| list.is_empty()), "commit first: results hold for a commit");
+    let results = results(proof)?;
+    for shard in shards(proof.shards, part)? {
+        let done = &results[shard as usize];
+        if !done.is_file() {
+            let output = done.with_extension("unfinished");
+            fs::create_dir_all(done.with_file_name(""))?;
+            let mut command = (proof.command)(shard)?;
+            command.stdout(File::create(&output)?);
+            run::step(&format!("{name}, shard {} of {}", shard + 1, proof.shards), &mut command)?;
+            judge(&fs::read_to_string(&output)?, proof.bounds)?;
+            fs::rename(output, done)?;
+        }
+    }
+    list()
+}
+
+/// The files of the results of all shards. They hold for one commit.
+fn results(proof: &Proof) -> Result<Vec<PathBuf>> {
+    let commit = run::output("git", &["rev-parse", "--short=10", "HEAD"]).context("no commit")?;
+    let dir = run::target_dir()?.join("prove").join(proof.name).join(commit);
+    Ok((1..=proof.shards).map(|number| dir.join(format!("{number}.txt"))).collect())
+}
+
+/// The shards of a part, `K/N`: every Nth.
+fn shards(count: u32, part: &str) -> Result<Vec<u32>> {
+    let numbers = part.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+    let (k, n): (u32, u32) = numbers.with_context(|| format!("{part} is no part: K/N"))?;
+    ensure!((1..=n).contains(&k), "{part} is no part: K is from 1 to N");
+    Ok((k - 1..count).step_by(n as usize).collect())
+}
+
+/// Fails if a metric in a `--json` output is outside its bounds.
+fn judge(output: &str, bounds: &[(&str, f64, f64)]) -> Result<()> {
+    for &(metrics, least, largest) in bounds {
+        let json: Value = serde_json::from_str(output)?;
+        for name in metrics.split(' ') {
+            let value = json["metrics"][name].as_f64().with_context(|| format!("no {name}"))?;
+            let is_inside = (least..=largest).contains(&value);
+            ensure!(is_inside, "{name} is {value}, not {least} to {largest}");
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_metric_outside_its_bounds_fails() {
+        let json = r#"{"experiment":"monte-carlo","metrics":{"lost_runs":0.0,"rms_deg":1.7}}"#;
+        assert!(judge(json, &[("lost_runs", 0.0, 0.0), ("rms_deg", 1.6, 1.8)]).is_ok());
+        let error = judge(json, &[("lost_runs rms_deg", 0.0, 1.6)]).unwrap_err().to_string();
+        assert_eq!(error, "rms_deg is 1.7, not 0 to 1.6");
+        assert!(judge(json, &[("rms", 0.0, 9.0)]).is_err());
+        assert!(judge("a table", &[]).is_ok());
+    }
+
+    #[test]
+    fn the_parts_of_a_proof_are_all_its_shards() {
+        let mut all: Vec<u32> =
+            (1..=3).flat_map(|k| shards(10, &format!("{k}/3")).unwrap()).collect();
+        all.sort_unstable();
+        assert_eq!(all, (0..10).collect::<Vec<_>>());
+        assert!(["0/3", "4/3", "1/0", "3", "a/b"].iter().all(|part| shards(10, part).is_err()));
+    }
+}

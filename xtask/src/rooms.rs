@@ -1,0 +1,204 @@
+//! `cargo xtask rooms`: no circle between the modules of a crate.
+//!
+//! A module refers to another by a path, an import, or a name that a third module re-exports; a name from
+//! the root of the crate counts for the module that defines it. References are compared between siblings:
+//! one from `a::b` to `c::d` is an arrow from `a` to `c`. Those between a module and its own children do
+//! not count.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+
+use crate::modules::{self, Modules, Name};
+use crate::sources;
+
+/// Most modules that a path goes through before it is taken for one that leads to itself.
+const LONGEST: usize = 64;
+
+/// Arrows between siblings, each with one of its places.
+type Arrows = BTreeMap<Name, BTreeMap<Name, String>>;
+
+/// Prints the circles of every crate; fails if there is one.
+pub fn check() -> Result<()> {
+    let (mut count, mut in_circles) = (0, 0);
+    for root in sources::rust_files()?.into_iter().filter(|file| is_root(file)) {
+        let modules = modules::read(&root)?;
+        let arrows = arrows(&modules);
+        let circles = circles(&arrows);
+        for circle in &circles {
+            println!("\n{}: {}", root.display(), shown(circle));
+            for pair in circle.windows(2) {
+                println!("    {}  {}", shown(pair), arrows[&pair[0]][&pair[1]]);
+            }
+        }
+        count += modules.len();
+        in_circles += circles.iter().flatten().collect::<BTreeSet<_>>().len();
+    }
+    println!("\n{count} modules, {in_circles} in circles");
+    ensure!(in_circles == 0, "{in_circles} modules refer to each other in circles");
+    Ok(())
+}
+
+fn is_root(file: &Path) -> bool {
+    let is_bin = file.parent().is_some_and(|dir| dir.ends_with("src/bin"));
+    is_bin || file.ends_with("src/lib.rs") || file.ends_with("src/main.rs")
+}
+
+fn shown(modules: &[Name]) -> String {
+    modules.iter().map(|name| name.join("::")).collect::<Vec<_>>().join(" -> ")
+}
+
+fn arrows(modules: &Modules) -> Arrows {
+    let mut arrows = Arrows::new();
+    for (name, module) in modules {
+        for (path, place) in &module.paths {
+            let mut through = Vec::new();
+            follow(modules, name, path, &mut through);
+            for target in through {
+                let common = name.iter().zip(&target).take_while(|(a, b)| a == b).count();
+                if let (Some(from), Some(to)) = (name.get(..=common), target.get(..=common)) {
+                    let from = arrows.entry(from.to_vec()).or_default();
+                    from.entry(to.to_vec()).or_insert_with(|| place.clone());
+                }
+            }
+        }
+    }
+    arrows
+}
+
+/// Lists the modules that a path goes `through`, which is written in the module `at`.
+fn follow(modules: &Modules, at: &[String], path: &[String], through: &mut Vec<Name>) {
+    through.push(at.to_vec());
+    let Some((first, rest)) = path.split_first().filter(|_| through.len() < LONGEST) else {
+        return;
+    };
+    let child = [at, std::slice::from_ref(first)].concat();
+    let module = &modules[at];
+    match first.as_str() {
+        "crate" => follow(modules, &[], rest, through),
+        "self" => follow(modules, at, rest, through),
+        "super" => follow(modules, &at[..at.len().saturating_sub(1)], rest, through),
+        _ if modules.contains_key(&child) => follow(modules, &child, rest, through),
+        _ => match module.imports.get(first) {
+            Some(from) => follow(modules, at, &[from, rest].concat(), through),
+            // The name can be from any of these.
+            None => module.globs.iter().for_each(|glob| {
+                follow(modules, at, &[glob, path].concat(), through);
+            }),
+        },
+    }
+}
+
+/// Circles, such that each module in a circle is in one of them. The first module is also the last.
+fn circles(arrows: &Arrows) -> Vec<Vec<Name>> {
+    let mut circles: Vec<Vec<Name>> = Vec::new();
+    for start in arrows.keys() {
+        if !circles.iter().flatten().any(|name| name == start) {
+            circles.extend(shortest_circle(arrows, start));
+        }
+    }
+    circles
+}
+
+fn shortest_circle(arrows: &Arrows, start: &Name) -> Option<Vec<Name>> {
+    let mut before = BTreeMap::new();
+    let mut queue = VecDeque::from([start]);
+    while let Some(name) = queue.pop_front() {
+        for next in arrows.get(name).into_iter().flat_map(BTreeMap::keys) {
+            if !before.contains_key(next) {
+                before.insert(next, name);
+                queue.push_back(next);
+            }
+        }
+    }
+    let mut circle = vec![start.clone(), (*before.get(start)?).clone()];
+    while circle[circle.len() - 1] != *start {
+        circle.push(before[&circle[circle.len() - 1]].clone());
+    }
+    circle.reverse();
+    Some(circle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The circles of a crate with this root file.
+    fn found(text: &str) -> Vec<String> {
+        let mut modules = Modules::new();
+        modules::parse(&mut modules, Name::new(), "lib.rs".as_ref(), text).unwrap();
+        let shown = |circle: Vec<Name>| {
+            circle.iter().map(|name| name.join("::")).collect::<Vec<_>>().join(" ")
+        };
+        circles(&arrows(&modules)).into_iter().map(shown).collect()
+    }
+
+    #[test]
+    fn arrows_in_one_direction_are_no_circle() {
+        assert!(
+            found("mod a { use crate::b::B; } mod b { pub struct B; use super::c; } mod c {}")
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn circles_are_found_by_imports_and_by_paths() {
+        assert_eq!(
+            found("mod a { use crate::b::B; } mod b { fn f() { super::a::g(); } }"),
+            ["a b a"]
+        );
+        assert_eq!(
+            found("mod a { use super::{b, c}; } mod b {} mod c { fn f(x: crate::a::A) {} }"),
+            ["a c a"]
+        );
+        // In arguments of a macro or an attribute.
+        assert_eq!(
+            found("mod a { fn f() { g!(x = [crate::b::C]); } } mod b { use crate::a; }"),
+            ["a b a"]
+        );
+        assert_eq!(
+            found("mod a { #[d(e = super::b::C)] struct S; } mod b { use crate::a; }"),
+            ["a b a"]
+        );
+    }
+
+    #[test]
+    fn a_name_from_the_root_counts_for_its_module() {
+        let root = "pub use b::B; mod b { pub struct B; use crate::a::A; }";
+        assert_eq!(found(&format!("{root} mod a {{ fn f(b: crate::B) {{}} }}")), ["a b a"]);
+        assert_eq!(found(&format!("{root} mod a {{ use crate::B as Other; }}")), ["a b a"]);
+        assert_eq!(found(&format!("{root} mod a {{ use super::*; fn f(b: B) {{}} }}")), ["a b a"]);
+        // Over two re-exports, the second of all names.
+        let text = "pub use a::*; pub use b::B; mod a { pub struct A; pub use super::c::C; use crate::B; }";
+        let rest = "mod b { pub struct B; } mod c { pub struct C; fn f() -> crate::A {} }";
+        assert_eq!(found(&format!("{text} {rest}")), ["a c a"]);
+    }
+
+    #[test]
+    fn circles_are_looked_for_at_every_level() {
+        let inner = "mod a { mod c { use super::d::D; } mod d { use super::c; } }";
+        assert_eq!(found(inner), ["a::c a::d a::c"]);
+        let lifted = "mod a { mod c { use crate::b::B; } } mod b { mod d { use crate::a::A; } }";
+        assert_eq!(found(lifted), ["a b a"]);
+    }
+
+    #[test]
+    fn parents_tests_documentation_and_other_crates_do_not_count() {
+        assert!(
+            found("mod a { use self::b::B; struct A; mod b { use super::A; struct B; } }")
+                .is_empty()
+        );
+        let from_b = |item: &str| found(&format!("mod a {{ use super::b; }} mod b {{ {item} }}"));
+        assert!(from_b("#[cfg(test)] mod tests { use crate::a::A; }").is_empty());
+        assert!(
+            from_b(
+                "#[cfg(doc)] use crate::a::A; /// See [`crate::a::A`].
+ struct B;"
+            )
+            .is_empty()
+        );
+        assert!(from_b("use a::A; use other::a::B; fn f() { let a = 1; }").is_empty());
+        assert_eq!(from_b("#[cfg(unix)] use crate::a::A;"), ["a b a"]);
+    }
+}
