@@ -4,7 +4,7 @@
 use core::f32::consts::TAU;
 use core::fmt;
 
-use drive_core::identify::online::{Doubt, Online, Speed, Tracked};
+use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use drive_core::io::PERIOD_S;
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, AlphaBeta, Dq, Settings, Telemetry};
@@ -48,7 +48,7 @@ pub struct Tracking {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The estimate, or the reason why there is none.
-    pub estimate: Result<Tracked, Doubt>,
+    pub estimate: Result<RotorEstimate, NoEstimate>,
     /// Rotor time constant in use, s.
     pub used: f32,
 }
@@ -64,7 +64,7 @@ impl Tracking {
             source: settings.angle_source,
             next: 0,
             wait: PERIODS_PER_FIT,
-            report: Report { estimate: Err(Doubt::Settling), used: settings.motor.tau_r() },
+            report: Report { estimate: Err(NoEstimate::Settling), used: settings.motor.tau_r() },
         })
     }
 
@@ -75,7 +75,7 @@ impl Tracking {
             // The drive did not regulate, or the main loop came too late.
             self.online.restart();
             self.wait = PERIODS_PER_FIT;
-            self.report.estimate = Err(Doubt::Settling);
+            self.report.estimate = Err(NoEstimate::Settling);
         }
         self.next = seen.number.wrapping_add(1);
         self.online.push(seen.measured, seen.realised);
@@ -86,8 +86,8 @@ impl Tracking {
         self.wait = PERIODS_PER_FIT;
         let omega_m = seen.rotor_freq * (TAU / PERIOD_S);
         let speed = match self.source {
-            AngleSource::Encoder => Speed::Known(omega_m),
-            AngleSource::Injection => Speed::Guess(omega_m),
+            AngleSource::Encoder => SpeedInput::Known(omega_m),
+            AngleSource::Injection => SpeedInput::Guess(omega_m),
         };
         self.report.estimate = self.online.refine(seen.reference, speed);
         self.report.estimate.ok().map(|tracked| tracked.tau_r)
@@ -194,7 +194,7 @@ mod tests {
                 }
             }
             if n == 30_200 {
-                assert_eq!(tracking.report().estimate, Err(Doubt::Settling));
+                assert_eq!(tracking.report().estimate, Err(NoEstimate::Settling));
             }
         }
         assert!((30..60).contains(&lost), "{lost}");

@@ -48,7 +48,7 @@ impl FirmwareSettings {
 
     /// Drops what was learned, unless it would be the same with the settings `before`.
     pub fn forget_unless_as(&mut self, before: &Self) {
-        if !self.drive.learns_as(&before.drive) {
+        if !self.drive.shares_learning_with(&before.drive) {
             self.learned = None;
         }
     }

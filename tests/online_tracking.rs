@@ -6,8 +6,8 @@ mod common;
 use std::f64::consts::TAU;
 
 use common::config;
-use drive_core::flux::indirect::LIMITS;
-use drive_core::identify::online::{Doubt, Online, Speed};
+use drive_core::flux::indirect::TAU_R_LIMITS;
+use drive_core::identify::online::{NoEstimate, Online, SpeedInput};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
 use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 use hil_sim::plant::Load;
@@ -117,7 +117,7 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
             if !n.is_multiple_of(600) {
                 continue;
             }
-            let speed = Speed::Known(telemetry.rotor_freq * (TAU * RATE_HZ) as f32);
+            let speed = SpeedInput::Known(telemetry.rotor_freq * (TAU * RATE_HZ) as f32);
             if let Ok(tracked) = online.refine(telemetry.reference, speed) {
                 errors.push(error(tracked.tau_r));
                 let order = Command::RotorTimeConstant(tracked.tau_r);
@@ -177,11 +177,14 @@ fn what_is_not_a_signal_gives_no_estimate_and_does_no_harm() {
         let bad = if n % 7000 == 5 { f32::NAN } else { 0.0 };
         online.push(AlphaBeta::new(bad, 0.0), AlphaBeta::new(0.0, -bad));
         if n % 600 == 0 {
-            assert!(online.refine(current, Speed::Known(10.0)).is_err());
+            assert!(online.refine(current, SpeedInput::Known(10.0)).is_err());
         }
     }
-    assert_eq!(online.refine(current, Speed::Known(f32::NAN)), Err(Doubt::Transient));
-    assert_eq!(online.refine(Dq::new(f32::NAN, 0.0), Speed::Known(1.0)), Err(Doubt::Transient));
+    assert_eq!(online.refine(current, SpeedInput::Known(f32::NAN)), Err(NoEstimate::Transient));
+    assert_eq!(
+        online.refine(Dq::new(f32::NAN, 0.0), SpeedInput::Known(1.0)),
+        Err(NoEstimate::Transient)
+    );
     assert!(online.rls().latest().iter().all(|x| x.is_finite()));
 }
 
@@ -199,11 +202,12 @@ fn the_drive_takes_a_time_constant_only_if_it_is_wanted_bounded_and_slowly() {
     let mut rig = Rig::new(&plant_settings(&config), &tracked, 1).unwrap();
     assert!(matches!(rig.drive.command(&asked), Err(Refused::State(_))), "not while it is off");
     rig.start(Mode::Torque).unwrap();
-    for factor in [0.9 * LIMITS[0], 1.1 * LIMITS[1], -1.0] {
+    for factor in [0.9 * TAU_R_LIMITS[0], 1.1 * TAU_R_LIMITS[1], -1.0] {
         let refused = rig.drive.command(&Command::RotorTimeConstant(factor * nominal));
         let Err(Refused::OutOfRange { min, max }) = refused else { panic!("{refused:?}") };
         assert!(
-            (min / nominal - LIMITS[0]).abs() < 1e-6 && (max / nominal - LIMITS[1]).abs() < 1e-6
+            (min / nominal - TAU_R_LIMITS[0]).abs() < 1e-6
+                && (max / nominal - TAU_R_LIMITS[1]).abs() < 1e-6
         );
     }
     let nan = rig.drive.command(&Command::RotorTimeConstant(f32::NAN));

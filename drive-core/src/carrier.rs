@@ -1,4 +1,4 @@
-//! The injected carrier: its voltage, and the demodulation of its current.
+//! The injected carrier: generation of its voltage and demodulation of its current.
 
 pub mod demodulator;
 pub mod injection;

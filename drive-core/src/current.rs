@@ -1,4 +1,4 @@
-//! From converter codes to currents, from currents to voltages, from voltages to compare values.
+//! The current loop and the inverter: current sensing, PI control, dead-time compensation, modulation.
 
 pub mod dead_time;
 pub mod inverter_drop;

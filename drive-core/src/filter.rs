@@ -1,4 +1,4 @@
-//! Digital filters as second-order sections, and sums over the last samples.
+//! Digital filters as cascades of second-order sections, and moving sums.
 
 pub mod dissertation;
 pub mod moving_sum;

@@ -1,4 +1,4 @@
-//! The angle of the rotor flux: from the encoder, or from the saliency that the carrier sees.
+//! Angle of the rotor flux: from encoder and slip, or from the saliency measured with the carrier.
 
 pub mod estimator;
 pub mod indirect;

@@ -1,9 +1,9 @@
-//! Angles, vectors and their frames.
+//! Angles, vectors with their reference frames, and decimal output.
 
 pub mod angle;
 pub mod frames;
 
-/// `value` within ±`largest`.
+/// `value` clamped to ±`largest`; NaN stays NaN.
 pub(crate) fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {
         largest

@@ -1,29 +1,28 @@
-//! Speed and position of the rotor: the loops of section 4.1 around the torque, one inside the other,
-//! at 100 Hz, with the encoder or without it.
+//! Speed and position control: the cascaded loops of section 4.1 around the torque, at 100 Hz, with or
+//! without the encoder.
 //!
 //! ```text
 //! position error -> braking curve -> limit -> ramp -> PI on the speed -> limit -> i_q
 //! ```
 //!
-//! The speed mode enters at the limit. The PI controller is that of Eq. 3.35, designed by
-//! [`design_motion_loops`](crate::tuning::design_motion_loops) for the inertia and for what finds the
-//! rotor; the current that the ramp needs is fed forward. (The PI on the position of Eq. 4.2 is
-//! unstable with the plant of Eq. 4.1, |z| = 1.046: it was designed as if one of the plant's
-//! integrators were not there. A PI on the speed inside a P on the position has the same terms.)
+//! The speed mode enters at the limit. The PI controller of Eq. 3.35 is designed by
+//! [`design_motion_loops`](crate::tuning::design_motion_loops) for the inertia and for the source of the
+//! rotor position; the current for the ramp is fed forward. (The PI on the position of Eq. 4.2 is unstable
+//! with the plant of Eq. 4.1, |z| = 1.046: its design ignores one integrator of the plant. A PI on the
+//! speed inside a P on the position has the same terms.)
 //!
 //! # Without the encoder
-//! The rotor is where the flux is less the slip since the start:
-//! `theta_r = phi - (1/tau_r) ∫ i_q/i_d dt`, Eq. 2.10 solved for the other angle. The injection
-//! observes the flux, and nothing observes the rotor inside it: a cage looks the same from everywhere.
-//! An error of the slip is therefore an error of the speed, and its integral one of the position
-//! that nothing takes back. Measured on the simulated motor (experiment `sensorless-position`),
-//! mechanical: a step of five turns ends within 8° (ten runs), a position held for a minute moves by some 10°
-//! without a load, and under load by 130° per ampere and percent of error of the rotor resistance.
-//! Learning the reference of the saliency with the shaft locked takes that error out until the
-//! rotor's temperature changes.
+//! The rotor angle is the flux angle minus the slip integrated since the start:
+//! `theta_r = phi - (1/tau_r) ∫ i_q/i_d dt`, Eq. 2.10 solved for the rotor angle. The injection observes
+//! the flux but not the rotor, since a cage is rotationally symmetric. A slip error is therefore a speed
+//! error, and its integral a position error that nothing corrects. Measured on the simulated motor
+//! (experiment `sensorless-position`), mechanical: a step of five turns ends within 8° (ten runs); a
+//! position held for a minute drifts by some 10° without load, and under load by 130° per ampere and
+//! percent of error of the rotor resistance. Learning the reference of the saliency with the shaft locked
+//! removes that error until the rotor temperature changes.
 //!
-//! The acceleration that is asked for is fed to the tracking loop, too: it would lag by the
-//! acceleration over the square of its natural frequency.
+//! The acceleration reference is also fed forward to the tracking loop, which would otherwise lag by the
+//! acceleration divided by the square of its natural frequency.
 
 use crate::current::pi::{Pi, PiState};
 use crate::math::angle::Angle;
@@ -32,10 +31,10 @@ use crate::tuning::MotionDesign;
 
 /// Control periods per step of the loops: 100 Hz.
 pub const DIVIDER: u8 = 60;
-/// Counts per electrical turn of the rotor angle without the encoder.
+/// Counts of [`RotorCount`] per electrical turn.
 pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
-/// Largest position reference, turns: an f32 still resolves 0.02° there.
+/// Largest position reference, mechanical turns: f32 resolves 0.02° there.
 pub const LARGEST_POSITION: f32 = 1000.0;
 
 /// Coefficients of the loops. Speeds in mechanical turns/s, positions in mechanical turns.
@@ -43,33 +42,33 @@ pub const LARGEST_POSITION: f32 = 1000.0;
 pub struct Motion {
     /// Speed controller, A per turn/s.
     pub pi: Pi,
-    /// Current for an acceleration, A per turn/s in one step of the loops.
+    /// Feed-forward current for a change of the speed reference, A per turn/s in one step of the loops.
     forward: f32,
     turns_per_count: f32,
     /// Steps of the loops per second.
     rate: f32,
-    /// Share of the newest value in the speed.
+    /// Share of the newest value in the low-pass of the speed.
     smoothing: f32,
-    /// Largest speed that is asked for, turns/s.
-    pub limit: f32,
-    /// Largest position that is asked for, turns.
-    pub furthest: f32,
-    /// Largest change of it per step of the loops, turns/s.
+    /// Largest speed reference, turns/s.
+    pub speed_limit: f32,
+    /// Largest position reference, turns.
+    pub position_limit: f32,
+    /// Largest change of the speed reference per step of the loops, turns/s.
     ramp: f32,
     /// Twice the deceleration of the braking curve, turns/s^2.
     twice_braking: f32,
-    /// Speed at which the braking curve bends, turns/s.
+    /// Speed at which the braking curve changes from linear to square root, turns/s.
     bend: f32,
     /// Largest current, A.
     i_q_limit: f32,
 }
 
-/// What the loops are to hold.
+/// Reference of the loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
-    /// Turns/s.
+    /// Speed, mechanical turns/s.
     Speed(f32),
-    /// Turns from the start.
+    /// Position, mechanical turns from the start.
     Position(f32),
 }
 
@@ -77,13 +76,13 @@ pub enum Goal {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MotionState {
     pi: PiState,
-    /// Ramped reference of the speed, turns/s.
+    /// Ramped speed reference, turns/s.
     reference: f32,
-    /// How fast it changes, turns/s per control period.
+    /// Rate of change of the speed reference, turns/s per control period.
     pub acceleration: f32,
-    /// Speed of the rotor, turns/s.
+    /// Filtered speed of the rotor, turns/s.
     speed: f32,
-    /// The speed that position or command want, turns/s.
+    /// Speed reference before limit and ramp, turns/s.
     wanted: f32,
     origin: u32,
     last: Option<u32>,
@@ -92,9 +91,17 @@ pub struct MotionState {
 }
 
 impl Motion {
-    /// With the controllers of a design; `counts` of the position per mechanical turn, largest speed
-    /// in turns/s, largest acceleration of the reference in turns/s^2, largest current in A.
-    pub fn new(design: &MotionDesign, counts: u32, limit: f32, ramp: f32, i_q_limit: f32) -> Self {
+    /// Loops with the controllers of `design` and `counts` of the position per mechanical turn.
+    ///
+    /// Limits of the references: `speed_limit`, mechanical turns/s; acceleration `ramp`, mechanical
+    /// turns/s^2; `i_q_limit`, A.
+    pub fn new(
+        design: &MotionDesign,
+        counts: u32,
+        speed_limit: f32,
+        ramp: f32,
+        i_q_limit: f32,
+    ) -> Self {
         let rate = (1.0 / design.period_s) as f32;
         Self {
             pi: Pi { k_c: design.k_c as f32, z_c: design.z_c as f32 },
@@ -102,8 +109,8 @@ impl Motion {
             turns_per_count: 1.0 / counts as f32,
             rate,
             smoothing: design.smoothing as f32,
-            limit,
-            furthest: limited(0.5 * i32::MAX as f32 / counts as f32, LARGEST_POSITION),
+            speed_limit,
+            position_limit: limited(0.5 * i32::MAX as f32 / counts as f32, LARGEST_POSITION),
             ramp: ramp / rate,
             twice_braking: 2.0 * ramp,
             bend: ramp / design.k_x as f32,
@@ -111,20 +118,20 @@ impl Motion {
         }
     }
 
-    /// Starts at the position `count`, which becomes zero, with no current.
+    /// Resets `state` to zero current at the position `count`, which becomes the origin.
     pub fn start(&self, state: &mut MotionState, count: u32) {
         *state = MotionState { origin: count, ..MotionState::default() };
     }
 
-    /// Position in turns from the start.
+    /// Position in mechanical turns from the start.
     pub fn turns(&self, state: &MotionState, count: u32) -> f32 {
         count.wrapping_sub(state.origin) as i32 as f32 * self.turns_per_count
     }
 
-    /// Called every control period; every 60th time it computes a new current on the quadrature
-    /// axis from the goal and the position `count`. Returns that current, A.
+    /// Returns the quadrature current, A, for the goal at the position `count`; called in every control
+    /// period. The current changes every [`DIVIDER`] periods.
     ///
-    /// The work is spread over three periods: speed, what is wanted of it, current.
+    /// The computation is spread over three periods: speed, speed reference, current.
     pub fn step(&self, state: &mut MotionState, goal: Goal, count: u32) -> f32 {
         match state.phase {
             0 => {
@@ -140,7 +147,7 @@ impl Motion {
                 };
             }
             2 => {
-                let change = limited(state.wanted, self.limit) - state.reference;
+                let change = limited(state.wanted, self.speed_limit) - state.reference;
                 let step = limited(change, self.ramp);
                 state.reference += step;
                 state.acceleration = step * (1.0 / DIVIDER as f32);
@@ -156,24 +163,33 @@ impl Motion {
         state.output
     }
 
-    /// The speed from which the rotor comes to rest over an error in turns, turns/s: `k_x e` for small
-    /// ones, and the square root of `2 a e` for large ones, so that the deceleration stays below `a`.
+    /// Speed, turns/s, from which the rotor comes to rest over a position `error` in turns: `k_x e` for
+    /// small errors, the square root of `2 a e` for large ones, so that the deceleration stays below `a`.
     fn braking_curve(&self, error: f32) -> f32 {
-        // sqrt(bend^2 + 2 a |e|) - bend, written without cancellation and with the sign of e.
+        // sqrt(bend^2 + 2 a |e|) - bend with the sign of e, written without cancellation.
         let square = self.bend * self.bend + self.twice_braking * error.abs();
         self.twice_braking * error / (libm::sqrtf(square) + self.bend)
     }
 }
 
-/// Electrical angle of the rotor without the encoder, counted on over whole turns as an encoder
-/// would: [`COUNTS_PER_TURN`] an electrical turn, wrapping.
+/// Counter of the estimated rotor angle in place of an encoder: [`COUNTS_PER_TURN`] per electrical turn,
+/// wrapping.
+///
+/// ```
+/// use drive_core::{Angle, motion::{COUNTS_PER_TURN, RotorCount}};
+///
+/// let mut rotor = RotorCount::default();
+/// let turns = [0.25, 0.5, 0.75, 0.0, 0.25];
+/// let counts = turns.map(|turns| rotor.follow(Angle::from_turns(turns)));
+/// assert_eq!(counts[4], 5 * COUNTS_PER_TURN / 4);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RotorCount {
     count: u32,
 }
 
 impl RotorCount {
-    /// Follows the rotor to its present angle, less than half a turn away; the count.
+    /// Follows the rotor to its present electrical angle, less than half a turn away; returns the count.
     pub fn follow(&mut self, rotor: Angle) -> u32 {
         let now = (rotor.to_bits() >> 16) as u16;
         let moved = now.wrapping_sub(self.count as u16) as i16;

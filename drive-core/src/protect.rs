@@ -1,4 +1,4 @@
-//! Checks of sensors, wiring, saliency and lock; each ends in a fault.
+//! Protections: checks of sensors, wiring, saliency and lock. Each raises a fault.
 
 pub mod lock_monitor;
 pub mod noise_watch;

@@ -75,7 +75,7 @@ pub struct IntegratorLag {
 
 /// T-equivalent circuit of the motor per phase (Table 5), in ohm and H.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motor {
+pub struct EquivalentCircuit {
     /// Stator resistance.
     pub r_s: f64,
     /// Rotor resistance.
@@ -90,7 +90,7 @@ pub struct Motor {
 
 /// What [`rule_3_8`] gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rule {
+pub struct RuleDesign {
     /// Gain of the controller.
     pub k_c: f64,
     /// Zero of the controller and pole of the reference filter.
@@ -214,7 +214,7 @@ impl IntegratorLag {
 ///
 /// # Errors
 /// A parameter that is not positive and finite, or a period out of range.
-pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningError> {
+pub fn motor_plant(motor: &EquivalentCircuit, period_s: f64) -> Result<FirstOrder, TuningError> {
     check_period(period_s)?;
     check("r_s in ohm", motor.r_s, 0.0, 1e9)?;
     check("r_r in ohm", motor.r_r, 0.0, 1e9)?;
@@ -235,7 +235,7 @@ pub fn motor_plant(motor: &Motor, period_s: f64) -> Result<FirstOrder, TuningErr
 ///
 /// # Errors
 /// A gain that is not positive and finite, a pole outside (0, 1), a period out of range.
-pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<Rule, TuningError> {
+pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
     let wanted = 100.0 * (PI / 180.0) + libm::atan2(4.0, 1.0);
@@ -256,7 +256,7 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<Rule, TuningError> {
     let (sin, cos) = libm::sincos(0.5 * low);
     let half_v_t = sin / cos;
     let z_c = zero_at(half_v_t / 4.0);
-    Ok(Rule {
+    Ok(RuleDesign {
         k_c: 1.0 / (pi_response(1.0, z_c, low) * plant.response(low)).norm(),
         z_c,
         v: 2.0 / period_s * half_v_t,
@@ -338,7 +338,7 @@ pub fn design_current_loop(
     physical: FirstOrder,
     period_s: f64,
 ) -> Result<CurrentLoopDesign, TuningError> {
-    let Rule { k_c: rule_k_c, z_c, .. } = rule_3_8(identified, period_s)?;
+    let RuleDesign { k_c: rule_k_c, z_c, .. } = rule_3_8(identified, period_s)?;
     check_plant(physical.k, physical.p)?;
     let open_loop = current_loop(z_c, physical, &LPF.sections, DELAY);
     let margins_with = |k_c: f64| margins_or_error(&|w| open_loop(w) * k_c, 1, z_c, period_s);

@@ -6,15 +6,16 @@ use drive_core::filter::dissertation::{LPF, LPF_AS_PRINTED};
 use drive_core::filter::section::Section;
 use drive_core::filter::sos::SosState;
 use drive_core::tuning::{
-    DELAY, FirstOrder, IntegratorLag, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins, Motor, TuningError,
-    current_loop_margins, design_current_loop, design_motion_loops, motor_plant, pi_response,
-    roots, rule_3_8,
+    DELAY, EquivalentCircuit, FirstOrder, IntegratorLag, MAX_MS, MIN_PHASE_MARGIN_DEG, Margins,
+    TuningError, current_loop_margins, design_current_loop, design_motion_loops, motor_plant,
+    pi_response, roots, rule_3_8,
 };
 use num_complex::Complex64;
 use proptest::prelude::*;
 
 const T: f64 = 1.0 / 6000.0;
-const TABLE_5: Motor = Motor { r_s: 5.4, r_r: 1.1, l_m: 0.1771, l_ls: 0.0276, l_lr: 0.0276 };
+const TABLE_5: EquivalentCircuit =
+    EquivalentCircuit { r_s: 5.4, r_r: 1.1, l_m: 0.1771, l_ls: 0.0276, l_lr: 0.0276 };
 const EQ_3_34: FirstOrder = FirstOrder { k: 0.004_053_2, p: 0.93916 };
 const EQ_3_41: FirstOrder = FirstOrder { k: 0.002_837, p: 0.9511 };
 const EQ_3_42: FirstOrder = FirstOrder { k: 0.003_721, p: 0.9503 };
@@ -257,11 +258,11 @@ fn errors_name_the_value_and_its_range() {
         ),
         (rule(0.003, 0.9, 0.0), "period in s = 0: must be above 0.0000001 and below 10"),
         (
-            motor_plant(&Motor { l_lr: f64::NAN, ..TABLE_5 }, T).map(drop),
+            motor_plant(&EquivalentCircuit { l_lr: f64::NAN, ..TABLE_5 }, T).map(drop),
             "l_lr in H = NaN: must be above 0 and below 1000000",
         ),
         (
-            motor_plant(&Motor { r_s: -1.0, ..TABLE_5 }, T).map(drop),
+            motor_plant(&EquivalentCircuit { r_s: -1.0, ..TABLE_5 }, T).map(drop),
             "r_s in ohm = -1: must be above 0 and below 1000000000",
         ),
         (
@@ -276,7 +277,7 @@ fn errors_name_the_value_and_its_range() {
         assert_eq!(message(result), text);
     }
     // A motor so slow that nothing of it is left after one period.
-    assert!(motor_plant(&Motor { l_ls: 1e-9, l_lr: 1e-9, ..TABLE_5 }, 1.0).is_err());
+    assert!(motor_plant(&EquivalentCircuit { l_ls: 1e-9, l_lr: 1e-9, ..TABLE_5 }, 1.0).is_err());
     // An identified plant that is not this motor's: a hundred times its gain.
     let wrong = FirstOrder { k: 0.28, p: 0.9511 };
     let error = design_current_loop(wrong, table_5(), T).expect_err("refused");

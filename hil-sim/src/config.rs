@@ -32,9 +32,9 @@ impl Key {
 
 impl MotorConfig {
     /// The T-equivalent circuit, ohm and H.
-    pub fn circuit(&self) -> tuning::Motor {
+    pub fn circuit(&self) -> tuning::EquivalentCircuit {
         let Self { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *self;
-        tuning::Motor { r_s, r_r, l_m, l_ls, l_lr }
+        tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr }
     }
 }
 

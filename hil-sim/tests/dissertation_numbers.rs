@@ -6,11 +6,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use drive_core::tuning::{FirstOrder, Motor, motor_plant, rule_3_8};
+use drive_core::tuning::{EquivalentCircuit, FirstOrder, motor_plant, rule_3_8};
 use hil_sim::{Config, Outcome, experiments};
 
 const T: f64 = 1.0 / 6000.0;
-const TABLE_5: Motor = Motor { r_s: 5.4, r_r: 1.1, l_m: 0.1771, l_ls: 0.0276, l_lr: 0.0276 };
+const TABLE_5: EquivalentCircuit =
+    EquivalentCircuit { r_s: 5.4, r_r: 1.1, l_m: 0.1771, l_ls: 0.0276, l_lr: 0.0276 };
 
 /// Within half a unit of the last digit given.
 fn same(name: &str, value: f64, expected: &str) {

@@ -1,6 +1,6 @@
 mod doubles;
 
-use drive_core::identify::online::Doubt;
+use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
 use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample};
 use proptest::prelude::*;
@@ -268,7 +268,7 @@ fn status_tells_what_is_known_of_the_rotor_time_constant() {
     assert_eq!(of_the_rotor(&mut talk).unwrap(), "not found: settling; used 186.1 ms");
     // The longest is not cut off.
     let tracking = talk.drive.tracking.as_ref().unwrap().report();
-    for doubt in [Doubt::Transient, Doubt::PoorExcitation, Doubt::Unbelievable] {
+    for doubt in [NoEstimate::Transient, NoEstimate::PoorExcitation, NoEstimate::OutOfRange] {
         let report = Report { estimate: Err(doubt), ..tracking };
         assert!(report.to_string().len() < 75, "{report}");
     }

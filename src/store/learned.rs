@@ -73,7 +73,7 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
 
 /// The result with these values, if it is one that a learning accepts.
 pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
-    let carrier = CarrierTable::of_points(table(words, CARRIER, 1.0));
+    let carrier = CarrierTable::from_points(table(words, CARRIER, 1.0));
     let value = |index: usize| f32::from_bits(words[index]);
     let flags = words[FLAGS];
     let fitted = |index, bit| Fitted {
@@ -82,7 +82,7 @@ pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
         accepted: flags & bit != 0,
     };
     let learned = Learned {
-        reference: ReferenceTable::of_points(table(words, REFERENCE, 0.0))?,
+        reference: ReferenceTable::from_points(table(words, REFERENCE, 0.0))?,
         carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
         points: (flags & 0xff) as usize,
         asymmetry: value(FITS),

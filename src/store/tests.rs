@@ -98,8 +98,8 @@ fn learned(random: [f32; POINTS]) -> Learned {
     let mut carrier = random.map(|x| 1.25 + 0.75 * x);
     (reference[0], carrier[0]) = (0.0, 1.0);
     Learned {
-        reference: ReferenceTable::of_points(reference).unwrap(),
-        carrier: CarrierTable::of_points(carrier).filter(|_| random[1] > -0.5),
+        reference: ReferenceTable::from_points(reference).unwrap(),
+        carrier: CarrierTable::from_points(carrier).filter(|_| random[1] > -0.5),
         points: 13,
         asymmetry: 0.005 * random[2].abs(),
         gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },

@@ -1,5 +1,8 @@
-//! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along `theta = phi + 90°`, with
+//! The injected voltage, Eq. 3.6: `v_hf cos(Omega t)` along the injection axis `theta = phi + 90°`, with
 //! `Omega / 2 pi` = f_s / 10 (600 Hz at 6 kHz).
+//!
+//! The fundamental may leave too little voltage for the full amplitude. [`Carrier::fit`] then reduces the
+//! carrier to a `share` of it, and reports when less than half would remain.
 
 use crate::math::frames::Dq;
 use crate::tuning::FirstOrder;
@@ -28,29 +31,31 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
     -0.587_785_24,
 ];
 
-/// Coefficients of the injection.
+/// Coefficients of the injection: the carrier tabulated over one carrier period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
     periods: [CarrierPeriod; CARRIER_SAMPLES],
-    /// Amplitude of the voltage, V.
+    /// Amplitude of the voltage, V peak.
     amplitude: f32,
-    /// Amplitude of the sampled current, A.
+    /// Amplitude of the carrier current along the injection axis at full voltage, A peak.
     pub current_amplitude: f32,
 }
 
 impl Injection {
-    /// For an amplitude in V, the current response of the motor, A/V, sampled at ten times the carrier
-    /// frequency, and the time constant of the analog filter in samples.
+    /// Tabulates the carrier for an amplitude in V peak.
+    ///
+    /// `plant` is the current response of the motor, A/V, at the control rate (ten times the carrier
+    /// frequency); `analog` the time constant of the analog current filter in samples.
     pub fn new(amplitude_v: f32, plant: FirstOrder, analog: f32) -> Self {
-        // Steady response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current at
-        // the start of period n is V k / (e^(j w) - p) e^(j w n); its mean over the period that of
-        // the samples at both ends, to 0.1 %.
+        // Steady-state response of i[n+1] = p i[n] + k v[n] to v[n] = V cos(2 pi n / 10): the current
+        // at the start of period n is V k / (e^(j w) - p) e^(j w n). Its mean over the period equals
+        // the mean of the samples at both ends to 0.1 %.
         let one = Complex64 { re: 1.0, im: 0.0 };
         let turn = Complex64 { re: 0.809_016_994_374_947_5, im: 0.587_785_252_292_473_1 };
         let response = Complex64 { re: plant.k, im: 0.0 } / (turn - one * plant.p);
         let mean = response * (one + turn) * 0.5;
-        // What is computed in step k acts from the sample k + 1 on: at sample k the response is that
-        // of period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
+        // The voltage computed in step k acts from sample k + 1 on: sample k shows the response to
+        // period k - 1, H e^(-j w), behind the analog filter 1 / (1 + j w tau).
         let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
         let sampled = response / (turn * Complex64 { re: 1.0, im: w * f64::from(analog) });
         let single = |z: Complex64| (z.re as f32, z.im as f32);
@@ -73,67 +78,69 @@ impl Injection {
     }
 }
 
-/// Where in its period the carrier is, and how much of it is put out.
+/// State of the carrier: position in its period, and share of the amplitude in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carrier {
     index: usize,
-    /// Share of the amplitude that is put out: 1 unless the fundamental leaves less.
+    /// Share of the full amplitude in use, at most 1; lower where the fundamental leaves too little voltage.
     pub share: f32,
-    /// 1 over its square.
+    /// 1 / `share`^2.
     pub per_share_squared: f32,
     /// Carrier periods since the share changed.
     unchanged: u8,
 }
 
 impl Default for Carrier {
-    /// At its beginning, all of it.
+    /// At the beginning of a carrier period, full amplitude.
     fn default() -> Self {
         Self { index: 0, share: 1.0, per_share_squared: 1.0, unchanged: u8::MAX }
     }
 }
 
-/// There is too little voltage left for the carrier.
+/// The fundamental leaves too little voltage for the carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NoRoom;
+pub struct InsufficientHeadroom;
 
-/// By how much the share of the carrier goes down in a carrier period, and up again: quickly, since a
-/// voltage that does not fit is shortened, which turns the carrier; slowly back.
+/// Decrease of the share per carrier period. Fast: a voltage outside the hexagon is shortened, which
+/// rotates the carrier.
 const SHARE_DOWN: f32 = 1.0 / 16.0;
+/// Increase of the share per carrier period.
 const SHARE_UP: f32 = 1.0 / 64.0;
-/// Room that must be there beyond the next step up, as a share: without it the share would hunt.
+/// Headroom required before the share is increased, as a share; it prevents hunting.
 const SHARE_MARGIN: f32 = 0.125;
-/// Least share: noise makes twice the angle error there.
+/// Minimum share: noise causes twice the angle error there.
 const LEAST_SHARE: f32 = 0.5;
-/// Carrier periods until the demodulation has forgotten a change: 40 samples.
+/// Carrier periods until a change of the share has left the demodulation: 40 samples.
 const FORGOTTEN: u8 = 4;
 
-/// The carrier during one PWM period.
+/// The carrier in one PWM period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CarrierPeriod {
     /// Voltage along the injection axis, V.
     pub voltage: f32,
-    /// Mean current expected from it along the injection axis, A.
+    /// Expected mean of the carrier current along the injection axis over the period, A.
     pub mean_current: f32,
-    /// Current expected from it in the sample from which this period is computed, A.
+    /// Expected carrier current along the injection axis in the sample from which this period is
+    /// computed, A.
     pub sampled: f32,
-    /// Cosine of its phase.
+    /// Cosine of the carrier phase.
     pub cos: f32,
-    /// Sine of its phase.
+    /// Sine of the carrier phase.
     pub sin: f32,
 }
 
 impl Carrier {
-    /// Fits the carrier, once a carrier period, into what the `fundamental` voltage, V, leaves of the
-    /// `largest` vector that can be put out in every direction, V.
+    /// Adapts the share to the voltage that the `fundamental`, V peak, leaves; called once per carrier
+    /// period. `largest` is the largest vector that the inverter realises in every direction, V peak.
     ///
     /// # Errors
-    /// [`NoRoom`] when less than half of it fits.
+    /// [`InsufficientHeadroom`] when less than half of the amplitude fits.
     pub fn fit(
         &mut self,
         injection: &Injection,
         fundamental: Dq,
         largest: f32,
-    ) -> Result<(), NoRoom> {
+    ) -> Result<(), InsufficientHeadroom> {
         let at_most_all = |share: f32| if share < 1.0 { share } else { 1.0 };
         let used = fundamental.length_squared();
         let fits = |share: f32| {
@@ -153,18 +160,18 @@ impl Carrier {
             self.unchanged = 0;
             (self.share, self.per_share_squared) = (share, 1.0 / (share * share));
         }
-        if share < LEAST_SHARE { Err(NoRoom) } else { Ok(()) }
+        if share < LEAST_SHARE { Err(InsufficientHeadroom) } else { Ok(()) }
     }
 
-    /// Whether what is demodulated is of the present share throughout.
+    /// Whether the demodulation averages contain the present share only.
     pub fn is_settled(&self) -> bool {
         self.unchanged > FORGOTTEN
     }
 
-    /// Goes on to the next PWM period: its number in the carrier period, 0 to 9, which counts with or
-    /// without a carrier.
+    /// Advances to the next PWM period and returns its index in the carrier period, 0 to 9. It counts
+    /// with or without a carrier.
     pub fn advance(&mut self) -> usize {
-        // Below ten by construction: this is for a flipped bit.
+        // Always below ten; the test guards against a flipped bit.
         let index = if self.index < CARRIER_SAMPLES { self.index } else { 0 };
         self.index = index + 1;
         index

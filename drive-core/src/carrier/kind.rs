@@ -1,13 +1,14 @@
-//! The choice among the demodulations.
+//! Selection of the demodulator.
 
-/// How the carrier is demodulated and the angle tracked.
+/// Demodulator of the carrier current; it also selects the angle-tracking loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DemodulatorKind {
     /// The chain of the dissertation as printed; see [`crate::carrier::demodulator::Literal`]. It cannot track.
     Literal,
-    /// The same with a rectifier; see [`crate::carrier::demodulator::Rectified`].
+    /// The printed chain with a rectifier; see [`crate::carrier::demodulator::Rectified`].
     Rectified,
-    /// Ha and Sul, with the carrier along the flux; see [`crate::carrier::demodulator::RmsImpedance`].
+    /// Impedance difference after Ha and Sul, carrier along the flux; see
+    /// [`crate::carrier::demodulator::RmsImpedance`].
     RmsImpedance,
     /// Difference of envelopes; see [`crate::carrier::demodulator::Envelope`].
     Envelope,

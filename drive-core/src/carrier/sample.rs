@@ -1,4 +1,4 @@
-//! The signals that the demodulations take and give.
+//! Input and output signals of the demodulators.
 
 use core::f32::consts::FRAC_1_SQRT_2;
 
@@ -6,14 +6,14 @@ use crate::carrier::injection::CarrierPeriod;
 use crate::math::angle::UnitVector;
 use crate::math::frames::AlphaBeta;
 
-/// What a demodulation is given at each sample.
+/// Input of a demodulator, one per control period.
 #[derive(Clone, Copy, Debug)]
 pub struct CarrierSample {
-    /// The sampled current, A.
+    /// Sampled stator current, A peak.
     pub current: AlphaBeta,
-    /// The injection axis `e^(j theta)`, delayed as the current that is seen from it.
+    /// Injection axis `e^(j theta)` in the stator frame, delayed by the lag of the sampled current.
     pub axis: UnitVector,
-    /// The injection in this period.
+    /// The carrier in this period.
     pub carrier: CarrierPeriod,
 }
 
@@ -24,22 +24,22 @@ impl CarrierSample {
     }
 }
 
-/// What the demodulation gives.
+/// Output of the synchronous demodulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Saliency {
-    /// The saliency `q`; 0 where there is no carrier.
+    /// Saliency component `q` across the injection axis, dimensionless; 0 without a carrier.
     pub q: f32,
-    /// Amplitude of the carrier current along the injection axis, squared, A^2.
+    /// Squared amplitude of the carrier current along the injection axis, A^2.
     pub carrier_squared: f32,
-    /// The reference current, delayed as `q` is, A.
+    /// Reference of the quadrature current, averaged and delayed like `q`, A.
     pub i_q: f32,
 }
 
-/// The carrier current of one carrier period as complex amplitudes `(re, im)`, A.
+/// Carrier current of one carrier period as complex amplitudes `(re, im)`, A peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarrierCurrent {
-    /// Along the injection axis.
+    /// Component along the injection axis.
     pub along: (f32, f32),
-    /// 90° ahead of it.
+    /// Component 90° ahead of the injection axis.
     pub across: (f32, f32),
 }

@@ -1,55 +1,55 @@
-//! Synchronous demodulation: the saliency the carrier sees, as a pure number.
+//! Synchronous demodulation: the saliency as a dimensionless number.
 //!
-//! The sampled current is seen along and across the injection axis, both parts are mixed with the
-//! carrier's own frequency and averaged twice over two carrier periods:
+//! The sampled current is resolved along and across the injection axis. Both components are mixed with
+//! the carrier frequency and averaged twice over two carrier periods:
 //!
 //! ```text
 //! X = MA20 MA20 ( 2 i_along e^(-j 2 pi k/10) )       Y likewise from i_across
 //! q = -Re( Y conj(X) ) / |X|^2
 //! ```
 //!
-//! which is what the channels of the dm-qm frame, A = (X - Y)/sqrt2 and B = (X + Y)/sqrt2, give as
-//! ( |A|^2 - |B|^2 ) / |A + B|^2. Dividing by the part along the injection axis takes the amplitude of the injection, the dc link and
-//! the leakage inductance out; taking magnitudes takes the phase of the carrier out. The averages have
-//! their zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks through
-//! the printed band-pass, is gone. They delay `q` by 19 samples (3.2 ms).
+//! In the channels of the dm-qm frame, A = (X - Y)/sqrt2 and B = (X + Y)/sqrt2, this is
+//! ( |A|^2 - |B|^2 ) / |A + B|^2. Dividing by the component along the injection axis removes the injected
+//! amplitude, the dc link and the leakage inductance; taking magnitudes removes the phase of the carrier.
+//! The averages have zeros at dc and at every multiple of 300 Hz, so the fundamental current, which leaks
+//! through the printed band-pass, is rejected. They delay `q` by 19 samples (3.2 ms).
 //!
-//! The averages are looked at once a carrier period. Their weights rise by one a sample for twenty samples
-//! and then fall, so over the ten samples of a carrier period they are a constant and a ramp: two sums
-//! a signal are kept in every period, `S = sum x` and `D = sum S`, and once a carrier period
+//! The averages are evaluated once per carrier period. Their weights rise by one per sample for twenty
+//! samples and then fall, so over the ten samples of a carrier period they are a constant and a ramp. Two
+//! sums per signal are updated in every sample, `S = sum x` and `D = sum S`; once per carrier period
 //!
 //! ```text
 //! 400 X = D[0] + (10 S + D)[1] + (20 S - D)[2] + (10 S - D)[3]        [n]: n carrier periods ago
 //! ```
 //!
-//! All sums begin anew with every carrier period, so that no rounding adds up. What is done with those of
-//! a whole one is the drive's to [call in turn](crate::Drive).
+//! All sums restart with every carrier period, so that rounding does not accumulate. The
+//! [drive](crate::Drive) calls the functions that run once per carrier period.
 
 use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::carrier::{CarrierCurrent, CarrierSample, Saliency};
 
-/// Sample of the carrier period in which the reference current is to be [seen](SynchronousState::see_reference):
-/// it is then as old as the other signals are.
+/// Sample of the carrier period in which [`average_reference`](SynchronousState::average_reference) is to
+/// be called: the reference current then has the same delay as the other signals.
 pub const REFERENCE_AT: usize = 5;
 
-/// Of the mixed current along and across the axis: real and imaginary parts.
+/// Mixed current: real and imaginary part along the axis, real and imaginary part across it.
 type Mixed = [f32; 4];
 
-/// The two sums over a carrier period; A.
+/// The two sums `S` and `D` over a carrier period, A.
 #[derive(Clone, Copy, Debug, Default)]
 struct Period {
     sum: Mixed,
     ramp: Mixed,
 }
 
-/// What an average of one signal takes along of earlier carrier periods, A: transposed form.
+/// State of the average of one signal in transposed form: contributions of earlier carrier periods, A.
 #[derive(Clone, Copy, Debug, Default)]
 struct Average {
     earlier: [f32; 3],
 }
 
 impl Average {
-    /// Takes a carrier period in; the average, times [`WEIGHTS`].
+    /// Adds one carrier period and returns the average, times [`WEIGHTS`].
     fn step(&mut self, sum: f32, ramp: f32) -> f32 {
         const N: f32 = CARRIER_SAMPLES as f32;
         let [one, two, three] = self.earlier;
@@ -65,20 +65,20 @@ const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    /// The carrier period that goes on.
+    /// The present carrier period.
     period: Period,
-    /// Sum over the one before, A.
+    /// Sum over the previous carrier period, A.
     last: Mixed,
     averages: [Average; 4],
     /// X and Y, times [`WEIGHTS`], A.
     mean: Mixed,
     i_q_earlier: [f32; 3],
-    /// What was seen last.
-    pub seen: Saliency,
+    /// The latest result.
+    pub saliency: Saliency,
 }
 
 impl SynchronousState {
-    /// Mixes a sample.
+    /// Mixes one sample with the carrier and adds it to the sums; called in every control period.
     pub fn mix(&mut self, sample: &CarrierSample) {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
@@ -90,7 +90,7 @@ impl SynchronousState {
         }
     }
 
-    /// Once a carrier period, behind its last sample: averages, and begins the next.
+    /// Updates the averages and restarts the sums; called once per carrier period, after its last sample.
     pub fn average(&mut self) {
         let Period { sum, ramp } = &mut self.period;
         for n in 0..sum.len() {
@@ -100,34 +100,35 @@ impl SynchronousState {
         }
     }
 
-    /// The same average of the reference of the quadrature current, A, of one sample in each of the carrier
-    /// periods, that of [`REFERENCE_AT`]: 1, 3, 3, 1 eighths.
-    pub fn see_reference(&mut self, now: f32) {
+    /// Averages the reference of the quadrature current, `now`, A, over four carrier periods with weights
+    /// 1, 3, 3, 1 eighths; called once per carrier period, in sample [`REFERENCE_AT`].
+    pub fn average_reference(&mut self, now: f32) {
         let (i_q, [one, two, three]) = (0.125 * now, self.i_q_earlier);
         self.i_q_earlier = [3.0 * i_q + two, 3.0 * i_q + three, i_q];
-        self.seen.i_q = i_q + one;
+        self.saliency.i_q = i_q + one;
     }
 
-    /// Once a carrier period, after [`average`](Self::average): the saliency.
-    pub fn see(&mut self) {
+    /// Computes the saliency from the averages; called once per carrier period, after
+    /// [`average`](Self::average).
+    pub fn update_saliency(&mut self) {
         // The mean of the mixed current is half the amplitude.
         const MEAN: f32 = 2.0 / WEIGHTS;
         let [x_re, x_im, y_re, y_im] = self.mean.map(|x| x * MEAN);
         let squared = x_re * x_re + x_im * x_im;
         let product = x_re * y_re + x_im * y_im;
-        // Not-a-number is not below the least.
-        self.seen.q = if squared < LEAST { 0.0 } else { -product / squared };
-        self.seen.carrier_squared = squared;
+        // NaN fails the comparison and propagates.
+        self.saliency.q = if squared < LEAST { 0.0 } else { -product / squared };
+        self.saliency.carrier_squared = squared;
     }
 
-    /// The carrier current in the carrier period before this one.
+    /// The carrier current of the previous carrier period.
     pub fn carrier_current(&self) -> CarrierCurrent {
         let [x_re, x_im, y_re, y_im] = self.last.map(|x| x * (2.0 / CARRIER_SAMPLES as f32));
         CarrierCurrent { along: (x_re, x_im), across: (y_re, y_im) }
     }
 }
 
-/// Square of the carrier current below which there is no saliency to speak of, A^2.
+/// Squared carrier current below which the saliency is reported as 0, A^2.
 const LEAST: f32 = 5e-7;
 
 #[cfg(test)]
@@ -163,18 +164,18 @@ pub(crate) mod tests {
     }
 
     impl Demodulate for InTurn {
-        type Seen = Saliency;
+        type Output = Saliency;
 
         fn step(&mut self, sample: &CarrierSample) -> Saliency {
             self.state.mix(sample);
             match self.k % CARRIER_SAMPLES {
-                0 => self.state.see(),
-                REFERENCE_AT => self.state.see_reference(self.i_q),
+                0 => self.state.update_saliency(),
+                REFERENCE_AT => self.state.average_reference(self.i_q),
                 9 => self.state.average(),
                 _ => {}
             }
             self.k += 1;
-            self.state.seen
+            self.state.saliency
         }
     }
 
@@ -202,7 +203,7 @@ pub(crate) mod tests {
         for (amplitude, phase) in [(0.26, 0.0), (0.26, 1.0), (0.05, 2.0), (0.5, -0.4)] {
             for x in [-0.1, -0.01, 0.0, 0.03] {
                 let state = steady(amplitude, x, phase);
-                let s = state.seen;
+                let s = state.saliency;
                 assert!(
                     (f64::from(s.q) + x.tan()).abs() < 2e-4,
                     "{amplitude} {phase} {x}: {}",
@@ -264,11 +265,11 @@ pub(crate) mod tests {
 
     #[test]
     fn no_carrier_is_no_saliency_and_no_number_is_seen() {
-        assert_eq!(steady(0.0, 0.0, 0.0).seen.q, 0.0);
+        assert_eq!(steady(0.0, 0.0, 0.0).saliency.q, 0.0);
         let mut state = SynchronousState::default();
         state.mix(&sample(AlphaBeta::new(f32::NAN, 0.0), Angle::ZERO, 7));
         state.average();
-        state.see();
-        assert!(state.seen.q.is_nan());
+        state.update_saliency();
+        assert!(state.saliency.q.is_nan());
     }
 }

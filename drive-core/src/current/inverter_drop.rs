@@ -1,52 +1,52 @@
-//! The voltage per phase that the power stage drops beyond its dead time, measured at every start.
+//! Voltage drop per phase of the power stage beyond its dead time, measured at every start.
 //!
-//! Switching delays and forward voltages add to the dead time and go with the sign of the phase
-//! current as it does. Left in, they act like a saliency where a phase current is near zero: 1.64 V
-//! shift the flux angle by up to 8° there. While the flux is built up, the current stands on the direct
-//! axis, first at 3/2 of its value (which builds the flux up faster), then at its value:
+//! Switching delays and forward voltages add to the dead time and have the sign of the phase current.
+//! Uncompensated, they act like a saliency where a phase current is near zero: 1.64 V shift the flux angle
+//! by up to 8° there. During magnetisation the current lies on the direct axis, first at 3/2 of its final
+//! value (which builds the flux up faster), then at the final value:
 //!
 //! ```text
 //! v_d - r_r (L_m/L_r)^2 (i_d - i_m) = r_s i_d + g v_drop
 //! ```
 //!
 //! with the magnetising current i_m and the direct component g of the signs of the phase currents (4/3
-//! along the axis of a phase). The means at the two levels give r_s and v_drop, whatever the
-//! temperature of the stator. An error of r_r by 30 % makes one of 0.17 V.
+//! along the axis of a phase). The means at the two levels give r_s and v_drop, independent of the
+//! temperature of the stator. An error of r_r of 30 % causes an error of 0.17 V.
 
 use crate::io::periods;
 use crate::math::frames::Dq;
 use crate::settings::{Motor, Sequence};
 
-/// Level of the forcing current, of the magnetising current.
+/// Forcing current relative to the final direct current.
 const FORCED: f32 = 1.5;
-/// Least level from which on there is a measurement.
+/// Minimum relative forcing current for a measurement.
 const LEAST_FORCED: f32 = 1.2;
-/// Time at the end of the magnetisation in which the lower level is averaged, s.
+/// Averaging time of the lower level, at the end of the magnetisation, s.
 const AVERAGE_S: f32 = 0.1;
-/// Range of the stator resistance found, of the one believed: beyond it the model does not hold and
-/// the drop is not used.
+/// Accepted range of the measured stator resistance relative to the setting. Outside it the model does not
+/// hold and the drop is discarded.
 const RESISTANCE: (f32, f32) = (0.5, 2.0);
-/// Largest drop that is believed, of the dc link.
+/// Largest accepted drop as a share of the dc link.
 const LARGEST: f32 = 0.05;
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverterDrop {
-    /// Level of the forcing current, of the magnetising current; 1 where there is no room for it.
+    /// Relative forcing current; 1 where current limit or time do not allow it.
     forced: f32,
-    /// Control periods of the forcing current.
+    /// Duration of the forcing current, control periods.
     until: u32,
-    /// Control period from which on the lower level is averaged.
+    /// First control period in the average of the lower level.
     from: u32,
-    /// Control periods of the magnetisation.
+    /// Duration of the magnetisation, control periods.
     end: u32,
     /// r_r (L_m/L_r)^2, ohm.
     rotor: f32,
-    /// Stator resistance as believed, ohm.
+    /// Stator resistance of the settings, ohm.
     r_s: f32,
 }
 
-/// Sums over one level.
+/// Sums over the periods of one current level.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
     count: f32,
@@ -59,31 +59,31 @@ struct Level {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InverterDropState {
     levels: [Level; 2],
-    /// The drop that was found, V; 0 before, and where what was found is not believed.
+    /// The measured drop per phase, V; 0 before the measurement and when its result is implausible.
     pub volts: f32,
 }
 
-/// One period of the magnetisation, as the measurement takes it.
+/// Input of the measurement, one per control period of the magnetisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DropSample {
-    /// Current in the flux frame, A.
+    /// Current in the flux frame, A peak.
     pub current: Dq,
-    /// Voltage for it, V.
+    /// Voltage of the current controller in the flux frame, V peak.
     pub voltage: Dq,
-    /// Magnetising current, A.
+    /// Magnetising current i_m, A.
     pub magnetising: f32,
-    /// Signs of the phase currents, as a vector in the flux frame.
+    /// Signs of the phase currents as a vector in the flux frame.
     pub signs: Dq,
-    /// Dc link, V.
+    /// Dc-link voltage, V.
     pub dc_link: f32,
 }
 
 impl InverterDrop {
-    /// For the magnetisation of a motor with currents up to `largest_a`, A.
+    /// Plans the magnetisation of a motor with currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, sequence: &Sequence, largest_a: f32) -> Self {
         let room =
             if FORCED * sequence.i_d < largest_a { FORCED } else { largest_a / sequence.i_d };
-        // Until the flux has the value of the lower level: 1 - e^(-t/tau_r) = 1/forced.
+        // The flux reaches the value of the lower level when 1 - e^(-t/tau_r) = 1/forced.
         let until_s = motor.tau_r() * libm::logf(room / (room - 1.0));
         let fits = room >= LEAST_FORCED && sequence.magnetise_s >= 2.0 * (until_s + AVERAGE_S);
         Self {
@@ -96,15 +96,15 @@ impl InverterDrop {
         }
     }
 
-    /// Level of the direct current in period `elapsed` of the magnetisation, of its value.
+    /// Direct current in period `elapsed` of the magnetisation, relative to its final value.
     pub fn level(&self, elapsed: u32) -> f32 {
         if elapsed < self.until { self.forced } else { 1.0 }
     }
 
-    /// Takes period `elapsed` of the magnetisation; in the last one the drop is found.
+    /// Processes period `elapsed` of the magnetisation; the last one computes the drop.
     pub fn step(&self, state: &mut InverterDropState, elapsed: u32, sample: &DropSample) {
         let level = if elapsed < self.until {
-            // The first half is for the current to settle.
+            // The current settles in the first half.
             if 2 * elapsed < self.until { None } else { Some(0) }
         } else if self.until > 0 && elapsed >= self.from {
             Some(1)
@@ -119,19 +119,20 @@ impl InverterDrop {
             level.signs += sample.signs.d;
         }
         if elapsed.saturating_add(1) == self.end {
-            state.volts = self.found(&state.levels, LARGEST * sample.dc_link);
+            state.volts = self.solve(&state.levels, LARGEST * sample.dc_link);
         }
     }
 
-    /// Two equations, two unknowns. The sums stand for the means: a common factor of a row.
-    fn found(&self, [high, low]: &[Level; 2], largest: f32) -> f32 {
+    /// The drop, V, from two equations with the unknowns r_s and drop; 0 if either is implausible. Sums
+    /// replace the means: the count is a common factor of a row.
+    fn solve(&self, [high, low]: &[Level; 2], largest: f32) -> f32 {
         let determinant = high.current * low.signs - low.current * high.signs;
         let (r_s, volts) = (
             (high.voltage * low.signs - low.voltage * high.signs) / determinant,
             (high.current * low.voltage - low.current * high.voltage) / determinant,
         );
         let (least, most) = RESISTANCE;
-        // Not-a-number, as from no measurement, fails the tests.
+        // NaN, as without a measurement, fails the comparisons.
         let believed = high.count > 0.0
             && low.count > 0.0
             && r_s >= least * self.r_s

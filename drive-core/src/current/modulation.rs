@@ -1,45 +1,56 @@
 //! Space-vector modulation (section 2.2, Table 2, Figures 4 and 5).
 //!
-//! The symmetric sequence O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the
-//! two zero vectors is what comes out when the middle between the highest and the lowest phase
-//! voltage is put at half the dc link: no sectors, no tables. A test compares it with the on-times
-//! of Table 2.
+//! Centring the highest and the lowest phase voltage on half the dc link yields the symmetric sequence
+//! O_000, U_x, U_x±60, O_111, U_x±60, U_x, O_000 with equal shares of the two zero vectors, without
+//! sectors or tables. A test compares the on-times with Table 2.
 
 use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta, SQRT_3};
 
-/// Pulses shorter than the dead time plus this much are dropped or extended, s.
+/// Pulses shorter than the dead time plus this time are dropped or extended, s.
 const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 
 /// Coefficients of the modulator.
+///
+/// ```
+/// use drive_core::{Abc, AlphaBeta, current::modulation::Modulator};
+///
+/// let modulator = Modulator::new(14_167, 2.2e-6, false);
+/// // Zero voltage: all legs at half the dc link.
+/// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).compare, [7084; 3]);
+/// // 400 V along phase a: limited to the corner of the hexagon, 2/3 of the dc link.
+/// let out = modulator.step(AlphaBeta::new(400.0, 0.0), Abc::ZERO, 311.0);
+/// assert_eq!(out.compare, [14_167, 0, 0]);
+/// assert!(out.limited && (out.realised.alpha - 207.33).abs() < 0.01);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulator {
-    /// Compare value of a high side that is on throughout.
+    /// Compare value at which the high side is on throughout.
     top: f32,
-    /// Shortest pulse that is put out, in counts.
+    /// Shortest pulse, counts.
     shortest: f32,
-    /// Share of the dc link that is left when the dead-time compensation has taken its part.
+    /// Share of the dc link that the dead-time compensation leaves.
     usable: f32,
 }
 
-/// The result for one period.
+/// Result of the modulation for one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulated {
-    /// Compare values of a, b, c.
+    /// Compare values of phases a, b, c, 0 to `top`; see [`Compare`](crate::Compare).
     pub compare: [u16; 3],
-    /// The mean voltage at the motor, V peak: what was asked for, limited to the hexagon, and
-    /// without the pulses that were dropped or extended. Rounding to counts (11 mV at 311 V) is not
-    /// in it: a controller fed with that would stall on increments below half a count.
+    /// Realised mean voltage at the motor, V peak: the reference, limited to the hexagon, with dropped or
+    /// extended pulses accounted for. Rounding to counts (11 mV at 311 V) is excluded: anti-windup with it
+    /// would stall a controller on increments below half a count.
     pub realised: AlphaBeta,
-    /// Whether that is anything but what was asked for.
+    /// Whether `realised` differs from the reference.
     pub limited: bool,
 }
 
 impl Modulator {
-    /// For a timer that counts to `top` and a dead time in s.
+    /// Modulator for a timer that counts to `top` and a dead time in s.
     ///
-    /// `compensated`: whether a dead-time compensation is going to be added, which takes twice its
-    /// amplitude from the dc link.
+    /// `compensated`: whether a dead-time compensation is added; it needs twice its amplitude of the dc
+    /// link.
     pub fn new(top: u16, dead_time_s: f32, compensated: bool) -> Self {
         let ratio = dead_time_s / PERIOD_S;
         Self {
@@ -49,16 +60,16 @@ impl Modulator {
         }
     }
 
-    /// The largest vector that can be put out in every direction at a dc link of `v_dc`, V peak: the
-    /// circle inside the hexagon.
+    /// Radius of the circle inside the hexagon, V peak: the largest vector available in every direction
+    /// at a dc link of `v_dc`, V.
     pub fn circle(&self, v_dc: f32) -> f32 {
         self.usable * v_dc * (1.0 / SQRT_3)
     }
 
-    /// Compare values for a `wanted` mean voltage, V peak, and a `compensation` of the dead time that
-    /// the power stage takes off again, V per phase, at a dc link of `v_dc` > 0, V.
+    /// Compare values for a mean voltage `wanted`, V peak, plus the dead-time `compensation`, V per phase,
+    /// at a dc link of `v_dc` > 0, V. The power stage loses the compensation again.
     ///
-    /// A voltage outside the hexagon is shortened without turning its angle.
+    /// A voltage outside the hexagon is shortened; its angle is kept.
     pub fn step(&self, wanted: AlphaBeta, compensation: Abc, v_dc: f32) -> Modulated {
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
@@ -67,14 +78,14 @@ impl Modulator {
         if shortened {
             motor = motor * (usable / span);
         }
-        // The middle between the lowest and the highest leg is put at half the dc link.
+        // Centre the lowest and the highest leg on half the dc link.
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
         let per_volt = self.top / v_dc;
         let centre = 0.5 * (self.top - (low + high) * per_volt);
         let ideal = [leg.a, leg.b, leg.c].map(|volts| centre + volts * per_volt);
         let [a, b, c] = ideal.map(|count| self.drop_or_extend(count));
-        // Not-a-number is not equal to itself.
+        // NaN differs from itself and so counts as limited.
         let limited = shortened || [a, b, c] != ideal;
         let realised = if limited {
             (Abc::new(a, b, c) * (v_dc / self.top) - compensation).to_alpha_beta()
@@ -84,7 +95,7 @@ impl Modulator {
         Modulated { compare: [rounded(a), rounded(b), rounded(c)], realised, limited }
     }
 
-    /// Moves a pulse of either switch that is too short to the nearer of none and the shortest.
+    /// Rounds a too short pulse of either switch to no pulse or to the shortest one, whichever is nearer.
     fn drop_or_extend(&self, count: f32) -> f32 {
         let from_top = self.top - count;
         if count < self.shortest {
@@ -97,12 +108,13 @@ impl Modulator {
     }
 }
 
-/// The nearest whole count of a count from 0 to `top`; 0 for not-a-number.
+/// Rounds a count from 0 to `top` to the nearest integer; 0 for NaN.
 fn rounded(count: f32) -> u16 {
-    // By way of u32: that cast is one instruction of the core, the saturating one to u16 is twelve.
+    // The cast to u32 is one instruction of the core, the saturating cast to u16 twelve.
     (count + 0.5) as u32 as u16
 }
 
+/// The lowest and the highest component.
 fn extremes(v: Abc) -> (f32, f32) {
     let (low, high) = if v.a < v.b { (v.a, v.b) } else { (v.b, v.a) };
     (if v.c < low { v.c } else { low }, if v.c > high { v.c } else { high })

@@ -6,19 +6,30 @@
 //! u[k] = u_realised[k-1] + k_c (e[k] - z_c e[k-1])        C(z) = k_c (z - z_c)/(z - 1)
 //! ```
 //!
-//! where `u_realised` is what really reached the plant: limited, compensated, corrected. The
-//! source prints `u[k+1]` on the left (B.1, B.3); taken literally that is one more delay, the
-//! printed example is then unstable without any limit (|z| = 1.0996) and Figure 40 does not come out.
+//! where `u_realised` is the output that reached the plant: limited, compensated, corrected. The source
+//! prints `u[k+1]` on the left (B.1, B.3). Taken literally this is one more delay: the printed example is
+//! then unstable without any limit (|z| = 1.0996), and Figure 40 is not reproduced.
 //!
-//! A step is two calls: `step` gives the wanted output, `back_calculate` takes the difference between
-//! applied and wanted output. Without the second call (or with zero) it is the unlimited controller, exactly.
+//! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference
+//! between realised and wanted output. Without the second call (or with zero) the controller is exactly the
+//! unlimited one.
 //!
-//! The output is the integrator, in `f32`: near 180 V it stops moving for errors below
+//! The state is the output itself, in `f32`: near 180 V it does not change for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
 
 use crate::math::frames::Dq;
 
 /// Coefficients of a PI controller, Eq. 3.35.
+///
+/// ```
+/// use drive_core::current::pi::{Pi, PiState};
+///
+/// let (pi, mut state) = (Pi { k_c: 2.0, z_c: 0.5 }, PiState::default());
+/// assert_eq!(pi.step(&mut state, 1.0), 2.0);
+/// assert_eq!(pi.step(&mut state, 1.0), 3.0); // integrates k_c (1 - z_c) e
+/// state.back_calculate(2.5 - 3.0); // the actuator was limited to 2.5
+/// assert_eq!(pi.step(&mut state, 1.0), 3.5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pi {
     /// Gain k_c, output unit per input unit (V/A in the current loop).
@@ -35,7 +46,7 @@ pub struct PiState {
 }
 
 impl Pi {
-    /// The output wanted for this error.
+    /// Wanted output for `error` = reference - measured.
     pub fn step(&self, state: &mut PiState, error: f32) -> f32 {
         let output = state.output + self.k_c * (error - self.z_c * state.error);
         *state = PiState { output, error };
@@ -44,18 +55,18 @@ impl Pi {
 }
 
 impl PiState {
-    /// Anti-windup: adds `correction` = applied - wanted output, zero if nothing was limited.
+    /// Anti-windup: adds `correction` = realised - wanted output, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: f32) {
         self.output += correction;
     }
 
-    /// The output of the last step as realised.
+    /// Realised output of the last step.
     pub fn output(&self) -> f32 {
         self.output
     }
 }
 
-/// Coefficients of the current loop: one controller per axis, currents in A, voltages in V.
+/// Coefficients of the current loop in the flux frame: one controller per axis, A peak to V peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DqPi {
     /// Direct axis.
@@ -72,20 +83,20 @@ pub struct DqPiState {
 }
 
 impl DqPi {
-    /// The voltage wanted for this current error.
+    /// Wanted voltage, V peak, for `error` = reference - measured current, A peak.
     pub fn step(&self, state: &mut DqPiState, error: Dq) -> Dq {
         Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
 }
 
 impl DqPiState {
-    /// Anti-windup: adds `correction` = applied - wanted voltage, zero if nothing was limited.
+    /// Anti-windup: adds `correction` = realised - wanted voltage, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: Dq) {
         self.d.back_calculate(correction.d);
         self.q.back_calculate(correction.q);
     }
 
-    /// The voltage of the last step as realised.
+    /// Realised voltage of the last step, V peak.
     pub fn output(&self) -> Dq {
         Dq { d: self.d.output, q: self.q.output }
     }
@@ -93,27 +104,27 @@ impl DqPiState {
 
 /// First-order reference filter, Eq. 3.40: F_ref(z) = (1 - p_f)/(z - p_f). Unit gain at dc.
 ///
-/// Strictly proper as printed: the output of a step depends on references up to the step before.
-/// With `p_f` = `z_c` it cancels the controller's zero in the response to the reference.
+/// Strictly proper as printed: the output depends on the references up to the previous step.
+/// With `p_f` = `z_c` it cancels the zero of the controller in the response to the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceFilter {
     /// 1 - p_f, in (0, 1].
     pub one_minus_p: f32,
 }
 
-/// What a [`ReferenceFilter`] remembers: its next output.
+/// State of a [`ReferenceFilter`]: its next output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceState {
     next: f32,
 }
 
 impl ReferenceFilter {
-    /// With its pole at `p_f`.
+    /// Filter with its pole at `p_f`, in [0, 1).
     pub const fn new(p_f: f64) -> Self {
         Self { one_minus_p: (1.0 - p_f) as f32 }
     }
 
-    /// One sample.
+    /// Filters one sample, any unit.
     pub fn step(&self, state: &mut ReferenceState, reference: f32) -> f32 {
         let output = state.next;
         state.next += self.one_minus_p * (reference - output);

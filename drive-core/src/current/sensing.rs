@@ -1,4 +1,4 @@
-//! From converter codes to amperes and volts (section 3.2, Eq. 3.5), and the offset calibration.
+//! Conversion of ADC codes to amperes and volts (section 3.2, Eq. 3.5), and offset calibration.
 
 use crate::fault::Fault;
 use crate::io::Sample;
@@ -8,26 +8,26 @@ use crate::settings::Line;
 /// Coefficients of the sensing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensing {
-    /// Current a, A.
+    /// Calibration of current a, A.
     pub current_a: Line,
-    /// Current b, A.
+    /// Calibration of current b, A.
     pub current_b: Line,
-    /// Dc-link voltage, V.
+    /// Calibration of the dc-link voltage, V.
     pub dc_link: Line,
-    /// Largest code a current channel can give. At it, or at 0, the channel is saturated.
+    /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
     pub full_scale: u16,
-    /// Heat-sink codes above this are too hot.
+    /// Heat-sink code above which the drive trips.
     pub heat_sink_trip: u16,
-    /// Samples to average for the offsets.
+    /// Number of samples averaged for the offsets.
     pub calibration_samples: u16,
-    /// Largest offset that is believed, A.
+    /// Largest accepted offset, A.
     pub largest_offset: f32,
 }
 
-/// State of the sensing: the offsets found at start.
+/// State of the sensing: the offsets measured at start.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SensingState {
-    /// Value at code 0 with that of no current taken off, channels a and b, A.
+    /// Offset-corrected value at code 0, channels a and b, A.
     zeros: [f32; 2],
     sum: [f32; 2],
     count: u16,
@@ -36,22 +36,22 @@ pub struct SensingState {
 /// One sample in SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Phase currents, A; c is -(a + b).
+    /// Phase currents into the motor, A; c is -(a + b).
     pub phases: Abc,
-    /// The same in the stator frame, A peak.
+    /// The current in the stator frame, A peak.
     pub current: AlphaBeta,
     /// Dc-link voltage, V.
     pub dc_link: f32,
 }
 
 impl Sensing {
-    /// Takes out that the gain of channel a is too large by this share of that of b, half on each.
-    pub fn take_mismatch(&mut self, mismatch: f32) {
+    /// Corrects a gain `mismatch` = (gain of a) / (gain of b) - 1, half on each channel.
+    pub fn correct_mismatch(&mut self, mismatch: f32) {
         self.current_a = self.current_a.scaled(1.0 - 0.5 * mismatch);
         self.current_b = self.current_b.scaled(1.0 + 0.5 * mismatch);
     }
 
-    /// Codes to SI units, offsets taken off.
+    /// Converts codes to SI units and subtracts the offsets.
     pub fn step(&self, state: &SensingState, sample: &Sample) -> Measured {
         let a = self.current_a.gain * f32::from(sample.current_a) + state.zeros[0];
         let b = self.current_b.gain * f32::from(sample.current_b) + state.zeros[1];
@@ -62,10 +62,10 @@ impl Sensing {
         }
     }
 
-    /// Checks the codes.
+    /// Checks the codes against their limits.
     ///
     /// # Errors
-    /// The fault of a saturated channel or of a hot heat sink.
+    /// [`Fault::SensorSaturatedA`], [`Fault::SensorSaturatedB`] or [`Fault::OverTemperature`].
     pub fn check(&self, sample: &Sample) -> Result<(), Fault> {
         let saturated = |code: u16| code == 0 || code >= self.full_scale;
         if saturated(sample.current_a) {
@@ -79,7 +79,7 @@ impl Sensing {
         }
     }
 
-    /// Begins with the lines as they are set, and no offsets known.
+    /// Resets `state` to the calibration lines of the settings, without offset correction.
     pub fn start(&self, state: &mut SensingState) {
         *state = SensingState {
             zeros: [self.current_a.offset, self.current_b.offset],
@@ -87,10 +87,11 @@ impl Sensing {
         };
     }
 
-    /// Averages one sample with the outputs off. `Some` once enough were averaged.
+    /// Averages one sample with the outputs off; `Some` when the offsets are measured.
     ///
     /// # Errors
-    /// The fault when an offset is beyond the largest that is believed; no offset is changed then.
+    /// [`Fault::OffsetA`] or [`Fault::OffsetB`] when an offset is above the limit; the offsets in use
+    /// stay unchanged.
     pub fn calibrate(
         &self,
         state: &mut SensingState,
@@ -106,7 +107,7 @@ impl Sensing {
         let (a, b) = (state.sum[0] * mean, state.sum[1] * mean);
         state.sum = [0.0; 2];
         state.count = 0;
-        // Written so that not-a-number fails the test.
+        // NaN fails the comparison.
         let within = |x: f32| x.abs() <= self.largest_offset;
         match (within(a), within(b)) {
             (false, _) => Err(Fault::OffsetA),

@@ -102,7 +102,7 @@ impl Coefficients {
             + self.reference_filter[0].one_minus_p
             + self.reference_filter[1].one_minus_p
             + self.motion.pi.k_c
-            + self.motion.limit
+            + self.motion.speed_limit
             + self.sequence.i_d
             + self.sequence.stop_ramp;
         sum.is_finite()
@@ -155,7 +155,7 @@ impl Settings {
         self.check()?;
         let m = &self.motor;
         let motor_plant = tuning::motor_plant(
-            &tuning::Motor {
+            &tuning::EquivalentCircuit {
                 r_s: f64::from(m.r_s),
                 r_r: f64::from(m.r_r),
                 l_m: f64::from(m.l_m),

@@ -60,13 +60,13 @@ impl Drive {
             }
             Command::Speed(rpm) => {
                 self.takes_references(Mode::Speed, rpm)?;
-                let taken = limited(rpm, self.c.motion.limit * 60.0);
+                let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
                 self.control.references.speed = taken / 60.0;
                 Ok(accepted(rpm, taken))
             }
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
-                let taken = limited(turns, self.c.motion.furthest);
+                let taken = limited(turns, self.c.motion.position_limit);
                 self.control.references.turns = taken;
                 Ok(accepted(turns, taken))
             }
@@ -108,7 +108,7 @@ impl Drive {
                 let taken = self
                     .c
                     .indirect
-                    .track(tau_r)
+                    .track_tau_r(tau_r)
                     .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
                 self.changes = self.changes.wrapping_add(1);
                 Ok(accepted(tau_r, taken))

@@ -66,7 +66,7 @@ impl Coefficients {
     ) -> Result<(), Fault> {
         match index {
             0 => {
-                self.estimator.see(&mut s.estimator);
+                self.estimator.update_saliency(&mut s.estimator);
                 self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
                 if self.source == AngleSource::Injection {
                     s.seen.rotor_count = s.count_by_flux();
@@ -75,8 +75,8 @@ impl Coefficients {
             }
             1 => {
                 let acceleration = self.freq_per_speed * s.motion.acceleration;
-                self.estimator.push(&mut s.estimator, acceleration);
-                s.prediction.take();
+                self.estimator.update_correction(&mut s.estimator, acceleration);
+                s.prediction.latch_voltage();
                 self.watch_noise(s, 1, step.sample)
             }
             2 => {
@@ -89,12 +89,12 @@ impl Coefficients {
             }
             4 => self.check_lock(s, step),
             REFERENCE_AT => {
-                s.estimator.synchronous.see_reference(step.i_q);
+                s.estimator.synchronous.average_reference(step.i_q);
                 self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis);
                 Ok(())
             }
             6 => {
-                s.prediction.take();
+                s.prediction.latch_voltage();
                 self.check_both_channels(s, step)
             }
             7 => {
@@ -140,7 +140,7 @@ impl Coefficients {
             Some(monitor)
                 if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
             {
-                let seen = s.estimator.synchronous.seen;
+                let seen = s.estimator.synchronous.saliency;
                 monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, step.held)
             }
             _ => Ok(()),

@@ -6,7 +6,7 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::estimator::AngleLoop;
-use crate::identify::learning::{Learned, LearningSample, Next};
+use crate::identify::learning::{Learned, LearningAction, LearningSample};
 use crate::math::angle::Angle;
 
 impl Drive {
@@ -36,9 +36,9 @@ impl Drive {
             voltage: t.voltage,
         };
         match c.learning.step(&mut s.learning, &sample) {
-            Next::Current(i_q) => self.control.references.current.q = i_q,
-            Next::Moved | Next::Stuck => return Err(Fault::ShaftNotLocked),
-            Next::Done => {
+            LearningAction::Current(i_q) => self.control.references.current.q = i_q,
+            LearningAction::Moved | LearningAction::Stuck => return Err(Fault::ShaftNotLocked),
+            LearningAction::Done => {
                 let flux = c.saliency_check.map_or(0.0, |check| check.seen(&s.saliency_check));
                 let learned = c.learning.result(&s.learning, normalised, flux, s.lock.baseline);
                 self.learned = Some(learned);
@@ -61,12 +61,12 @@ impl Coefficients {
             return;
         }
         let b = learned.current_saliency;
-        self.estimator.take(&learned.reference, b.accepted.then_some(b.value));
+        self.estimator.set_reference(&learned.reference, b.accepted.then_some(b.value));
         if let (Some(monitor), Some(carrier)) = (&mut self.lock_monitor, &learned.carrier) {
-            monitor.take(carrier);
+            monitor.set_carrier_table(carrier);
         }
         if learned.gain_mismatch.accepted {
-            self.sensing.take_mismatch(learned.gain_mismatch.value);
+            self.sensing.correct_mismatch(learned.gain_mismatch.value);
         }
     }
 }

@@ -6,8 +6,8 @@ use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
 use crate::io::{Compare, Sample};
 use crate::math::frames::Dq;
-use crate::protect::saliency_check::{Phase, SaliencyCheck};
-use crate::protect::wiring_check::{Next, WiringCheckState};
+use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
+use crate::protect::wiring_check::{WiringAction, WiringCheckState};
 use crate::settings::AngleSource;
 
 impl Drive {
@@ -47,13 +47,13 @@ impl Drive {
     /// Short voltage pulses, without control.
     fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
         Ok(match self.c.wiring.step(&mut self.wiring, measured.phases)? {
-            Next::Apply(voltage, flowing) => {
-                let signs = self.c.dead_time.signs(flowing.to_abc());
+            WiringAction::Apply { voltage, current } => {
+                let signs = self.c.dead_time.signs(current.to_abc());
                 let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
                 let modulated = self.c.modulator.step(voltage, compensation, measured.dc_link);
                 Compare::on(modulated.compare)
             }
-            Next::Passed => {
+            WiringAction::Passed => {
                 self.wiring_unchecked = false;
                 self.magnetising_from_here(sample);
                 Compare::LOW_SIDES_ON
@@ -80,25 +80,25 @@ impl Drive {
         let phase =
             match (self.elapsed.checked_sub(self.c.sequence.magnetise), self.c.saliency_check) {
                 (None, _) => return Ok(magnetising),
-                (Some(_), None) => Phase::Passed,
+                (Some(_), None) => SaliencyCheckAction::Passed,
                 (Some(n), Some(check)) => {
                     check.step(&mut s.saliency_check, n, s.estimator.saliency().q)
                 }
             };
         match phase {
-            Phase::Look => {
+            SaliencyCheckAction::Look => {
                 r.injection_axis = SaliencyCheck::LOOK_AXIS;
                 return Ok(Dq::ZERO);
             }
-            Phase::Restore => {
+            SaliencyCheckAction::Restore => {
                 s.lock.share = s.saliency_check.share;
                 r.injection_axis = self.c.injection_axis;
             }
-            Phase::Passed => {
+            SaliencyCheckAction::Passed => {
                 let watched = self.c.lock_monitor.is_some() && self.mode != Mode::Learning;
                 self.enter(if watched { State::Verifying } else { State::of_mode(self.mode) });
             }
-            Phase::Failed => return Err(Fault::NoSaliency),
+            SaliencyCheckAction::Failed => return Err(Fault::NoSaliency),
         }
         Ok(magnetising)
     }
@@ -107,7 +107,7 @@ impl Drive {
     pub(super) fn verify(&mut self) -> Result<Dq, Fault> {
         if self.elapsed >= self.c.sequence.verify {
             let step = self.control.estimator.rotor_freq;
-            if self.c.lock_monitor.is_some_and(|monitor| !monitor.stands(step)) {
+            if self.c.lock_monitor.is_some_and(|monitor| !monitor.is_standstill(step)) {
                 return Err(Fault::LostLock);
             }
             self.enter(State::of_mode(self.mode));

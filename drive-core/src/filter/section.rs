@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-/// One section,
+/// Coefficients of one second-order section,
 ///
 /// ```text
 ///          b0 + b1 z⁻¹ + b2 z⁻²
@@ -10,7 +10,7 @@ use num_complex::Complex64;
 ///           1 + a1 z⁻¹ + a2 z⁻²
 /// ```
 ///
-/// so `a1` and `a2` have the sign of Eq. C.2 and are subtracted in the step, as in Eq. C.1.
+/// `a1` and `a2` have the sign of Eq. C.2 and are subtracted in the step, as in Eq. C.1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// Coefficient of the input.
@@ -26,7 +26,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// The section that changes nothing.
+    /// H(z) = 1.
     pub const IDENTITY: Self = Self { b0: 1.0, b1: 0.0, b2: 0.0, a1: 0.0, a2: 0.0 };
 
     /// From `[b0, b1, b2, a1, a2]`, each rounded to the nearest `f32`.
@@ -40,12 +40,12 @@ impl Section {
         a2 < 1.0 && a1 < 1.0 + a2 && -a1 < 1.0 + a2
     }
 
-    /// H(1) of the rounded coefficients.
+    /// Gain at dc, H(1), of the rounded coefficients.
     pub const fn dc_gain(&self) -> f64 {
         (self.b0 as f64 + self.b1 as f64 + self.b2 as f64) / (1.0 + self.a1 as f64 + self.a2 as f64)
     }
 
-    /// The section with its gain multiplied by `gain`.
+    /// Section with the response `gain` H(z).
     pub const fn scaled(self, gain: f64) -> Self {
         Self {
             b0: (self.b0 as f64 * gain) as f32,
@@ -64,7 +64,7 @@ impl Section {
     }
 }
 
-/// H(e^(j ωT)) of a cascade, with the coefficients as they are stored; `omega_t` in rad/sample.
+/// Frequency response H(e^(j ωT)) of a cascade with its rounded coefficients; `omega_t` in rad/sample.
 ///
 /// Not for the control step.
 pub fn response(sections: &[Section], omega_t: f64) -> Complex64 {
@@ -74,9 +74,9 @@ pub fn response(sections: &[Section], omega_t: f64) -> Complex64 {
     })
 }
 
-/// Group delay -d arg H / d(ωT) of a cascade in samples, analytically; `omega_t` in rad/sample.
+/// Group delay -d arg H / d(ωT) of a cascade in samples, computed analytically; `omega_t` in rad/sample.
 ///
-/// A zero exactly at this frequency makes it not-a-number. Not for the control step.
+/// NaN at a frequency with a zero on the unit circle. Not for the control step.
 pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
     let delay = Complex64::cis(-omega_t);
     let of = |[c0, c1, c2]: [f64; 3]| {
@@ -86,6 +86,7 @@ pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
     sections.iter().map(|s| of(s.numerator()) - of(s.denominator())).sum()
 }
 
+/// c0 + c1 x + c2 x².
 fn polynomial([c0, c1, c2]: [f64; 3], x: Complex64) -> Complex64 {
     Complex64::new(c0, 0.0) + x * (Complex64::new(c1, 0.0) + x * Complex64::new(c2, 0.0))
 }

@@ -1,31 +1,46 @@
-//! Digital filters as second-order sections.
+//! Cascades of second-order sections.
 //!
 //! A filter is a constant set of coefficients ([`Sos`]) and any number of states ([`SosState`]), each for a
-//! number or a vector. The step is transposed direct form II in `f32`: it never panics, and anything
-//! non-finite that enters stays in the state until it is replaced.
+//! scalar or a vector. The step is transposed direct form II in `f32`. It never panics; a non-finite input
+//! stays in the state until the state is replaced.
 //!
-//! There is no direct form (Eq. C.1) of higher order here, on purpose. With the coefficients of
-//! Tables 7 and 8 rounded to `f32` it is wrong by 13 mA (LPF) and up to 15 mA rms (PP) for currents
-//! of 3 A, more than the 10 mA the demodulation looks for; sections are wrong by 2 µA and 11 µA.
+//! A direct form of higher order (Eq. C.1) is not offered. With the coefficients of Tables 7 and 8
+//! rounded to `f32` its error is 13 mA (LPF) and up to 15 mA rms (PP) for currents of 3 A, more than the
+//! 10 mA that the demodulation evaluates; the error of the sections is 2 µA and 11 µA.
+//!
+//! Own code instead of `idsp::iir::Biquad` with `DirectForm2Transposed` (idsp 0.23.1): that processes one
+//! scalar type for coefficients and samples, so a vector needs two filters and two passes. It has no
+//! `const` constructors for gain-normalised cascades, no stability test and no group delay.
 
 use core::ops::{Add, Mul, Sub};
 
 use crate::filter::section::{Section, group_delay, response};
 use num_complex::Complex64;
 
-/// A cascade of `N` sections: coefficients only.
+/// Coefficients of a cascade of `N` sections.
 ///
-/// The loop over the sections unrolls completely. A vector through four sections is 127 instructions
-/// on a Cortex-M4F, 115 where the coefficients are constants at the place of the call: then a section
-/// with `b0 == b2` (a zero pair on the unit circle) takes one multiplication less.
+/// The loop over the sections unrolls completely. A vector through four sections takes 127 instructions
+/// on a Cortex-M4F, 115 where the coefficients are constants at the call site: a section with `b0 == b2`
+/// (a zero pair on the unit circle) then needs one multiplication less.
+///
+/// ```
+/// use drive_core::{AlphaBeta, filter::sos::{Sos, SosState}};
+///
+/// // y[k] = 0.5 x[k] + 0.5 y[k-1] on a vector.
+/// let low_pass = Sos::<1>::from_f64(&[[0.5, 0.0, 0.0, -0.5, 0.0]]);
+/// assert!(low_pass.is_stable() && low_pass.dc_gain() == 1.0);
+/// let mut state = SosState::default();
+/// assert_eq!(low_pass.step(&mut state, AlphaBeta::new(1.0, -2.0)), AlphaBeta::new(0.5, -1.0));
+/// assert_eq!(low_pass.step(&mut state, AlphaBeta::ZERO), AlphaBeta::new(0.25, -0.5));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sos<const N: usize> {
-    /// The sections, in the order they are run.
+    /// The sections in the order of processing.
     pub sections: [Section; N],
 }
 
 impl<const N: usize> Sos<N> {
-    /// From rows `[b0, b1, b2, a1, a2]`, each coefficient rounded to the nearest `f32`.
+    /// Cascade from rows `[b0, b1, b2, a1, a2]`, each coefficient rounded to the nearest `f32`.
     pub const fn from_f64(rows: &[[f64; 5]; N]) -> Self {
         let mut sections = [Section::IDENTITY; N];
         let mut n = 0;
@@ -36,8 +51,8 @@ impl<const N: usize> Sos<N> {
         Self { sections }
     }
 
-    /// The same with `b0` = 1 in all sections but the last, which has the gain of all: where the
-    /// coefficients are constants a multiplication by 1 is none.
+    /// Cascade with `b0` = 1 in all sections but the last, which carries the whole gain: with constant
+    /// coefficients the multiplications by 1 vanish. Rows as in [`Sos::from_f64`].
     pub const fn with_gain_last(rows: &[[f64; 5]; N]) -> Self {
         let mut rows = *rows;
         let mut n = 0;
@@ -54,8 +69,8 @@ impl<const N: usize> Sos<N> {
         Self::from_f64(&rows)
     }
 
-    /// The same filter with H(1) = 1. The gain goes into the last section, so nothing before it
-    /// changes its range; one more rounding of three coefficients.
+    /// The filter scaled to H(1) = 1. The last section is scaled, so the signal range before it does not
+    /// change; its three numerator coefficients are rounded once more.
     pub const fn with_unit_dc_gain(mut self) -> Self {
         if N > 0 {
             self.sections[N - 1] = self.sections[N - 1].scaled(1.0 / self.dc_gain());
@@ -63,7 +78,7 @@ impl<const N: usize> Sos<N> {
         self
     }
 
-    /// H(1) of the rounded coefficients.
+    /// Gain at dc, H(1), of the rounded coefficients.
     pub const fn dc_gain(&self) -> f64 {
         let mut gain = 1.0;
         let mut n = 0;
@@ -86,7 +101,7 @@ impl<const N: usize> Sos<N> {
         true
     }
 
-    /// One sample of a signal, any unit. A vector is filtered component by component.
+    /// Filters one sample, any unit; a vector component by component.
     pub fn step<V: Signal>(&self, state: &mut SosState<V, N>, x: V) -> V {
         let mut y = x;
         for (c, s) in self.sections.iter().zip(state.sections.iter_mut()) {
@@ -109,7 +124,7 @@ impl<const N: usize> Sos<N> {
     }
 }
 
-/// A signal that a filter takes: a number or a vector.
+/// A signal type of a filter: a scalar or a vector.
 pub trait Signal:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self>
 {

@@ -1,31 +1,31 @@
-//! The flux angle from the injected carrier: demodulation, reference, tracking.
+//! Sensorless flux angle from the injected carrier: demodulation, reference, tracking.
 //!
-//! Any of the [demodulations](crate::carrier::demodulator) feeds one of two loops: that of the dissertation (a
-//! reference of the current difference and the PII controller) or, behind the synchronous one, a
-//! learned reference, scheduled gain and slip feed-forward.
+//! Each [demodulator](crate::carrier::demodulator) feeds one of two loops: the loop of the dissertation
+//! (reference of the current difference and PII controller) or, for the synchronous demodulation, a loop
+//! with learned reference, scheduled gain and slip feed-forward.
 
 use crate::carrier::demodulator::{Demodulate, Demodulator};
 use crate::carrier::synchronous::SynchronousState;
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
-use crate::flux::tracker::{Pll, Push, Tracker, TrackerState};
+use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
 use crate::math::angle::Angle;
 use crate::settings::table::ReferenceTable;
 
-/// `ref_delta_i` over i_q: odd, constant from a certain current on, linear below.
+/// Reference `ref_delta_i` over i_q (section 3.3): odd, linear up to the current `from`, constant beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantReference {
-    /// Value from there on, A.
+    /// Value above `from`, A.
     pub full: f32,
-    /// Slope below, A/A.
+    /// Slope below `from`, A/A.
     pub slope: f32,
-    /// Where it becomes constant, A.
+    /// Quadrature current from which on the reference is constant, A.
     pub from: f32,
 }
 
 impl ConstantReference {
-    /// Reference of the current difference, A.
+    /// Reference of the current difference at `i_q`, both A.
     fn at(&self, i_q: f32) -> f32 {
         if i_q > self.from {
             self.full
@@ -37,17 +37,17 @@ impl ConstantReference {
     }
 }
 
-/// What the current difference is compared with.
+/// Reference of the current difference over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
-    /// Section 3.3.
+    /// As printed, section 3.3.
     Constant(ConstantReference),
-    /// Learned over i_q, A.
+    /// Learned table, A.
     Learned(ReferenceTable),
 }
 
 impl Reference {
-    /// Reference of the current difference, A.
+    /// Reference of the current difference at `i_q`, both A.
     fn at(&self, i_q: f32) -> f32 {
         match self {
             Self::Constant(constant) => constant.at(i_q),
@@ -56,92 +56,92 @@ impl Reference {
     }
 }
 
-/// How the axis is turned by what was seen.
+/// Angle-tracking loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AngleLoop {
-    /// Section 3.11.
+    /// PII controller of section 3.11, for all demodulators but the synchronous one.
     Pii {
-        /// What the current difference is compared with.
+        /// Reference of the current difference.
         reference: Reference,
-        /// What turns the axis.
+        /// Controller of the injection axis.
         tracker: Tracker,
     },
-    /// Behind the synchronous demodulation.
+    /// Type-3 loop for the synchronous demodulation.
     Pll {
-        /// What the saliency is compared with.
+        /// Reference of the saliency and gain schedule.
         schedule: GainSchedule,
-        /// What turns the axis.
+        /// Controller of the injection axis.
         pll: Pll,
     },
 }
 
-/// Coefficients.
+/// Coefficients of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimator {
-    /// What is made of the carrier current.
+    /// The selected demodulator.
     pub demodulator: DemodulatorKind,
-    /// Length of the rms filters of Ha and Sul, samples.
+    /// Length of the rms filters of the impedance demodulator, samples.
     pub rms_samples: u8,
-    /// Current difference that an impedance difference of theirs stands for, A/ohm.
+    /// Current difference equivalent to an impedance difference of that demodulator, A/ohm.
     pub ampere_per_ohm: f32,
-    /// How the axis is turned by it.
+    /// The tracking loop.
     pub angle_loop: AngleLoop,
-    /// Samples by which the sampled carrier current lags the injection axis.
+    /// Lag of the sampled carrier current behind the injection axis, samples.
     pub lag: f32,
-    /// The same of the band-pass, for the demodulations that rotate behind it.
+    /// Additional lag of the band-pass, samples, for demodulators that rotate after it.
     pub band_pass_lag: f32,
 }
 
-/// State.
-// In this order: the large one that is hardly used comes last.
+/// State of the estimator.
+// The large demodulator, seldom used, comes last: all other fields stay within reach of one base address.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub struct EstimatorState {
     tracker: TrackerState,
-    /// The carrier current, and what the synchronous demodulation sees.
+    /// State of the synchronous demodulation, which always runs.
     pub synchronous: SynchronousState,
-    /// Mean speed of the flux, turns per period, for the lag of the printed chain: the present one
-    /// would feed the tracker's own steps back to it.
+    /// Mean frequency of the flux, electrical turns per period, for the lag of the printed chain. The
+    /// present frequency would feed the tracker's corrections back to it.
     mean_freq: f32,
     /// Electrical speed of the rotor, turns per period.
     pub rotor_freq: f32,
-    /// Current difference that any but the synchronous demodulation sees, A.
+    /// Output of the selected demodulator as a current difference, A; 0 with the synchronous one.
     pub delta_i: f32,
-    /// Which way the synchronous demodulation pushes the axis, by what it saw last. That is 1.1 ms older,
-    /// on average, than what the averages themselves delay by 3.2 ms: little for a loop of 4 Hz.
-    push: Push,
+    /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
+    /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
+    correction: PllCorrection,
     demodulator: Demodulator,
 }
 
-/// Share of the newest value in the mean speed of the flux: 50 ms.
+/// Share of the newest value in the mean frequency of the flux: 50 ms.
 const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
-/// The tracker ran away.
+/// The tracker has reached its speed limit: the flux angle is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lost;
+pub struct TrackingLost;
 
 impl EstimatorState {
-    /// The flux angle at the present sample.
+    /// Estimated flux angle at the present sample.
     pub fn flux(&self) -> FluxAngle {
         FluxAngle { phi: self.tracker.angle - Angle::QUARTER, freq: self.tracker.freq }
     }
 
-    /// Whether everything is a finite number.
+    /// Whether all state variables of the loop are finite.
     pub fn is_finite(&self) -> bool {
         (self.tracker.freq + self.mean_freq + self.rotor_freq + self.delta_i).is_finite()
-            && self.synchronous.seen.q.is_finite()
+            && self.synchronous.saliency.q.is_finite()
     }
 
-    /// What the synchronous demodulation sees; nothing where it does not track.
+    /// Result of the synchronous demodulation. `q` stays 0 where another demodulator tracks.
     pub fn saliency(&self) -> &Saliency {
-        &self.synchronous.seen
+        &self.synchronous.saliency
     }
 }
 
 impl Estimator {
-    /// Starts with the flux along phase a.
+    /// Resets `state` to a flux along phase a, at standstill.
     pub fn start(&self, state: &mut EstimatorState) {
         let EstimatorState {
             tracker,
@@ -150,57 +150,58 @@ impl Estimator {
             rotor_freq,
             delta_i,
             synchronous,
-            push,
+            correction,
         } = state;
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
         *tracker = TrackerState::default();
         tracker.angle = Angle::QUARTER;
         demodulator.start(self.demodulator, self.rms_samples);
         (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
-        (*synchronous, *push) = (SynchronousState::default(), Push::default());
+        (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
     }
 
-    /// Replaces the reference by a learned one, and the saliency per ampere of stator current, 1/A,
-    /// where one was learned.
-    pub fn take(&mut self, learned: &ReferenceTable, current_saliency: Option<f32>) {
+    /// Replaces the reference by a `learned` one and, if learned, the saliency per ampere of stator
+    /// current, 1/A.
+    pub fn set_reference(&mut self, learned: &ReferenceTable, current_saliency: Option<f32>) {
         match &mut self.angle_loop {
             AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(*learned),
             AngleLoop::Pll { schedule, .. } => {
-                *schedule = schedule.with(learned, current_saliency);
+                *schedule = schedule.with_learned(learned, current_saliency);
             }
         }
     }
 
-    /// Demodulates one sample: the current, A; the injection axis, delayed by [`lag`](Self::lag), and how
-    /// fast it turns, turns per period; the carrier; the reference of the quadrature current, A.
-    pub fn observe(&self, state: &mut EstimatorState, sample: &CarrierSample, step: f32) {
+    /// Demodulates one sample, whose axis is delayed by [`lag`](Self::lag); called in every control
+    /// period. `flux_freq` is the frequency of the axis, electrical turns per period.
+    pub fn observe(&self, state: &mut EstimatorState, sample: &CarrierSample, flux_freq: f32) {
         state.synchronous.mix(sample);
         if let AngleLoop::Pii { .. } = self.angle_loop {
-            self.observe_printed(state, *sample, step);
+            self.demodulate(state, *sample, flux_freq);
         }
     }
 
-    /// Once a carrier period, where the synchronous demodulation tracks: the saliency that the one before shows.
-    pub fn see(&self, state: &mut EstimatorState) {
+    /// Computes the saliency of the previous carrier period, where the synchronous demodulation tracks;
+    /// called once per carrier period.
+    pub fn update_saliency(&self, state: &mut EstimatorState) {
         if let AngleLoop::Pll { .. } = self.angle_loop {
-            state.synchronous.see();
+            state.synchronous.update_saliency();
         }
     }
 
-    /// Once a carrier period, with the saliency of the one before: which way the axis is pushed by it. An
-    /// acceleration of the rotor that is asked for is known, turns per period in each.
-    pub fn push(&self, state: &mut EstimatorState, acceleration: f32) {
+    /// Computes the correction from the saliency of the previous carrier period; called once per carrier
+    /// period. `acceleration` is the rotor's acceleration reference, electrical turns per period squared.
+    pub fn update_correction(&self, state: &mut EstimatorState, acceleration: f32) {
         if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
-            let (error, share) = schedule.correction(state.saliency());
-            state.push = pll.push(error, share, acceleration);
+            let (error, share) = schedule.angle_error(state.saliency());
+            state.correction = pll.correction(error, share, acceleration);
         }
     }
 
-    /// The other demodulations.
-    fn observe_printed(&self, state: &mut EstimatorState, mut sample: CarrierSample, step: f32) {
+    /// Runs the selected demodulator, all but the synchronous one.
+    fn demodulate(&self, state: &mut EstimatorState, mut sample: CarrierSample, flux_freq: f32) {
         if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
-            // These rotate what has passed the band-pass.
-            state.mean_freq += FLUX_SMOOTHING * (step - state.mean_freq);
+            // These rotate the output of the band-pass.
+            state.mean_freq += FLUX_SMOOTHING * (flux_freq - state.mean_freq);
             sample.axis = sample.axis.turned_slightly(-state.mean_freq * self.band_pass_lag);
         }
         state.delta_i = match &mut state.demodulator {
@@ -211,22 +212,28 @@ impl Estimator {
         };
     }
 
-    /// Turns the axis on to the next sample by what was observed, with the reference of the
-    /// quadrature current, A, and the slip, turns per period.
+    /// Advances the injection axis to the next sample; called in every control period. `i_q` is the
+    /// reference of the quadrature current, A, `slip_freq` the slip, electrical turns per period.
     ///
     /// # Errors
-    /// [`Lost`] when the speed has reached its limit.
-    pub fn track(&self, state: &mut EstimatorState, i_q: f32, slip_freq: f32) -> Result<(), Lost> {
+    /// [`TrackingLost`] when the PII tracker has reached its speed limit. (The drive itself checks the
+    /// speed of the other loop.)
+    pub fn track(
+        &self,
+        state: &mut EstimatorState,
+        i_q: f32,
+        slip_freq: f32,
+    ) -> Result<(), TrackingLost> {
         match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
                 let error = reference.at(i_q) - state.delta_i;
                 let held = tracker.step(&mut state.tracker, error);
                 let rotor_freq = state.tracker.freq - slip_freq;
                 state.rotor_freq += ROTOR_SMOOTHING * (rotor_freq - state.rotor_freq);
-                if held { Ok(()) } else { Err(Lost) }
+                if held { Ok(()) } else { Err(TrackingLost) }
             }
             AngleLoop::Pll { .. } => {
-                Pll::step(&mut state.tracker, &mut state.rotor_freq, state.push, slip_freq);
+                Pll::step(&mut state.tracker, &mut state.rotor_freq, state.correction, slip_freq);
                 Ok(())
             }
         }

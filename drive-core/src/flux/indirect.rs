@@ -1,9 +1,8 @@
 //! Indirect rotor-flux angle from the encoder, Eq. 2.10:
 //! `phi = theta_r + (1 / tau_r) ∫ i_q / i_d dt`.
 //!
-//! `i_d` is the magnetising current, which follows the current on the direct axis with the rotor
-//! time constant `tau_r = L_r / r_r`; the two are the same once the flux stands, which is where the
-//! printed form holds.
+//! `i_d` is the magnetising current here, which follows the direct current with the rotor time constant
+//! `tau_r = L_r / r_r`. Both are equal at constant flux, where the printed form holds.
 
 use core::f32::consts::TAU;
 
@@ -13,24 +12,38 @@ use crate::math::angle::Angle;
 use crate::settings::Motor;
 
 /// Coefficients of the encoder and the slip.
+///
+/// ```
+/// use drive_core::flux::indirect::{Indirect, IndirectState};
+/// use drive_core::settings::Motor;
+///
+/// // Two pole pairs, 10 000 counts per mechanical turn, 0.7 A, at most 60 turns/s.
+/// let indirect = Indirect::new(&Motor::default(), 10_000, 0.7, 60.0);
+/// let mut state = IndirectState::default();
+/// // An eighth of a mechanical turn, without slip so far.
+/// let flux = indirect.angle(&mut state, 1250).unwrap();
+/// assert!((flux.phi.to_degrees() - 90.0).abs() < 0.01);
+/// // At standstill, 1250 counts from one period to the next are implausible.
+/// assert!(indirect.angle(&mut state, 2500).is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indirect {
-    /// Electrical angle of one count in units of 2^-32 turn. Rounding it is a relative error of the
-    /// speed below 1e-6 (10 000 counts), which the orientation takes as that much slip.
+    /// Electrical angle of one count in units of 2^-32 turn. Its rounding is a relative speed error below
+    /// 1e-6 (10 000 counts), equivalent to that much slip.
     bits_per_count: u32,
     /// T / tau_r.
     rate: f32,
-    /// The same of the settings, for [`Self::track`].
+    /// T / tau_r of the settings, for [`Self::track_tau_r`].
     nominal_rate: f32,
-    /// Least magnetising current that is divided by, A.
+    /// Lower bound of the magnetising current in the slip, A.
     least: f32,
-    /// Share of the newest step in the mean speed.
+    /// Share of the newest value in the mean speed.
     smoothing: f32,
-    /// Most counts the rotor can turn in a period.
+    /// Largest plausible movement per period, counts.
     most_counts: i32,
-    /// Electrical turns that a counter which stands still may have missed.
+    /// Largest plausible distance the rotor can have moved while the counter stood still, electrical turns.
     missed: f32,
-    /// Speed from which that is judged, electrical turns per period.
+    /// Speed from which on a standing counter is judged, electrical turns per period.
     judged_from: f32,
 }
 
@@ -38,54 +51,54 @@ pub struct Indirect {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IndirectState {
     last_count: Option<u32>,
-    /// Integral of the slip: by so much the flux is ahead of the rotor.
+    /// Integral of the slip: angle of the flux ahead of the rotor, electrical.
     pub slip: Angle,
-    /// Slip, electrical turns per period.
+    /// Slip frequency, electrical turns per period.
     pub slip_freq: f32,
-    /// Magnetising current, A: the rotor flux over L_m.
+    /// Magnetising current, A: rotor flux / L_m.
     pub magnetising: f32,
-    /// Slip per quadrature current at that flux, electrical turns per period and A.
+    /// Slip per quadrature current at the present flux, electrical turns per period and A.
     slip_per_ampere: f32,
     /// Mean electrical speed of the rotor, turns per period.
     pub rotor_freq: f32,
-    /// That speed when the counter last moved.
+    /// `rotor_freq` when the counter last moved.
     moving_freq: f32,
-    /// How far the rotor would have gone on since, electrical turns.
+    /// Movement at that speed since then, electrical turns.
     missed: f32,
 }
 
-/// A flux angle and how fast it turns.
+/// Rotor-flux angle and frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FluxAngle {
-    /// At the present sample.
+    /// Electrical angle from phase a at the present sample.
     pub phi: Angle,
-    /// Electrical turns per period.
+    /// Frequency of the flux, electrical turns per period.
     pub freq: f32,
 }
 
-/// The encoder moved, or stood still, as the rotor cannot.
+/// The encoder moved, or stood still, in a way the rotor cannot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Impossible;
+pub struct ImplausibleEncoder;
 
-/// Mechanical turns within which no rotor stops from [`JUDGED_FROM`]: 1.4°. That would take 2200 rad/s^2,
-/// 26 N m on 0.012 kg m^2, several times what such a motor makes.
+/// Minimum stopping distance from [`JUDGED_FROM`], mechanical turns: 1.4°. A shorter one would take
+/// 2200 rad/s^2, 26 N m on 0.012 kg m^2, several times the torque of such a motor.
 const STOPS_WITHIN: f32 = 4e-3;
-/// Mechanical turns/s: 100 rpm. Below, a standstill may be a real one.
+/// Minimum speed for judging a standing counter, mechanical turns/s: 100 rpm. Below, the rotor may have
+/// stopped.
 const JUDGED_FROM: f32 = 100.0 / 60.0;
 
-/// tau_r, as a factor of the one in the settings, beyond which it is not believed: the rotor at
-/// 150 degrees has 0.65.
-pub const LIMITS: [f32; 2] = [0.5, 2.0];
-/// Most that one command changes 1 / tau_r, as a share of that of the settings: at ten commands a
-/// second a wrong estimate needs 1.5 s for the 30 % of a warm rotor.
-pub const TRACKED_STEP: f32 = 0.02;
+/// Accepted range of tau_r relative to the settings; a rotor at 150 °C has 0.65.
+pub const TAU_R_LIMITS: [f32; 2] = [0.5, 2.0];
+/// Largest change of 1 / tau_r per command, relative to the settings: at ten commands per second a wrong
+/// estimate needs 1.5 s for the 30 % of a warm rotor.
+pub const TAU_R_STEP: f32 = 0.02;
 
 /// Time constant of the mean speed, s.
 const SPEED_FILTER_S: f32 = 5e-3;
 
 impl Indirect {
-    /// For a motor with `counts` of the encoder per mechanical turn, the nominal magnetising current
-    /// `i_d`, A, and the `highest` speed, mechanical turns/s.
+    /// Orientation for a motor with `counts` of the encoder per mechanical turn, the nominal magnetising
+    /// current `i_d`, A, and the `highest` plausible speed, mechanical turns/s.
     pub fn new(motor: &Motor, counts: u32, i_d: f32, highest: f32) -> Self {
         let bits = (u64::from(motor.pole_pairs) << 32) as f64 / f64::from(counts);
         let rate = PERIOD_S / motor.tau_r();
@@ -101,17 +114,17 @@ impl Indirect {
         }
     }
 
-    /// Goes towards another rotor time constant, s, by no more than [`TRACKED_STEP`] of the settings'
-    /// rate; gives the one that holds now. Not from within the control step: it divides.
+    /// Moves the rotor time constant towards `tau_r`, s, by at most [`TAU_R_STEP`] of the settings' rate,
+    /// and returns the one now in use, s. Not for the control step: it divides.
     ///
     /// # Errors
-    /// The smallest and the largest one allowed, s.
-    pub fn track(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
-        let limits = LIMITS.map(|factor| factor * PERIOD_S / self.nominal_rate);
+    /// The smallest and the largest allowed value, s, when `tau_r` is outside [`TAU_R_LIMITS`].
+    pub fn track_tau_r(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
+        let limits = TAU_R_LIMITS.map(|factor| factor * PERIOD_S / self.nominal_rate);
         if !(limits[0]..=limits[1]).contains(&tau_r) {
             return Err(limits);
         }
-        let most = TRACKED_STEP * self.nominal_rate;
+        let most = TAU_R_STEP * self.nominal_rate;
         let change = PERIOD_S / tau_r - self.rate;
         if change > most {
             self.rate += most;
@@ -124,15 +137,19 @@ impl Indirect {
         Ok(PERIOD_S / self.rate)
     }
 
-    /// The flux angle at the present sample from the encoder's counter.
+    /// Flux angle at the present sample from the encoder `count`.
     ///
     /// # Errors
-    /// [`Impossible`] when the counter moved further than the rotor can turn in a period, or stands still
-    /// from one period to the next while the rotor was fast: cable off, or supply gone.
-    pub fn angle(&self, state: &mut IndirectState, count: u32) -> Result<FluxAngle, Impossible> {
+    /// [`ImplausibleEncoder`] when the counter moved further than the rotor can turn in a period, or stopped
+    /// abruptly while the rotor was fast: cable or supply interrupted.
+    pub fn angle(
+        &self,
+        state: &mut IndirectState,
+        count: u32,
+    ) -> Result<FluxAngle, ImplausibleEncoder> {
         let moved = count.wrapping_sub(state.last_count.unwrap_or(count)) as i32;
         if moved > self.most_counts || moved < -self.most_counts {
-            return Err(Impossible);
+            return Err(ImplausibleEncoder);
         }
         state.last_count = Some(count);
         let moved = Angle::from_bits(moved.wrapping_mul(self.bits_per_count as i32)).to_turns();
@@ -140,7 +157,7 @@ impl Indirect {
         if moved == 0.0 {
             state.missed += state.moving_freq;
             if state.missed.abs() > self.missed && state.moving_freq.abs() > self.judged_from {
-                return Err(Impossible);
+                return Err(ImplausibleEncoder);
             }
         } else {
             (state.missed, state.moving_freq) = (0.0, state.rotor_freq);
@@ -149,18 +166,18 @@ impl Indirect {
         Ok(FluxAngle { phi: rotor + state.slip, freq: state.rotor_freq + state.slip_freq })
     }
 
-    /// Integrates the slip over one period with the quadrature current, A.
+    /// Integrates the slip over one control period at the quadrature current `i_q`, A.
     pub fn slip(&self, state: &mut IndirectState, i_q: f32) {
         state.slip_freq = state.slip_per_ampere * i_q;
         state.slip += Angle::within_turn(state.slip_freq);
     }
 
-    /// Once a carrier period: the magnetising current follows the direct current, A.
+    /// Updates the magnetising current with the direct current `i_d`, A; called once per carrier period.
     pub fn magnetise(&self, state: &mut IndirectState, i_d: f32) {
         let i_m =
             state.magnetising + CARRIER_SAMPLES as f32 * self.rate * (i_d - state.magnetising);
         state.magnetising = i_m;
-        // Not-a-number stays one, and shows in the slip.
+        // NaN propagates to the slip.
         let divisor = if i_m < self.least { self.least } else { i_m };
         state.slip_per_ampere = self.rate * (1.0 / TAU) / divisor;
     }
@@ -223,6 +240,6 @@ mod tests {
         let mut state = IndirectState::default();
         ind.angle(&mut state, u32::MAX - 3).unwrap();
         ind.angle(&mut state, 3).unwrap();
-        assert_eq!(ind.angle(&mut state, 5000), Err(Impossible));
+        assert_eq!(ind.angle(&mut state, 5000), Err(ImplausibleEncoder));
     }
 }

@@ -1,37 +1,36 @@
-//! What the synchronous demodulation is compared with, and how strongly it corrects, over the torque
-//! current.
+//! Reference of the saliency and loop gain of the synchronous demodulation over the torque current.
 //!
-//! At the right angle the saliency `q` is not zero but depends on i_q, because part of the saliency
+//! At the true angle the saliency `q` is not zero but depends on i_q, because part of the saliency
 //! follows the stator current. The reference is an odd table over i_q, learned with the shaft locked.
-//! The loop gain depends on i_q as well: an error of the angle turns the real current, and with it
-//! the current's part of the saliency, so that fast errors see a slope of 2 (|a| + b |i| |cos 2g|)
-//! instead of 2 |a|. The gain is scheduled to make up for that.
+//! The loop gain depends on i_q as well: an angle error rotates the real current and with it the
+//! current-dependent part of the saliency, so fast errors see a slope of 2 (|a| + b |i| |cos 2g|)
+//! instead of 2 |a|. The gain schedule compensates this.
 
 use crate::carrier::Saliency;
 use crate::settings::table::{POINTS, ReferenceTable, STEP_A, between, odd, place};
 
-/// Share of the proportional part that is left however steep the fast slope. Only errors faster than
-/// the current loop see that slope in full; with all of it taken out the tracking loop has too little
-/// damping at large currents. (3.5 Hz, a rotor 30 % warmer than believed, 3 A to -3 A, the worst of
-/// 72 runs: 19.8° with 0.3, 17.4° with 0.8, 16.5° with 1; 1.54°, 1.63° and 1.69° rms at constant
-/// current.)
+/// Minimum share of the proportional gain. Only errors faster than the current loop see the steep slope in
+/// full; full compensation leaves the tracking loop too little damping at large currents. (3.5 Hz, rotor
+/// resistance 30 % above the setting, 3 A to -3 A, worst of 72 runs: 19.8° with 0.3, 17.4° with 0.8, 16.5°
+/// with 1; 1.54°, 1.63° and 1.69° rms at constant current.)
 const LEAST_SHARE: f32 = 0.8;
-/// Reference and gain over i_q, for the control step.
+
+/// Reference of the saliency and share of the proportional gain over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSchedule {
     table: ReferenceTable,
     share: [f32; POINTS],
-    /// What it was made for.
+    /// Arguments of `new`, for `with_learned`.
     flux_saliency: f32,
     current_saliency: f32,
     i_d: f32,
-    /// Angle error per difference of the saliency, rad.
+    /// Angle error, rad, per difference between reference and saliency.
     pub per_saliency: f32,
 }
 
 impl GainSchedule {
-    /// With the flux-fixed saliency `a` at nominal flux, the saliency `b` per ampere of stator
-    /// current, 1/A, and the direct-axis current, A.
+    /// Schedule for the flux-fixed saliency `a` at nominal flux (negative), the saliency `b` per ampere of
+    /// stator current, 1/A, and the direct current `i_d`, A.
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
         let share = core::array::from_fn(|n| {
             let i_q = n as f32 * STEP_A;
@@ -52,18 +51,19 @@ impl GainSchedule {
         }
     }
 
-    /// The same with another reference and, where there is one, another saliency per ampere, 1/A.
-    pub fn with(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
+    /// Schedule for the same motor with a learned reference and, if learned, another saliency `b` per
+    /// ampere, 1/A.
+    pub fn with_learned(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
         Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
     }
 
-    /// The angle error that a saliency tells of, rad, and the share of the proportional part.
-    pub fn correction(&self, seen: &Saliency) -> (f32, f32) {
-        let (reference, share) = self.at(seen.i_q);
-        (self.per_saliency * (reference - seen.q), share)
+    /// Angle error, rad, derived from a measured saliency, and share of the proportional gain.
+    pub fn angle_error(&self, saliency: &Saliency) -> (f32, f32) {
+        let (reference, share) = self.at(saliency.i_q);
+        (self.per_saliency * (reference - saliency.q), share)
     }
 
-    /// Reference of `q`, and share of the proportional part, at a quadrature current, A.
+    /// Reference of `q` and share of the proportional gain at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> (f32, f32) {
         let place = place(i_q);
         (odd(i_q, between(self.table.points(), place)), between(&self.share, place))

@@ -1,9 +1,9 @@
-//! The PII controller of Eq. 3.7 / 3.44 that turns the injection axis until `delta_i` is at its
-//! reference.
+//! Tracking of the injection axis: the PII controller of the dissertation ([`Tracker`]) and the type-3 loop
+//! of the synchronous demodulation ([`Pll`]).
 //!
-//! `u[k+1] = 2 u[k] - u[k-1] + k_s (e[k] - z_s e[k-1])`, written as two accumulators: the step per
-//! period, and the angle, which wraps. Two integrators follow a flux that turns at constant speed
-//! without a steady error.
+//! The PII controller of Eq. 3.7 / 3.44 rotates the injection axis until `delta_i` equals its reference:
+//! `u[k+1] = 2 u[k] - u[k-1] + k_s (e[k] - z_s e[k-1])`, written as two accumulators: the frequency, and
+//! the angle, which wraps. Two integrators follow a flux of constant speed without steady-state error.
 
 use core::f32::consts::TAU;
 
@@ -12,38 +12,51 @@ use crate::math::angle::Angle;
 use crate::math::limited;
 use crate::tuning;
 
-/// Coefficients of the tracker.
+/// Coefficients of the PII tracker.
+///
+/// ```
+/// use core::f32::consts::TAU;
+/// use drive_core::flux::tracker::{Tracker, TrackerState};
+///
+/// let tracker = Tracker::new(0.01 * TAU, 0.5, 0.1);
+/// let mut state = TrackerState::default();
+/// assert!(tracker.step(&mut state, 1.0)); // one ampere: 0.01 turns per period
+/// assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.01).abs() < 1e-7);
+/// assert!(tracker.step(&mut state, 0.5)); // e[k] = z_s e[k-1]: the frequency is kept
+/// assert!((state.freq - 0.01).abs() < 1e-7 && (state.angle.to_turns() - 0.02).abs() < 1e-7);
+/// assert!(!tracker.step(&mut state, 100.0)); // beyond the speed limit: the angle is lost
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracker {
     /// Gain, turns per period and ampere.
     gain: f32,
     /// Zero.
     zero: f32,
-    /// Largest step per period, turns.
+    /// Largest frequency, turns per period.
     limit: f32,
 }
 
-/// State of the tracker.
+/// State of [`Tracker`] and [`Pll`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrackerState {
-    /// The tracked angle at the present sample.
+    /// Angle of the injection axis at the present sample, electrical.
     pub angle: Angle,
-    /// Turns per period.
+    /// Its frequency, electrical turns per period.
     pub freq: f32,
     error: f32,
-    /// Turns per period and period.
+    /// Acceleration, electrical turns per period squared.
     acceleration: f32,
 }
 
 impl Tracker {
-    /// `k_s` in rad/A and `z_s` as in Eq. 3.44; `limit` is the largest speed, turns per period,
-    /// below 1/2.
+    /// Tracker with gain `k_s`, rad/A, and zero `z_s` of Eq. 3.44; `limit` is the largest frequency,
+    /// electrical turns per period, below 1/2.
     pub fn new(k_s: f32, z_s: f32, limit: f32) -> Self {
         Self { gain: k_s / TAU, zero: z_s, limit }
     }
 
-    /// Moves on by one period with the error `reference - delta_i`, A. False when the speed has
-    /// reached its limit (or is not a number): the angle is lost.
+    /// Advances by one period with `error` = reference - `delta_i`, A. Returns false when the frequency
+    /// has reached its limit or is NaN: the angle is lost.
     pub fn step(&self, state: &mut TrackerState, error: f32) -> bool {
         let freq = state.freq + self.gain * (error - self.zero * state.error);
         state.error = error;
@@ -53,35 +66,47 @@ impl Tracker {
     }
 }
 
-/// The loop behind the synchronous demodulation: a type-3 loop whose speed and acceleration are the
-/// rotor's, with the slip fed forward.
+/// Coefficients of the type-3 loop of the synchronous demodulation. Its speed and acceleration states are
+/// those of the rotor; the slip is fed forward.
 ///
 /// ```text
 /// a += T k_a e      w_i += T (a + k_i e)      w = w_i + slip      theta += T (w + k_p g e)
 /// (s + w_n)^2 (s + c w_n) = s^3 + k_p s^2 + k_i s + k_a           c = 0.2
 /// ```
 ///
-/// `w_i` is an estimate of the electrical speed of the rotor. Without the acceleration the angle would
-/// lag by the acceleration over w_n^2 for as long as it lasts (11° at 600 rpm/s, 4 Hz and four poles);
-/// with braking torque that takes the flux away, and with it the gain of the loop. The third pole
-/// is slow so that the loop stays stable down to a fifteenth of its gain. The
-/// schedule `g` goes with the proportional part alone: the rise of the gain with the torque current
-/// that it makes up for is one of fast errors only, slow ones always see the same.
+/// `w_i` estimates the electrical speed of the rotor. Without the acceleration state the angle would lag by
+/// the acceleration over w_n^2 (11° at 600 rpm/s, 4 Hz and four poles); with braking torque such a lag
+/// weakens the flux, and with it the gain of the loop. The third pole is slow so that the loop stays stable
+/// down to a fifteenth of its gain. The schedule `g` scales the proportional part only: the gain rises with
+/// the torque current for fast errors, but not for slow ones.
+///
+/// ```
+/// use drive_core::flux::tracker::{Pll, TrackerState};
+///
+/// let (pll, mut state, mut rotor_freq) = (Pll::new(4.0), TrackerState::default(), 0.0);
+/// let axis = 0.02; // turns
+/// for _ in 0..12_000 {
+///     let error = core::f32::consts::TAU * (axis - state.angle.to_turns());
+///     let correction = pll.correction(error, 1.0, 0.0);
+///     Pll::step(&mut state, &mut rotor_freq, correction, 0.0);
+/// }
+/// assert!((state.angle.to_turns() - axis).abs() < 1e-4 && rotor_freq.abs() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pll {
     /// Turns per period and radian.
     proportional: f32,
     /// Turns per period, per period and radian.
     integral: f32,
-    /// The same of the acceleration.
+    /// Turns per period, per period squared and radian.
     jerk: f32,
 }
 
-/// Largest error that is corrected at once, rad.
+/// Clamp of the angle error, rad.
 const LARGEST_ERROR: f32 = 0.6;
 
 impl Pll {
-    /// For a bandwidth in Hz.
+    /// Loop with the natural frequency w_n = 2 pi `bandwidth_hz`.
     pub fn new(bandwidth_hz: f32) -> Self {
         let w = TAU * bandwidth_hz * PERIOD_S;
         let c = tuning::THIRD_POLE as f32;
@@ -92,35 +117,40 @@ impl Pll {
         }
     }
 
-    /// What an angle error, rad, turns, with the schedule's share of the proportional part, while the rotor
-    /// gets faster by `known` turns per period in each: the angle does not lag by that.
-    pub fn push(&self, error: f32, share: f32, known: f32) -> Push {
+    /// Correction for an angle `error`, rad, with the scheduled `share` of the proportional gain. `known`
+    /// is the rotor's acceleration reference, electrical turns per period squared, fed forward.
+    pub fn correction(&self, error: f32, share: f32, known: f32) -> PllCorrection {
         let error = limited(error, LARGEST_ERROR);
-        Push {
+        PllCorrection {
             angle: self.proportional * share * error,
             speed: self.integral * error + known,
             acceleration: self.jerk * error,
         }
     }
 
-    /// Moves on by one period, pushed by the error that was seen last, with the slip, turns per period. The
-    /// rotor's speed is kept in `rotor_freq`. (The drive looks at its limit and whether it is a number.)
-    pub fn step(state: &mut TrackerState, rotor_freq: &mut f32, push: Push, slip_freq: f32) {
-        state.acceleration += push.acceleration;
-        *rotor_freq += push.speed + state.acceleration;
+    /// Advances by one period with the latest correction and the slip. `rotor_freq` is the speed state;
+    /// frequencies in electrical turns per period. (The drive checks that it is finite and within limits.)
+    pub fn step(
+        state: &mut TrackerState,
+        rotor_freq: &mut f32,
+        correction: PllCorrection,
+        slip_freq: f32,
+    ) {
+        state.acceleration += correction.acceleration;
+        *rotor_freq += correction.speed + state.acceleration;
         state.freq = *rotor_freq + slip_freq;
-        state.angle += Angle::within_turn(state.freq + push.angle);
+        state.angle += Angle::within_turn(state.freq + correction.angle);
     }
 }
 
-/// What an angle error adds in every period, in turns per period, per period and period.
+/// Increments of the loop's states per period, caused by an angle error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Push {
-    /// To the angle.
+pub struct PllCorrection {
+    /// Increment of the angle, electrical turns.
     pub angle: f32,
-    /// To the speed.
+    /// Increment of the speed, electrical turns per period.
     pub speed: f32,
-    /// To the acceleration.
+    /// Increment of the acceleration, electrical turns per period squared.
     pub acceleration: f32,
 }
 

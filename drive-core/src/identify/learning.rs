@@ -125,7 +125,7 @@ pub struct LearningState {
 
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Next {
+pub enum LearningAction {
     /// Regulate this torque current, A.
     Current(f32),
     /// All points are there.
@@ -200,14 +200,14 @@ impl Learning {
     }
 
     /// Takes one period.
-    pub fn step(&self, state: &mut LearningState, sample: &LearningSample) -> Next {
+    pub fn step(&self, state: &mut LearningState, sample: &LearningSample) -> LearningAction {
         if state.point >= self.points() {
-            return Next::Done;
+            return LearningAction::Done;
         }
         let s = &mut state.sums;
         s.elapsed = s.elapsed.saturating_add(1);
         if s.elapsed <= self.settle {
-            return Next::Current(self.current(state.point));
+            return LearningAction::Current(self.current(state.point));
         }
         let seen = sample.theta - Angle::within_turn(sample.flux_freq * LAG);
         let UnitVector { cos, sin } = (seen + seen - TWELFTH).unit_vector();
@@ -219,18 +219,18 @@ impl Learning {
         s.quadrature += sample.signal * cos;
         s.voltage += sample.voltage;
         if s.count > self.average.1 {
-            return Next::Stuck;
+            return LearningAction::Stuck;
         }
         // A point ends with a half turn.
         let half_turned = 2.0 * s.turned.abs() >= (s.halves + 1) as f32;
         s.halves += u32::from(half_turned);
         if half_turned && s.count >= self.average.0 && !self.finish(state) {
-            return Next::Moved;
+            return LearningAction::Moved;
         }
         if state.point >= self.points() {
-            Next::Done
+            LearningAction::Done
         } else {
-            Next::Current(self.current(state.point))
+            LearningAction::Current(self.current(state.point))
         }
     }
 
@@ -322,10 +322,10 @@ impl Learning {
             }
             *place = held;
         }
-        let reference = ReferenceTable::of_points(q);
+        let reference = ReferenceTable::from_points(q);
         Learned {
             reference: reference.unwrap_or_default(),
-            carrier: CarrierTable::of_points(ratio),
+            carrier: CarrierTable::from_points(ratio),
             points: self.points,
             asymmetry,
             gain_mismatch,
@@ -390,7 +390,10 @@ mod tests {
     }
 
     /// Goes through all points with the signal that `q(i_q, theta)` gives and the voltage `v(i_q)`.
-    fn learn(q: impl Fn(f64, f64) -> f64, v: impl Fn(f32) -> Dq) -> (Next, LearningState) {
+    fn learn(
+        q: impl Fn(f64, f64) -> f64,
+        v: impl Fn(f32) -> Dq,
+    ) -> (LearningAction, LearningState) {
         let (learning, mut state) = (learning(), LearningState::default());
         let (mut i_q, mut theta) = (0.0_f32, 0.25_f64);
         for _ in 0..3_000_000 {
@@ -407,7 +410,7 @@ mod tests {
                 voltage: v(i_q),
             };
             match learning.step(&mut state, &sample) {
-                Next::Current(next) => i_q = next,
+                LearningAction::Current(next) => i_q = next,
                 other => return (other, state),
             }
         }
@@ -433,7 +436,7 @@ mod tests {
         for mismatch in [0.0, 0.01, -0.05] {
             let q = |i_q, theta: f64| reference(i_q) + negative_sequence(mismatch, theta);
             let (next, state) = learn(q, locked);
-            assert_eq!(next, Next::Done);
+            assert_eq!(next, LearningAction::Done);
             let learned = learning().result(&state, true, 0.0, CARRIER * CARRIER);
             assert!(learned.accepted && learned.gain_mismatch.accepted, "{learned:?}");
             // A half turn ends within a period: 1/800 at the highest slip.
@@ -474,8 +477,8 @@ mod tests {
         let q = |i_q, _| reference(i_q);
         let turned = |i_q| locked(i_q) + Dq::new(0.0, 0.6);
         let free = |i_q: f32| locked(i_q) - Dq::new(0.153 * i_q * i_q / (0.7 * 0.186), 0.0);
-        assert_eq!(learn(q, turned).0, Next::Moved);
-        assert_eq!(learn(q, free).0, Next::Moved);
+        assert_eq!(learn(q, turned).0, LearningAction::Moved);
+        assert_eq!(learn(q, free).0, LearningAction::Moved);
     }
 
     #[test]
@@ -488,7 +491,8 @@ mod tests {
             flux_freq: 0.0,
             voltage: Dq::ZERO,
         };
-        let stuck = (0..200_000).any(|_| learning.step(&mut state, &nothing) == Next::Stuck);
+        let stuck =
+            (0..200_000).any(|_| learning.step(&mut state, &nothing) == LearningAction::Stuck);
         assert!(stuck);
     }
 

@@ -17,7 +17,7 @@
 //!   sinusoidal current has a fundamental in phase with it, and acts like a resistance;
 //! * 1 / tau_r;
 //! * the speed, where no encoder gives it. Then the flux must not stand still: in the steady state
-//!   speed and rotor resistance show as the slip alone, and the answer is [`Doubt::PoorExcitation`]
+//!   speed and rotor resistance show as the slip alone, and the answer is [`NoEstimate::PoorExcitation`]
 //!   until the magnetising current is moved, by ±0.2 A at 2 Hz for example
 //!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the injection's tracking
 //!   loop is no substitute: the believed slip is in it.
@@ -38,7 +38,7 @@ mod fit;
 use core::f32::consts::TAU;
 use core::fmt;
 
-use crate::flux::indirect::LIMITS;
+use crate::flux::indirect::TAU_R_LIMITS;
 use crate::identify::rls::filter::Filter;
 use crate::identify::rls::{Rls, RlsError, RlsSettings};
 use crate::io::PERIOD_S;
@@ -86,7 +86,7 @@ const UNCERTAIN_GUESS: f32 = 0.04;
 
 /// What else is known of the speed, electrical rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Speed {
+pub enum SpeedInput {
     /// By an encoder: it is not estimated.
     Known(f32),
     /// By the tracking loop of the injection: the fit begins there.
@@ -95,7 +95,7 @@ pub enum Speed {
 
 /// An estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracked {
+pub struct RotorEstimate {
     /// Rotor time constant, s.
     pub tau_r: f32,
     /// Stator resistance and what looks like one: the dead time that is left, over the current, ohm.
@@ -108,25 +108,25 @@ pub struct Tracked {
 
 /// Why there is no estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doubt {
+pub enum NoEstimate {
     /// The memory is not full yet since the start, or since samples were missing.
     Settling,
     /// Speed or current changed: what was learnt before is forgotten.
     Transient,
     /// The signals do not tell tau_r (and the speed) apart from the rest.
     PoorExcitation,
-    /// tau_r outside [`LIMITS`] times that of the settings, or a resistance below zero or above
+    /// tau_r outside [`TAU_R_LIMITS`] times that of the settings, or a resistance below zero or above
     /// three times that of the settings.
-    Unbelievable,
+    OutOfRange,
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for NoEstimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Settling => "settling",
             Self::Transient => "speed or torque change",
             Self::PoorExcitation => "the excitation is too poor",
-            Self::Unbelievable => "out of range",
+            Self::OutOfRange => "out of range",
         })
     }
 }
@@ -135,7 +135,7 @@ impl fmt::Display for Doubt {
 #[derive(Clone, Copy, Debug)]
 pub struct Online {
     rls: Rls,
-    motor: Motor,
+    motor: MotorModel,
     /// Share of the voltage of the period before: the delay of the current's analog filter.
     delay: f32,
     before: AlphaBeta,
@@ -169,7 +169,7 @@ const fn squared(x: f32) -> f32 {
 
 /// What is taken from the settings.
 #[derive(Clone, Copy, Debug)]
-struct Motor {
+struct MotorModel {
     r_s: f32,
     tau_r: f32,
     sigma_l_s: f32,
@@ -180,7 +180,7 @@ struct Motor {
     steady_squared: f32,
 }
 
-impl Motor {
+impl MotorModel {
     /// What the settings say, with this speed, electrical rad/s.
     fn nominal(&self, omega_m: f32) -> Unknowns {
         Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
@@ -215,7 +215,7 @@ impl Online {
         let (m, limits) = (&settings.motor, &settings.limits);
         let synchronous = &settings.injection.synchronous;
         let l_s = m.l_m + m.l_ls;
-        let motor = Motor {
+        let motor = MotorModel {
             r_s: m.r_s,
             tau_r: m.tau_r(),
             sigma_l_s: l_s - m.l_m * m.l_m / m.l_r(),
@@ -309,12 +309,12 @@ impl Online {
     ///
     /// # Errors
     /// Why the estimate must not be used now.
-    pub fn refine(&mut self, current: Dq, speed: Speed) -> Result<Tracked, Doubt> {
-        let (Speed::Known(seen) | Speed::Guess(seen)) = speed;
-        let free_speed = matches!(speed, Speed::Guess(_));
+    pub fn refine(&mut self, current: Dq, speed: SpeedInput) -> Result<RotorEstimate, NoEstimate> {
+        let (SpeedInput::Known(seen) | SpeedInput::Guess(seen)) = speed;
+        let free_speed = matches!(speed, SpeedInput::Guess(_));
         if !(current.is_finite() && seen.is_finite()) {
             self.calls = 0;
-            return Err(Doubt::Transient);
+            return Err(NoEstimate::Transient);
         }
         let weight = if self.calls == 0 { 1.0 } else { SMOOTHING };
         self.current += (current - self.current) * weight;
@@ -328,14 +328,14 @@ impl Online {
         let steady = (seen - self.speed).abs() < most && moved < self.motor.steady_squared;
         if !steady {
             self.begin();
-            return Err(Doubt::Transient);
+            return Err(NoEstimate::Transient);
         }
         self.calls = self.calls.saturating_add(1);
         let nominal = self.motor.nominal(self.speed);
         let machine = self.motor.machine(self.current);
         let Some(fit) = machine.step(&self.rls, &self.unknowns, &nominal, free_speed) else {
             self.unknowns = nominal;
-            return Err(Doubt::PoorExcitation);
+            return Err(NoEstimate::PoorExcitation);
         };
         self.unknowns = fit.unknowns;
         let Unknowns { r_s, rate, omega_m } = fit.unknowns;
@@ -344,14 +344,18 @@ impl Online {
         let certain = uncertainty < uncertain && self.rls.missing() < MISSING;
         let at_rest = fit.moved < AT_REST;
         if self.calls < SETTLE || !at_rest {
-            Err(Doubt::Settling)
+            Err(NoEstimate::Settling)
         } else if !certain {
-            Err(Doubt::PoorExcitation)
-        } else if ratio > LIMITS[0] && ratio < LIMITS[1] && r_s > 0.0 && r_s < 3.0 * nominal.r_s {
-            Ok(Tracked { tau_r, resistance: r_s, omega_m, uncertainty })
+            Err(NoEstimate::PoorExcitation)
+        } else if ratio > TAU_R_LIMITS[0]
+            && ratio < TAU_R_LIMITS[1]
+            && r_s > 0.0
+            && r_s < 3.0 * nominal.r_s
+        {
+            Ok(RotorEstimate { tau_r, resistance: r_s, omega_m, uncertainty })
         } else {
             self.unknowns = nominal;
-            Err(Doubt::Unbelievable)
+            Err(NoEstimate::OutOfRange)
         }
     }
 

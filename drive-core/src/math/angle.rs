@@ -1,4 +1,4 @@
-//! Angles as a wrapping binary fraction of a turn, and their sine and cosine.
+//! Angles as wrapping binary fractions of a turn, with sine and cosine.
 
 use core::f32::consts::{PI, TAU};
 use core::ops::{Add, AddAssign, Neg, Sub, SubAssign};
@@ -6,11 +6,20 @@ use core::ops::{Add, AddAssign, Neg, Sub, SubAssign};
 use fixed::Wrapping;
 use fixed::types::I0F32;
 
-/// An angle in turns, in `[-0.5, 0.5)`, that wraps by itself.
+/// An angle in turns, in `[-0.5, 0.5)`; arithmetic wraps.
 ///
 /// One unit in the last place is 2^-32 turn (84 n°). Electrical unless the name of the variable
-/// says `mechanical`. The bits are what `idsp::cossin` takes, so host and target compute the same
+/// says `mechanical`. `idsp::cossin` takes the bits directly, so host and target compute the same
 /// sine and cosine to the bit.
+///
+/// ```
+/// use drive_core::Angle;
+///
+/// let sum = Angle::from_degrees(170.0) + Angle::from_degrees(20.0);
+/// assert!((sum.to_degrees() + 170.0).abs() < 1e-4);
+/// let axis = Angle::QUARTER.unit_vector();
+/// assert!(axis.cos.abs() < 2e-5 && (axis.sin - 1.0).abs() < 2e-5);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Angle(pub Wrapping<I0F32>);
 
@@ -18,28 +27,28 @@ pub struct Angle(pub Wrapping<I0F32>);
 const UNITS_PER_TURN: f32 = 4_294_967_296.0;
 
 impl Angle {
-    /// Angle zero.
+    /// Zero.
     pub const ZERO: Self = Self::from_bits(0);
     /// A quarter turn, 90°.
     pub const QUARTER: Self = Self::from_bits(1 << 30);
     /// An eighth of a turn, 45°.
     pub const EIGHTH: Self = Self::from_bits(1 << 29);
 
-    /// The angle whose binary fraction of a turn is `bits` / 2^32.
+    /// Angle of `bits` / 2^32 turns.
     pub const fn from_bits(bits: i32) -> Self {
         Self(Wrapping(I0F32::from_bits(bits)))
     }
 
-    /// The binary fraction of a turn, times 2^32.
+    /// The angle in units of 2^-32 turn.
     pub const fn to_bits(self) -> i32 {
         self.0.0.to_bits()
     }
 
-    /// From turns. Whole turns are dropped exactly up to ±2^30 turns; not-a-number gives zero.
+    /// Angle from turns. Whole turns are removed exactly up to ±2^30 turns; NaN gives zero.
     ///
     /// The fraction keeps the precision of `f32` (relative 6e-8).
     pub fn from_turns(turns: f32) -> Self {
-        // The saturating cast makes this total: beyond ±2^30 turns f32 has no fraction anyway.
+        // Saturating cast: beyond ±2^30 turns f32 has no fraction.
         let fraction = turns - (turns as i32) as f32;
         // Exact: both have the same exponent or the difference is smaller than either.
         Self::within_turn(if fraction >= 0.5 {
@@ -51,43 +60,43 @@ impl Angle {
         })
     }
 
-    /// From turns that are known to lie within ±half a turn: one multiplication and one conversion.
+    /// Angle from turns known to lie within ±0.5: one multiplication and one conversion.
     ///
-    /// Beyond that range the result is pinned to the end of it; not-a-number gives zero.
+    /// Saturates beyond that range; NaN gives zero.
     pub fn within_turn(turns: f32) -> Self {
         Self::from_bits((turns * UNITS_PER_TURN) as i32)
     }
 
-    /// From radians; see [`Angle::from_turns`].
+    /// Angle from radians; see [`Angle::from_turns`].
     pub fn from_radians(radians: f32) -> Self {
         Self::from_turns(radians * (1.0 / TAU))
     }
 
-    /// From degrees; see [`Angle::from_turns`].
+    /// Angle from degrees; see [`Angle::from_turns`].
     pub fn from_degrees(degrees: f32) -> Self {
         Self::from_turns(degrees * (1.0 / 360.0))
     }
 
-    /// In turns, `[-0.5, 0.5)`; exact to 2^-25 turn.
+    /// The angle in turns, `[-0.5, 0.5)`; exact to 2^-25 turn.
     pub fn to_turns(self) -> f32 {
         self.to_bits() as f32 * (1.0 / UNITS_PER_TURN)
     }
 
-    /// In radians, `[-pi, pi)`.
+    /// The angle in radians, `[-pi, pi)`.
     pub fn to_radians(self) -> f32 {
         self.to_turns() * (2.0 * PI)
     }
 
-    /// In degrees, `[-180, 180)`.
+    /// The angle in degrees, `[-180, 180)`.
     pub fn to_degrees(self) -> f32 {
         self.to_turns() * 360.0
     }
 
-    /// Cosine and sine together.
+    /// Cosine and sine of the angle.
     ///
-    /// Largest error of either, and of the length of the vector, is below 1.2e-5 (tested against
-    /// f64 over the turn): the table of `idsp` interpolates to 9e-6, and its amplitude, which is
-    /// 2^31 - 0.85 * 2^15, is divided out here.
+    /// The error of either component and of the length is below 1.2e-5 (tested against f64 over a turn):
+    /// the table of `idsp` interpolates to 9e-6, and its amplitude of 2^31 - 0.85 * 2^15 is divided out
+    /// here.
     pub fn unit_vector(self) -> UnitVector {
         const SCALE: f32 = 1.0 / (2_147_483_648.0 - 0.85 * 32_768.0);
         let (cos, sin) = idsp::cossin(self.to_bits());
@@ -128,7 +137,7 @@ impl SubAssign for Angle {
     }
 }
 
-/// `e^(j angle)`: the cosine and sine of an angle, computed once and used for every rotation by it.
+/// `e^(j angle)`: cosine and sine of an angle, computed once and used for every rotation by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitVector {
     /// Cosine.
@@ -138,11 +147,11 @@ pub struct UnitVector {
 }
 
 impl UnitVector {
-    /// Turned by a small angle, in turns: `1 - x^2/2` and `x - x^3/6`, without a division, a table or
-    /// a call.
+    /// The vector rotated by a small angle in turns, with the series `1 - x^2/2` and `x - x^3/6` instead of
+    /// a table.
     ///
-    /// Error below 1e-5 up to 0.02 turns, which is no more than that of
-    /// [`Angle::unit_vector`]; the length is off by x^4/72 there, 4e-6.
+    /// Error below 1e-5 up to 0.02 turns, no more than that of [`Angle::unit_vector`]; the error of the
+    /// length there is x^4/72 = 4e-6.
     #[inline]
     pub fn turned_slightly(self, turns: f32) -> Self {
         let x = turns * TAU;
@@ -150,7 +159,7 @@ impl UnitVector {
         self.turned_by(Self { cos: 1.0 - half, sin: x - x * half * (1.0 / 3.0) })
     }
 
-    /// This vector turned on by the angle of `other`.
+    /// The vector rotated by the angle of `other`.
     pub fn turned_by(self, other: Self) -> Self {
         Self {
             cos: self.cos * other.cos - self.sin * other.sin,

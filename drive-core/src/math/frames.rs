@@ -1,7 +1,16 @@
 //! Reference frames as types, with the transformations of Clarke and Park (section 2.1).
 //!
-//! Amplitude-invariant: a component is a peak phase value. Frames cannot be mixed by accident:
-//! each has its own type, and only a transformation turns one into another.
+//! Amplitude-invariant: a component is a peak phase value. Each frame has its own type, so frames
+//! cannot be mixed by accident; only a transformation converts one into another.
+//!
+//! ```
+//! use drive_core::{Abc, Angle};
+//!
+//! // A balanced set with peak 2 at angle 0, in the frame of a flux at 30°: it lies 30° behind d.
+//! let i = Abc::new(2.0, -1.0, -1.0).to_alpha_beta();
+//! let dq = i.to_dq(Angle::from_degrees(30.0).unit_vector());
+//! assert!((dq.d - 1.732).abs() < 1e-3 && (dq.q + 1.0).abs() < 1e-3);
+//! ```
 
 use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
@@ -21,7 +30,7 @@ macro_rules! frame {
             /// The zero vector.
             pub const ZERO: Self = Self { $($field: 0.0,)+ };
 
-            /// The vector with these components.
+            /// Vector of the given components.
             pub const fn new($($field: f32),+) -> Self {
                 Self { $($field,)+ }
             }
@@ -75,7 +84,7 @@ macro_rules! frame {
 }
 
 frame! {
-    /// The three phases.
+    /// Values of the three phases.
     Abc {
         /// Phase a.
         a,
@@ -97,7 +106,7 @@ frame! {
 }
 
 frame! {
-    /// The frame of the (estimated) rotor flux: d along it, q 90° ahead.
+    /// The frame of the (estimated) rotor flux: d along the flux, q 90° ahead of it.
     Dq {
         /// Along the rotor flux.
         d,
@@ -107,8 +116,8 @@ frame! {
 }
 
 frame! {
-    /// The measuring frame of the injection: dm and qm lie 45° before and behind the injected
-    /// voltage, which is their bisector (section 2.4, Figure 8).
+    /// The measuring frame of the injection: dm lies 45° behind and qm 45° ahead of the injected
+    /// voltage, their bisector (section 2.4, Figure 8).
     DmQm {
         /// 45° behind the injection axis.
         dm,
@@ -133,12 +142,12 @@ impl Abc {
 }
 
 impl AlphaBeta {
-    /// Clarke transformation of two measured phases, Eq. 2.4, where a + b + c = 0.
+    /// Clarke transformation of two measured phases, Eq. 2.4, with a + b + c = 0.
     pub fn from_two_phases(a: f32, b: f32) -> Self {
         Self { alpha: a, beta: FRAC_1_SQRT_3 * a + (2.0 * FRAC_1_SQRT_3) * b }
     }
 
-    /// Inverse of Eq. 2.3 with no zero-sequence component.
+    /// Inverse of Eq. 2.3 without zero-sequence component.
     pub fn to_abc(self) -> Abc {
         let (half_alpha, other) = (0.5 * self.alpha, (0.5 * SQRT_3) * self.beta);
         Abc { a: self.alpha, b: other - half_alpha, c: -other - half_alpha }
@@ -150,13 +159,13 @@ impl AlphaBeta {
         Dq { d, q }
     }
 
-    /// Rotation into the measuring frame; `axis` is the dm axis, `e^(j (theta - 45°))`.
+    /// Rotation into the measuring frame whose dm axis is `axis` = `e^(j (theta - 45°))`.
     pub fn to_dm_qm(self, axis: UnitVector) -> DmQm {
         let (dm, qm) = self.seen_from(axis);
         DmQm { dm, qm }
     }
 
-    /// A vector of this length along `axis` (negative lengths point the other way).
+    /// Vector of signed `length` along `axis`.
     pub fn along(axis: UnitVector, length: f32) -> Self {
         Self { alpha: axis.cos * length, beta: axis.sin * length }
     }
@@ -166,7 +175,7 @@ impl AlphaBeta {
         self.alpha * self.alpha + self.beta * self.beta
     }
 
-    /// The components along `axis` and across it, 90° ahead.
+    /// Components along `axis` and across it, 90° ahead.
     pub fn seen_from(self, axis: UnitVector) -> (f32, f32) {
         (axis.cos * self.alpha + axis.sin * self.beta, axis.cos * self.beta - axis.sin * self.alpha)
     }
@@ -174,14 +183,14 @@ impl AlphaBeta {
 
 impl Mul<f32> for UnitVector {
     type Output = Dq;
-    /// A vector of this length along an axis that is seen from the flux.
+    /// Vector of this length along an axis given in the flux frame.
     fn mul(self, length: f32) -> Dq {
         Dq { d: self.cos * length, q: self.sin * length }
     }
 }
 
 impl Dq {
-    /// Inverse Park transformation: back from the frame whose d axis lies along `axis`.
+    /// Inverse Park transformation from the frame whose d axis lies along `axis`.
     pub fn to_alpha_beta(self, axis: UnitVector) -> AlphaBeta {
         AlphaBeta {
             alpha: axis.cos * self.d - axis.sin * self.q,

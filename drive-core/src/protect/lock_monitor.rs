@@ -1,104 +1,132 @@
-//! Is the angle that is tracked the flux's? Watched in every carrier period.
+//! Lock monitor: checks in every carrier period that the tracked angle is that of the flux.
 //!
-//! The tracker looks at one component of the saliency alone, the one across the injection axis (`q`,
-//! [`crate::carrier::synchronous`]), and brings it to its reference. That does not say where the flux is: the
-//! reference is met as well when the flux is gone, or turns away under the axis too fast to be
-//! followed. A false lock comes to just that: current in the wrong direction lets the flux decay, and
-//! with it the saliency that would have pulled the axis back.
+//! The tracker uses only the saliency component across the injection axis (`q`,
+//! [`crate::carrier::synchronous`]) and drives it to its reference. The reference is also met when the flux
+//! has decayed, or turns under the axis too fast to be followed. A false lock ends in this condition:
+//! current in the wrong direction lets the flux decay, and with it the saliency that would pull the axis
+//! back.
 //!
-//! The other component comes with the demodulation: it makes the carrier current along the axis larger
-//! or smaller. With `s` the saliency vector seen from the estimated flux axis,
+//! The other component changes the amplitude of the carrier current along the axis, which the demodulation
+//! provides as well. With the saliency vector `s` in the estimated flux frame,
 //!
 //! ```text
-//! |C| ~ 1 - Re s     q ~ Im s     s = a f e^(2 j e) + (the current's part)
+//! |C| ~ 1 - Re s     q ~ Im s     s = a f e^(2 j e) + (current-dependent part)
 //! loss = (1 - |C| / |C|_ref) / |a| = 1 - f cos 2e
 //! ```
 //!
-//! (a < 0 fixed to the flux, e the angle error, f = 1 at nominal flux). The loss is 0 at the right
-//! angle, 1 without flux, 2 at an error of 90°, and averages to 1 when the flux turns under the axis.
-//! Resistances, dead time and speed are hardly in it, and nothing has to be perturbed. The voltage
-//! equation is no help at low speed: a wrong angle changes it by less than 1 V there, and the dead time
-//! alone leaves 2 V.
+//! (a < 0 fixed to the flux, e the angle error, f = 1 at nominal flux). The loss is 0 at the true angle, 1
+//! without flux, 2 at an error of 90°, and averages to 1 when the flux turns under the axis. Resistances,
+//! dead time and speed hardly influence it, and no perturbation is needed. The voltage equation does not
+//! help at low speed: a wrong angle changes it by less than 1 V, while the dead time alone leaves 2 V.
 //!
-//! An error of 180° looks right by symmetry, but the current does not hold it: the flux decays through
-//! zero to the right sign, or its loss is seen on the way.
+//! An error of 180° gives no loss by symmetry, but the current does not maintain it: the flux decays through
+//! zero to the true sign, or the loss is detected on the way.
 //!
-//! `|C|_ref` is the carrier current seen while the drive magnetises, where the direction of the flux is
-//! known, times a learned even function of i_q. `a` is what the saliency check saw, if there was one.
+//! `|C|_ref` is the carrier current measured during magnetisation, when the direction of the flux is known,
+//! times a learned even function of i_q. `a` is the result of the saliency check, if it is enabled.
 //!
-//! The mean loss of the simulated motor, 80 ms, stays below 0.22 in 10 000 runs within 300 rpm, with
-//! reversals of the torque and load steps, below 0.35 with a dead-time residual of 4.1 V or a carrier
-//! of 30 V, and passes 0.65 in every false lock. A load that speeds the shaft up against the torque of the
-//! drive makes the flux itself smaller: at 2 A and 600 rpm/s to a third, which is seen as a loss.
+//! The mean loss of the simulated motor, 80 ms, stays below 0.22 in 10 000 runs within 300 rpm, with torque
+//! reversals and load steps; below 0.35 with a dead-time residual of 4.1 V or a carrier of 30 V; and exceeds
+//! 0.65 in every false lock. A load that accelerates the shaft against the torque of the drive reduces the
+//! flux itself, at 2 A and 600 rpm/s to a third, which counts as a loss.
 
 use crate::carrier::Saliency;
 use crate::fault::Fault;
 use crate::settings::table::{CarrierTable, POINTS, between, place};
 
 /// Coefficients of the monitor.
+///
+/// ```
+/// use drive_core::carrier::Saliency;
+/// use drive_core::fault::Fault;
+/// use drive_core::protect::lock_monitor::{LockMonitor, LockMonitorSettings, LockMonitorState};
+/// use drive_core::settings::table::CarrierTable;
+///
+/// let settings = LockMonitorSettings {
+///     flux_saliency: -0.035,
+///     smoothing_s: 0.08,
+///     allowed: 0.55,
+///     carrier_a: 0.26,
+///     standing_freq: 1e-4,
+///     period_s: 1.0 / 600.0,
+/// };
+/// let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
+/// let mut state = LockMonitorState::default();
+/// let carrier = |a: f32| Saliency { q: 0.0, carrier_squared: a * a, i_q: 0.0 };
+/// for _ in 0..600 {
+///     monitor.step(&mut state, &carrier(0.26), 1.0, true).unwrap(); // baseline while magnetising
+/// }
+/// // Without flux the carrier current falls by the saliency: 3.5 %.
+/// let gone = carrier(0.26 * (1.0 - 0.035));
+/// assert!(monitor.step(&mut state, &gone, 1.0, false).is_ok());
+/// let mut after = (0..60).map(|_| monitor.step(&mut state, &gone, 1.0, false));
+/// assert!(after.any(|result| result == Err(Fault::LostLock)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitor {
     /// 1 / ratio^2 of the carrier table.
     inverse_square: [f32; POINTS],
     /// 1 / |a|.
     per_saliency: f32,
-    /// Share of the newest value in the mean loss and in the mean baseline.
+    /// Share of the newest value in the mean loss.
     smoothing: f32,
+    /// Share of the newest value in the mean baseline.
     baseline_smoothing: f32,
     /// Allowed loss.
     allowed: f32,
-    /// Square of the least carrier current, A^2.
+    /// Square of the minimum carrier current, A^2.
     least: f32,
-    /// Electrical speed up to which the shaft counts as standing, turns per control period.
+    /// Electrical speed below which the shaft counts as standing, turns per control period.
     standing: f32,
 }
 
-/// What the monitor takes of the settings; SI units.
+/// Settings of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitorSettings {
-    /// The saliency fixed to the flux.
+    /// Flux-fixed saliency at nominal flux, negative.
     pub flux_saliency: f32,
     /// Time constant of the mean loss, s.
     pub smoothing_s: f32,
-    /// Allowed loss; 1 is a flux that is gone.
+    /// Allowed mean loss; 1 corresponds to zero flux.
     pub allowed: f32,
-    /// Carrier current that is expected, A.
+    /// Expected carrier current along the injection axis, A peak.
     pub carrier_a: f32,
-    /// Electrical speed up to which the shaft counts as standing, turns per control period.
+    /// Electrical speed below which the shaft counts as standing, turns per control period.
     pub standing_freq: f32,
-    /// Period of the carrier, s: that of the monitor's steps.
+    /// Interval of the monitor's steps, s: the carrier period.
     pub period_s: f32,
 }
 
 /// State of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitorState {
-    /// Square of the carrier current at i_q = 0, A^2, mean.
+    /// Mean squared carrier current at i_q = 0, A^2.
     pub baseline: f32,
-    /// Saliency of the motor as a share of the expected one.
+    /// Measured saliency of the motor relative to the setting.
     pub share: f32,
     /// Loss per relative change of the squared carrier current; 0 until it is first needed.
     per_change: f32,
+    /// 1 / `baseline`.
     per_baseline: f32,
     /// Mean loss.
     pub loss: f32,
-    /// Carrier periods in a row with too little carrier current.
+    /// Consecutive carrier periods with too little carrier current.
     weak: u8,
 }
 
 impl Default for LockMonitorState {
-    /// Nothing seen yet, the expected saliency taken for granted.
+    /// No baseline yet; the saliency of the settings.
     fn default() -> Self {
         Self { baseline: 0.0, share: 1.0, per_change: 0.0, per_baseline: 0.0, loss: 0.0, weak: 0 }
     }
 }
 
-/// Time constant of the mean of the baseline, s: noise of 5 mA makes 0.1 % of it, 0.03 in the loss.
+/// Time constant of the baseline mean, s: noise of 5 mA causes 0.1 % of error in it, 0.03 in the loss.
 const BASELINE_S: f32 = 0.1;
-/// Share of the expected carrier current below which there is too little. An open phase leaves the
-/// square of the cosine between the axis and what is left to flow along.
+/// Minimum carrier current as a share of the expected one. With an open phase the carrier current is
+/// reduced by the squared cosine of the angle between the injection axis and the remaining current axis.
 const LEAST_CARRIER: f32 = 0.5;
-/// Carrier periods in a row until that is a fault. The averages of the demodulation take four to fill.
+/// Consecutive weak carrier periods until the fault. The averages of the demodulation need four to fill.
 const WEAK_PERIODS: u8 = 8;
 
 fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
@@ -106,7 +134,7 @@ fn inverse_square(table: &CarrierTable) -> [f32; POINTS] {
 }
 
 impl LockMonitor {
-    /// See [`LockMonitorSettings`].
+    /// Monitor with the carrier current over i_q of `table`.
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {
@@ -120,26 +148,27 @@ impl LockMonitor {
         }
     }
 
-    /// Compares with what was learned from now on.
-    pub fn take(&mut self, table: &CarrierTable) {
+    /// Replaces the carrier table by a learned one.
+    pub fn set_carrier_table(&mut self, table: &CarrierTable) {
         self.inverse_square = inverse_square(table);
     }
 
-    /// One carrier period: what is demodulated, and `per_share_squared`, one over the square of the share of
-    /// the carrier that is put out. While the axis is `held` the flux is where it must be, with i_q = 0, and the baseline is
-    /// taken.
+    /// Evaluates one carrier period.
+    ///
+    /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held`
+    /// (magnetisation, i_q = 0) the flux lies along it, and the baseline is measured.
     ///
     /// # Errors
-    /// [`Fault::CarrierWeak`] after eight carrier periods with hardly any carrier current, whatever the
-    /// angle; [`Fault::LostLock`] when the mean loss is too large.
+    /// [`Fault::CarrierWeak`] after eight consecutive carrier periods with too little carrier current at any
+    /// angle; [`Fault::LostLock`] when the mean loss exceeds the allowed one.
     pub fn step(
         &self,
         state: &mut LockMonitorState,
-        seen: &Saliency,
+        saliency: &Saliency,
         per_share_squared: f32,
         held: bool,
     ) -> Result<(), Fault> {
-        let carrier = seen.carrier_squared * per_share_squared;
+        let carrier = saliency.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
         if state.weak >= WEAK_PERIODS {
             return Err(Fault::CarrierWeak);
@@ -150,24 +179,24 @@ impl LockMonitor {
             return Ok(());
         }
         if state.per_change == 0.0 {
-            // 1 - |C|/|C|_ref is half of what it is for the squares.
+            // For small changes, 1 - |C|/|C|_ref is half the change of the squares.
             state.per_change = 0.5 * self.per_saliency / state.share;
             state.per_baseline = 1.0 / state.baseline;
         }
-        let relative = carrier * state.per_baseline * self.inverse_square(seen.i_q);
+        let relative = carrier * state.per_baseline * self.inverse_square(saliency.i_q);
         let loss = (1.0 - relative) * state.per_change;
         state.loss += self.smoothing * (loss - state.loss);
-        // Not-a-number is not within the limit.
+        // NaN fails the comparison.
         if state.loss <= self.allowed { Ok(()) } else { Err(Fault::LostLock) }
     }
 
-    /// 1 / ratio^2 at a quadrature current, A.
+    /// 1 / ratio^2 at a quadrature current `i_q`, A.
     fn inverse_square(&self, i_q: f32) -> f32 {
         between(&self.inverse_square, place(i_q))
     }
 
-    /// Whether the shaft stands by an electrical speed, turns per control period.
-    pub fn stands(&self, rotor_freq: f32) -> bool {
+    /// Whether the electrical speed `rotor_freq`, turns per control period, counts as standstill.
+    pub fn is_standstill(&self, rotor_freq: f32) -> bool {
         rotor_freq.abs() <= self.standing
     }
 }

@@ -1,23 +1,24 @@
-//! Is a current sensor so noisy that it turns the tracked angle?
+//! Noise watch: detects current-sensor noise that would disturb the tracked angle.
 //!
-//! Noise of a sensor turns the angle long before anything else shows it: 15 mA rms in one of them, 0.4 % of
-//! its range, make errors of 15°. It is looked for where no signal is. Once a carrier period each
-//! channel gives the second difference of three samples in a row,
+//! Sensor noise disturbs the angle before it shows anywhere else: 15 mA rms in one sensor, 0.4 % of its
+//! range, cause errors of 15°. The noise is measured in a combination of samples without signal. Once per
+//! carrier period each channel forms the second difference of three consecutive samples, and the second
+//! difference of these over the carrier periods:
 //!
 //! ```text
 //! h = i[n] - 2 i[n-1] + i[n-2]        d = h - 2 h[1] + h[2]        [m]: m carrier periods ago
 //! ```
 //!
-//! and the second difference of these over the carrier periods. The first leaves little of the fundamental,
-//! the second nothing of a carrier that stands and 5 % of one that turns at 700 rpm; of white noise `d` has 36
-//! times the variance. The mean of its square over 67 ms is compared with that of the noise allowed.
+//! The first rejects most of the fundamental, the second all of a carrier at standstill and 95 % of one at
+//! 700 rpm. White noise appears in `d` with 36 times its variance. The mean square of `d` over 67 ms is
+//! compared with that of the allowed noise.
 //!
-//! What is allowed goes with what the noise is measured against: the part of the carrier current that the
-//! saliency makes, `|a| I`, which is 9.1 mA for 3.5 % of 0.26 A; 1.1 times that are allowed. Measured on the
-//! simulated motor with converters of 12 bits and 5 mA in the other sensor, 200 runs of a second for each
-//! line and torque current, 0.5 A to 3 A, shaft locked:
+//! The allowed noise is relative to the part of the carrier current caused by the saliency, `|a| I`, which
+//! is 9.1 mA for 3.5 % of 0.26 A: 1.1 times that part. Measured on the simulated motor with 12-bit
+//! converters and 5 mA in the other sensor, 200 runs of a second for each row and torque current, 0.5 A to
+//! 3 A, shaft locked:
 //!
-//! | noise of one sensor, rms | largest angle error without the watch | until the fault, mean and longest |
+//! | noise of one sensor, rms | largest angle error without the watch | time to the fault, mean and longest |
 //! |---|---|---|
 //! | 5 mA | 6.5° | never |
 //! | 7.8 mA | 11° | one run in ten within the second |
@@ -27,28 +28,28 @@
 //! | 30 mA | 41° | 26 ms, 51 ms |
 //! | 100 mA | | 18 ms, 25 ms |
 //!
-//! Later than 100 ms after the noise began, one of these 7200 runs and as many at 300 rpm was beyond 15° with
-//! the outputs on, by 1.2°. With 5 mA in both sensors the mean square came to 0.7 of what is allowed at most
-//! in 2400 s with reversals of 3 A and up to 600 rpm.
+//! Later than 100 ms after the onset of the noise, one of these 7200 runs and as many at 300 rpm exceeded
+//! 15° with the outputs on, by 1.2°. With 5 mA in both sensors the mean square reached at most 0.7 of the
+//! allowed one in 2400 s with reversals of 3 A and up to 600 rpm.
 
 use crate::fault::Fault;
 use crate::io::Sample;
 
-/// Noise allowed, as a share of the carrier current that the saliency makes.
+/// Allowed noise relative to the carrier current caused by the saliency.
 const ALLOWED: f32 = 1.1;
-/// Variance of `d` for white noise of variance 1: the squares of the weights, 6 by 6.
+/// Variance of `d` for white noise of variance 1: sum of the squared weights, 6 times 6.
 const WEIGHTS: f32 = 36.0;
-/// Share of the newest square in its mean: 40 carrier periods.
+/// Share of the newest square in the mean: 40 carrier periods.
 const SMOOTHING: f32 = 1.0 / 40.0;
-/// What one square counts at most, in units of what is allowed: a step of the current is no noise.
+/// Clamp of one square relative to the allowed mean square, so that a current step does not trip.
 const MOST: f32 = 4.0;
-/// Samples that are looked at for a channel.
+/// Samples per channel and carrier period.
 const LOOKS: usize = 3;
 
-/// Coefficients.
+/// Coefficients of the watch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseWatch {
-    /// Mean square of `d` that is allowed, of the codes of channels a and b.
+    /// Allowed mean square of `d`, channels a and b, in squared converter codes.
     allowed: [f32; 2],
 }
 
@@ -58,18 +59,19 @@ pub struct NoiseWatchState {
     channels: [Channel; 2],
 }
 
-/// Of one sensor.
+/// State of one sensor's watch.
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
-    /// `h` as far as it has come, and those of the last two carrier periods, codes.
+    /// Partial sum of `h`, codes.
     difference: i32,
+    /// `h` of the last two carrier periods, codes.
     last: [i32; 2],
     /// Mean square of `d`.
     level: f32,
 }
 
 impl NoiseWatch {
-    /// For the saliency fixed to the flux, the amplitude of the carrier current, A, and the gains of
+    /// Watch for a flux-fixed saliency, a carrier current of `carrier_a`, A peak, and the `gains` of
     /// channels a and b, A per code.
     pub fn new(flux_saliency: f32, carrier_a: f32, gains: [f32; 2]) -> Self {
         let square = |gain: f32| {
@@ -79,11 +81,11 @@ impl NoiseWatch {
         Self { allowed: gains.map(square) }
     }
 
-    /// Looks at a sample, the `look`-th of six in a carrier period: 0 to 2 in three samples in a row for
-    /// channel a, 3 to 5 as well for channel b.
+    /// Processes a sample, number `look` of six per carrier period: 0 to 2 are three consecutive samples
+    /// for channel a, 3 to 5 for channel b.
     ///
     /// # Errors
-    /// The channel is noisy, which comes out with its third.
+    /// [`Fault::SensorNoisyA`] or [`Fault::SensorNoisyB`], with the third sample of the channel.
     pub fn step(
         &self,
         state: &mut NoiseWatchState,
@@ -112,16 +114,16 @@ impl NoiseWatch {
 }
 
 impl Channel {
-    /// Whether its mean square has passed what is allowed.
+    /// Updates the mean square; returns whether it exceeds the allowed one.
     fn is_noisy(&mut self, allowed: f32) -> bool {
-        // Wrapping: four times four codes fit; a flipped bit may not.
+        // Wrapping guards against a flipped bit; sixteen codes fit.
         let [one, two] = self.last;
         let d = self.difference.wrapping_sub(one.wrapping_mul(2)).wrapping_add(two) as f32;
         self.last = [self.difference, one];
         let (square, most) = (d * d, MOST * allowed);
         let square = if square < most { square } else { most };
         self.level += SMOOTHING * (square - self.level);
-        // Not-a-number is not within the limit.
+        // NaN fails the comparison and counts as noisy.
         let within = self.level <= allowed;
         !within
     }

@@ -1,11 +1,10 @@
-//! Do the current sensors tell the truth? Two checks that need no third sensor.
+//! Plausibility of the current sensors: two checks without a third sensor.
 //!
-//! * The carrier must be seen by both channels, wherever the injection axis has a component along
-//!   the axis of the channel: finds an open or stuck channel.
-//! * The current must follow the applied voltage: the voltage that a first-order model of the motor
-//!   and the back-emf of its rotor flux cannot explain is filtered and must stay small. That finds
-//!   a sensor that lies, an open phase, and an angle or speed that is wrong while the rotor turns
-//!   fast enough for its back-emf to stand out.
+//! * [`CarrierWatch`]: both channels must show the carrier wherever the injection axis has a component
+//!   along their axis. It detects an open or stuck channel.
+//! * [`Prediction`]: the current must follow the applied voltage. The voltage unexplained by a first-order
+//!   model of the motor and the back-emf of its rotor flux is filtered and must stay small. It detects a
+//!   faulty sensor, an open phase, and a wrong angle or speed at speeds with a noticeable back-emf.
 
 use core::f32::consts::TAU;
 
@@ -20,12 +19,12 @@ use crate::tuning::FirstOrder;
 
 /// Share of the expected carrier amplitude below which a channel counts as silent.
 const SILENT: f32 = 0.25;
-/// Least share of the injection along the axis of a channel for the channel to be judged.
+/// Minimum component of the injection axis along the axis of a channel for a judgement.
 const LEAST_SHARE: f32 = 0.4;
-/// Carrier periods in a row that a channel must be silent: 5 ms at 600 Hz.
+/// Consecutive silent carrier periods until the fault: 5 ms at 600 Hz.
 const SILENT_PERIODS: u8 = 3;
 
-/// Watches for the carrier in both channels.
+/// Watch for the carrier in both current channels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CarrierWatch {
     silent: [u8; 2],
@@ -33,19 +32,19 @@ pub struct CarrierWatch {
 }
 
 impl CarrierWatch {
-    /// Once a carrier period: the carrier current in it, the injection axis, and the amplitude of the
-    /// carrier current expected along it, A.
+    /// Evaluates one carrier period: its carrier `current`, the injection `axis` in the stator frame, and
+    /// the `expected` amplitude of the carrier current along that axis, A peak.
     ///
     /// # Errors
-    /// A channel does not see it.
+    /// [`Fault::CarrierMissingA`] or [`Fault::CarrierMissingB`] after three consecutive silent periods.
     pub fn step(
         &mut self,
-        seen: CarrierCurrent,
+        current: CarrierCurrent,
         axis: UnitVector,
         expected: f32,
     ) -> Result<(), Fault> {
-        // Of the axes: what of the injection lies along phases a and b, cos(theta) and cos(theta - 120°);
-        // and of what lies 90° ahead of it.
+        // Components along phases a and b: cos(theta) and cos(theta - 120°) of the injection axis, and
+        // those of the axis 90° ahead of it.
         let phases = |x: f32, y: f32| [x, 0.5 * (SQRT_3 * y - x)];
         let along = phases(axis.cos, axis.sin);
         let across = phases(-axis.sin, axis.cos);
@@ -55,8 +54,8 @@ impl CarrierWatch {
             return Ok(());
         }
         for ((along, across), silent) in along.into_iter().zip(across).zip(&mut self.silent) {
-            let re = along * seen.along.0 + across * seen.across.0;
-            let im = along * seen.along.1 + across * seen.across.1;
+            let re = along * current.along.0 + across * current.across.0;
+            let im = along * current.along.1 + across * current.across.1;
             let due = SILENT * expected * along;
             let judged = along.abs() > LEAST_SHARE;
             let quiet = judged && re * re + im * im < due * due;
@@ -72,29 +71,29 @@ impl CarrierWatch {
     }
 }
 
-/// Coefficients of the comparison of measured and predicted current.
+/// Coefficients of the comparison between measured and predicted current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// 1/k of the motor, V/A.
+    /// 1/k of the current response, V/A.
     per_ampere: f32,
-    /// Pole of the motor.
+    /// Pole of the current response.
     pole: f32,
-    /// What the rotor flux of 1 A of magnetising current adds along it, V/A.
+    /// Voltage along the rotor flux per magnetising current, by its decay, V/A.
     decay: f32,
-    /// What it takes away across it, V/A per electrical turn per period of the rotor.
+    /// Back-emf across the rotor flux, V/A per electrical turn per period of the rotor.
     emf: f32,
-    /// Voltage that may stay unexplained at standstill, V.
+    /// Allowed unexplained voltage at standstill, V peak.
     allowed: f32,
 }
 
-/// The rotor flux in a sample, as the comparison takes it. Frequencies in electrical turns per period.
+/// Rotor flux in a sample. Frequencies in electrical turns per period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFlux {
     /// Magnetising current, A.
     pub magnetising: f32,
     /// Speed of the rotor.
     pub rotor_freq: f32,
-    /// Axis of the flux when the sampled current flowed.
+    /// Axis of the flux when the sampled current flowed, in the stator frame.
     pub axis: UnitVector,
     /// Frequency of the flux.
     pub flux_freq: f32,
@@ -103,29 +102,33 @@ pub struct RotorFlux {
 /// State of the comparison.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PredictionState {
-    /// Sum of the currents since it was judged last, A, and the last one before.
+    /// Sum of the currents since the last comparison, A.
     currents: AlphaBeta,
+    /// Current of the last comparison, A.
     last: AlphaBeta,
-    /// Sum of the computed voltages since they were last taken, and what was taken, V.
+    /// Sum of the voltages since they were last latched, V.
     voltages: AlphaBeta,
+    /// Latched sum of the voltages, V.
     taken: AlphaBeta,
-    /// Voltage of the rotor that is expected in the mean of the samples between, V.
+    /// Expected mean rotor voltage between the comparisons, V.
     rotor: AlphaBeta,
+    /// Filtered unexplained voltage, V.
     unexplained: AlphaBeta,
 }
 
-/// Samples from one comparison to the next: half a carrier period. Over a whole one the carrier would be zero
-/// in the mean, but a sensor that lies would drive the current for twice as long.
+/// Samples between two comparisons: half a carrier period. Over a whole one the carrier would average to
+/// zero, but a faulty sensor would drive the current for twice as long.
 const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
 
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
 const SMOOTHING: f32 = 0.276;
-/// Share of the expected back-emf that may be wrong as well. All of it: 15° of angle error at 2 A
-/// make the flux 1.7 times what the drive believes.
+/// Tolerated error of the expected back-emf as a share of it. 15° of angle error at 2 A make the flux 1.7
+/// times the estimated one.
 const EMF_SHARE: f32 = 1.0;
 
 impl Prediction {
-    /// For a motor, its current response, A/V, and an allowed voltage, V.
+    /// Comparison for a motor with the current response `plant`, A/V, and an allowed unexplained voltage at
+    /// standstill of `allowed_v`, V peak.
     pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32) -> Self {
         let coupled = motor.coupled_inductance();
         Self {
@@ -137,25 +140,23 @@ impl Prediction {
         }
     }
 
-    /// The sample before it is judged: the voltage that the rotor flux adds to the applied one, V,
-    /// (L_m/L_r)(1/tau_r - j w_r) psi.
+    /// Computes the rotor voltage, V, that adds to the applied one, (L_m/L_r)(1/tau_r - j w_r) psi; called
+    /// one sample before [`judge`](Self::judge).
     pub fn expect(&self, state: &mut PredictionState, flux: &RotorFlux) {
         let rotor = Dq {
             d: self.decay * flux.magnetising,
             q: -self.emf * flux.magnetising * flux.rotor_freq,
         };
-        // The middle of the samples lies so far back from here.
+        // Distance from here back to the middle of the samples.
         const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
         state.rotor = rotor.to_alpha_beta(flux.axis.turned_slightly(-MIDDLE * flux.flux_freq));
     }
 
-    /// Every fifth sample: the current, A, which is [collected](PredictionState::collect)
-    /// already.
-    ///
-    /// The mean of the model of a period, `i[k] - p i[k-1] = k_g v[k-2]`, over the five.
+    /// Compares the `current`, A, after it was [collected](PredictionState::collect); called in every fifth
+    /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five.
     ///
     /// # Errors
-    /// The current is not as predicted.
+    /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit.
     pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
@@ -165,22 +166,24 @@ impl Prediction {
         // The two uncertainties are independent: their squares add.
         let allowed =
             self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * state.rotor.length_squared();
-        // (Not-a-number is not within the limit.)
+        // NaN fails the comparison.
         let explained = state.unexplained.length_squared() <= allowed;
         if explained { Ok(()) } else { Err(Fault::CurrentNotAsPredicted) }
     }
 }
 
 impl PredictionState {
-    /// One sample: the current, A, and the voltage just computed, V.
+    /// Adds one sample: the measured `current`, A, and the `computed` voltage of the same step, V, both in
+    /// the stator frame.
     pub fn collect(&mut self, current: AlphaBeta, computed: AlphaBeta) {
         self.currents += current;
         self.voltages += computed;
     }
 
-    /// Two samples before it is judged: what is computed in a sample acts between the next one and the one
-    /// after that, and so explains the current two samples later.
-    pub fn take(&mut self) {
+    /// Latches the sum of the voltages; called two samples before [`Prediction::judge`]. The voltage
+    /// computed in a sample acts from the next sample to the one after, and so determines the current two
+    /// samples later.
+    pub fn latch_voltage(&mut self) {
         self.taken = core::mem::replace(&mut self.voltages, AlphaBeta::ZERO);
     }
 }

@@ -1,12 +1,12 @@
-//! Does the motor have the saliency that the injection lives on? Asked at every start, before there is
-//! torque.
+//! Saliency check: verifies at every start, before torque, that the motor has the saliency that the
+//! injection needs.
 //!
-//! With current in the stator the answer is hidden: the current makes a saliency of its own, along the
-//! flux when there is no torque. So the current is taken away when the flux stands, and while the flux
-//! decays (with the rotor time constant) the carrier, turned to 60° from it, sees the saliency of the
-//! flux alone. (60° and not 45°: the flux lies along phase a, and at multiples of 30° the voltage that
-//! the power stage drops has the direction of the carrier. At 45° a drop of 1.6 V a phase looks like a
-//! saliency of 0.0135.) Then the flux is built up again.
+//! Stator current masks the flux-fixed saliency, since it causes a saliency of its own, along the flux when
+//! there is no torque. The current is therefore removed once the flux is built up. While the flux decays
+//! with the rotor time constant, the carrier, turned to 60° from it, shows the saliency of the flux alone.
+//! (60° instead of 45°: the flux lies along phase a, and at multiples of 30° the voltage drop of the power
+//! stage has the direction of the carrier. At 45° a drop of 1.6 V per phase looks like a saliency of
+//! 0.0135.) Then the flux is built up again.
 
 use crate::io::periods;
 use crate::math::angle::UnitVector;
@@ -15,17 +15,17 @@ use crate::math::frames::SQRT_3;
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SaliencyCheck {
-    /// Control periods until current and averages have settled.
+    /// Settling time of current and averages, control periods.
     settle: u32,
-    /// Control periods to average.
+    /// Averaging time, control periods.
     average: u32,
-    /// Control periods to build the flux up again.
+    /// Time to build the flux up again, control periods.
     restore: u32,
-    /// Least mean saliency, signed as it must be.
+    /// Threshold of the mean saliency, with its sign.
     least: f32,
-    /// 1 / mean saliency of a motor that has what is expected.
+    /// 1 / expected mean saliency.
     per_expected: f32,
-    /// 1 / samples that are averaged.
+    /// 1 / number of averaged samples.
     per_average: f32,
 }
 
@@ -33,37 +33,39 @@ pub struct SaliencyCheck {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SaliencyCheckState {
     sum: f32,
-    /// Saliency of the motor as a share of the expected one, as the last check saw it.
+    /// Measured saliency of the motor relative to the setting; result of the last check.
     pub share: f32,
 }
 
-/// What the drive is to do in this period of the check.
+/// Action of the drive in a control period of the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// No current, the injection turned to 60° from the flux.
+pub enum SaliencyCheckAction {
+    /// Zero current, injection along [`SaliencyCheck::LOOK_AXIS`].
     Look,
-    /// The magnetising current again, the injection where it belongs.
+    /// Magnetising current, injection along its normal axis.
     Restore,
-    /// Go on.
+    /// The check has passed; continue the start.
     Passed,
-    /// There is too little saliency.
+    /// The saliency is too small.
     Failed,
 }
 
-/// Time to settle and to average, s; together below the rotor time constant.
+/// Settling time, s; with [`AVERAGE_S`] below the rotor time constant.
 const SETTLE_S: f32 = 0.020;
+/// Averaging time, s.
 const AVERAGE_S: f32 = 0.120;
-/// The mean over the decaying flux, seen at 60°, as a share of the saliency at nominal flux.
+/// Mean saliency over the decaying flux at 60°, relative to the saliency at nominal flux.
 const SEEN_SHARE: f32 = 0.535;
-/// Least share of the expected saliency. The mean is 0.54 with all of it, 0.27 with half of it, 0.05
-/// with a tenth and 0 with none, each ±0.024 rms by noise of 5 mA: the limit lies in the middle between
-/// a tenth and half, more than four deviations from both. (A longer mean would be of less flux.)
+/// Threshold relative to the saliency of the settings. The mean is 0.54 with the full saliency, 0.27 with
+/// half of it, 0.05 with a tenth and 0 without, each ±0.024 rms by noise of 5 mA. The threshold lies midway
+/// between a tenth and half, more than four standard deviations from both. (A longer average would contain
+/// less flux.)
 const LEAST_SHARE: f32 = 0.161;
-/// Time to build the flux up again, in rotor time constants: it comes back to 5 %.
+/// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
 const RESTORE_T: f32 = 2.4;
 
 impl SaliencyCheck {
-    /// For the saliency fixed to the flux and the rotor time constant, s.
+    /// Check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
     pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
         let average = periods(AVERAGE_S);
         Self {
@@ -76,31 +78,36 @@ impl SaliencyCheck {
         }
     }
 
-    /// The saliency fixed to the flux, at its nominal value, that a finished check has seen.
+    /// Flux-fixed saliency at nominal flux measured by a finished check.
     pub fn seen(&self, state: &SaliencyCheckState) -> f32 {
         state.sum / (SEEN_SHARE * self.average as f32)
     }
 
-    /// The injection axis seen from the flux while looking: a sixth of a turn ahead.
+    /// Injection axis in the flux frame during [`SaliencyCheckAction::Look`]: 60° ahead of the flux.
     pub const LOOK_AXIS: UnitVector = UnitVector { cos: 0.5, sin: 0.5 * SQRT_3 };
 
-    /// Period `elapsed` of the check, with the saliency seen in it.
-    pub fn step(&self, state: &mut SaliencyCheckState, elapsed: u32, q: f32) -> Phase {
+    /// Processes control period `elapsed` of the check with its saliency `q`.
+    pub fn step(
+        &self,
+        state: &mut SaliencyCheckState,
+        elapsed: u32,
+        q: f32,
+    ) -> SaliencyCheckAction {
         let looked = self.settle + self.average;
         if elapsed < self.settle {
             state.sum = 0.0;
-            Phase::Look
+            SaliencyCheckAction::Look
         } else if elapsed < looked {
             state.sum += q;
-            Phase::Look
+            SaliencyCheckAction::Look
         } else if elapsed < looked + self.restore {
             let mean = state.sum * self.per_average;
-            // Beyond the least, on its side of zero. Not-a-number is not.
+            // The mean must exceed the threshold with the same sign; NaN fails.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
             state.share = mean * self.per_expected;
-            if enough { Phase::Restore } else { Phase::Failed }
+            if enough { SaliencyCheckAction::Restore } else { SaliencyCheckAction::Failed }
         } else {
-            Phase::Passed
+            SaliencyCheckAction::Passed
         }
     }
 }

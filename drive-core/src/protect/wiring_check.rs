@@ -1,48 +1,48 @@
-//! Are the sensors where the settings say, and the right way round? Asked once, before there is flux,
+//! Wiring check: verifies assignment and polarity of the current sensors, once, before the flux is built up,
 //! with voltage pulses so short that no current reaches 0.5 A.
 //!
-//! Each leg in turn gets a pulse along its phase, and the same the other way round. Over so short a time
-//! the motor is its transient inductance, so the current of that phase rises to a known height, and
-//! those of the two others to half of it on the other side. A sensor that is right answers the pulse of
-//! its own phase most, and with its sign:
+//! Each phase in turn gets a positive and a negative voltage pulse along its axis. Over so short a time the
+//! motor acts as its transient inductance: the current of that phase rises to a known peak, those of the
+//! two others to half of it with opposite sign. A correct sensor responds most to the pulse of its own
+//! phase, with the sign of the pulse:
 //!
-//! | what is wrong | what is seen |
+//! | error | response |
 //! |---|---|
-//! | sensor or phase open | no answer to any pulse |
-//! | sensor turned round | the largest answer to its own phase, negative |
-//! | sensors exchanged, or legs against sensors | the largest answer to another phase |
+//! | sensor or phase open | none to any pulse |
+//! | sensor reversed | largest to its own phase, negative |
+//! | sensors exchanged, or legs against sensors | largest to another phase |
 //!
-//! Whether the cable exchanges two phases behind the sensors is not seen: a motor at rest is the same
-//! both ways round, it only turns the other way.
+//! Two phases exchanged between sensors and motor are not detected: a motor at rest responds alike, it only
+//! turns the other way.
 //!
-//! # The bound
-//! The pulse is made for [`EXPECTED_A`] with the inductance of the settings. The current is checked at
-//! every sample against what half that inductance gives, and a little for noise. So as long as the
-//! motor has half of the inductance, 0.4 A are not exceeded, whatever the sensors say; with less, a
-//! sensor that works ends it at the next sample: down to a fifth below 0.5 A.
+//! # Current bound
+//! The pulses are designed for [`EXPECTED_A`] with the inductance of the settings. Every sample is checked
+//! against the current that half that inductance gives, plus a margin for noise. A motor with at least half
+//! the inductance therefore stays below 0.4 A, whatever the sensors report. With less inductance, a working
+//! sensor ends the pulse at the next sample, which keeps the current below 0.5 A down to a fifth.
 
 use crate::fault::Fault;
 use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta};
 
-/// Height to which the pulses are made, A.
+/// Peak current of the pulses with the inductance of the settings, A.
 pub const EXPECTED_A: f32 = 0.2;
-/// What half the inductance makes of it, A.
+/// Peak current with half the inductance, A.
 const LARGEST_A: f32 = 2.0 * EXPECTED_A;
-/// Noise, and what is left of the pulse before, A: ten times 5 mA rms.
+/// Margin for noise and the residual current of the previous pulse, A: ten times 5 mA rms.
 const NOISE_A: f32 = 0.05;
-/// Share of [`EXPECTED_A`] below which a sensor sees nothing: half of what twice the inductance gives.
+/// Threshold of a response relative to [`EXPECTED_A`]: half the response with twice the inductance.
 const LEAST_SHARE: f32 = 0.25;
-/// Highest voltage of a pulse, V: what the lowest dc link in use gives; a motor with more inductance
-/// gets a longer pulse. It is far above what the dead time costs (4 V).
+/// Largest voltage of a pulse, V: available at the lowest dc link in use; a larger inductance gets a longer
+/// pulse. It is far above the voltage lost by the dead time (4 V).
 const HIGHEST_V: f32 = 60.0;
-/// Shortest rise, periods: the first sample in it ends it if the current rises too fast.
+/// Shortest rise, periods: its first sample can still end the pulse if the current rises too fast.
 const SHORTEST_RISE: u32 = 2;
-/// Longest, periods: the answer would be the resistance's, no longer the inductance's.
+/// Longest rise, periods: beyond, the resistance dominates the response.
 const LONGEST_RISE: u32 = 60;
-/// Periods of rest after a pulse.
+/// Pause after a pulse, periods.
 const REST: u32 = 8;
-/// Pulses on each phase and sign.
+/// Pulses per phase and sign.
 const ROUNDS: u32 = 2;
 /// Phases times signs.
 const PULSES_PER_ROUND: u32 = 6;
@@ -50,29 +50,34 @@ const PULSES_PER_ROUND: u32 = 6;
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WiringCheck {
-    /// Height of the pulses, V.
+    /// Amplitude of the pulses, V peak.
     volts: f32,
-    /// Periods up, and as many down.
+    /// Duration of the rise and of the fall, periods.
     rise: u32,
 }
 
 /// State of the check.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WiringCheckState {
-    /// Period of the pulse.
+    /// Control period within the pulse.
     period: u32,
     /// Number of the pulse.
     pulse: u32,
-    /// Sum of the answers to pulses on a, b, c: of the sensors a and b, A.
+    /// Summed responses of sensors a and b to the pulses on phases a, b, c, A.
     answers: [[f32; 2]; 3],
 }
 
-/// What the drive is to do in the next period.
+/// Action of the drive in the next control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Next {
-    /// Put this voltage out, V, while this current flows, A.
-    Apply(AlphaBeta, AlphaBeta),
-    /// Go on: the wiring is right.
+pub enum WiringAction {
+    /// Apply a voltage pulse.
+    Apply {
+        /// Voltage in the stator frame, V peak.
+        voltage: AlphaBeta,
+        /// Expected current in the stator frame, A peak, for the dead-time compensation.
+        current: AlphaBeta,
+    },
+    /// The wiring is correct; continue the start.
     Passed,
 }
 
@@ -84,7 +89,7 @@ const AXES: [AlphaBeta; 3] = [
 ];
 
 impl WiringCheck {
-    /// For the transient inductance of the motor, H.
+    /// Check for a motor with the transient inductance `sigma_ls`, H.
     pub fn new(sigma_ls: f32) -> Self {
         let volt_periods = EXPECTED_A * sigma_ls / PERIOD_S;
         let rise = (volt_periods / HIGHEST_V) as u32 + 1;
@@ -93,17 +98,18 @@ impl WiringCheck {
         Self { volts: if volts < HIGHEST_V { volts } else { HIGHEST_V }, rise }
     }
 
-    /// One sample: phase currents, A.
+    /// Processes one sample of the phase currents, A.
     ///
     /// # Errors
-    /// What is wrong with the wiring.
-    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<Next, Fault> {
-        // Of the voltage computed in period n, the sample n + 1 is the first that could know, and the
-        // sample n + 2 does.
+    /// [`Fault::WiringCurrent`] when the current exceeds its bound; after the last pulse
+    /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
+    /// [`Fault::WiringPolarityB`].
+    pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<WiringAction, Fault> {
+        // The voltage computed in period n acts from sample n + 1 on and shows in sample n + 2.
         let risen = state.period.saturating_sub(1);
         let share = if risen < self.rise { risen as f32 / self.rise as f32 } else { 1.0 };
         let allowed = LARGEST_A * share + NOISE_A;
-        // Not-a-number is not below.
+        // NaN fails the comparison.
         if !(phases.a.abs() < allowed && phases.b.abs() < allowed) {
             return Err(Fault::WiringCurrent);
         }
@@ -128,19 +134,19 @@ impl WiringCheck {
             state.period = 0;
             state.pulse += 1;
             if state.pulse >= PULSES_PER_ROUND * ROUNDS {
-                return judge(&state.answers).map_or(Ok(Next::Passed), Err);
+                return judge(&state.answers).map_or(Ok(WiringAction::Passed), Err);
             }
         }
         let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
-        Ok(Next::Apply(axis * volts, axis * flowing))
+        Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
     }
 }
 
-/// What is wrong, by the answers.
+/// Evaluates the responses; the fault, if any.
 fn judge(answers: &[[f32; 2]; 3]) -> Option<Fault> {
     let [a, b, c] = *answers;
     let least = LEAST_SHARE * EXPECTED_A * (2 * ROUNDS) as f32;
-    // What a sensor answers to its own phase and to the two others.
+    // Responses of a sensor to its own phase and to the two others.
     let sensors = [
         ([a[0], b[0], c[0]], Fault::WiringPolarityA),
         ([b[1], a[1], c[1]], Fault::WiringPolarityB),
@@ -172,7 +178,7 @@ mod tests {
             let ends = (0..longest).any(|n| {
                 let current = |k: usize| f32::from_bits(bits[(n as usize + k) % 16]);
                 match check.step(&mut state, Abc::new(current(0), current(1), 0.0)) {
-                    Ok(Next::Apply(voltage, _)) => {
+                    Ok(WiringAction::Apply { voltage, .. }) => {
                         assert!(voltage.length_squared() <= HIGHEST_V * HIGHEST_V * 1.000_1);
                         false
                     }

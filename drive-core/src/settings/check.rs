@@ -1,8 +1,8 @@
-//! The range of every setting.
+//! Range check of every setting.
 
 use super::{AngleSource, Settings, SettingsError};
 use crate::carrier::DemodulatorKind;
-use crate::carrier::demodulator::{LONGEST, SHORTEST};
+use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
 use crate::io::PERIOD_S;
 
 /// The first value outside its range.
@@ -10,9 +10,8 @@ use crate::io::PERIOD_S;
 struct Ranges(Option<SettingsError>);
 
 impl Ranges {
-    /// Not inlined: it is called fifty times, and never in a hurry.
     fn check(&mut self, name: &'static str, value: f32, min: f32, max: f32) {
-        // Not-a-number fails the test.
+        // NaN fails the comparison.
         let inside = value >= min && value <= max;
         if !inside && self.0.is_none() {
             self.0 = Some(SettingsError::Range { name, value, min, max });
@@ -21,7 +20,10 @@ impl Ranges {
 }
 
 impl Settings {
-    /// Every value against its range.
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// [`SettingsError::Range`] with the first value outside its range.
     pub(crate) fn check(&self) -> Result<(), SettingsError> {
         let mut ranges = Ranges::default();
         let mut check = |name, value, min, max| ranges.check(name, value, min, max);
@@ -51,7 +53,7 @@ impl Settings {
         check("scales.encoder_counts", s.encoder_counts as f32, 16.0, 1e7);
 
         let inj = &self.injection;
-        // Without a carrier there is nothing to watch the lock by.
+        // The lock monitor needs a carrier.
         let watched = self.angle_source == AngleSource::Injection
             && inj.demodulator == DemodulatorKind::Synchronous
             && inj.synchronous.monitor;
@@ -62,12 +64,12 @@ impl Settings {
         check("injection.full_reference_iq_a", t.full_reference_iq_a, 0.01, 10.0);
         check("injection.k_s", t.k_s, 0.0, 100.0);
         check("injection.z_s", t.z_s, 0.0, 1.0);
-        let (shortest, longest) = (f32::from(SHORTEST), f32::from(LONGEST));
+        let (shortest, longest) = (f32::from(MIN_RMS_SAMPLES), f32::from(MAX_RMS_SAMPLES));
         check("injection.rms_samples", f32::from(t.rms_samples), shortest, longest);
         let t = &inj.synchronous;
         check("injection.bandwidth_hz", t.bandwidth_hz, 0.1, 30.0);
-        // Towards zero the loop would have no gain; positive, the current's part would work against
-        // the flux's.
+        // Near zero the loop would have no gain. With a positive value the current-dependent part would
+        // oppose the flux-fixed part.
         check("injection.flux_saliency", t.flux_saliency, -0.3, -0.001);
         check("injection.current_saliency", t.current_saliency, -0.3, 0.3);
         check("injection.allowed_loss", t.allowed_loss, 0.3, 0.9);
@@ -75,7 +77,7 @@ impl Settings {
         check("injection.tracked_rpm", t.tracked_rpm, 1.0, 20_000.0);
 
         let l = &self.limits;
-        // The nearest end of either sensor's range: a trip beyond it would never come.
+        // The smaller end of both sensor ranges: a trip level beyond it would never be reached.
         let end = [s.current_a, s.current_b]
             .into_iter()
             .fold(f32::MAX, |end, line| end.min(-line.offset).min(line.at(s.full_scale)));
@@ -89,8 +91,8 @@ impl Settings {
         let q = &self.sequence;
         check("sequence.calibrate_s", q.calibrate_s, 0.001, 10.0);
         check("sequence.precharge_s", q.precharge_s, 0.0, 10.0);
-        // The lock monitor takes its baseline while the flux is built up; the saliency check leaves it
-        // another time to do so.
+        // The lock monitor measures its baseline during magnetisation; with the saliency check also while
+        // the flux is restored.
         let needs_baseline = watched && !inj.synchronous.check;
         check("sequence.magnetise_s", q.magnetise_s, if needs_baseline { 0.5 } else { 0.0 }, 60.0);
         check("sequence.i_d", q.i_d, 0.01, l.current_a);
@@ -100,7 +102,7 @@ impl Settings {
         check("speed.i_q_limit_a", v.i_q_limit_a, 0.01, l.current_a);
         check("speed.limit_rpm", v.limit_rpm, 1.0, l.speed_rpm);
         check("speed.ramp_rpm_per_s", v.ramp_rpm_per_s, 1.0, 1e5);
-        // Below 45° the position loop, which has some 12° less, rings; the zero leaves 76° at most.
+        // Below 45° the position loop, with some 12° less, rings; the zero allows 76° at most.
         check("speed.phase_margin_deg", v.phase_margin_deg, 45.0, 70.0);
         ranges.0.map_or(Ok(()), Err)
     }

@@ -1,10 +1,10 @@
-//! The settings that what was learned on a motor depends on.
+//! The settings on which the results of a learning depend.
 
 use super::Settings;
 
 impl Settings {
-    /// Whether what was learned with `other` set would be learned with these as well.
-    pub fn learns_as(&self, other: &Self) -> bool {
+    /// Whether results learned with the settings `other` are valid for these settings, too.
+    pub fn shares_learning_with(&self, other: &Self) -> bool {
         self.learning_depends_on() == other.learning_depends_on()
     }
 
@@ -54,7 +54,7 @@ mod tests {
         let changed = |change: fn(&mut Settings)| {
             let mut settings = Settings::default();
             change(&mut settings);
-            settings.learns_as(&Settings::default())
+            settings.shares_learning_with(&Settings::default())
         };
         let same: [fn(&mut Settings); 6] = [
             |_| {},

@@ -1,15 +1,24 @@
-//! Tables over the torque current: the reference of the saliency, and the carrier current.
+//! Tables over the torque current: reference of the saliency, and carrier current.
 
 use core::fmt;
 
-/// Points of the tables, from i_q = 0 on.
+/// Number of points of a table, from i_q = 0 on.
 pub const POINTS: usize = 16;
-/// Their distance, A.
+/// Distance of the points, A.
 pub const STEP_A: f32 = 0.25;
-/// Largest saliency that is believed.
+/// Largest accepted saliency.
 const LARGEST: f32 = 0.3;
 
-/// The reference of `q` over i_q, odd.
+/// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last.
+///
+/// ```
+/// use drive_core::settings::table::ReferenceTable;
+///
+/// let table = ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.02), (2.0, 0.03)])?;
+/// assert!((table.at(0.5) - 0.01).abs() < 1e-6 && (table.at(-1.5) + 0.025).abs() < 1e-6);
+/// assert_eq!(table.at(3.5), 0.03);
+/// # Ok::<(), drive_core::settings::table::TableError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceTable {
     q: [f32; POINTS],
@@ -22,9 +31,9 @@ pub enum TableError {
     TooShort,
     /// The first point is not 0 at i_q = 0: the table would not be odd.
     NotOdd,
-    /// The currents do not increase strictly, or are not finite, from this point on.
+    /// The current of this point is not above the previous one, or not finite.
     NotIncreasing(usize),
-    /// A value beyond ±0.3, or not finite, at this point.
+    /// The value of this point is beyond ±0.3, or not finite.
     TooLarge(usize, f32),
 }
 
@@ -44,7 +53,8 @@ impl fmt::Display for TableError {
 impl core::error::Error for TableError {}
 
 impl ReferenceTable {
-    /// From points `(i_q in A, q)`, i_q = 0 first; linear between them, constant beyond the last.
+    /// Table from points `(i_q in A, q)` with increasing i_q, (0, 0) first; linear between them, constant
+    /// beyond the last.
     ///
     /// # Errors
     /// See [`TableError`].
@@ -57,7 +67,7 @@ impl ReferenceTable {
             return Err(TableError::TooShort);
         }
         for (n, pair) in points.windows(2).enumerate() {
-            // Not-a-number fails the tests.
+            // NaN fails the comparisons.
             if !(pair[1].0 > pair[0].0 && pair[1].0.is_finite()) {
                 return Err(TableError::NotIncreasing(n + 1));
             }
@@ -69,18 +79,19 @@ impl ReferenceTable {
         Ok(Self { q: sampled(points) })
     }
 
-    /// From its values at multiples of [`STEP_A`]; none when the first is not 0 or any is beyond ±0.3.
-    pub fn of_points(q: [f32; POINTS]) -> Option<Self> {
+    /// Table from its values at multiples of [`STEP_A`]; `None` when the first is not 0 or any is beyond
+    /// ±0.3.
+    pub fn from_points(q: [f32; POINTS]) -> Option<Self> {
         let believable = q.iter().all(|q| (-LARGEST..=LARGEST).contains(q));
         (q[0] == 0.0 && believable).then_some(Self { q })
     }
 
-    /// Its values at multiples of [`STEP_A`].
+    /// The values at multiples of [`STEP_A`].
     pub fn points(&self) -> &[f32; POINTS] {
         &self.q
     }
 
-    /// The reference at a quadrature current, A.
+    /// Reference at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> f32 {
         odd(i_q, between(&self.q, place(i_q)))
     }
@@ -98,8 +109,8 @@ impl Default for ReferenceTable {
     }
 }
 
-/// A table of the line through points `(i_q in A, value)`, of which there are two at least and whose
-/// currents increase; constant beyond the last.
+/// Samples the line through `points` `(i_q in A, value)` at multiples of [`STEP_A`]; constant beyond the
+/// last. At least two points with increasing currents.
 pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
     core::array::from_fn(|n| {
         let i_q = n as f32 * STEP_A;
@@ -110,8 +121,8 @@ pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
     })
 }
 
-/// The interval of the tables in which a current lies, A, and the share of it that is past. The last
-/// value is held beyond the end.
+/// Interval of the tables that contains |i_q|, A, and the position in it, 0 to 1. The last value is held
+/// beyond the end.
 pub(crate) fn place(i_q: f32) -> (usize, f32) {
     let x = i_q.abs() * (1.0 / STEP_A);
     // Saturating cast.
@@ -120,19 +131,20 @@ pub(crate) fn place(i_q: f32) -> (usize, f32) {
     (n, if past < 1.0 { past } else { 1.0 })
 }
 
-/// The value at a [`place`] of a table.
+/// Linear interpolation of a table at a [`place`].
 pub(crate) fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
     table[n] + (table[n + 1] - table[n]) * past
 }
 
+/// Odd continuation: the sign of `i_q` on the value `q` at |i_q|.
 pub(crate) fn odd(i_q: f32, q: f32) -> f32 {
     if i_q < 0.0 { -q } else { q }
 }
 
-/// Range of a believable ratio.
+/// Accepted range of the ratio.
 const RATIO: (f32, f32) = (0.5, 2.0);
 
-/// The carrier current over i_q, as a ratio to that at i_q = 0; even.
+/// Carrier current over i_q as a ratio to that at i_q = 0; even.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarrierTable {
     ratio: [f32; POINTS],
@@ -140,7 +152,7 @@ pub struct CarrierTable {
 
 impl CarrierTable {
     /// From its values at multiples of [`STEP_A`]; none when the first is not 1 or any is out of range.
-    pub fn of_points(ratio: [f32; POINTS]) -> Option<Self> {
+    pub fn from_points(ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
@@ -182,12 +194,12 @@ mod tests {
     #[test]
     fn a_carrier_table_begins_with_one_and_has_believable_ratios() {
         let mut ratio = [1.1; POINTS];
-        assert_eq!(CarrierTable::of_points(ratio), None);
+        assert_eq!(CarrierTable::from_points(ratio), None);
         ratio[0] = 1.0;
-        assert_eq!(CarrierTable::of_points(ratio).map(|t| *t.points()), Some(ratio));
+        assert_eq!(CarrierTable::from_points(ratio).map(|t| *t.points()), Some(ratio));
         for wrong in [0.49, 2.1, f32::NAN] {
             ratio[15] = wrong;
-            assert_eq!(CarrierTable::of_points(ratio), None, "{wrong}");
+            assert_eq!(CarrierTable::from_points(ratio), None, "{wrong}");
         }
     }
 }

@@ -5,8 +5,8 @@ mod differences;
 
 use drive_core::filter::dissertation::LPF;
 use drive_core::tuning::{
-    CurrentLoopDesign, DELAY, FirstOrder, Rule, design_current_loop, motor_plant, pi_response,
-    rule_3_8,
+    CurrentLoopDesign, DELAY, FirstOrder, RuleDesign, design_current_loop, motor_plant,
+    pi_response, rule_3_8,
 };
 use num_complex::Complex64;
 
@@ -98,7 +98,7 @@ fn hz(v: f64) -> f64 {
     v / std::f64::consts::TAU
 }
 
-fn w_plane(plant: FirstOrder, rule: Rule) -> Figure {
+fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
     let one = Complex64::ONE;
     let g = |w: f64| plant.response(w);
     let integrated = |w: f64| plant.response(w) / (Complex64::cis(w) - one);
@@ -118,7 +118,7 @@ fn w_plane(plant: FirstOrder, rule: Rule) -> Figure {
         .panel(phase.y_range(-360.0, 0.0).with(at(-360.0, 0.0)))
 }
 
-fn rule_table(rules: &[(Identified, Rule)]) -> Table {
+fn rule_table(rules: &[(Identified, RuleDesign)]) -> Table {
     let heads = ["plant", "", "crossover v (Hz)", "zc = pf", "kc (V/A)", "phase of L at v (°)"];
     let mut table = Table::new("Rule of section 3.8", &heads);
     for (Identified { name, plant, printed, .. }, rule) in rules {

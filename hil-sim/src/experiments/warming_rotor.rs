@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::identify::online::{Doubt, Online, SAMPLE_S, Speed, Tracked};
+use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 use drive_core::{Command, Mode};
 
 use crate::config::{AngleSource, Config};
@@ -44,7 +44,7 @@ pub struct WarmingMoment {
     /// True speed, electrical rad/s.
     pub omega_m: f64,
     /// The online estimate.
-    pub estimate: Result<Tracked, Doubt>,
+    pub estimate: Result<RotorEstimate, NoEstimate>,
     /// Model D from the same least squares.
     pub model_d: Estimate,
     /// Mean of the flux angle error, degrees.
@@ -100,7 +100,7 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         }
         let telemetry = rig.drive.telemetry();
         let seen = telemetry.rotor_freq * (TAU * RATE_HZ) as f32;
-        let speed = if encoder { Speed::Known(seen) } else { Speed::Guess(seen) };
+        let speed = if encoder { SpeedInput::Known(seen) } else { SpeedInput::Guess(seen) };
         let estimate = online.refine(telemetry.reference, speed);
         if let (true, Ok(tracked)) = (case.used, &estimate) {
             rig.command(&Command::RotorTimeConstant(tracked.tau_r))?;

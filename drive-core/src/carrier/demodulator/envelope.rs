@@ -1,18 +1,18 @@
 //! Envelope detection after C. Fritsch, A. Ibanez and M. Parrilla, "A digital envelope detection filter
 //! for real-time operation", IEEE Trans. Instrum. Meas. 48(6), 1999.
 //!
-//! Two samples of a sinusoid that are a known phase `x` apart are two equations for its amplitude and
-//! phase; the amplitude, that of the analytic signal, is
+//! Two samples of a sinusoid a known phase `x` apart determine its amplitude and phase. The amplitude,
+//! that of the analytic signal, is
 //!
 //! ```text
 //! E^2 = ( u[k]^2 + u[k-m]^2 - 2 u[k] u[k-m] cos x ) / sin^2 x
 //! ```
 //!
-//! The source takes neighbours; here they are two samples apart, 72°: the nearest to the 90° at which
-//! noise is least. Both currents pass the band-pass first, and the difference of their envelopes is
-//! averaged over one carrier period: what still leaks of the fundamental is ripple at 600 Hz and
-//! 1200 Hz (the "spurious oscillations" of section 5.2), where this average has its zeros. So no
-//! post-processing filter is needed, and its 24 samples of delay are saved.
+//! The source takes neighbouring samples. Here they are two samples apart, 72°: closest to the 90° at
+//! which the noise is lowest. Both currents pass the band-pass first, and the difference of their
+//! envelopes is averaged over one carrier period. The residual leakage of the fundamental is ripple at
+//! 600 Hz and 1200 Hz (the "spurious oscillations" of section 5.2), where this average has zeros. No
+//! post-processing filter is needed, which saves its delay of 24 samples.
 
 use super::{BandPass, Demodulate};
 use crate::carrier::CarrierSample;
@@ -20,12 +20,12 @@ use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::filter::moving_sum::MovingSum;
 use crate::math::frames::DmQm;
 
-/// Samples between the two.
+/// Distance of the two samples.
 const APART: usize = 2;
-/// Units per ampere in the sum.
+/// Units per ampere in the moving sum.
 const UNITS: f32 = 131_072.0;
 
-/// The difference of the envelopes of i_dm and i_qm, A.
+/// Demodulator with output envelope(i_dm) - envelope(i_qm), A peak.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Envelope {
     band_pass: BandPass,
@@ -35,7 +35,7 @@ pub struct Envelope {
 }
 
 impl Demodulate for Envelope {
-    type Seen = f32;
+    type Output = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let now = self.band_pass.step_rotated(sample);
@@ -48,7 +48,7 @@ impl Demodulate for Envelope {
     }
 }
 
-/// Amplitude of a sinusoid from two of its samples.
+/// Amplitude of a sinusoid at the carrier frequency from two samples [`APART`] apart.
 fn envelope(now: f32, before: f32) -> f32 {
     let square = now * now + before * before - 2.0 * CARRIER_COS[APART] * (now * before);
     libm::sqrtf(square) * (1.0 / CARRIER_SIN[APART])

@@ -1,18 +1,18 @@
 //! The chain of section 3.4 (Figure 20): band-pass, rotation into the dm-qm frame, difference,
 //! post-processing low-pass.
 
-use super::{BandPass, Demodulate, Post};
+use super::{BandPass, Demodulate, PostFilter};
 use crate::carrier::CarrierSample;
 use crate::math::frames::DmQm;
 
-/// `i_dm - i_qm`, A, as printed. The post-processing filter takes the 600 Hz out again (-76 dB):
-/// what is left is the fundamental that leaks through the band-pass (-40 dB at dc), which says
-/// nothing about the flux. Kept to show just that (Figure 19); it cannot track.
+/// Demodulator with output `i_dm - i_qm`, A, as printed. The post-processing filter removes the 600 Hz
+/// (-76 dB); the rest is the fundamental that leaks through the band-pass (-40 dB at dc) and carries no
+/// information on the flux. Kept to demonstrate this (Figure 19); it cannot track.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Literal(Chain);
 
-/// `|i_dm| - |i_qm|`, A: sees the saliency. Biased by the same leak, and by the group delay of the
-/// band-pass at speed.
+/// Demodulator with output `|i_dm| - |i_qm|`, A, which contains the saliency. Biased by the same leakage,
+/// and at speed by the group delay of the band-pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rectified(Chain);
 
@@ -20,7 +20,7 @@ pub struct Rectified(Chain);
 #[derive(Clone, Copy, Debug, Default)]
 struct Chain {
     band_pass: BandPass,
-    post: Post,
+    post: PostFilter,
 }
 
 impl Chain {
@@ -31,7 +31,7 @@ impl Chain {
 }
 
 impl Demodulate for Literal {
-    type Seen = f32;
+    type Output = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         self.0.step(sample, |i| i.dm - i.qm)
@@ -39,7 +39,7 @@ impl Demodulate for Literal {
 }
 
 impl Demodulate for Rectified {
-    type Seen = f32;
+    type Output = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         self.0.step(sample, |i| i.dm.abs() - i.qm.abs())

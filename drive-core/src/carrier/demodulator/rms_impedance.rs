@@ -1,69 +1,67 @@
-//! The estimator of J.-I. Ha and S.-K. Sul (1997) as the dissertation describes it (section 2.4,
+//! Impedance estimator of J.-I. Ha and S.-K. Sul (1997) as the dissertation describes it (section 2.4,
 //! Figure 10).
 //!
-//! The carrier lies along the flux (`theta = phi`, Eq. 2.12). Rms values of injected voltage and current
-//! over the last `n` samples give the impedances of the two channels; their difference is zero where
-//! the carrier lies on an axis of the saliency:
+//! The carrier lies along the flux (`theta = phi`, Eq. 2.12). Rms values of injected voltage and carrier
+//! current over the last `n` samples give the impedances of the two channels. Their difference is zero
+//! when the carrier lies on an axis of the saliency:
 //!
 //! ```text
 //! Z_dm = rms(v_dm) / rms(i_dm)     Z_qm = rms(v_qm) / rms(i_qm)     error = F3 (Z_dm - Z_qm)
 //! ```
 //!
 //! No source gives F3 or the length of the rms filters. Here F3 is the post-processing filter of
-//! section 3.10, once, behind the difference, which is the same as on either impedance. Lengths that are
-//! whole half periods of the carrier (5 samples) have no ripple before it. A step of the angle changes
-//! the inverse of an rms value, so large steps are answered unevenly; within a few degrees the delay
-//! is that of band-pass, rms filter, (n - 1)/2, and F3.
+//! section 3.10, applied once to the difference, which equals applying it to both impedances. Lengths of
+//! whole half carrier periods (5 samples) cause no ripple. A step of the angle changes the inverse of an
+//! rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum of
+//! band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::{BandPass, Demodulate, Post};
+use super::{BandPass, Demodulate, PostFilter};
 use crate::carrier::CarrierSample;
 use crate::filter::moving_sum::MovingSum;
 
-/// Least and largest length of the rms filters, samples. One sample alone may lie on a zero of the
-/// current.
-pub const SHORTEST: u8 = 2;
-/// See [`SHORTEST`].
-pub const LONGEST: u8 = 60;
+/// Minimum length of the rms filters, samples. A single sample may lie on a zero of the current.
+pub const MIN_RMS_SAMPLES: u8 = 2;
+/// Maximum length of the rms filters, samples.
+pub const MAX_RMS_SAMPLES: u8 = 60;
 
 /// Units per square ampere in the sums: 2^19.
 const UNITS: f32 = 524_288.0;
-/// Largest square that is taken in; sixty of them fit the sum.
+/// Upper clamp of a square, in A^2 or [`VOLTS`]^2; sixty of them fit the sum.
 const LARGEST: f32 = 60.0;
-/// The voltage is squared in units of 32 V: then it needs as many bits as the current.
+/// Voltage unit of the squares, V: the voltage then needs as many bits as the current.
 const VOLTS: f32 = 32.0;
-/// Least mean square of the current from which an impedance is made, in units: 3 mA rms.
+/// Minimum mean square of the current for a valid impedance, in units: 3 mA rms.
 const LEAST: i32 = 5;
 
-/// The difference of the impedances of the dm and the qm channel, ohm; 0 where there is no carrier
-/// current.
+/// Demodulator with output F3 (Z_dm - Z_qm), ohm; the difference counts as 0 without carrier current.
 #[derive(Clone, Copy, Debug)]
 pub struct RmsImpedance {
     band_pass: BandPass,
-    squares: MovingSum<3, { LONGEST as usize }>,
+    squares: MovingSum<3, { MAX_RMS_SAMPLES as usize }>,
     length: u8,
     index: u8,
-    f3: Post,
+    f3: PostFilter,
 }
 
 impl RmsImpedance {
-    /// With rms filters of this many samples, taken as [`SHORTEST`] to [`LONGEST`].
+    /// At rest, with rms filters of `samples`, clamped to [`MIN_RMS_SAMPLES`] to [`MAX_RMS_SAMPLES`].
     pub fn new(samples: u8) -> Self {
         Self {
             band_pass: BandPass::default(),
             squares: MovingSum::default(),
-            length: samples.clamp(SHORTEST, LONGEST),
+            length: samples.clamp(MIN_RMS_SAMPLES, MAX_RMS_SAMPLES),
             index: 0,
-            f3: Post::default(),
+            f3: PostFilter::default(),
         }
     }
 }
 
 impl Demodulate for RmsImpedance {
-    type Seen = f32;
+    type Output = f32;
 
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let i = self.band_pass.step_rotated(sample);
-        // The carrier's voltage lies on the bisector: the same share in both channels.
+        // The carrier voltage lies on the bisector: equal components in both channels.
         let v = sample.carrier.voltage * (core::f32::consts::FRAC_1_SQRT_2 / VOLTS);
         let squares = [i.dm, i.qm, v].map(|x| {
             let square = x * x;

@@ -1,13 +1,13 @@
 //! Where the printed numbers do not follow from the printed parameters.
 
-use drive_core::tuning::{FirstOrder, IntegratorLag, Motor};
+use drive_core::tuning::{EquivalentCircuit, FirstOrder, IntegratorLag};
 
 use super::PERIOD_S;
 use crate::experiments::bode::{RATE, largest_pole};
 use crate::outcome::{Cell, Table};
 
 /// The printed values beside those that the printed parameters give.
-pub fn table(motor: &Motor, physical: FirstOrder) -> Table {
+pub fn table(motor: &EquivalentCircuit, physical: FirstOrder) -> Table {
     let l_r = motor.l_m + motor.l_lr;
     let l_s = motor.l_m + motor.l_ls;
     let ratio = motor.l_m / l_r;
