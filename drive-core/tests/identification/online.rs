@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::identify::online::{Doubt, Online, Speed, Tracked};
+use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SpeedInput};
 use drive_core::io::PERIOD_S;
 use drive_core::{AlphaBeta, Dq, Settings};
 use num_complex::Complex64;
@@ -79,7 +79,7 @@ impl Bench {
     }
 
     /// A tenth of a second, then a step of the fit.
-    fn call(&mut self, speed: Speed) -> Result<Tracked, Doubt> {
+    fn call(&mut self, speed: SpeedInput) -> Result<RotorEstimate, NoEstimate> {
         for _ in 0..CALL {
             let (measured, realised) = self.period();
             self.online.push(measured, realised);
@@ -87,13 +87,13 @@ impl Bench {
         self.online.refine(CURRENT, speed)
     }
 
-    fn calls(&mut self, count: usize, speed: Speed) -> Result<Tracked, Doubt> {
+    fn calls(&mut self, count: usize, speed: SpeedInput) -> Result<RotorEstimate, NoEstimate> {
         (0..count).map(|_| self.call(speed)).last().unwrap()
     }
 }
 
-fn known() -> Speed {
-    Speed::Known(OMEGA_M as f32)
+fn known() -> SpeedInput {
+    SpeedInput::Known(OMEGA_M as f32)
 }
 
 /// Default settings without saliency, and their motor.
@@ -129,10 +129,10 @@ fn with_a_flux_that_moves_the_speed_is_found_too() {
     machine.rate *= 1.2;
     for guess in [OMEGA_M - 2.0, OMEGA_M + 2.0] {
         let mut bench = Bench::new(&settings, machine);
-        let still = bench.calls(40, Speed::Guess(guess as f32));
-        assert_eq!(still, Err(Doubt::PoorExcitation), "speed and slip look the same");
+        let still = bench.calls(40, SpeedInput::Guess(guess as f32));
+        assert_eq!(still, Err(NoEstimate::PoorExcitation), "speed and slip look the same");
         bench.excitation = 1.2;
-        let found = bench.calls(60, Speed::Guess(guess as f32)).unwrap();
+        let found = bench.calls(60, SpeedInput::Guess(guess as f32)).unwrap();
         assert!(near(found.tau_r, 1.0 / machine.rate, 0.01), "{found:?}");
         assert!(near(found.omega_m, OMEGA_M, 0.003), "{found:?}");
     }
@@ -156,12 +156,15 @@ fn it_speaks_after_three_seconds_and_again_three_seconds_after_a_transient() {
     let (settings, machine) = plain();
     let mut bench = Bench::new(&settings, machine);
     for _ in 0..2 {
-        assert_eq!(bench.calls(29, known()), Err(Doubt::Settling));
+        assert_eq!(bench.calls(29, known()), Err(NoEstimate::Settling));
         bench.call(known()).unwrap();
         // 3 rad/s count as another machine.
-        assert!(bench.call(Speed::Known((OMEGA_M + 2.9) as f32)).is_ok());
+        assert!(bench.call(SpeedInput::Known((OMEGA_M + 2.9) as f32)).is_ok());
         bench.calls(60, known()).unwrap();
-        assert_eq!(bench.call(Speed::Known((OMEGA_M - 3.4) as f32)), Err(Doubt::Transient));
+        assert_eq!(
+            bench.call(SpeedInput::Known((OMEGA_M - 3.4) as f32)),
+            Err(NoEstimate::Transient)
+        );
         bench.online = Online::new(&settings).unwrap();
     }
     // 0.175 A, a quarter of the magnetising current, do so too; in either axis.
@@ -173,7 +176,7 @@ fn it_speaks_after_three_seconds_and_again_three_seconds_after_a_transient() {
             bench.online.push(measured, realised);
             let other = bench.online.refine(CURRENT + axis * step, known());
             assert_eq!(other.is_ok(), steady, "{step} {axis:?}");
-            assert_eq!(other.err(), (!steady).then_some(Doubt::Transient));
+            assert_eq!(other.err(), (!steady).then_some(NoEstimate::Transient));
             assert_eq!(bench.calls(29, known()).is_ok(), steady, "forgotten after a step");
             bench.call(known()).unwrap();
         }
@@ -198,7 +201,7 @@ fn what_does_not_tell_the_rotor_gives_no_estimate() {
             bench.online.push(measured, realised * 1e6);
         }
         let found = bench.online.refine(CURRENT, known());
-        assert_eq!(found.err(), (!enough).then_some(Doubt::PoorExcitation), "{lost}");
+        assert_eq!(found.err(), (!enough).then_some(NoEstimate::PoorExcitation), "{lost}");
     }
     // Not a number: it begins anew.
     for (bad, none) in [(AlphaBeta::new(f32::NAN, 0.0), AlphaBeta::ZERO)]
@@ -208,23 +211,23 @@ fn what_does_not_tell_the_rotor_gives_no_estimate() {
         let mut bench = Bench::new(&settings, machine);
         bench.calls(40, known()).unwrap();
         bench.online.push(bad, none);
-        assert_eq!(bench.calls(29, known()), Err(Doubt::Settling));
+        assert_eq!(bench.calls(29, known()), Err(NoEstimate::Settling));
         bench.call(known()).unwrap();
     }
     for (current, speed) in
-        [(CURRENT, Speed::Known(f32::NAN)), (Dq::new(f32::INFINITY, 0.0), known())]
+        [(CURRENT, SpeedInput::Known(f32::NAN)), (Dq::new(f32::INFINITY, 0.0), known())]
     {
         let mut bench = Bench::new(&settings, machine);
         bench.calls(40, known()).unwrap();
-        assert_eq!(bench.online.refine(current, speed), Err(Doubt::Transient));
-        assert_eq!(bench.calls(29, known()), Err(Doubt::Settling));
+        assert_eq!(bench.online.refine(current, speed), Err(NoEstimate::Transient));
+        assert_eq!(bench.calls(29, known()), Err(NoEstimate::Settling));
         bench.call(known()).unwrap();
     }
 }
 
 #[test]
 fn what_no_motor_of_these_settings_has_is_not_believed() {
-    let unbelievable = Some(Doubt::Unbelievable);
+    let unbelievable = Some(NoEstimate::Unbelievable);
     for (rotor, stator, doubt) in [
         (1.0 / 1.85, 1.0, None),
         (1.0 / 2.2, 1.0, unbelievable),
@@ -238,7 +241,7 @@ fn what_no_motor_of_these_settings_has_is_not_believed() {
         machine.r_s *= stator;
         machine.omega_m = 12.6;
         let mut bench = Bench::new(&settings, machine);
-        let seen: Vec<_> = (0..130).map(|_| bench.call(Speed::Known(12.6)).err()).collect();
+        let seen: Vec<_> = (0..130).map(|_| bench.call(SpeedInput::Known(12.6)).err()).collect();
         assert!(seen.contains(&doubt), "{rotor} {stator}");
         // (On its way to a resistance that is out of range, the fit passes others.)
         assert!(doubt.is_none() || rotor == 1.0 || !seen.contains(&None), "{rotor} {stator}");
@@ -249,14 +252,14 @@ fn what_no_motor_of_these_settings_has_is_not_believed() {
 #[test]
 fn the_uncertainty_is_that_of_the_noise() {
     let (settings, machine) = plain();
-    let estimates: Vec<Tracked> = (1..=12)
+    let estimates: Vec<RotorEstimate> = (1..=12)
         .map(|seed| {
             let mut bench = Bench::new(&settings, machine);
             (bench.noise, bench.random) = (0.1, seed * 12_345);
             bench.calls(40, known()).unwrap()
         })
         .collect();
-    let mean = |value: &dyn Fn(&Tracked) -> f64| {
+    let mean = |value: &dyn Fn(&RotorEstimate) -> f64| {
         estimates.iter().map(value).sum::<f64>() / estimates.len() as f64
     };
     let tau_r = mean(&|e| e.tau_r.into());
