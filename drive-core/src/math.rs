@@ -1,7 +1,6 @@
 //! Angles, vectors with their reference frames, and decimal output.
 
 pub mod angle;
-pub mod decimal;
 pub mod frames;
 
 /// `value` clamped to ±`largest`; NaN stays NaN.

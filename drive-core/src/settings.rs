@@ -13,7 +13,6 @@ pub mod table;
 
 use core::fmt;
 
-use crate::math::decimal::Shortest;
 use crate::tuning::{FirstOrder, TuningError};
 
 pub use hardware::{Inverter, Line, Scales};
@@ -187,7 +186,6 @@ impl fmt::Display for SettingsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Range { name, value, min, max } => {
-                let [value, min, max] = [value, min, max].map(|x| Shortest(*x));
                 write!(f, "{name} = {value}: allowed is {min} to {max}")
             }
             Self::Tuning(error) => write!(f, "controllers: {error}"),

@@ -35,7 +35,6 @@ use core::fmt;
 
 use crate::filter::dissertation::LPF;
 use crate::filter::section::{Section, response};
-use crate::math::decimal::{Fixed, Shortest};
 use num_complex::Complex64;
 
 mod margins;
@@ -145,15 +144,14 @@ impl fmt::Display for TuningError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfRange { name, value, min, max } => {
-                let [value, min, max] = [value, min, max].map(|x| Shortest(*x as f32));
+                // Settings are f32: their digits, not those of the f64 they became.
+                let [value, min, max] = [value, min, max].map(|x| *x as f32);
                 write!(f, "{name} = {value}: must be above {min} and below {max}")
             }
             Self::NoCrossover { crossover_hz, zero_hz } => write!(
                 f,
-                "crossover on the motor's plant = {} Hz: must be above the controller's zero at {} Hz; \
-                 does the identified plant belong to this motor?",
-                Fixed::<2>(*crossover_hz as f32),
-                Fixed::<2>(*zero_hz as f32),
+                "crossover on the motor's plant = {crossover_hz:.2} Hz: must be above the controller's zero at \
+                 {zero_hz:.2} Hz; does the identified plant belong to this motor?",
             ),
         }
     }

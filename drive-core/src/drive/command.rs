@@ -3,7 +3,6 @@
 use crate::drive::coefficients::Coefficients;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
-use crate::math::decimal::Shortest;
 use crate::math::frames::Dq;
 
 /// A command to the drive; see [`Drive::command`](crate::Drive::command) for the refusals.
@@ -91,7 +90,6 @@ impl core::fmt::Display for Refused {
             Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),
             Self::OutOfRange { min, max } => {
-                let (min, max) = (Shortest(*min), Shortest(*max));
                 write!(f, "the value is outside the allowed range {min} to {max}")
             }
         }

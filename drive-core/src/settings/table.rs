@@ -2,8 +2,6 @@
 
 use core::fmt;
 
-use crate::math::decimal::Shortest;
-
 /// Number of points of a table, from i_q = 0 on.
 pub const POINTS: usize = 16;
 /// Distance of the points, A.
@@ -46,8 +44,7 @@ impl fmt::Display for TableError {
             Self::NotOdd => write!(f, "point 0 must be 0 at 0 A: the table is odd"),
             Self::NotIncreasing(n) => write!(f, "point {n}: the currents must increase strictly"),
             Self::TooLarge(n, q) => {
-                let (q, largest) = (Shortest(*q), Shortest(LARGEST));
-                write!(f, "point {n}: {q} is outside -{largest} to {largest}")
+                write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}")
             }
         }
     }

@@ -34,7 +34,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
     let mut roots = [Complex64::ONE; N];
     let mut power = Complex64::new(bound, 0.0);
     for r in &mut roots {
-        power = power * seed;
+        power *= seed;
         *r = power;
     }
     for _ in 0..1000 {
@@ -48,7 +48,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
             let mut others = Complex64::ONE;
             for (j, other) in roots.iter().enumerate() {
                 if j != i {
-                    others = others * (here - *other);
+                    others *= here - *other;
                 }
             }
             if others == Complex64::default() {

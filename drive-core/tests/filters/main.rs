@@ -21,3 +21,8 @@ fn largest_distance(one: impl Fn(f64) -> Complex64, other: impl Fn(f64) -> Compl
         .map(|n| PI * f64::from(n) / 6000.0)
         .fold(0.0, |m, w| m.max((one(w) - other(w)).norm()))
 }
+
+/// Magnitude in dB.
+fn db(response: Complex64) -> f64 {
+    20.0 * libm::log10(response.norm())
+}

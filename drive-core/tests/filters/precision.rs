@@ -6,6 +6,7 @@ use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
 use drive_core::filter::section::Section;
 use drive_core::filter::sos::{Sos, SosState};
 
+use super::db;
 use super::printed::{Direct32, Direct64, Printed, TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
 use super::{RATE, largest_distance, rad};
 
@@ -119,7 +120,7 @@ fn single_precision_direct_form_is_useless() {
 fn rounding_the_printed_coefficients() {
     let w = rad(600.0);
     let single = TABLE_7_LPF.rounded();
-    let notch = single.response(w).norm().log10() * 20.0;
+    let notch = db(single.response(w));
     let moved = largest_distance(|w| single.response(w), |w| TABLE_7_LPF.response(w));
     let pp_dc = TABLE_8_PP.rounded().response(0.0).re;
     println!(

@@ -133,7 +133,7 @@ impl Cpu {
                 let instructions = cost_of(&mut lengths, uc, address as u32, size);
                 let watched = uc.get_data().watched.as_ref();
                 if let Some(watched) = watched {
-                    let own = watched.has(address as u32);
+                    let own = watched.counts(address as u32);
                     let cycles =
                         if own { cost_of(&mut costs, uc, address as u32, size) } else { 0 };
                     uc.get_data_mut().watch(address as u32, size, cycles);

@@ -62,7 +62,7 @@ impl Ud {
     pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
         for j in (1..N).rev() {
             for i in 0..j {
-                x[i] = x[i] - self.u[above(i, j)] * x[j];
+                x[i] -= self.u[above(i, j)] * x[j];
             }
         }
         core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
@@ -86,7 +86,7 @@ impl Ud {
         self.column::<3>(&x, inverse, &mut pass);
         let mut error = y;
         for (x, theta) in x.iter().zip(&self.theta) {
-            error = error - *x * *theta;
+            error -= *x * *theta;
         }
         let step = error * pass.inverse;
         // The sum is finite only if all summands are.
@@ -141,4 +141,116 @@ struct Pass {
 /// Index of element (i, j) of U, i < j.
 const fn above(i: usize, j: usize) -> usize {
     j * (j - 1) / 2 + i
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+
+    const LAMBDA: f64 = 0.9;
+    const P0: f64 = 10.0;
+
+    fn double(x: Complex32) -> Complex64 {
+        Complex64::new(x.re.into(), x.im.into())
+    }
+
+    /// Regressors and what they are said to give, without a law.
+    fn data() -> Vec<([Complex32; N], Complex32)> {
+        let mut random = 1_u32;
+        let mut uniform = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (random >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let mut complex = || Complex32::new(uniform(), uniform());
+        (0..30).map(|_| (core::array::from_fn(|_| complex()), complex())).collect()
+    }
+
+    fn updated(data: &[([Complex32; N], Complex32)]) -> Ud {
+        let mut ud = Ud::new([ONE; N], P0 as f32);
+        for (x, y) in data {
+            let lambda = (LAMBDA as f32, 1.0 / LAMBDA as f32);
+            ud.update(*x, *y, lambda).unwrap();
+        }
+        ud
+    }
+
+    const ONE: Complex32 = Complex32::new(1.0, 0.0);
+
+    fn product(x: &[Complex32; N], z: &[Complex32; N]) -> Complex64 {
+        x.iter().zip(z).map(|(x, z)| double(*x) * double(*z)).sum()
+    }
+
+    /// P^-1 is the sum of what was taken in, and of what was known at the beginning, forgotten by lambda.
+    #[test]
+    fn the_covariance_is_the_inverse_of_the_information() {
+        let data = data();
+        for count in 0..data.len() {
+            let ud = updated(&data[..count]);
+            let (z, _) = data[data.len() - 1 - count];
+            let mut information = product(&z, &z.map(|z| z.conj())).re / P0;
+            for (x, _) in &data[..count] {
+                information = LAMBDA * information + product(x, &z).norm_sqr();
+            }
+            let whitened = ud.whitened(z);
+            let got = product(&whitened, &whitened.map(|z| z.conj())).re;
+            assert!((got / information - 1.0).abs() < 1e-5, "{count}: {got} for {information}");
+        }
+    }
+
+    /// The estimate solves the normal equations; the error is that of the estimate before.
+    #[test]
+    fn the_estimate_is_that_of_weighted_least_squares() {
+        let data = data();
+        let mut ud = updated(&data);
+        let mut rest = ud.theta.map(|theta| double(ONE - theta) / P0);
+        for (x, y) in &data {
+            let error = double(*y) - product(x, &ud.theta);
+            for (rest, x) in rest.iter_mut().zip(x) {
+                *rest = *rest * LAMBDA + double(x.conj()) * error;
+            }
+        }
+        assert!(rest.iter().all(|rest| rest.norm() < 1e-5), "{rest:?}");
+        let (x, y) = data[3];
+        let expected = double(y) - product(&x, &ud.theta);
+        let error = ud.update(x, y, (1.0, 1.0)).unwrap();
+        assert!((double(error) - expected).norm() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_not_excited_grows_more_uncertain() {
+        for left_out in 0..N {
+            let mut data = data();
+            for (x, _) in &mut data {
+                x[left_out] = Complex32::ZERO;
+            }
+            let expected = P0 / LAMBDA.powi(data.len() as i32);
+            let largest = f64::from(updated(&data).largest());
+            assert!((largest / expected - 1.0).abs() < 1e-5, "{left_out}: {largest}");
+        }
+    }
+
+    /// Corrections below half a unit in the last place add up: 1e-8 at a time.
+    #[test]
+    fn small_corrections_are_not_lost() {
+        let mut ud = Ud::new([ONE, Complex32::ZERO, Complex32::ZERO, Complex32::ZERO], 1e-8);
+        let x = [ONE, Complex32::ZERO, Complex32::ZERO, Complex32::ZERO];
+        for _ in 0..1000 {
+            ud.update(x, Complex32::new(2.0, -1.0), (1.0, 1.0)).unwrap();
+        }
+        let moved = ud.theta[0] - ONE;
+        assert!((moved - Complex32::new(1e-5, -1e-5)).norm() < 2e-7, "{moved}");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_said() {
+        let (x, y) = data()[0];
+        let lambda = (1.0, 1.0);
+        for bad in [f32::NAN, f32::INFINITY] {
+            let mut spoilt = x;
+            spoilt[2].im = bad;
+            assert_eq!(updated(&[]).update(spoilt, y, lambda), None);
+            assert_eq!(updated(&[]).update(x, Complex32::new(bad, 0.0), lambda), None);
+        }
+    }
 }

@@ -14,33 +14,40 @@ pub struct Watched {
     pub calls: Vec<u32>,
     /// The blocks of the longest.
     pub longest: Vec<Block>,
-    /// Those of the present one.
+    /// The blocks of the present call, those of its callees too; none outside a call.
     present: Vec<Block>,
+    /// End of the last block before the present call: the return address.
+    returns_to: u32,
 }
 
 impl Watched {
     /// Counts the calls of a function in the flash.
     pub fn new(function: Region) -> Self {
-        Self { function, calls: Vec::new(), longest: Vec::new(), present: Vec::new() }
+        Self {
+            function,
+            calls: Vec::new(),
+            longest: Vec::new(),
+            present: Vec::new(),
+            returns_to: 0,
+        }
     }
 
-    /// Whether a block is its own.
+    /// Whether the block at this address belongs to a call.
     #[inline]
-    pub fn has(&self, address: u32) -> bool {
-        (self.function.address..self.function.end()).contains(&address)
+    pub fn counts(&self, address: u32) -> bool {
+        address == self.function.address || !self.present.is_empty()
     }
 
-    /// A block of the flash is about to be executed; `cycles` of one of its own.
+    /// A block of the flash is about to be executed; `cycles` if it [counts](Self::counts).
     fn block(&mut self, address: u32, size: u32, cycles: u32) {
+        if !self.counts(address) {
+            self.returns_to = address + size;
+            return;
+        }
         if let Some(last) = self.present.last_mut() {
             last.taken = last.address + last.size != address;
         }
-        if address == self.function.address {
-            self.present.clear();
-        } else if self.present.is_empty() {
-            return;
-        }
-        if self.has(address) {
+        if address != self.returns_to {
             self.present.push(Block { address, size, cycles, taken: false });
             return;
         }
@@ -50,6 +57,7 @@ impl Watched {
         }
         self.calls.push(spent);
         self.present.clear();
+        self.returns_to = address + size;
     }
 }
 
