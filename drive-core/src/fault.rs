@@ -1,10 +1,10 @@
-//! Faults: numbered for ever.
+//! Faults with their permanent numbers.
 
 use core::fmt;
 
 macro_rules! faults {
     ($($(#[$doc:meta])* $name:ident = $code:literal, $text:literal;)+) => {
-        /// Why the drive switched its outputs off.
+        /// Reason why the drive switched its outputs off.
         ///
         /// A code never changes its meaning and is never used again. Codes below 64 belong to the
         /// drive, those from 64 on to the firmware around it.
@@ -19,7 +19,7 @@ macro_rules! faults {
             /// All faults, by code.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// What it means, in a few words. (Not inlined: its texts are many, and needed seldom.)
+            /// Short description.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$name => $text,)+ }
             }
@@ -68,7 +68,7 @@ faults! {
 }
 
 impl Fault {
-    /// Its number.
+    /// Number of the fault.
     pub const fn code(self) -> u8 {
         self as u8
     }

@@ -1,4 +1,4 @@
-//! Identification on the drive itself: the reference of the angle tracking, and the rotor time constant.
+//! Identification on the drive itself: learning with locked shaft, and the rotor time constant online.
 
 pub mod learning;
 pub mod online;

@@ -1,9 +1,9 @@
-//! Design of the controllers: section 3.8 of the dissertation, made exact and checked against the
-//! physical loop.
+//! Controller design: section 3.8 of the dissertation, evaluated exactly and checked against the physical
+//! loop.
 //!
-//! Everything here is `f64` with `libm` and runs when settings are turned into coefficients, never
-//! in the control step. The current loop's design evaluates the loop at some 1200 frequencies, 3500
-//! where it has to lower the gain: on a core without `f64` arithmetic, do it once, at start.
+//! The design uses `f64` with `libm` and runs when settings are converted to coefficients, never in the
+//! control step. The design of a current loop evaluates the loop at some 1200 frequencies, 3500 where it
+//! lowers the gain; a core without `f64` arithmetic should do it once, at start.
 //!
 //! # The rule of section 3.8
 //! For an identified plant G = k/(z - p) ([`rule_3_8`]):
@@ -14,9 +14,9 @@
 //!    z_c follows from Eq. 2.17 with w = -v/4 (Eq. 3.38 prints +, which puts the zero at 1.055);
 //! 3. k_c makes the gain 1 there; the pole of the reference filter is p_f = z_c (3.40).
 //!
-//! The zero is counted with atan 4 alone: the source leaves out the atan(vT/2) of Eq. 2.27, so the
-//! phase really is some -94° at the crossover. With 76.0° (as Eq. 3.37 prints it) for atan 4, k_c
-//! comes out 0.12 % to 0.14 % larger.
+//! The zero contributes atan 4 only: the source omits the atan(vT/2) of Eq. 2.27, so the actual phase is
+//! some -94° at the crossover. With 76.0° (as Eq. 3.37 prints it) for atan 4, k_c is 0.12 % to 0.14 %
+//! larger.
 //!
 //! | plant | crossover v | z_c | k_c | printed |
 //! |---|---|---|---|---|
@@ -24,11 +24,11 @@
 //! | Eq. 3.41, d | 180.63 Hz | 0.953803 | 66.527 | - |
 //! | Eq. 3.42, q | 182.35 Hz | 0.953374 | 51.215 | - |
 //!
-//! # What the rule does not see
-//! A plant of first order cannot hold the phase of the filter and of a delay, whatever was in the
-//! loop when it was identified. On the plant computed from the motor, with the filter and one period
-//! of delay, the rule's gains for Eq. 3.41 leave a phase margin of 41.3° and a sensitivity peak of
-//! 2.87. [`design_current_loop`] therefore lowers k_c until both are in order.
+//! # Limits of the rule
+//! A first-order plant cannot represent the phase of the filter and of a delay, even if both were in the
+//! loop during the identification. On the plant computed from the motor, with the filter and one period of
+//! delay, the gains of the rule for Eq. 3.41 give a phase margin of 41.3° and a sensitivity peak of 2.87.
+//! [`design_current_loop`] therefore lowers k_c until both meet their limits.
 
 use core::f64::consts::{PI, TAU};
 use core::fmt;
@@ -51,11 +51,11 @@ use margins::{gain_limit, scan};
 pub const MIN_PHASE_MARGIN_DEG: f64 = 45.0;
 /// Sensitivity peak above which [`design_current_loop`] lowers the gain.
 pub const MAX_MS: f64 = 2.2;
-/// Delay between sampling a current and the voltage it leads to, beyond the hold that is part of
-/// the plant, in periods.
+/// Delay from the sample of a current to the resulting voltage, in periods, without the hold, which is
+/// part of the plant.
 pub const DELAY: f64 = 1.0;
 
-/// A plant k/(z - p), for example current in A over voltage in V.
+/// First-order plant k/(z - p), for example current in A over voltage in V.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrder {
     /// Gain k, output unit per input unit.
@@ -64,7 +64,7 @@ pub struct FirstOrder {
     pub p: f64,
 }
 
-/// A plant k/((z - 1)(z - p)), for example position over torque current (Eq. 4.1), in any units.
+/// Integrating plant k/((z - 1)(z - p)), for example position over torque current (Eq. 4.1), any units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegratorLag {
     /// Gain k, output unit per input unit.
@@ -88,7 +88,7 @@ pub struct EquivalentCircuit {
     pub l_lr: f64,
 }
 
-/// What [`rule_3_8`] gives.
+/// Result of [`rule_3_8`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RuleDesign {
     /// Gain of the controller.
@@ -99,7 +99,7 @@ pub struct RuleDesign {
     pub v: f64,
 }
 
-/// What [`design_current_loop`] gives, with what it found on the way.
+/// Result of [`design_current_loop`], with intermediate results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentLoopDesign {
     /// Gain of the controller, V/A.
@@ -116,24 +116,24 @@ pub struct CurrentLoopDesign {
     pub rule_margins: Margins,
 }
 
-/// Why a controller could not be designed.
+/// Reason why a controller could not be designed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TuningError {
-    /// A value that is not a number or not strictly between two bounds.
+    /// A value is NaN or not strictly between its bounds.
     OutOfRange {
-        /// What, and its unit.
+        /// Name of the value, with its unit.
         name: &'static str,
-        /// What it was.
+        /// The value.
         value: f64,
-        /// It must be above this,
+        /// Lower bound, excluded.
         min: f64,
-        /// and below this.
+        /// Upper bound, excluded.
         max: f64,
     },
-    /// The loop on the physical plant crosses unit gain below the zero of its controller, where the
-    /// rule means nothing (or nowhere): the identified plant is not this motor's.
+    /// The loop on the physical plant crosses unit gain below the zero of its controller, where the rule
+    /// does not apply, or nowhere: the identified plant does not belong to this motor.
     NoCrossover {
-        /// Where it crosses, Hz; not-a-number if nowhere.
+        /// Frequency of the crossover, Hz; NaN if there is none.
         crossover_hz: f64,
         /// Frequency of the zero, Hz.
         zero_hz: f64,
@@ -160,7 +160,7 @@ impl fmt::Display for TuningError {
 impl core::error::Error for TuningError {}
 
 fn check(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), TuningError> {
-    // Not-a-number fails the test.
+    // NaN fails the comparison.
     if value > min && value < max {
         Ok(())
     } else {
@@ -206,14 +206,14 @@ impl IntegratorLag {
     }
 }
 
-/// The plant the current controller acts on, computed from the motor: Eq. 3.14 with a zero-order
+/// Current response of the motor, A/V, computed from its equivalent circuit: Eq. 3.14 with a zero-order
 /// hold, k = (1 - p)/R', p = exp(-T R'/(σ L_s)), R' = r_s + r_r (L_m/L_r)².
 ///
 /// Table 5 at 6 kHz: k = 0.0032052 A/V, p = 0.980053. (Eq. 3.33 prints 0.003237 and 0.8359: Eq. 3.20
-/// to 3.22 hold a slip of a factor 8.14, and Eq. 3.25 is the forward difference.)
+/// to 3.22 contain an error of a factor 8.14, and Eq. 3.25 is the forward difference.)
 ///
 /// # Errors
-/// A parameter that is not positive and finite, or a period out of range.
+/// [`TuningError::OutOfRange`]: a parameter is not positive and finite, or the period is out of range.
 pub fn motor_plant(motor: &EquivalentCircuit, period_s: f64) -> Result<FirstOrder, TuningError> {
     check_period(period_s)?;
     check("r_s in ohm", motor.r_s, 0.0, 1e9)?;
@@ -231,10 +231,11 @@ pub fn motor_plant(motor: &EquivalentCircuit, period_s: f64) -> Result<FirstOrde
     Ok(plant)
 }
 
-/// The rule of section 3.8, see the [module](self).
+/// Applies the rule of section 3.8 to `plant`; see the [module](self).
 ///
 /// # Errors
-/// A gain that is not positive and finite, a pole outside (0, 1), a period out of range.
+/// [`TuningError::OutOfRange`]: the gain is not positive and finite, the pole is outside (0, 1), or the
+/// period is out of range.
 pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningError> {
     check_period(period_s)?;
     check_plant(plant.k, plant.p)?;
@@ -263,21 +264,22 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
     })
 }
 
-/// The real z whose fictitious frequency is w = -2/T `half_w_t` (2.17).
+/// Real z with the fictitious frequency w = -2/T `half_w_t` (2.17).
 fn zero_at(half_w_t: f64) -> f64 {
     (1.0 - half_w_t) / (1.0 + half_w_t)
 }
 
-/// C(e^(j omega_t)) of k_c (z - z_c)/(z - 1) (3.35).
+/// Frequency response C(e^(j omega_t)) of the PI controller k_c (z - z_c)/(z - 1) (3.35).
 pub fn pi_response(k_c: f64, z_c: f64, omega_t: f64) -> Complex64 {
     let z = Complex64::cis(omega_t);
     (z - Complex64::new(z_c, 0.0)) * k_c / (z - Complex64::ONE)
 }
 
-/// Margins of k_c (z - z_c)/(z - 1) with `plant`, the cascade `filter` and `delay` periods.
+/// Margins of the loop of k_c (z - z_c)/(z - 1), `plant`, the cascade `filter` and `delay` periods.
 ///
 /// # Errors
-/// A plant, gain or period out of range, or no crossover above 1.6e-6 of the sampling rate.
+/// [`TuningError::OutOfRange`]: a plant, gain, zero, delay or period is out of range.
+/// [`TuningError::NoCrossover`]: no crossover above 1.6e-6 of the sampling rate.
 pub fn current_loop_margins(
     k_c: f64,
     z_c: f64,
@@ -295,6 +297,7 @@ pub fn current_loop_margins(
     margins_or_error(&|w| unit(w) * k_c, 1, z_c, period_s)
 }
 
+/// Open current loop for k_c = 1.
 fn current_loop(
     z_c: f64,
     plant: FirstOrder,
@@ -319,20 +322,22 @@ fn margins_or_error(
         .ok_or(TuningError::NoCrossover { crossover_hz: f64::NAN, zero_hz: zero_hz(z_c, period_s) })
 }
 
+/// Fictitious frequency of the zero z_c, Hz.
 fn zero_hz(z_c: f64, period_s: f64) -> f64 {
     2.0 / period_s * (1.0 - z_c) / (1.0 + z_c) / TAU
 }
 
-/// Current controller by section 3.8 for the `identified` plant, checked on the `physical` one (see
-/// [`motor_plant`]) with the filter [`LPF`] and one period of delay, at standstill.
+/// Designs a current controller by section 3.8 for the `identified` plant and checks it on the `physical`
+/// one (see [`motor_plant`]) with the filter [`LPF`] and one period of delay, at standstill.
 ///
-/// Where the phase margin is below 45° or the sensitivity peak above 2.2, k_c is the largest gain
-/// (less 0.1 %) up to which both hold; the zero stays. Measured with Table 5 and the drive's filter: Eq. 3.41 gives
-/// k_c = 55.26 V/A instead of 66.53, margin 48.1°, peak 2.20 at 316 Hz; Eq. 3.42 stays at 51.2 V/A
-/// with 50.1° and 2.03.
+/// If the phase margin is below 45° or the sensitivity peak above 2.2, k_c is lowered to the largest gain
+/// (less 0.1 %) up to which both limits hold; the zero stays. With Table 5 and the filter of the drive,
+/// Eq. 3.41 gives k_c = 55.26 V/A instead of 66.53, margin 48.1°, peak 2.20 at 316 Hz; Eq. 3.42 stays at
+/// 51.2 V/A with 50.1° and 2.03.
 ///
 /// # Errors
-/// A plant or period out of range, or a crossover below the controller's zero.
+/// [`TuningError::OutOfRange`]: a plant or the period is out of range. [`TuningError::NoCrossover`]: the
+/// crossover lies below the zero of the controller.
 pub fn design_current_loop(
     identified: FirstOrder,
     physical: FirstOrder,

@@ -1,23 +1,21 @@
-//! Learning on the motor itself what the angle tracking compares with: the reference over the torque
-//! current, the saliency that the current makes, and how far the gains of the two current sensors
-//! differ.
+//! Learning with locked shaft: the reference of the angle tracking over the torque current, the
+//! current-dependent saliency, and the gain mismatch of the two current sensors.
 //!
-//! The shaft is locked. The rotor then stands, the flux turns with the slip alone, and its angle is
-//! known from the currents without any sensor. The torque current goes through the points of the
-//! table, each with both signs; at each the demodulated signal is averaged over whole half turns of
-//! the flux. What repeats with every half turn falls out of the mean, and is the measure of the
-//! sensors: with the gain of a high by `d` and that of b low by `d`, the carrier's negative sequence
-//! adds
+//! With the shaft locked the flux rotates at slip frequency, and its angle is known from the currents
+//! without a position sensor. The torque current steps through the points of the table, each with both
+//! signs; at each point the demodulated signal is averaged over whole half turns of the flux. Components
+//! that repeat with every half turn average out; they measure the sensors: with the gain of channel a high
+//! by `d` and that of b low by `d`, the negative sequence of the carrier adds
 //!
 //! ```text
 //! q_d = d 2/sqrt3 sin(2 theta - 30°) - d/sqrt3
 //! ```
 //!
-//! A shaft that is turned induces a voltage on the quadrature axis that is the same for both signs of
-//! the torque current, where all others change sign with it. A shaft that is free follows the current
-//! after a moment and the flux lies along the current: then the whole stator inductance acts on the
-//! direct axis, where it is the leakage `sigma L_s` alone on a locked shaft. (The inverter's drop must
-//! be compensated for that to be seen.)
+//! Two checks detect a shaft that is not locked. A shaft turned from outside induces a quadrature voltage
+//! that is equal for both signs of the torque current, while all other components change sign with it. A
+//! free shaft follows the current, and the flux aligns with the current: the whole stator inductance then
+//! acts on the direct axis, instead of the leakage `sigma L_s` alone. (This requires a compensated
+//! inverter drop.)
 
 use core::f32::consts::TAU;
 
@@ -27,39 +25,41 @@ use crate::math::frames::{Dq, SQRT_3};
 use crate::settings::Motor;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, STEP_A};
 
-/// Time for flux and averages to settle at a point, in rotor time constants.
+/// Settling time of flux and averages at a point, in rotor time constants.
 const SETTLE_T: f32 = 2.0;
-/// Least and longest time to average at a point, s. A second leaves 0.2° of a sensor noise of 5 mA.
+/// Minimum and maximum averaging time at a point, s. One second reduces sensor noise of 5 mA to 0.2°.
 const AVERAGE_S: (f32, f32) = (1.0, 30.0);
-/// Samples by which the synchronous demodulation lags: 19 of the averages, and 4.5 because they are
-/// looked at once in ten samples.
+/// Lag of the synchronous demodulation, samples: 19 of the averages, and 4.5 on average because they are
+/// evaluated once in ten samples.
 const LAG: f32 = 23.5;
-/// Voltage that may be the same for both signs of the torque current, V: the noise of the mean is
-/// below 0.05 V, a shaft at 22 rpm with the flux of the default motor gives 0.5 V.
+/// Largest quadrature voltage common to both signs of the torque current, V. The noise of the mean is
+/// below 0.05 V; a shaft at 22 rpm with the flux of the default motor gives 0.5 V.
 const MOVED_V: f32 = 0.5;
-/// Voltage of a free shaft on the direct axis from which on it is judged, V. Half of it counts as
+/// Expected direct voltage of a free shaft from which on the shaft is judged, V. Half of it counts as
 /// moved.
 const JUDGED_V: f32 = 1.0;
 /// A twelfth of a turn, 30°.
 const TWELFTH: Angle = Angle::from_bits(357_913_941);
 
-/// Largest even part of the reference that is believed. Noise gives 0.001.
+/// Largest accepted even part of the reference. Noise gives 0.001.
 const ASYMMETRY: f32 = 0.005;
-/// Largest difference of the two gains that is believed.
+/// Largest accepted gain mismatch.
 const LARGEST_MISMATCH: f32 = 0.1;
-/// Part of the negative sequence that no gain can make: at most this and a quarter of what one can.
+/// Limit of the negative-sequence component that a gain mismatch cannot cause: absolute part, and share of
+/// the component that it can cause.
 const WRONG_PHASE: (f32, f32) = (0.001, 0.25);
-/// Largest saliency of the current, 1/A, and rms misfit of its law, of the reference's rms.
+/// Largest accepted current-dependent saliency, 1/A, and rms misfit of its law relative to the rms of the
+/// reference.
 const CURRENT_SALIENCY: (f32, f32) = (0.3, 0.35);
 
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
-    /// Control periods until a point has settled.
+    /// Settling time of a point, control periods.
     settle: u32,
-    /// Least and most control periods to average.
+    /// Minimum and maximum averaging time, control periods.
     average: (u32, u32),
-    /// Points of the table to learn beside zero.
+    /// Number of table points to learn, without zero.
     points: usize,
     /// Direct current, A.
     i_d: f32,
@@ -67,22 +67,22 @@ pub struct Learning {
     leakage: f32,
     /// L_m^2 / L_r, H.
     coupled: f32,
-    /// rad/s of a turn per period.
+    /// rad/s per turn per control period.
     rad_per_s: f32,
 }
 
-/// One period of the learning.
+/// Input of the learning, one per control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearningSample {
-    /// The demodulated signal: the saliency, or a current difference in A.
+    /// Demodulated signal: the saliency, or a current difference in A.
     pub signal: f32,
-    /// Square of the carrier current, A^2.
+    /// Squared carrier current, A^2.
     pub carrier_squared: f32,
-    /// The injection axis.
+    /// Angle of the injection axis, electrical.
     pub theta: Angle,
-    /// How fast it turns, turns per period.
+    /// Frequency of the injection axis, electrical turns per period.
     pub flux_freq: f32,
-    /// Voltage without the carrier, V.
+    /// Voltage without the carrier in the flux frame, V peak.
     pub voltage: Dq,
 }
 
@@ -91,9 +91,9 @@ pub struct LearningSample {
 struct Sums {
     elapsed: u32,
     count: u32,
-    /// Turns of the flux since averaging began.
+    /// Electrical turns of the flux since averaging began.
     turned: f32,
-    /// Half turns that were completed.
+    /// Completed half turns.
     halves: u32,
     signal: f32,
     /// Squares of the carrier current, A^2.
@@ -106,74 +106,73 @@ struct Sums {
 /// State of the learning.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LearningState {
-    /// The point at work: two for every current of the table, plus and minus.
+    /// Index of the present point: two for every current of the table, plus and minus.
     point: usize,
     sums: Sums,
-    /// Mean signal at plus and minus every current.
+    /// Mean signal at the positive and at the negative currents.
     signal: [[f32; POINTS]; 2],
-    /// Mean square of the carrier current at both signs of every current, A^2.
+    /// Mean squared carrier current over both signs of every current, A^2.
     carrier: [f32; POINTS],
-    /// Mean voltage at plus, V.
+    /// Mean voltage at the positive current, V.
     voltage: Dq,
-    /// Direct voltage of the first current without the leakage's, V, and slip times torque current,
+    /// At the first current: direct voltage without that of the leakage, V, and slip times torque current,
     /// rad/s A.
     first: Option<(f32, f32)>,
-    /// Sums of the components of the negative sequence over the points.
+    /// Sums of the negative-sequence components over the points.
     in_phase: f32,
     quadrature: f32,
 }
 
-/// What to do next.
+/// Action of the drive in the next control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LearningAction {
     /// Regulate this torque current, A.
     Current(f32),
-    /// All points are there.
+    /// All points are measured.
     Done,
     /// The shaft is not locked.
     Moved,
-    /// A point took too long: the flux does not turn.
+    /// A point took too long: the flux does not rotate.
     Stuck,
 }
 
-/// A value that was found, how well it fits, and whether it is used.
+/// A fitted value with its misfit and acceptance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fitted {
     /// The value.
     pub value: f32,
-    /// How much of what was measured it leaves unexplained; see where it is used.
+    /// Unexplained part of the measurement; defined with each value.
     pub misfit: f32,
-    /// Whether value and misfit are within their bounds. If not, what was set before still holds.
+    /// Whether value and misfit are within their bounds. Otherwise the previous value stays in use.
     pub accepted: bool,
 }
 
-/// What was learned.
+/// Result of a learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learned {
-    /// The reference over the torque current: of the saliency, or of the current difference in A.
+    /// Reference over the torque current: of the saliency, or of the current difference in A.
     pub reference: ReferenceTable,
-    /// The carrier current over the torque current, where it is believable.
+    /// Carrier current over the torque current, if plausible.
     pub carrier: Option<CarrierTable>,
-    /// How many points of it were measured beside zero; it is held beyond.
+    /// Number of measured points, without zero; the tables are constant beyond.
     pub points: usize,
-    /// Largest even part of the reference, which has none: its misfit. Beyond 0.005 all is refused.
+    /// Largest even part of the reference, which should be odd. Beyond 0.005 the whole result is refused.
     pub asymmetry: f32,
-    /// Gain of current sensor a over that of b, less one (within ±0.1). Misfit: the part of the
-    /// negative sequence that no difference of the gains can make, as a gain. Not with the rectified
-    /// chain.
+    /// (gain of current sensor a) / (gain of b) - 1, within ±0.1. Misfit: the negative-sequence part that
+    /// no gain mismatch can cause, as a gain. Synchronous demodulation only.
     pub gain_mismatch: Fitted,
-    /// Saliency by the stator current, 1/A (within ±0.3): least squares of the reference on
-    /// 2 i_d i_q/|i|. Misfit: rms of the rest, of the reference's (at most 0.35).
+    /// Saliency per ampere of stator current, 1/A, within ±0.3: least squares of the reference on
+    /// 2 i_d i_q/|i|. Misfit: rms of the residual relative to that of the reference, at most 0.35.
     pub current_saliency: Fitted,
-    /// Saliency fixed to the flux at nominal flux, as the check at the start saw it (±5 % by noise); 0
-    /// where there was no check. It is for the reader and changes nothing.
+    /// Flux-fixed saliency at nominal flux measured by the check at the start (±5 % by noise); 0 without
+    /// the check. For information only.
     pub flux_saliency: f32,
-    /// Whether the reference, and with it anything, is used.
+    /// Whether the reference, and with it the whole result, is used.
     pub accepted: bool,
 }
 
 impl Learning {
-    /// For a motor with the direct current `i_d`, A, and currents up to `largest_a`, A.
+    /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
         let coupled = motor.coupled_inductance();
@@ -188,18 +187,18 @@ impl Learning {
         }
     }
 
-    /// Points that are gone through: two for every current of the table.
+    /// Number of points of a learning: two for every current of the table.
     pub fn points(&self) -> usize {
         2 * self.points
     }
 
-    /// The torque current of a point, A.
+    /// Torque current of a point, A.
     fn current(&self, point: usize) -> f32 {
         let i_q = (point / 2 + 1) as f32 * STEP_A;
         if point.is_multiple_of(2) { i_q } else { -i_q }
     }
 
-    /// Takes one period.
+    /// Processes one control period.
     pub fn step(&self, state: &mut LearningState, sample: &LearningSample) -> LearningAction {
         if state.point >= self.points() {
             return LearningAction::Done;
@@ -221,7 +220,7 @@ impl Learning {
         if s.count > self.average.1 {
             return LearningAction::Stuck;
         }
-        // A point ends with a half turn.
+        // A point ends at a completed half turn.
         let half_turned = 2.0 * s.turned.abs() >= (s.halves + 1) as f32;
         s.halves += u32::from(half_turned);
         if half_turned && s.count >= self.average.0 && !self.finish(state) {
@@ -234,7 +233,7 @@ impl Learning {
         }
     }
 
-    /// Takes a point in. False when the shaft moved.
+    /// Evaluates the sums of a completed point. False when the shaft moved.
     fn finish(&self, state: &mut LearningState) -> bool {
         let (s, point) = (state.sums, state.point);
         state.sums = Sums::default();
@@ -257,13 +256,15 @@ impl Learning {
         let x = self.rad_per_s * s.turned * mean * self.current(point);
         let direct = even.d + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
-        let of_free = self.coupled * (x - first_x);
-        let follows = of_free > JUDGED_V && direct - first_v < -0.5 * of_free;
+        let free_shaft_v = self.coupled * (x - first_x);
+        let follows = free_shaft_v > JUDGED_V && direct - first_v < -0.5 * free_shaft_v;
         even.q.abs() <= MOVED_V && !follows
     }
 
-    /// What follows from all points. `normalised`: the signal is the saliency, not a current.
-    /// `baseline`: the square of the carrier current at no torque current, A^2.
+    /// Evaluates all points.
+    ///
+    /// `normalised`: the signal is the saliency, not a current difference. `flux_saliency`: result of the
+    /// saliency check, or 0. `baseline`: squared carrier current without torque current, A^2.
     pub fn result(
         &self,
         state: &LearningState,
@@ -282,7 +283,7 @@ impl Learning {
         gain_mismatch.accepted = normalised
             && gain_mismatch.value.abs() <= LARGEST_MISMATCH
             && gain_mismatch.misfit <= WRONG_PHASE.0 + WRONG_PHASE.1 * gain_mismatch.value.abs();
-        // What the mismatch adds to both signs, -d/sqrt3.
+        // Contribution of the mismatch to both signs, -d/sqrt3.
         let offset = if gain_mismatch.accepted { -0.5 / SQRT_3 * gain_mismatch.value } else { 0.0 };
 
         let mut q = [0.0; POINTS];
@@ -292,7 +293,7 @@ impl Learning {
             if n <= self.points {
                 held = 0.5 * (p - m);
                 let even = 0.5 * (p + m) - offset;
-                // Not-a-number is found in the reference.
+                // NaN is detected in the reference.
                 if n > 0 && even.abs() > asymmetry {
                     asymmetry = even.abs();
                 }
@@ -337,7 +338,7 @@ impl Learning {
 }
 
 impl Learned {
-    /// Whether a stored result is one that a learning can have found and accepted; the tables check
+    /// Whether a stored result is plausible, i.e. could come from an accepted learning. The tables check
     /// their own values.
     pub fn is_believable(&self) -> bool {
         let within = |fitted: &Fitted, largest: f32| {
@@ -351,8 +352,8 @@ impl Learned {
             && self.flux_saliency.is_finite()
     }
 
-    /// The result that holds after this learning, done on a drive that worked with `before`. A value
-    /// that was not found stays as it was; the gain mismatch adds to the one corrected already.
+    /// Combines this result with the result `before` that was in use during the learning. Values not
+    /// accepted keep their previous state; the gain mismatch adds to the one already corrected.
     pub fn on_top_of(&self, before: Option<&Self>) -> Self {
         let mut learned = *self;
         if let Some(before) = before {

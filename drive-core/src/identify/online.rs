@@ -1,4 +1,4 @@
-//! The rotor time constant, and the speed, from the terminals while the drive runs.
+//! Online estimation of the rotor time constant, and of the speed, from voltage and current.
 //!
 //! ```text
 //! control step, 6 kHz: measured current, realised voltage -> ring
@@ -6,32 +6,32 @@
 //!                      -> Command::RotorTimeConstant
 //! ```
 //!
-//! [`Rls`] condenses the last 1.7 s into four complex coefficients and their covariance. They are
-//! not inverted one by one (Model D): while the drive runs, three sinusoids at most excite four complex
-//! unknowns, and the inverse reads the speed wrong by a factor of two on data of a simulation without
-//! any noise. [`refine`](Online::refine) instead fits the *machine* to them, weighted by the
-//! covariance: what the data do not fix carries no weight. Of the machine the inductances are taken
-//! from the settings, and these are free:
+//! [`Rls`] condenses the last 1.7 s into four complex coefficients and their covariance. They are not
+//! inverted one by one (Model D): in operation at most three sinusoids excite four complex unknowns, and
+//! the inverse gives a speed wrong by a factor of two on noise-free simulated data.
+//! [`refine`](Online::refine) instead fits a *machine model* to them, weighted by the covariance, so that
+//! directions without excitation carry no weight. The inductances of the model are those of the settings;
+//! its unknowns are:
 //!
-//! * the stator resistance, which takes up the dead time that is left uncompensated: the sign of a
-//!   sinusoidal current has a fundamental in phase with it, and acts like a resistance;
+//! * the stator resistance, which absorbs the uncompensated dead time: the sign of a sinusoidal current
+//!   has a fundamental in phase with it, and acts like a resistance;
 //! * 1 / tau_r;
-//! * the speed, where no encoder gives it. Then the flux must not stand still: in the steady state
-//!   speed and rotor resistance show as the slip alone, and the answer is [`NoEstimate::PoorExcitation`]
-//!   until the magnetising current is moved, by ±0.2 A at 2 Hz for example
-//!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the injection's tracking
-//!   loop is no substitute: the believed slip is in it.
+//! * the speed, without an encoder. The flux magnitude must then vary: in the steady state speed and rotor
+//!   resistance appear as the slip alone, and the result is [`NoEstimate::PoorExcitation`] until the
+//!   magnetising current is modulated, for example by ±0.2 A at 2 Hz
+//!   ([`Command::Magnetising`](crate::Command::Magnetising)). The speed of the tracking loop of the
+//!   injection is no substitute, since it contains the assumed slip.
 //!
-//! Where speed or torque change there is no one machine, and what was learnt is forgotten: three seconds
-//! of steady running give the next estimate. Measured on the simulated motor with the encoder, over
-//! steps of the torque between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time left and a
-//! rotor of 0.8 to 1.3 times the resistance in the settings: every estimate that is given is within 6 %.
+//! Changes of speed or torque do not fit a constant machine and restart the estimation; three seconds of
+//! steady operation give the next estimate. Measured on the simulated motor with the encoder, over torque
+//! steps between -2 A and 3 A, 0 to 150 rpm, up to half of the dead time uncompensated and 0.8 to 1.3
+//! times the rotor resistance of the settings: every published estimate is within 6 %.
 //!
-//! It costs an estimated 200 cycles of a Cortex-M4 per control period and 1000 more in every eighth, 2 MHz in
-//! all, and the fit ten times a second.
+//! The cost is an estimated 200 cycles of a Cortex-M4 per control period and 1000 more in every eighth,
+//! 2 MHz in all, and the fit ten times a second.
 //!
-//! The saliency makes the transient inductance look larger along the current; with the sensorless
-//! settings' two numbers that is taken into account (left out, tau_r is 11 % low at 2 A).
+//! The saliency increases the apparent transient inductance along the current. The two saliencies of the
+//! sensorless settings account for it (without them tau_r is 11 % low at 2 A).
 
 mod fit;
 
@@ -47,73 +47,73 @@ use crate::settings::Settings;
 use fit::{Machine, Unknowns};
 use num_complex::Complex32;
 
-/// Control periods to one sample of the least squares: 750 Hz. At 6 kHz the increments, which carry
-/// the rotor, would be a thousandth of the signals.
+/// Control periods per sample of the least squares: 750 Hz. At 6 kHz the increments, which carry the
+/// information on the rotor, would be a thousandth of the signals.
 const DECIMATION: u8 = 8;
 /// Sampling period of the least squares, s.
 pub const SAMPLE_S: f32 = DECIMATION as f32 * PERIOD_S;
-/// Corner of the filters before the decimation, Hz: the carrier comes through 27 000 times smaller.
+/// Corner of the filters before the decimation, Hz: they attenuate the carrier by 27 000.
 const BEFORE_HZ: f32 = 20.0;
-/// Corner of the filters of the least squares, Hz. They keep out the harmonics of the dead time; of
-/// the fundamental enough comes through up to some 20 Hz.
+/// Corner of the filters of the least squares, Hz. They reject the harmonics of the dead time and pass
+/// enough of the fundamental up to some 20 Hz.
 const CORNER_HZ: f32 = 10.0;
 /// Memory of 1250 samples, 1.7 s.
 const LAMBDA: f32 = 0.9992;
 /// Initial covariance in units of the bases.
 const P0: f32 = 1e6;
-/// Weight of a call of `refine` in the means of current and speed: the memory at ten calls a second.
+/// Weight of a call of `refine` in the means of current and speed: one memory at ten calls per second.
 const SMOOTHING: f32 = 0.06;
-/// Calls of `refine` until the memory is full once.
+/// Calls of `refine` until the memory is full.
 const SETTLE: u32 = 30;
-/// Largest change of the speed within the memory, electrical rad/s: faster, there is no one machine.
+/// Largest deviation of a known speed from its mean, electrical rad/s; beyond, the machine is not constant.
 const STEADY: f32 = 3.0;
-/// The same where the speed is a guess: the tracking loop moves with the flux.
+/// Largest deviation of a guessed speed, electrical rad/s: the tracking loop follows the modulated flux.
 const STEADY_GUESS: f32 = 12.0;
-/// The same of the reference of the current, as a share of the magnetising current. The saliency moves
-/// with the current, and what is left of the dead time does not grow with it: a step of 2 A put 24 %
-/// on tau_r.
+/// Largest deviation of the current reference from its mean, as a share of the magnetising current. The
+/// saliency depends on the current, and the residual dead time does not scale with it: a step of 2 A gave
+/// an error of 24 % in tau_r.
 const STEADY_CURRENT: f32 = 0.25;
-/// Samples that may be missing in a row.
+/// Largest number of consecutive missing samples.
 const MISSING: u32 = 75;
-/// Largest last step of the fit, as a share of the rate, with which tau_r is published.
+/// Largest relative change of the rate in the last step of the fit for a published tau_r.
 const AT_REST: f32 = 0.04;
-/// Largest relative uncertainty of tau_r that is published. It is that of the noise alone: where it is
-/// larger, what is systematic is larger still. At standstill with a slip below 0.3 Hz tau_r was 80 %
-/// off where 4 % were said; where 1 % was said, 6 % at most.
+/// Largest published relative uncertainty of tau_r. It covers the noise alone; where it is larger, the
+/// systematic error is larger still. At standstill with a slip below 0.3 Hz the error of tau_r was 80 % at
+/// an uncertainty of 4 %, and at most 6 % at an uncertainty of 1 %.
 const UNCERTAIN: f32 = 0.01;
-/// The same where the speed is estimated, with a magnetising current that moves.
+/// Largest published uncertainty with an estimated speed and a modulated magnetising current.
 const UNCERTAIN_GUESS: f32 = 0.04;
 
-/// What else is known of the speed, electrical rad/s.
+/// Prior information on the speed of the rotor, electrical rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SpeedInput {
-    /// By an encoder: it is not estimated.
+    /// Measured by an encoder: not estimated.
     Known(f32),
-    /// By the tracking loop of the injection: the fit begins there.
+    /// From the tracking loop of the injection: initial value of the fit.
     Guess(f32),
 }
 
-/// An estimate.
+/// Estimate of the rotor parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorEstimate {
     /// Rotor time constant, s.
     pub tau_r: f32,
-    /// Stator resistance and what looks like one: the dead time that is left, over the current, ohm.
+    /// Stator resistance including the equivalent resistance of the uncompensated dead time, ohm.
     pub resistance: f32,
-    /// Speed of the rotor, electrical rad/s: what was given, or the estimate.
+    /// Speed of the rotor, electrical rad/s: the known one, or the estimate.
     pub omega_m: f32,
     /// Relative uncertainty of tau_r by the noise.
     pub uncertainty: f32,
 }
 
-/// Why there is no estimate.
+/// Reason why there is no estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoEstimate {
     /// The memory is not full yet since the start, or since samples were missing.
     Settling,
-    /// Speed or current changed: what was learnt before is forgotten.
+    /// Speed or current changed; the estimation restarts.
     Transient,
-    /// The signals do not tell tau_r (and the speed) apart from the rest.
+    /// The signals do not determine tau_r (and the speed).
     PoorExcitation,
     /// tau_r outside [`TAU_R_LIMITS`] times that of the settings, or a resistance below zero or above
     /// three times that of the settings.
@@ -131,19 +131,24 @@ impl fmt::Display for NoEstimate {
     }
 }
 
-/// The estimator. It lives in the idle loop.
+/// Estimator of the rotor time constant, for the idle loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Online {
     rls: Rls,
     motor: MotorModel,
-    /// Share of the voltage of the period before: the delay of the current's analog filter.
+    /// Delay of the analog current filter in periods: share of the previous voltage in the effective one.
     delay: f32,
+    /// Voltage of the previous period, V.
     before: AlphaBeta,
+    /// Voltage of the present period, V.
     present: AlphaBeta,
+    /// Filters of voltage and current before the decimation.
     filters: [Filter; 2],
-    /// Sum of the filtered voltages since the last sample, and the filtered current then.
+    /// Sum of the filtered voltages since the last sample of the least squares.
     sum: Complex32,
+    /// Filtered current at that sample.
     sampled: Complex32,
+    /// Control periods since that sample.
     pushed: u8,
     unknowns: Unknowns,
     current: Dq,
@@ -151,8 +156,7 @@ pub struct Online {
     calls: u32,
 }
 
-/// `base`, but with `limit` no more than 50 times as large, and no less: what the least squares ask for, for
-/// any motor that the drive takes.
+/// `base` clamped to 0.02 to 1 times `limit`, within the range that the least squares require.
 fn between(base: f32, limit: f32) -> f32 {
     if base > limit {
         limit
@@ -167,7 +171,7 @@ const fn squared(x: f32) -> f32 {
     x * x
 }
 
-/// What is taken from the settings.
+/// Motor parameters from the settings.
 #[derive(Clone, Copy, Debug)]
 struct MotorModel {
     r_s: f32,
@@ -181,13 +185,13 @@ struct MotorModel {
 }
 
 impl MotorModel {
-    /// What the settings say, with this speed, electrical rad/s.
+    /// Parameters of the settings at the speed `omega_m`, electrical rad/s.
     fn nominal(&self, omega_m: f32) -> Unknowns {
         Unknowns { r_s: self.r_s, rate: 1.0 / self.tau_r, omega_m }
     }
 
-    /// The machine's inductances with `current`, A: L x = sigma L_s (x - s x*), and x turns with the
-    /// current in the steady state.
+    /// Inductances of the machine at `current`, A: L x = sigma L_s (x - s x*) with the saliency s, where x
+    /// rotates with the current in the steady state.
     fn machine(&self, current: Dq) -> Machine {
         let square = current.length_squared();
         let along = current.d * current.d - current.q * current.q;
@@ -206,11 +210,10 @@ impl MotorModel {
 }
 
 impl Online {
-    /// For the motor and the sensors of these settings.
+    /// Estimator for the motor and the sensors of the settings.
     ///
     /// # Errors
-    /// What the recursive least squares refuse: nothing of settings that
-    /// [`build`](Settings::build) takes.
+    /// [`RlsError`] of the recursive least squares; never with settings that [`Settings::build`] accepts.
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
         let (m, limits) = (&settings.motor, &settings.limits);
         let synchronous = &settings.injection.synchronous;
@@ -252,21 +255,21 @@ impl Online {
         Ok(online)
     }
 
-    /// One control period, in order and without gaps: the current that was measured, A, and the voltage
-    /// that the same step put out, V ([`Telemetry`](crate::Telemetry) has both).
+    /// Processes one control period, in order and without gaps: the `measured` current, A, and the
+    /// `realised` voltage of the same step, V, both of [`Telemetry`](crate::Telemetry).
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta) {
-        // What a step puts out acts from the next sample on; the current is seen later still.
+        // The voltage of a step acts from the next sample on; the analog filter delays the current.
         let voltage = self.present + (self.before - self.present) * self.delay;
         (self.before, self.present) = (self.present, realised);
         if !(voltage.is_finite() && measured.is_finite()) {
-            // Inside the filters they would never leave.
+            // The filters would never recover.
             self.restart();
         } else {
             self.sample(voltage.into(), measured.into());
         }
     }
 
-    /// The work of a control period. Not inlined: `cargo xtask cycles` counts it by its name.
+    /// Filters and decimates one control period. Not inlined: `cargo xtask cycles` finds it by its name.
     #[inline(never)]
     fn sample(&mut self, voltage: Complex32, current: Complex32) {
         let [on_voltage, on_current] = &mut self.filters;
@@ -284,7 +287,7 @@ impl Online {
         self.pushed += 1;
     }
 
-    /// Samples were lost, or the outputs were off: begins anew, but with what it believes.
+    /// Restarts after lost samples or a pause of the outputs; keeps the means of current and speed.
     pub fn restart(&mut self) {
         self.rls.reset();
         self.begin();
@@ -293,7 +296,7 @@ impl Online {
         (self.sum, self.pushed) = (Complex32::ZERO, 0);
     }
 
-    /// The least squares begin anew with what is believed.
+    /// Restarts the least squares from the parameters of the settings.
     fn begin(&mut self) {
         let nominal = self.motor.nominal(self.speed);
         self.rls.begin_at(self.motor.machine(self.current).coefficients(&nominal));
@@ -301,14 +304,14 @@ impl Online {
         self.calls = 0;
     }
 
-    /// Takes the fit one step on; call it ten times a second. `current` is the reference in the flux
-    /// frame, A.
+    /// Advances the fit by one step and returns the estimate; to be called ten times per second. `current`
+    /// is the current reference in the flux frame, A peak.
     ///
-    /// Four times the sampled machine and a system of three equations, about 2000 multiplications and
+    /// Computes the sampled machine four times and solves three equations: about 2000 multiplications and
     /// additions.
     ///
     /// # Errors
-    /// Why the estimate must not be used now.
+    /// The reason why there is no valid estimate at present.
     pub fn refine(&mut self, current: Dq, speed: SpeedInput) -> Result<RotorEstimate, NoEstimate> {
         let (SpeedInput::Known(seen) | SpeedInput::Guess(seen)) = speed;
         let free_speed = matches!(speed, SpeedInput::Guess(_));
@@ -359,7 +362,7 @@ impl Online {
         }
     }
 
-    /// The recursive least squares behind it.
+    /// The underlying recursive least squares.
     pub fn rls(&self) -> &Rls {
         &self.rls
     }

@@ -1,4 +1,4 @@
-//! Recursive least squares on the stator voltage and current: the sampled machine, while it runs.
+//! Recursive least squares on stator voltage and current: identifies the sampled machine in operation.
 //!
 //! The equation is that of C. B. Jacobina, A. M. N. Lima, L. A. de S. Ribeiro, 1996, Eq. 14,
 //! i(t+h) = f1 i(t) + f0 i(t-h) + h1 v(t) + h0 v(t-h), written in differences D x(t) = x(t) - x(t-h):
@@ -7,19 +7,19 @@
 //! D i(t+h) = (f1 - 1) D i(t) + (f1 + f0 - 1) i(t-h) + h1 D v(t) + (h1 + h0) v(t-h)
 //! ```
 //!
-//! The least-squares problem is the same; the small sums that carry resistance and rotor time
-//! constant are estimated themselves instead of being left over from a cancellation. Equation and
-//! section numbers in this module are those of that paper. With f1 the speed is Im f1 / h (Eq. 42);
-//! the other parameters follow outside the interrupt.
+//! The least-squares problem is the same, but the small sums that determine resistance and rotor time
+//! constant are unknowns themselves instead of results of a cancellation. Equation and section numbers in
+//! this module are those of that paper. With f1 the speed is Im f1 / h (Eq. 42); the other parameters
+//! follow outside the interrupt.
 //!
-//! Measured beside the same recursion in `f64`, 60 s at 20 kHz, six-step with and without a Schroeder
+//! Measured against the same recursion in `f64`, 60 s at 20 kHz, six-step with and without a Schroeder
 //! signal at 375 and 61 rad/s, clean and with the noise of section 5: the speed differs by at most
-//! 0.0005 rad/s rms, the five parameters by Model C by at most 7e-5 (median). What brings it there is
-//! the factored covariance, the equation in differences, increments that the filters compute
-//! themselves, and the rounding of the estimate carried along (without it: 0.024 rad/s).
+//! 0.0005 rad/s rms, the five parameters by Model C by at most 7e-5 (median). The precision relies on the
+//! factored covariance, the equation in differences, increments computed by the filters themselves, and
+//! compensated summation of the estimate (without it: 0.024 rad/s).
 //!
-//! A sample costs the same whatever it is, an estimated 1000 cycles of a Cortex-M4: two filters, one update of [`ud::Ud`], no loop that
-//! depends on data, no function of a maths library, no panic.
+//! Every sample costs the same, an estimated 1000 cycles of a Cortex-M4: two filters, one update of
+//! [`ud::Ud`], no data-dependent loop, no function of a maths library, no panic.
 
 pub mod filter;
 pub mod ud;
@@ -28,34 +28,35 @@ use num_complex::Complex32;
 
 use crate::math::frames::AlphaBeta;
 use filter::{Filter, Filtered};
-use ud::{N, Ud};
+use ud::{Forgetting, N, Ud};
 
 /// Initial estimate: all coefficients of Eq. 14 zero, as in the paper.
 const START: [Complex32; N] =
     [Complex32::new(-1.0, 0.0), Complex32::new(-1.0, 0.0), Complex32::ZERO, Complex32::ZERO];
 
-/// Settings. Bases are values for which voltage and current are about 1.
+/// Settings of the estimator. Voltage and current are divided by their bases, to be about 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RlsSettings {
     /// Forgetting factor lambda, 0.9 to 1. The memory is 1 / (1 - lambda) samples.
     pub lambda: f32,
     /// Initial covariance, in units of the bases.
     pub p0: f32,
-    /// Corner of the input filters times the sampling period, omega_n h, 0.001 to 1.
+    /// Corner of the input filters, omega_n h, 0.001 to 1 rad/sample.
     pub corner: f32,
     /// Base of the voltage, V.
     pub voltage_base: f32,
     /// Base of the current, A.
     pub current_base: f32,
-    /// A sample with a component of the voltage at or beyond this, V, is not used.
+    /// Voltage limit, V: a sample with a component at or beyond it is not used.
     pub voltage_limit: f32,
-    /// The same for the current, A: a little below the full scale of the converter.
+    /// Current limit, A: a sample with a component at or beyond it is not used. A little below the full
+    /// scale of the converter.
     pub current_limit: f32,
 }
 
 impl RlsSettings {
-    /// The recursion of the paper: lambda 0.999, P0 = 1000 I in volts and amperes, about 1e6 in
-    /// units of the bases; corner at five times 60 Hz and 50 µs.
+    /// Settings of the paper: lambda 0.999, P0 = 1000 I in volts and amperes, about 1e6 in units of the
+    /// bases; corner at five times 60 Hz and 50 µs.
     pub const fn paper(voltage_base: f32, current_base: f32) -> Self {
         let corner = 5.0 * 376.991_1 * 50e-6;
         let (voltage_limit, current_limit) = (8.0 * voltage_base, 8.0 * current_base);
@@ -64,7 +65,7 @@ impl RlsSettings {
     }
 }
 
-/// A setting that cannot be.
+/// A setting out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RlsError {
     /// `lambda` is outside 0.9 to 1.
@@ -79,36 +80,37 @@ pub enum RlsError {
     Limit,
 }
 
-/// Above this covariance nothing is forgotten: the wind-up guard.
+/// Covariance above which nothing is forgotten: the wind-up guard.
 const WIND_UP: f32 = 1e8;
-/// A misfit above this is not valid: good data have up to 5e-4, with 20 % of noise.
+/// Largest valid misfit: good data have up to 5e-4, with 20 % of noise.
 const MISFIT: f32 = 0.02;
-/// One prediction error above this share of the mean square of what is predicted is not valid.
+/// Largest valid squared prediction error relative to the mean square of the predicted signal.
 const OUTLIER: f32 = 0.01;
-/// Largest covariance that counts as known, times the cube of the corner. In units of the bases,
-/// filtered noise alone has more; good data have 0.065 or less.
+/// Largest covariance of a known parameter, times the cube of the corner. In units of the bases, filtered
+/// noise alone gives more; good data give 0.065 or less.
 const UNKNOWN: f32 = 0.2;
-/// The current is along one axis, a phase open or the voltage constant, where the determinant of its
-/// mean square is below this share of the squared trace (a circle: 0.25).
+/// Threshold of a current along one axis (open phase or constant voltage): determinant of its mean square
+/// relative to the squared trace. A circle has 0.25.
 const ONE_AXIS: f32 = 0.01;
-/// By so much shorter than the estimate's is the memory of these means: an open phase shows sooner.
+/// These means forget four times faster than the estimate, so an open phase is detected sooner.
 const AXES: f32 = 4.0;
-/// Below this mean square of voltage or current, in bases, samples say nothing.
+/// Minimum mean square of voltage and current, in units of the bases, for a sample to be used.
 const SILENT: f32 = 1e-4;
-/// Weight of a sample in that mean: 32 samples, so that a current that passes through zero counts.
+/// Weight of a sample in that mean: 32 samples, so that zero crossings of the current do not count.
 const LOUDNESS: f32 = 1.0 / 32.0;
-/// Samples until the filters have forgotten a gap, times the corner: e^-20 · 221 = 5e-7.
+/// Samples until a gap has left the filters, times the corner: e^-20 · 221 = 5e-7.
 const SETTLE: f32 = 20.0;
 
-/// When an estimate is worth publishing.
+/// Bookkeeping for the validity of the estimate.
 #[derive(Clone, Copy, Debug)]
 struct Validity {
-    /// Samples used since there was last something wrong.
+    /// Used samples since the last invalid one.
     good: u32,
-    /// Samples not used in a row.
+    /// Consecutive samples not used.
     missing: u32,
-    /// Mean square of the prediction error and of what was predicted.
+    /// Mean square of the prediction error.
     error: f32,
+    /// Mean square of the predicted signal.
     signal: f32,
 }
 
@@ -116,7 +118,7 @@ impl Validity {
     const NONE: Self = Self { good: 0, missing: 0, error: 0.0, signal: 0.0 };
 }
 
-/// The estimator.
+/// Recursive least-squares estimator of the sampled machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Rls {
     settings: RlsSettings,
@@ -124,16 +126,17 @@ pub struct Rls {
     ud: Ud,
     voltage: Filter,
     current: Filter,
-    /// Voltage and current: increment one sample ago, value two samples ago; and value one ago.
+    /// Of voltage and current: increment one sample ago, value two samples ago, value one sample ago.
     history: [[Complex32; 3]; 2],
     /// Mean square of voltage and current.
     power: [f32; 2],
     /// Means of alpha², beta² and alpha beta of the current.
     axes: [f32; 3],
+    /// Weight of a sample in the means over one memory.
     forget: f32,
-    lambda_inverse: f32,
+    forgetting: Forgetting,
     unknown: f32,
-    /// Samples to go until the filters have settled.
+    /// Samples left until the filters have settled.
     settling: u32,
     settle: u32,
     memory: u32,
@@ -141,7 +144,10 @@ pub struct Rls {
 }
 
 impl Rls {
-    /// At rest.
+    /// Estimator at rest.
+    ///
+    /// # Errors
+    /// The setting that is out of range; see [`RlsError`].
     pub fn new(settings: RlsSettings) -> Result<Self, RlsError> {
         let RlsSettings { lambda, p0, corner, voltage_base, current_base, .. } = settings;
         let base = |x: f32| x.is_finite() && x > 1e-9 && x < 1e9;
@@ -155,7 +161,7 @@ impl Rls {
             () => {}
         }
         let settle = (SETTLE / corner) as u32;
-        // With lambda 1 nothing is forgotten; a thousand samples then count as known.
+        // With lambda = 1 nothing is forgotten; the memory is then taken as 10 000 samples.
         let memory = if lambda < 0.9999 { (1.0 / (1.0 - lambda)) as u32 } else { 10_000 };
         Ok(Self {
             settings,
@@ -170,15 +176,16 @@ impl Rls {
             settle,
             memory,
             forget: 1.0 / memory as f32,
-            lambda_inverse: 1.0 / lambda,
+            forgetting: Forgetting { lambda, inverse: 1.0 / lambda },
             unknown: UNKNOWN / (corner * corner * corner),
             validity: Validity::NONE,
         })
     }
 
-    /// One sample: `current` (A) as sampled, `voltage` (V) as applied from this sample to the next.
+    /// Processes one sample in the stator frame: the sampled `current`, A peak, and the `voltage` applied
+    /// from this sample to the next, V peak.
     pub fn step(&mut self, voltage: AlphaBeta, current: AlphaBeta) {
-        // Before the filters: a NaN inside them would never leave. False for a NaN, too.
+        // Checked before the filters, which a NaN would never leave. False for NaN.
         let inside = |x: AlphaBeta, limit: f32| x.alpha.abs() < limit && x.beta.abs() < limit;
         let RlsSettings { voltage_limit, current_limit, .. } = self.settings;
         if !(inside(voltage, voltage_limit) && inside(current, current_limit)) {
@@ -209,21 +216,21 @@ impl Rls {
             return;
         }
         let wound_up = self.ud.largest() > WIND_UP;
-        let lambda =
-            if wound_up { (1.0, 1.0) } else { (self.settings.lambda, self.lambda_inverse) };
-        match self.ud.update([di, i2, dv, v2], i.change, lambda) {
+        let forgetting = if wound_up { Forgetting::NONE } else { self.forgetting };
+        match self.ud.update([di, i2, dv, v2], i.change, forgetting) {
             Some(error) => self.judge(error, i.change),
             None => self.reset(),
         }
     }
 
+    /// Shifts the history by one sample.
     fn remember(&mut self, v: Filtered, i: Filtered) {
         for (history, x) in self.history.iter_mut().zip([v, i]) {
             *history = [x.change, history[2], x.value];
         }
     }
 
-    /// A sample was not used.
+    /// Accounts for a sample that was not used.
     fn unused(&mut self) {
         self.validity.missing = self.validity.missing.saturating_add(1);
         if self.validity.missing > self.memory {
@@ -231,7 +238,7 @@ impl Rls {
         }
     }
 
-    /// A sample was used.
+    /// Accounts for a used sample with its prediction error and predicted signal.
     fn judge(&mut self, error: Complex32, signal: Complex32) {
         let (forget, validity) = (self.forget, &mut self.validity);
         validity.missing = 0;
@@ -243,41 +250,40 @@ impl Rls {
         validity.good = if fits && known { validity.good.saturating_add(1) } else { 0 };
     }
 
-    /// Whether the estimate is worth using: for one memory every sample was predicted and
-    /// all unknowns were excited, with never more than one memory of samples missing in a row.
+    /// Whether the estimate is valid: for one memory all samples were predicted and all unknowns were
+    /// excited, with at most one memory of consecutive samples missing.
     ///
-    /// It takes a fault some samples to show (at 20 kHz with a memory of 50 ms: an open phase up to 0.11 s, a
-    /// voltage that has become constant 0.34 s, a sine alone 0.43 s): hold the estimate back where a
-    /// wrong one would do harm. It is back within 0.12 s of good input.
+    /// Detection of a fault takes some samples (at 20 kHz with a memory of 50 ms: an open phase up to
+    /// 0.11 s, a constant voltage 0.34 s, a sine alone 0.43 s). Delay the use of the estimate where a wrong
+    /// one would do harm. The estimate is valid again within 0.12 s of good input.
     pub fn is_valid(&self) -> bool {
         self.validity.good >= self.memory
     }
 
-    /// The coefficients f1 - 1, f1 + f0 - 1, h1 (S) and h1 + h0 (S), if the estimate is valid.
+    /// The estimated coefficients f1 - 1, f1 + f0 - 1, h1 (S) and h1 + h0 (S), if valid.
     pub fn coefficients(&self) -> Option<[Complex32; N]> {
         self.is_valid().then(|| self.latest())
     }
 
-    /// The same, valid or not; finite in any case.
+    /// The estimated coefficients, valid or not; always finite.
     pub fn latest(&self) -> [Complex32; N] {
         let admittance = self.scale[0] * self.settings.current_base;
         let [g1, g0, h1, u0] = self.ud.theta;
         [g1, g0, h1 * admittance, u0 * admittance]
     }
 
-    /// A difference of coefficients, like those of [`latest`](Self::latest), as numbers of size one that know
-    /// nothing of each other; see [`Ud::whitened`].
+    /// Whitens a difference of coefficients in the units of [`latest`](Self::latest); see [`Ud::whitened`].
     pub fn whitened(&self, [g1, g0, h1, u0]: [Complex32; N]) -> [Complex32; N] {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud.whitened([g1, g0, h1 * impedance, u0 * impedance])
     }
 
-    /// Mean square of the prediction error over one memory, in units of the base.
+    /// Mean square of the prediction error over one memory, in units of the current base.
     pub fn error_square(&self) -> f32 {
         self.validity.error
     }
 
-    /// Samples in a row that were not used until now.
+    /// Number of consecutive samples not used, up to now.
     pub fn missing(&self) -> u32 {
         self.validity.missing
     }
@@ -287,24 +293,24 @@ impl Rls {
         &self.settings
     }
 
-    /// Largest element of D, in units of the bases: grows where the signals do not excite.
+    /// Largest element of D, in units of the bases; grows with poor excitation.
     pub fn uncertainty(&self) -> f32 {
         self.ud.largest()
     }
 
-    /// Mean square of the prediction error over that of what is predicted, over one memory.
+    /// Mean square of the prediction error relative to that of the predicted signal, over one memory.
     pub fn misfit(&self) -> f32 {
         if self.validity.signal > 0.0 { self.validity.error / self.validity.signal } else { 1.0 }
     }
 
-    /// Begins from these coefficients, as [`latest`](Self::latest) gives them, instead of from zero.
+    /// Restarts the estimation from the given coefficients, in the units of [`latest`](Self::latest).
     pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
         self.validity = Validity::NONE;
     }
 
-    /// Forgets everything but the settings.
+    /// Restarts the estimator at rest with the same settings.
     #[cold]
     pub fn reset(&mut self) {
         self.ud = Ud::new(START, self.settings.p0);

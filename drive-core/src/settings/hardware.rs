@@ -9,7 +9,7 @@ pub struct Inverter {
     pub dead_time_s: f32,
     /// Whether the dead time is compensated.
     pub compensate: bool,
-    /// Current from which on the compensation is full, A.
+    /// Phase current from which on the compensation is full, A.
     pub full_compensation_a: f32,
 }
 
@@ -36,7 +36,7 @@ impl Line {
     #[allow(clippy::excessive_precision)]
     pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
 
-    /// The line times a factor.
+    /// The line multiplied by a factor.
     pub fn scaled(self, factor: f32) -> Self {
         Self { gain: factor * self.gain, offset: factor * self.offset }
     }
@@ -58,7 +58,7 @@ pub struct Scales {
     pub dc_link: Line,
     /// Largest code of the current channels.
     pub full_scale: u16,
-    /// Heat-sink codes above this are too hot.
+    /// Heat-sink code above which the drive trips.
     pub heat_sink_trip: u16,
     /// Delay of the analog filters of the currents, s.
     pub current_delay_s: f32,

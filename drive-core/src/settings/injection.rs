@@ -3,7 +3,7 @@
 use crate::carrier::DemodulatorKind;
 use crate::settings::table::{CarrierTable, ReferenceTable};
 
-/// The loop of sections 3.4 and 3.11: behind all demodulations but the synchronous one.
+/// Tracking loop of sections 3.4 and 3.11, for all demodulators but the synchronous one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrintedChain {
     /// `ref_delta_i`, A (section 3.3): reference of the current difference from
@@ -17,7 +17,7 @@ pub struct PrintedChain {
     /// Zero z_s of the tracker (Eq. 3.44).
     pub z_s: f32,
     /// Reference of the current difference over the torque current, A, learned with the shaft locked;
-    /// takes the place of the constant one.
+    /// replaces the constant one.
     pub learned: Option<ReferenceTable>,
     /// Length of the rms filters of [`DemodulatorKind::RmsImpedance`], samples.
     pub rms_samples: u8,
@@ -45,22 +45,22 @@ pub struct SynchronousTracking {
     /// Saliency fixed to the flux at the nominal magnetising current. Negative: the inductance along
     /// the flux is the larger one.
     pub flux_saliency: f32,
-    /// Saliency by the stator current, 1/A; for the gain schedule.
+    /// Saliency per ampere of stator current, 1/A; for the gain schedule.
     pub current_saliency: f32,
     /// Reference of the saliency over the torque current, learned with the shaft locked.
     pub reference: ReferenceTable,
-    /// Whether a start checks that the motor has the saliency (see [`crate::protect::saliency_check`]). Without
-    /// it a start trusts that it has, and that the shaft stands still.
+    /// Whether a start checks the saliency of the motor (see [`crate::protect::saliency_check`]). Without
+    /// the check a start assumes it, and a shaft at standstill.
     pub check: bool,
     /// Whether the lock is verified at a start and watched (see [`crate::protect::lock_monitor`]).
     pub monitor: bool,
     /// Carrier current over the torque current, learned with the shaft locked; for the monitor.
     pub carrier: CarrierTable,
-    /// Share of the flux-fixed saliency that may be missing; 1 is a flux that is gone.
+    /// Allowed loss of the lock monitor: missing share of the flux-fixed saliency; 1 is zero flux.
     pub allowed_loss: f32,
-    /// Time constant of the mean of that share, s.
+    /// Time constant of the mean loss, s.
     pub loss_s: f32,
-    /// Speed of the rotor that trips, rpm: as far as the angle is tracked.
+    /// Mechanical speed that trips, rpm: the range in which the angle is tracked.
     pub tracked_rpm: f32,
 }
 
@@ -98,7 +98,7 @@ pub struct InjectionSettings {
 }
 
 impl Default for InjectionSettings {
-    /// 50 V (28 % of what the dc link gives) is assumed, the dissertation does not say.
+    /// 50 V (28 % of the largest voltage) is an assumption; the dissertation gives no amplitude.
     fn default() -> Self {
         Self {
             amplitude_v: 50.0,

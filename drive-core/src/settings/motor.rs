@@ -55,7 +55,7 @@ impl Motor {
         self.l_r() / self.r_r
     }
 
-    /// Torque per ampere on the quadrature axis with `i_d` A standing on the direct axis, Nm/A:
+    /// Torque per quadrature current, Nm/A, at a constant direct current `i_d`, A peak:
     /// 3/2 P L_m^2 / L_r i_d (Eq. 2.7 prints L_m for L_m^2 / L_r).
     pub fn torque_per_ampere(&self, i_d: f32) -> f32 {
         1.5 * f32::from(self.pole_pairs) * self.l_m * self.l_m / self.l_r() * i_d

@@ -151,13 +151,14 @@ pub struct CarrierTable {
 }
 
 impl CarrierTable {
-    /// From its values at multiples of [`STEP_A`]; none when the first is not 1 or any is out of range.
+    /// Table from its values at multiples of [`STEP_A`]; `None` when the first is not 1 or any is outside
+    /// 0.5 to 2.
     pub fn from_points(ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
         (ratio[0] == 1.0 && believable).then_some(Self { ratio })
     }
 
-    /// Its values at multiples of [`STEP_A`].
+    /// The values at multiples of [`STEP_A`].
     pub fn points(&self) -> &[f32; POINTS] {
         &self.ratio
     }

@@ -4,17 +4,17 @@ use core::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-/// How far a loop is from instability.
+/// Stability margins of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// Smallest angle between the open loop and -180° wherever its gain is 1, degrees; negative if
-    /// the closed loop is unstable.
+    /// Phase margin, degrees: smallest angle to -180° of all crossovers; negative if the closed loop is
+    /// unstable.
     pub phase_margin_deg: f64,
-    /// Where that is, Hz.
+    /// Frequency of that crossover, Hz.
     pub crossover_hz: f64,
-    /// Sensitivity peak, max |1/(1 + L)|: the inverse of the distance to -1.
+    /// Sensitivity peak, max |1/(1 + L)|: the inverse of the smallest distance to -1.
     pub ms: f64,
-    /// Where that is, Hz.
+    /// Frequency of the sensitivity peak, Hz.
     pub ms_hz: f64,
     /// Smallest factor on the gain above 1 that puts the open loop on -1; infinite if none does.
     pub gain_margin: f64,
@@ -22,26 +22,28 @@ pub struct Margins {
     pub stable: bool,
 }
 
-/// Points of the grid below and above `SPLIT`, where its spacing turns from even in the logarithm
-/// to even: 3.7 Hz at 6 kHz.
+/// Number of grid points below `SPLIT`, spaced logarithmically.
 const LOW: u32 = 200;
+/// Number of grid points above `SPLIT`, spaced linearly: 3.7 Hz at 6 kHz.
 const HIGH: u32 = 800;
-/// rad/sample
+/// Lowest frequency of the grid, rad/sample.
 const START: f64 = 1e-5;
+/// Frequency at which the spacing changes, rad/sample.
 const SPLIT: f64 = 0.05;
 /// ln(SPLIT / START), asserted in a test.
 const LN_SPLIT_OVER_START: f64 = 8.517_193_191_416_238;
 
+/// Frequency of grid point `n`, rad/sample.
 fn grid(n: u32) -> f64 {
     if n < LOW {
-        // Even in the logarithm: START (SPLIT / START)^(n / LOW).
+        // START (SPLIT / START)^(n / LOW).
         START * (1.0 + libm::expm1(LN_SPLIT_OVER_START * (f64::from(n) / f64::from(LOW))))
     } else {
         SPLIT + (PI - SPLIT) * (f64::from(n - LOW) / f64::from(HIGH))
     }
 }
 
-/// Margins of an open loop, a function of ωT, that has `integrators` poles at z = 1 and no pole
+/// Margins of `open_loop`, a function of ωT in rad/sample, with `integrators` poles at z = 1 and no pole
 /// outside the unit circle. `None` if its gain never crosses 1 on the grid.
 pub(super) fn scan(
     open_loop: &dyn Fn(f64) -> Complex64,
@@ -90,8 +92,8 @@ pub(super) fn scan(
     } else {
         minimum(&distance, grid(n - 1), grid(if n < LOW + HIGH { n + 1 } else { n }))
     };
-    // Argument principle: with all closed-loop poles inside, 1 + L turns by +90° per integrator on
-    // the upper half circle, and by 180° less per pole outside.
+    // Argument principle: with all closed-loop poles inside, the phase of 1 + L changes by +90° per
+    // integrator along the upper half circle, and by 180° less per pole outside.
     let stable = 0.5 * PI * f64::from(integrators) - turned < 0.5 * PI;
     Some(Margins {
         phase_margin_deg: if stable { phase_margin } else { -phase_margin },
@@ -103,11 +105,11 @@ pub(super) fn scan(
     })
 }
 
-/// The largest gain up to which, from zero on, an open loop keeps a phase margin and a sensitivity
-/// peak.
+/// Largest gain up to which, from zero on, an open loop keeps a phase margin, degrees, and a sensitivity
+/// peak `ms`.
 ///
-/// No search over the gain: at each frequency the gains that violate are known in closed form. With
-/// gain g, |1 + g L| >= 1/Ms is a quadratic in g; the phase margin forbids g = 1/|L| wherever L lies
+/// No search over the gain is needed: at each frequency the violating gains are known in closed form. With
+/// gain g, |1 + g L| >= 1/Ms is a quadratic in g; the phase margin excludes g = 1/|L| wherever L lies
 /// within the margin of the negative real axis.
 pub(super) fn gain_limit(
     open_loop: &dyn Fn(f64) -> Complex64,
@@ -137,13 +139,13 @@ pub(super) fn gain_limit(
         }
     }
     let (from, to) = (best.1.max(1) - 1, if best.1 < LOW + HIGH { best.1 + 1 } else { best.1 });
-    // Where the phase margin binds the limit jumps to infinity beside its minimum: the golden section
-    // still ends at the lower side.
+    // Where the phase margin limits the gain, the limit jumps to infinity beside its minimum; the golden
+    // section still ends on the lower side.
     let refined = minimum(&limit, grid(from), grid(to)).1;
     if refined < best.0 { refined } else { best.0 }
 }
 
-/// Where `f` changes its sign.
+/// Zero of `f` between `low` and `high`, by bisection.
 fn crossing(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let sign = f(low) < 0.0;
     for _ in 0..40 {
@@ -157,7 +159,7 @@ fn crossing(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Minimum of a function with one valley, by golden section: place and value.
+/// Position and value of the minimum of a unimodal function, by golden section.
 fn minimum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));

@@ -1,4 +1,4 @@
-//! Design of the speed and the position loop.
+//! Design of the speed loop and the position loop.
 
 use core::f64::consts::{PI, TAU};
 
@@ -6,51 +6,51 @@ use super::margins::{Margins, scan};
 use super::{TuningError, check, check_period, pi_response, zero_at};
 use num_complex::Complex64;
 
-/// What [`design_motion_loops`] gives, and for what.
+/// Result of [`design_motion_loops`], with the plant it is for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionDesign {
     /// Gain of the PI controller of the speed, A per turn/s.
     pub k_c: f64,
-    /// Its zero.
+    /// Zero of that controller.
     pub z_c: f64,
     /// Gain of the P controller of the position, turns/s per turn.
     pub k_x: f64,
     /// Crossover of the speed loop, rad/s.
     pub crossover: f64,
-    /// Acceleration that 1 A gives, turns/s^2.
+    /// Acceleration per ampere of torque current, mechanical turns/s^2.
     pub acceleration: f64,
-    /// Natural frequency of the loop that tracks the rotor without an encoder, rad/s.
+    /// Natural frequency of the tracking loop, rad/s; `None` with an encoder.
     pub tracking: Option<f64>,
-    /// Share of the newest value in the speed: a low-pass of first order, 1 for none.
+    /// Share of the newest value in the first-order low-pass of the speed; 1 for none.
     pub smoothing: f64,
-    /// Period of the loops, s.
+    /// Sampling period of the loops, s.
     pub period_s: f64,
 }
 
-/// Third pole of the loop that tracks the flux, in units of its natural frequency, beside two at it.
+/// Third pole of the flux-tracking loop relative to its natural frequency, where the other two poles lie.
 pub const THIRD_POLE: f64 = 0.2;
 
-/// Crossover of the speed loop over the zero of its controller (4 in section 3.8 as well), and over
-/// the gain of the position loop.
+/// Ratio of the crossover of the speed loop to the zero of its controller (4 in section 3.8 as well), and
+/// to the gain of the position loop.
 const SPREAD: f64 = 4.0;
 
-/// Corner of the low-pass of the speed over the natural frequency of the tracking loop: what the
-/// injection adds to a difference of two angles 10 ms apart is mostly noise.
+/// Ratio of the corner of the speed low-pass to the natural frequency of the tracking loop: above it, the
+/// difference of two estimated angles 10 ms apart is mostly noise.
 const CORNER: f64 = 2.0;
 
-/// Speed controller k_c (z - z_c)/(z - 1) and position gain for a rigid rotor on which 1 A makes an
-/// `acceleration` in turns/s^2, sampled with `period_s`.
+/// Designs the speed controller k_c (z - z_c)/(z - 1) and the position gain for a rigid rotor with an
+/// `acceleration` per ampere in mechanical turns/s^2, sampled with `period_s`. `tracking_hz` is the natural
+/// frequency of the tracking loop, `None` with an encoder.
 ///
-/// The zero lies at a quarter of the crossover, as fictitious frequencies: the rule of section 3.8
-/// as far as it can go. (Its crossover at -176° does not exist here: G/(z - 1) is a double integrator
-/// with a lag, its phase is below -180° everywhere.) The crossover is where the `phase_margin_deg` is
-/// met. What takes phase is exact: the current is held for a period and the speed is the mean over
-/// one, which makes the plant g T/2 (z + 1)/(z (z - 1)) with a phase of -90° - ωT; and without an
-/// encoder the rotor is seen through the loop that tracks the flux ([`THIRD_POLE`]), and the speed
-/// through a low-pass with its corner at 2 w_n.
+/// The zero lies at a quarter of the crossover, as fictitious frequencies, as in section 3.8. (The
+/// crossover at -176° of that rule does not exist here: G/(z - 1) is a double integrator with a lag, its
+/// phase is below -180° everywhere.) The crossover is where `phase_margin_deg` is met. The phase is exact:
+/// the current is held for a period and the speed is the mean over one, which gives the plant
+/// g T/2 (z + 1)/(z (z - 1)) with a phase of -90° - ωT. Without an encoder the tracking loop of the flux
+/// ([`THIRD_POLE`]) and a low-pass of the speed with its corner at 2 w_n are included.
 ///
-/// The position gain is a quarter of the crossover. Broken at the current, the loop of the position
-/// mode then has some 8° less; see [`MotionDesign::margins`].
+/// The position gain is a quarter of the crossover. Opened at the current, the position loop then has some
+/// 8° less phase margin; see [`MotionDesign::margins`].
 ///
 /// | | crossover | margin, speed | margin, position |
 /// |---|---|---|---|
@@ -58,7 +58,7 @@ const CORNER: f64 = 2.0;
 /// | 4 Hz tracking loop, 60°, 10 ms | 1.4 Hz | 60.0° | 52.2° |
 ///
 /// # Errors
-/// A value out of range.
+/// [`TuningError::OutOfRange`].
 pub fn design_motion_loops(
     acceleration: f64,
     tracking_hz: Option<f64>,
@@ -68,7 +68,7 @@ pub fn design_motion_loops(
     check_period(period_s)?;
     check("acceleration by 1 A in turns/s^2", acceleration, 0.0, 1e9)?;
     check("tracking bandwidth in Hz", tracking_hz.unwrap_or(1.0), 0.0, 1e6)?;
-    // 76° is what the zero leaves.
+    // The zero leaves 76° at most.
     check("phase margin of the speed loop in degrees", phase_margin_deg, 20.0, 75.0)?;
     let tracking = tracking_hz.map(|hz| TAU * hz);
     let smoothing = tracking.map_or(1.0, |w_n| -libm::expm1(-CORNER * w_n * period_s));
@@ -78,7 +78,7 @@ pub fn design_motion_loops(
         let tracked = tracking.map_or(Complex64::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
-    // Below the solution it is smaller, above larger.
+    // The lag increases with the frequency: bisection.
     let (mut low, mut high) = (0.0, PI);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
@@ -105,28 +105,28 @@ pub fn design_motion_loops(
     Ok(design)
 }
 
-/// What the tracking loop makes of the rotor's angle, at a frequency in units of its natural one:
-/// 1 - s^3 / ((s + 1)^2 (s + c)).
+/// Response of the tracking loop, tracked over true rotor angle, 1 - s^3 / ((s + 1)^2 (s + c)); `omega`
+/// relative to its natural frequency.
 fn tracked(omega: f64) -> Complex64 {
     let s = Complex64::new(0.0, omega);
     let (pole, third) = (s + Complex64::ONE, s + Complex64::new(THIRD_POLE, 0.0));
     Complex64::ONE - s * s * s / (pole * pole * third)
 }
 
-/// share / (1 - (1 - share) z^-1)
+/// Response of a first-order low-pass, share / (1 - (1 - share) z^-1).
 fn low_pass(share: f64, omega_t: f64) -> Complex64 {
     let kept = Complex64::cis(-omega_t) * (1.0 - share);
     Complex64::new(share, 0.0) / (Complex64::ONE - kept)
 }
 
 impl MotionDesign {
-    /// From the position to the speed that the controller sees, 1/s.
+    /// Response of the filtered speed to the position, 1/s.
     fn slope(&self, omega_t: f64) -> Complex64 {
         let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.period_s);
         difference * low_pass(self.smoothing, omega_t)
     }
 
-    /// The position seen, over the current: turns per A.
+    /// Response of the observed position to the current, turns/A.
     fn rotor(&self, omega_t: f64) -> Complex64 {
         let (z, t) = (Complex64::cis(omega_t), self.period_s);
         let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.acceleration)
@@ -137,13 +137,13 @@ impl MotionDesign {
         }
     }
 
-    /// Open loop of the speed mode.
+    /// Open loop of the speed mode at `omega_t` rad/sample.
     pub fn open_loop(&self, omega_t: f64) -> Complex64 {
         pi_response(self.k_c, self.z_c, omega_t) * self.rotor(omega_t) * self.slope(omega_t)
     }
 
-    /// Open loop of the position mode, broken at the current: the position moves the reference of the
-    /// speed, and with it the current that is fed forward.
+    /// Open loop of the position mode at `omega_t` rad/sample, opened at the current. The position acts on
+    /// the speed reference, and through it on the feed-forward current.
     pub fn open_position_loop(&self, omega_t: f64) -> Complex64 {
         let difference = (Complex64::ONE - Complex64::cis(-omega_t)) * (1.0 / self.period_s);
         let pi = pi_response(self.k_c, self.z_c, omega_t);
@@ -151,7 +151,7 @@ impl MotionDesign {
         self.rotor(omega_t) * (pi * (self.slope(omega_t) + Complex64::new(self.k_x, 0.0)) + forward)
     }
 
-    /// Margins of the speed mode and of the position mode.
+    /// Margins of the speed mode and of the position mode; `None` without a crossover.
     pub fn margins(&self) -> Option<[Margins; 2]> {
         Some([
             scan(&|w| self.open_loop(w), 2, self.period_s)?,

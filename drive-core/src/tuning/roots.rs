@@ -1,11 +1,23 @@
 //! Roots of a small real polynomial.
+//!
+//! Own code: eigenvalue routines of linear-algebra crates need an allocator or are large, while the
+//! polynomials here have two or three roots and no control step depends on them.
 
 use num_complex::Complex64;
 
-/// Roots of the monic polynomial z^N + c\[0\] z^(N-1) + … + c\[N-1\], by Durand and Kerner's
-/// simultaneous iteration; `None` where it does not converge (coefficients that are not finite).
+/// Roots of the monic polynomial z^N + c\[0\] z^(N-1) + … + c\[N-1\] by the simultaneous iteration of
+/// Durand and Kerner; `None` if it does not converge (non-finite coefficients).
 ///
-/// Simple roots come to about 1e-14 of the largest, double roots to 1e-7.
+/// Accuracy relative to the largest root: about 1e-14 for simple roots, 1e-7 for double roots.
+///
+/// ```
+/// use drive_core::tuning::roots;
+///
+/// // (z - 0.5)(z + 2) = z² + 1.5 z - 1
+/// let roots = roots([1.5, -1.0]).unwrap();
+/// assert!(roots.iter().any(|z| (z.re - 0.5).abs() < 1e-12 && z.im.abs() < 1e-12));
+/// assert!(roots.iter().any(|z| (z.re + 2.0).abs() < 1e-12 && z.im.abs() < 1e-12));
+/// ```
 pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
     // No root lies outside 1 + max |c|.
     let mut bound = 1.0;
@@ -17,7 +29,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
             bound = 1.0 + c.abs();
         }
     }
-    // Any start that is neither real nor symmetric about the real axis.
+    // Start values neither real nor symmetric about the real axis.
     let seed = Complex64::new(0.4, 0.9);
     let mut roots = [Complex64::ONE; N];
     let mut power = Complex64::new(bound, 0.0);
@@ -40,7 +52,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
                 }
             }
             if others == Complex64::default() {
-                // Two estimates fell together: part them.
+                // Two estimates coincide: separate them.
                 others = Complex64::new(1e-12, 1e-12);
             }
             let step = value / others;
@@ -53,7 +65,7 @@ pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
             return Some(roots);
         }
     }
-    // A multiple root creeps; take it if it has come to rest as far as rounding lets it.
+    // Multiple roots converge slowly; accept them if the residual is at the level of rounding.
     let close = |r: &Complex64| {
         let value = c.iter().fold(Complex64::ONE, |v, c| v * *r + Complex64::new(*c, 0.0));
         value.norm() <= 1e-10 * (0..N).fold(1.0, |power, _| power * bound)

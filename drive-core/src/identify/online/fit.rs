@@ -1,13 +1,12 @@
-//! One Gauss-Newton step of a machine towards what recursive least squares found.
+//! Gauss-Newton fit of a machine model to the coefficients of recursive least squares, one step per call.
 //!
-//! Everything here is inlined so that it is compiled for size with what calls it: it runs ten times a
-//! second.
+//! It runs ten times a second, outside the control interrupt.
 
 use crate::identify::rls::Rls;
 use crate::identify::rls::ud::N;
 use num_complex::Complex32;
 
-/// What is fitted.
+/// Fitted parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unknowns {
     /// Stator resistance, ohm.
@@ -18,7 +17,7 @@ pub struct Unknowns {
     pub omega_m: f32,
 }
 
-/// What is known.
+/// Known parameters of the machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine {
     /// Transient inductance of the stator, H.
@@ -29,14 +28,14 @@ pub struct Machine {
     pub period: f32,
 }
 
-/// A step of the fit.
+/// Result of one step of the fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
-    /// Where it leads.
+    /// Parameters after the step.
     pub unknowns: Unknowns,
-    /// Relative uncertainty of the rate, by the noise of the prediction and by what is excited.
+    /// Relative standard deviation of the rate, from prediction error and excitation.
     pub uncertainty: f32,
-    /// How far the rate still was from there, relatively.
+    /// Relative change of the rate in this step.
     pub moved: f32,
 }
 
@@ -45,12 +44,12 @@ type Column = [Complex32; N];
 const ONE: Complex32 = Complex32::new(1.0, 0.0);
 
 impl Machine {
-    /// The coefficients of [`Rls`] that this machine has: Eq. 9 sampled by the series to h^5 (the
-    /// largest element of A h is 0.07: what is left out is 1e-9), Eq. 15 to 18 in differences.
+    /// Coefficients of this machine in the form of [`Rls`]: Eq. 9 sampled by the series up to h^5 (the
+    /// largest element of A h is 0.07: the truncation error is 1e-9), Eq. 15 to 18 in differences.
     ///
-    /// With the trace t and the determinant d of A h, A² = t A - d (Cayley and Hamilton), so that the
+    /// With the trace t and the determinant d of A h, (A h)² = t A h - d (Cayley and Hamilton), so that the
     /// series X = 1 + A h/2 + (A h)²/6 + ... is p A h + q. F - 1 is A h X, and H is X b in its first
-    /// column; what Eq. 16 and 18 subtract cancels on paper and leaves the determinant of X.
+    /// column. The subtractions of Eq. 16 and 18 cancel analytically and leave the determinant of X.
     pub fn coefficients(&self, x: &Unknowns) -> Column {
         let h = self.period;
         let rotor = Complex32::new(x.rate * h, -x.omega_m * h);
@@ -68,8 +67,8 @@ impl Machine {
         [along * t - p * d * 2.0 + ONE, turned * -stator, (q + p * a11) * b, turned * b]
     }
 
-    /// A step from `from`; `scale` are sizes of the unknowns, and `free_speed` says whether the speed
-    /// is one. Nothing where the data do not fix the unknowns.
+    /// One Gauss-Newton step from the parameters `from`. `scale` holds typical values of the unknowns;
+    /// `free_speed` adds the speed to them. `None` if the data do not determine the unknowns.
     pub fn step(
         &self,
         rls: &Rls,
@@ -77,12 +76,11 @@ impl Machine {
         scale: &Unknowns,
         free_speed: bool,
     ) -> Option<Fit> {
-        // The rate last: the last pivot is what the data say of it with the others free.
+        // The rate comes last: the last pivot is its information with the other unknowns free.
         let sizes = [scale.rate, scale.r_s, scale.rate];
         let first = if free_speed { 0 } else { 1 };
         let here = self.coefficients(from);
-        // A hundredth of their size: the coefficients are all but straight over that, and it is far
-        // above rounding.
+        // Difference quotient over a hundredth of the scale: nearly linear, and far above rounding.
         const PART: f32 = 0.01;
         let mut columns = [[Complex32::ZERO; N]; UNKNOWNS + 1];
         for (k, column) in columns.iter_mut().enumerate().skip(first) {
@@ -98,7 +96,7 @@ impl Machine {
             *column = rls.whitened(core::array::from_fn(|n| (there[n] - here[n]) * part));
         }
         let Solution { step, information } = solve(&columns, first)?;
-        // No further than a factor: the next calls go on.
+        // The step is limited; the next calls continue.
         let limited = |x: f32, limit: f32| {
             if x > limit {
                 limit
@@ -116,7 +114,7 @@ impl Machine {
         if !(unknowns.rate + unknowns.r_s + unknowns.omega_m).is_finite() {
             return None;
         }
-        // The prediction errors behind the filters are alike for about 1/corner samples.
+        // The filtered prediction errors are correlated over about 1/corner samples.
         let noise = rls.error_square() / rls.settings().corner;
         let uncertainty = libm::sqrtf(noise / information);
         let moved = (unknowns.rate / from.rate - 1.0).abs();
@@ -124,21 +122,21 @@ impl Machine {
     }
 }
 
-/// Speed, resistance and rate, in this order.
+/// Number of unknowns: speed, resistance and rate, in this order.
 const UNKNOWNS: usize = 3;
 
-/// Least squares in units of the sizes.
+/// Least-squares solution in units of the scale.
 struct Solution {
     step: [f32; UNKNOWNS],
-    /// What the data say of the last unknown with the others free.
+    /// Information (inverse variance) of the last unknown with the others free.
     information: f32,
 }
 
-/// Solves for the unknowns from `first` on by Cholesky's method: the slopes by each, then what they are to
-/// explain.
+/// Solves the normal equations for the unknowns from `first` on by Cholesky decomposition. `columns` holds
+/// the derivatives by each unknown, then the right-hand side. `None` if they are singular.
 #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
 fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
-    // Its last row is what is to be explained, seen from the others.
+    // The last row is the right-hand side after forward substitution.
     let mut l = [[0.0f32; UNKNOWNS]; UNKNOWNS + 1];
     let mut information = 0.0;
     for i in first..=UNKNOWNS {
@@ -148,7 +146,7 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
                 sum -= l[i][k] * l[j][k];
             }
             if i == j {
-                // What rounding leaves of a sum that cancels says nothing; not-a-number neither.
+                // A remainder at the level of rounding carries no information; NaN neither.
                 if sum.is_nan() || sum <= 1e-5 * dot(&columns[i], &columns[i]) {
                     return None;
                 }
@@ -170,7 +168,7 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
     Some(Solution { step, information })
 }
 
-// Not inlined: it is called twice.
+/// Real part of the scalar product.
 fn dot(a: &Column, b: &Column) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.re * b.re + a.im * b.im).sum()
 }

@@ -1,32 +1,47 @@
-//! The covariance of recursive least squares as P = U D Uᴴ (Bierman): U upper triangular with ones
-//! on its diagonal, D real. P stays positive whatever the rounding, as long as D does, and every
-//! element of D is only ever multiplied by positive numbers.
+//! Recursive least squares with the covariance factored as P = U D Uᴴ (Bierman): U upper triangular with
+//! unit diagonal, D real. P stays positive definite under rounding as long as D is positive, and every
+//! element of D is multiplied by positive numbers only.
 //!
 //! The plain recursion on P fails with the settings of the paper: P loses its symmetry and then its
-//! sign, in `f32` after 42 to 87 samples, in `f64` after 62 to 385, and ends as NaN.
+//! definiteness, in `f32` after 42 to 87 samples, in `f64` after 62 to 385, and becomes NaN.
 
 use num_complex::Complex32;
 
-/// Unknowns.
+/// Number of unknowns.
 pub const N: usize = 4;
+
+/// Forgetting factor of one update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forgetting {
+    /// The factor lambda, at most 1.
+    pub lambda: f32,
+    /// 1 / lambda.
+    pub inverse: f32,
+}
+
+impl Forgetting {
+    /// Lambda = 1: nothing is forgotten.
+    pub const NONE: Self = Self { lambda: 1.0, inverse: 1.0 };
+}
 
 /// Estimate and covariance.
 #[derive(Clone, Copy, Debug)]
 pub struct Ud {
     /// The estimate.
     pub theta: [Complex32; N],
-    /// What the last addition to the estimate rounded off. Without it corrections below half a unit
-    /// in the last place are lost and the estimate stands still 1e-6 off.
+    /// Rounding error of the last addition to the estimate. Without it, corrections below half a unit in
+    /// the last place are lost and the estimate stops with an error of 1e-6.
     lost: [Complex32; N],
-    /// Above the diagonal of U, column by column.
+    /// Elements of U above the diagonal, column by column.
     u: [Complex32; N * (N - 1) / 2],
-    /// D, and its largest element.
+    /// Diagonal of D.
     d: [f32; N],
+    /// Largest element of D.
     largest: f32,
 }
 
 impl Ud {
-    /// This estimate, with P = `p0` times the unit matrix.
+    /// Estimate `theta` with P = `p0` I.
     pub const fn new(theta: [Complex32; N], p0: f32) -> Self {
         Self {
             theta,
@@ -37,13 +52,13 @@ impl Ud {
         }
     }
 
-    /// Largest element of D: how uncertain the least certain direction is.
+    /// Largest element of D: the variance of the least certain direction.
     pub fn largest(&self) -> f32 {
         self.largest
     }
 
-    /// D^-1/2 U^-1 x: where P is the covariance of x, numbers of size one that know nothing of each
-    /// other. Where P is large, x counts for little. Not for the control step: it takes roots.
+    /// Whitened vector D^-1/2 U^-1 x: uncorrelated with unit variance if P is the covariance of x. Not for
+    /// the control step: it takes square roots.
     pub fn whitened(&self, mut x: [Complex32; N]) -> [Complex32; N] {
         for j in (1..N).rev() {
             for i in 0..j {
@@ -53,28 +68,28 @@ impl Ud {
         core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
     }
 
-    /// Takes y = sum x theta in, forgetting by `lambda`, whose inverse is `forget`. The error of the
-    /// prediction; nothing if estimate or P are no longer finite and positive.
+    /// Updates the estimate with the equation y = sum x theta. Returns the prediction error before the
+    /// update; `None` if the estimate is no longer finite or P no longer positive.
     ///
     /// About 290 multiplications and additions and 4 divisions.
     pub fn update(
         &mut self,
         x: [Complex32; N],
         y: Complex32,
-        (lambda, forget): (f32, f32),
+        forgetting: Forgetting,
     ) -> Option<Complex32> {
-        let mut pass = Pass { alpha: lambda, inverse: forget, gain: [Complex32::ZERO; N] };
-        self.column::<0>(&x, forget, &mut pass);
-        self.column::<1>(&x, forget, &mut pass);
-        self.column::<2>(&x, forget, &mut pass);
-        self.column::<3>(&x, forget, &mut pass);
-        // (Before the columns, it would hold registers that they need.)
+        let Forgetting { lambda, inverse } = forgetting;
+        let mut pass = Pass { alpha: lambda, inverse, gain: [Complex32::ZERO; N] };
+        self.column::<0>(&x, inverse, &mut pass);
+        self.column::<1>(&x, inverse, &mut pass);
+        self.column::<2>(&x, inverse, &mut pass);
+        self.column::<3>(&x, inverse, &mut pass);
         let mut error = y;
         for (x, theta) in x.iter().zip(&self.theta) {
             error -= *x * *theta;
         }
         let step = error * pass.inverse;
-        // Of one that is infinite or not a number, the sum is neither finite.
+        // The sum is finite only if all summands are.
         let (mut sum, mut positive) = (0.0, true);
         self.largest = 0.0;
         for d in self.d {
@@ -93,7 +108,7 @@ impl Ud {
         (positive && sum.is_finite()).then_some(error)
     }
 
-    /// Column `J` of U: of one function, so that its loops are known to the compiler and unrolled.
+    /// Updates column `J` of U; a constant `J` lets the compiler unroll the loops. `forget` is 1 / lambda.
     #[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
     fn column<const J: usize>(&mut self, x: &[Complex32; N], forget: f32, pass: &mut Pass) {
         let mut w = x[J];
@@ -115,15 +130,15 @@ impl Ud {
     }
 }
 
-/// From column to column.
+/// Intermediate results passed from column to column.
 struct Pass {
     alpha: f32,
     inverse: f32,
-    /// P conj(x), as far as it is known.
+    /// P conj(x), accumulated over the columns.
     gain: [Complex32; N],
 }
 
-/// Where U's element of row i, column j is kept, i < j.
+/// Index of element (i, j) of U, i < j.
 const fn above(i: usize, j: usize) -> usize {
     j * (j - 1) / 2 + i
 }
