@@ -227,7 +227,7 @@ fn what_does_not_tell_the_rotor_gives_no_estimate() {
 
 #[test]
 fn what_no_motor_of_these_settings_has_is_not_believed() {
-    let unbelievable = Some(NoEstimate::Unbelievable);
+    let unbelievable = Some(NoEstimate::OutOfRange);
     for (rotor, stator, doubt) in [
         (1.0 / 1.85, 1.0, None),
         (1.0 / 2.2, 1.0, unbelievable),
