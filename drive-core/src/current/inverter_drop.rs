@@ -205,4 +205,38 @@ mod tests {
         }
         assert!((flux - 0.7_f32).abs() < 0.002, "{flux}");
     }
+
+    #[test]
+    fn it_is_believed_up_to_its_bounds() {
+        // Half and twice of the believed 5.4 ohm; 5 % of 311 V, 15.55 V, either way.
+        for (r_s, volts, believed) in [
+            (2.8, 1.64, true),
+            (2.6, 1.64, false),
+            (10.6, 1.64, true),
+            (11.0, 1.64, false),
+            (5.4, 15.4, true),
+            (5.4, 15.7, false),
+            (5.4, -15.4, true),
+            (5.4, -15.7, false),
+        ] {
+            let expected = if believed { volts } else { 0.0 };
+            let v = found(r_s, volts, 0.7, 3.5);
+            assert!((v - expected).abs() < 0.02, "{r_s} ohm, {volts} V: {v}");
+        }
+    }
+
+    #[test]
+    fn the_forcing_level_takes_the_room_there_is() {
+        let tau_r = Motor::default().tau_r();
+        for (largest_a, level) in [(3.5, 1.5), (0.98, 1.4), (0.9, 1.2857), (0.85, 1.0), (0.83, 1.0)]
+        {
+            let drop = inverter_drop(0.7, largest_a);
+            assert!((drop.level(0) - level).abs() < 1e-3, "{largest_a}");
+            let forced = (0..4800).filter(|&k| drop.level(k) > 1.0).count() as f32;
+            // Until 1 - e^(-t/tau_r) = 1/level
+            let expected =
+                if level > 1.0 { 6000.0 * tau_r * (level / (level - 1.0)).ln() } else { 0.0 };
+            assert!((forced - expected).abs() < 12.0, "{largest_a}: {forced} {expected}");
+        }
+    }
 }

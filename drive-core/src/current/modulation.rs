@@ -231,4 +231,31 @@ mod tests {
             }
         }
     }
+
+    /// A pulse of either switch is left out below half the shortest, and lengthened from there.
+    #[test]
+    fn short_pulses_are_dropped_or_lengthened() {
+        let modulator = Modulator { top: 1000.0, shortest: 40.0, ..modulator() };
+        for (count, expected) in
+            [(0.0, 0.0), (19.9, 0.0), (20.1, 40.0), (39.9, 40.0), (40.1, 40.1), (500.0, 500.0)]
+        {
+            assert_eq!(modulator.drop_or_extend(count), expected, "{count}");
+            let other = modulator.drop_or_extend(1000.0 - count);
+            assert!((other - (1000.0 - expected)).abs() < 1e-3, "{count}");
+        }
+    }
+
+    #[test]
+    fn the_circle_touches_the_hexagon() {
+        let modulator = modulator();
+        let circle = modulator.circle(V_DC);
+        for (angle, ratio) in [(PI / 6.0, 1.0), (0.0, 2.0 / 3.0_f64.sqrt())] {
+            let modulated = modulator.step(polar(1.5 * f64::from(circle), angle), Abc::ZERO, V_DC);
+            let length = f64::from(modulated.realised.length_squared()).sqrt();
+            assert!((length / f64::from(circle) - ratio).abs() < 1e-5, "{angle}: {length}");
+            assert!(
+                !modulator.step(polar(0.95 * f64::from(circle), angle), Abc::ZERO, V_DC).limited
+            );
+        }
+    }
 }

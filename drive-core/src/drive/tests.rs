@@ -1,6 +1,8 @@
 //! The drive on a resistive-inductive load: sequence, protections, commands. How it drives a motor
 //! is tested with the simulator.
 
+mod motor;
+
 use super::*;
 use crate::math::frames::Abc;
 

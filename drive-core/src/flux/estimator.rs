@@ -239,3 +239,70 @@ impl Estimator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_constant_reference_follows_the_sign_of_the_torque_current() {
+        let reference = ConstantReference { full: 0.01, slope: 0.02, from: 0.5 };
+        for (i_q, expected) in [(0.0, 0.0), (0.25, 0.005), (0.5, 0.01), (3.0, 0.01)] {
+            assert!((Reference::Constant(reference).at(i_q) - expected).abs() < 1e-8);
+            assert!((Reference::Constant(reference).at(-i_q) + expected).abs() < 1e-8);
+        }
+    }
+
+    fn pii(limit: f32) -> Estimator {
+        Estimator {
+            demodulator: DemodulatorKind::Envelope,
+            rms_samples: 10,
+            ampere_per_ohm: 1.0,
+            angle_loop: AngleLoop::Pii {
+                reference: Reference::Constant(ConstantReference {
+                    full: 0.01,
+                    slope: 0.02,
+                    from: 0.5,
+                }),
+                tracker: Tracker::new(0.13, 0.9, limit),
+            },
+            lag: 0.0,
+            band_pass_lag: 0.0,
+        }
+    }
+
+    /// The loop turns the axis by reference less difference; the rotor is what turns beside the slip.
+    #[test]
+    fn the_rotor_is_the_flux_less_the_slip() {
+        let (estimator, mut state) = (pii(0.1), EstimatorState::default());
+        estimator.start(&mut state);
+        assert_eq!(state.flux(), FluxAngle { phi: Angle::ZERO, freq: 0.0 });
+        state.delta_i = 0.015;
+        estimator.track(&mut state, 2.0, 0.0).unwrap();
+        assert!(state.flux().freq < 0.0, "the difference is beyond its reference");
+        // At the reference the speed stays.
+        state.delta_i = 0.01;
+        estimator.track(&mut state, 2.0, 0.0).unwrap();
+        let freq = state.flux().freq;
+        for _ in 0..600 {
+            estimator.track(&mut state, 2.0, 1e-3).unwrap();
+        }
+        assert_eq!(state.flux().freq, freq);
+        assert!((state.rotor_freq - (freq - 1e-3)).abs() < 1e-7, "{}", state.rotor_freq);
+        // By 5 ms, 30 periods: 63 % of a step.
+        for _ in 0..30 {
+            estimator.track(&mut state, 2.0, 0.0).unwrap();
+        }
+        let share = (state.rotor_freq - (freq - 1e-3)) / 1e-3;
+        assert!((share - 0.638).abs() < 0.005, "{share}");
+        assert!(state.is_finite());
+    }
+
+    #[test]
+    fn a_tracker_that_runs_away_is_lost() {
+        let (estimator, mut state) = (pii(1e-3), EstimatorState::default());
+        estimator.start(&mut state);
+        state.delta_i = -1.0;
+        assert!((0..1000).any(|_| estimator.track(&mut state, 2.0, 0.0) == Err(Lost)));
+    }
+}

@@ -242,4 +242,72 @@ mod tests {
         ind.angle(&mut state, 3).unwrap();
         assert_eq!(ind.angle(&mut state, 5000), Err(ImplausibleEncoder));
     }
+
+    #[test]
+    fn the_rate_is_tracked_in_steps_within_limits() {
+        let tau_r = Motor::default().tau_r();
+        let rate = |ind: &Indirect| ind.rate / PERIOD_S * tau_r;
+        for (target, sign) in [(1.3, 1.0), (0.7, -1.0)] {
+            let mut ind = indirect();
+            for n in 1..=14 {
+                let expected = 1.0 + sign * 0.02 * n as f32;
+                let now = ind.track(tau_r / target).unwrap();
+                assert!(
+                    (rate(&ind) - expected).abs() < 1e-5 && (tau_r / now - expected).abs() < 1e-5
+                );
+            }
+            ind.track(tau_r / target).unwrap();
+            assert_eq!(ind.track(tau_r / target), Ok(tau_r / target), "it has arrived");
+            assert!((rate(&ind) - target).abs() < 1e-6);
+        }
+        let mut ind = indirect();
+        for beyond in [0.49 * tau_r, 2.01 * tau_r, f32::NAN] {
+            let [least, most] = ind.track(beyond).unwrap_err();
+            assert!((least / tau_r - 0.5).abs() < 1e-5 && (most / tau_r - 2.0).abs() < 1e-5);
+        }
+        assert_eq!(ind, indirect(), "what is refused changes nothing");
+    }
+
+    #[test]
+    fn the_flux_turns_with_the_rotor_and_the_slip() {
+        let ind = indirect();
+        let mut state = IndirectState::default();
+        for k in 0..1200_u32 {
+            ind.magnetise(&mut state, 0.7);
+            ind.slip(&mut state, -1.4);
+            let flux = ind.angle(&mut state, 5 * k).unwrap();
+            assert_eq!(flux.freq, state.rotor_freq + state.slip_freq);
+        }
+        // Five counts of 10 000 and two pole pairs: a thousandth of a turn a period.
+        assert!((state.rotor_freq - 1e-3).abs() < 1e-6, "{}", state.rotor_freq);
+        // 2 i_d / i_q, over tau_r in periods
+        let slip = -2.0 / (Motor::default().tau_r() * 6000.0) / TAU;
+        assert!((state.slip_freq / slip - 1.0).abs() < 1e-3, "{}", state.slip_freq);
+    }
+
+    #[test]
+    fn the_magnetising_current_follows_with_the_rotor_time_constant() {
+        let ind = indirect();
+        let mut state = IndirectState::default();
+        ind.magnetise(&mut state, 0.0);
+        ind.slip(&mut state, 1.0);
+        // Without flux the slip is that of a fifth of the magnetising current.
+        let slip = 1.0 / (0.2 * 0.7) * PERIOD_S / Motor::default().tau_r() / TAU;
+        assert!((state.slip_freq / slip - 1.0).abs() < 1e-5);
+        for _ in 0..(600.0 * Motor::default().tau_r()) as u32 {
+            ind.magnetise(&mut state, 0.7);
+        }
+        assert!((state.magnetising / 0.7 - 0.632).abs() < 0.003, "{}", state.magnetising);
+    }
+
+    #[test]
+    fn the_rotor_turns_no_faster_than_it_can() {
+        // 60 turns/s are 100 counts a period; two more are allowed.
+        for (counts, possible) in [(101, true), (-101, true), (104, false), (-104, false)] {
+            let mut state = IndirectState::default();
+            indirect().angle(&mut state, 7).unwrap();
+            let moved = indirect().angle(&mut state, 7_u32.wrapping_add_signed(counts));
+            assert_eq!(moved.is_ok(), possible, "{counts}");
+        }
+    }
 }

@@ -96,4 +96,24 @@ mod tests {
             assert!((found - share).abs() < 0.011, "{n}: {found}");
         }
     }
+
+    #[test]
+    fn the_saliency_tells_the_angle() {
+        // q = 2 a x for a small angle error x of the flux-fixed saliency a, beside the reference.
+        let table = ReferenceTable::new(&[(0.0, 0.0), (2.0, 0.04)]).unwrap();
+        for a in [-0.035, 0.05] {
+            let schedule = GainSchedule::new(&table, a, 0.034, 0.7);
+            for (i_q, x) in [(0.0, 0.1), (1.0, -0.2), (-1.0, 0.05)] {
+                let q = 0.02 * i_q + 2.0 * a * x;
+                let (error, share) =
+                    schedule.correction(&Saliency { q, carrier_squared: 0.0, i_q });
+                assert!((error - x).abs() < 1e-5, "{error} for {x}");
+                assert_eq!(share, schedule.at(i_q).1);
+            }
+        }
+        // Another reference; another saliency per ampere only where there is one.
+        let schedule = GainSchedule::new(&ReferenceTable::default(), -0.035, 0.034, 0.7);
+        assert_eq!(schedule.with(&table, None), GainSchedule::new(&table, -0.035, 0.034, 0.7));
+        assert_eq!(schedule.with(&table, Some(0.02)), GainSchedule::new(&table, -0.035, 0.02, 0.7));
+    }
 }

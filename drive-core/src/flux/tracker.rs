@@ -182,4 +182,74 @@ mod tests {
         assert!((0..100_000).any(|_| !tracker.step(&mut state, 1.0)));
         assert!(!tracker.step(&mut TrackerState::default(), f32::NAN));
     }
+
+    /// The angle of the loop, turns, while `truth` turns, and the acceleration that it knows of.
+    fn tracked(truth: impl Fn(f64) -> f64, share: f32, known: f32, periods: u32) -> (f64, f32) {
+        let pll = Pll::new(4.0);
+        let (mut state, mut rotor_freq) = (TrackerState::default(), 0.0);
+        let mut error = Angle::ZERO;
+        for k in 0..periods {
+            error = Angle::from_turns(truth(f64::from(k)) as f32) - state.angle;
+            let push = pll.push(error.to_radians(), share, known);
+            Pll::step(&mut state, &mut rotor_freq, push, 1e-4);
+        }
+        (error.to_turns().into(), rotor_freq)
+    }
+
+    #[test]
+    fn the_loop_has_its_three_poles() {
+        // s^3 + k_p s^2 + k_i s + k_a with w_n, w_n and w_n / 5, in f64, from an error of 0.05 turns; the
+        // slip that is fed forward moves the angle by itself.
+        for share in [1.0, 0.8] {
+            let w = core::f64::consts::TAU * 4.0 / 6000.0;
+            let (k_p, k_i, k_a) = (2.2 * w * f64::from(share), 1.4 * w * w, 0.2 * w * w * w);
+            let (mut angle, mut speed, mut acceleration) = (0.0, 0.0, 0.0);
+            for periods in 1..=3000 {
+                let error = 0.05 - angle;
+                acceleration += k_a * error;
+                speed += k_i * error + acceleration;
+                angle += speed + k_p * error;
+                if periods % 250 == 0 {
+                    let (got, freq) = tracked(|k| 0.05 + 1e-4 * k, share, 0.0, periods);
+                    assert!((got - error).abs() < 2e-4, "{periods}: {got} for {error}");
+                    assert!((f64::from(freq) - speed).abs() < 1e-6, "{periods}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_accelerating_rotor_is_followed_without_lag() {
+        // 600 rpm/s with two pole pairs, in turns per period and period.
+        let a = 600.0 / 60.0 * 2.0 / 6000.0_f64.powi(2);
+        let truth = |k: f64| 1e-4 * k + 0.5 * a * k * k;
+        let (error, freq) = tracked(truth, 1.0, 0.0, 9000);
+        assert!(
+            error.abs() < 1e-3 && (f64::from(freq) - a * 9000.0).abs() < 1e-5,
+            "{error} {freq}"
+        );
+        // Known, it does not lag even at first: otherwise 11 degrees.
+        let (lag, _) = tracked(truth, 1.0, 0.0, 900);
+        let (error, _) = tracked(truth, 1.0, a as f32, 900);
+        assert!(lag > 0.015 && error.abs() < 1e-3, "{lag} {error}");
+    }
+
+    #[test]
+    fn no_error_counts_for_more_than_the_largest() {
+        let pll = Pll::new(4.0);
+        for sign in [1.0, -1.0] {
+            let most = pll.push(sign * LARGEST_ERROR, 1.0, 0.0);
+            assert_eq!(pll.push(sign * 3.0, 1.0, 0.0), most);
+            assert_ne!(pll.push(sign * 0.59, 1.0, 0.0), most);
+        }
+    }
+
+    #[test]
+    fn the_limit_holds_both_ways() {
+        let step = |freq: f32| {
+            let mut state = TrackerState { freq, ..TrackerState::default() };
+            Tracker::new(0.13, 0.9, 0.01).step(&mut state, 0.0)
+        };
+        assert!(step(0.0099) && step(-0.0099) && !step(0.0101) && !step(-0.0101));
+    }
 }

@@ -217,4 +217,32 @@ mod tests {
             prop_assert!((v.cos - w.cos).abs() < 4e-5 && (v.sin - w.sin).abs() < 4e-5);
         }
     }
+
+    #[test]
+    fn degrees_radians_and_turns_are_the_same_angle() {
+        for (degrees, turns) in [(0.0, 0.0), (90.0, 0.25), (-45.0, -0.125), (270.0, -0.25)] {
+            let angle = Angle::from_degrees(degrees);
+            assert_eq!(angle.to_turns(), turns);
+            assert_eq!(angle.to_degrees(), 360.0 * turns);
+            assert_eq!(angle.to_radians(), turns * TAU);
+            let error = (Angle::from_radians(turns * TAU) - angle).to_turns();
+            assert!(error.abs() < 1e-7, "{error}");
+            assert_eq!(-angle + angle, Angle::ZERO);
+        }
+        let mut angle = Angle::QUARTER;
+        angle += Angle::QUARTER;
+        angle -= Angle::from_degrees(30.0);
+        assert!((angle.to_degrees() - 150.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn small_turns_are_turns() {
+        for k in -20..=20 {
+            let turns = 1e-3 * k as f32;
+            let v = Angle::from_degrees(50.0).unit_vector().turned_slightly(turns);
+            let exact = (50.0_f64 / 360.0 + f64::from(turns)) * core::f64::consts::TAU;
+            let error = (f64::from(v.cos) - exact.cos()).hypot(f64::from(v.sin) - exact.sin());
+            assert!(error < 2.5e-5, "{turns}: {error}");
+        }
+    }
 }

@@ -111,3 +111,53 @@ impl SaliencyCheck {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Periods in each phase, the last phase, and the state, with this saliency seen throughout.
+    fn run(check: &SaliencyCheck, q: f32) -> ([usize; 2], Phase, SaliencyCheckState) {
+        let (mut state, mut count) = (SaliencyCheckState::default(), [0; 2]);
+        for elapsed in 0..100_000 {
+            match check.step(&mut state, elapsed, q) {
+                Phase::Look => count[0] += 1,
+                Phase::Restore => count[1] += 1,
+                end => return (count, end, state),
+            }
+        }
+        panic!("it does not end");
+    }
+
+    #[test]
+    fn enough_saliency_of_the_right_sign_passes() {
+        for expected in [-0.035, 0.05] {
+            let check = SaliencyCheck::new(expected, 0.186);
+            // The mean over the decaying flux is 0.535 of the saliency; 0.3 of what is expected is enough.
+            for (share, passes) in
+                [(1.0, true), (2.0, true), (0.31, true), (0.29, false), (-1.0, false)]
+            {
+                let (count, end, state) = run(&check, 0.535 * share * expected);
+                let expected_end = if passes { Phase::Passed } else { Phase::Failed };
+                assert_eq!(end, expected_end, "{expected} {share}");
+                assert!((state.share - share).abs() < 1e-3, "{}", state.share);
+                assert!((check.seen(&state) / (share * expected) - 1.0).abs() < 1e-3);
+                // 20 ms to settle, 120 ms to look, 2.4 time constants to restore.
+                assert_eq!(count[0], 840);
+                assert!(!passes || count[1].abs_diff(2678) <= 1, "{count:?}");
+            }
+            assert_eq!(run(&check, f32::NAN).1, Phase::Failed);
+        }
+    }
+
+    #[test]
+    fn what_is_seen_before_it_has_settled_does_not_count() {
+        let check = SaliencyCheck::new(-0.035, 0.186);
+        let mut state = SaliencyCheckState::default();
+        for elapsed in 0..841 {
+            let q = if elapsed < 120 || elapsed == 840 { 9.0 } else { -0.5 * 0.035 };
+            check.step(&mut state, elapsed, q);
+        }
+        assert!((state.share - 0.5 / 0.535).abs() < 1e-3, "{}", state.share);
+    }
+}

@@ -196,4 +196,75 @@ mod tests {
         let next = check.step(&mut WiringCheckState::default(), nan);
         assert_eq!(next, Err(Fault::WiringCurrent));
     }
+
+    /// What the check says of a motor of `inductance` H where it expects 51.5 mH, with sensors that show
+    /// what `sensors` makes of the phase currents; and the largest phase current, A.
+    fn check(inductance: f32, sensors: fn(Abc) -> Abc) -> (Result<(), Fault>, f32) {
+        let check = WiringCheck::new(0.0515);
+        let (mut state, mut current, mut largest) =
+            (WiringCheckState::default(), AlphaBeta::ZERO, 0.0_f32);
+        let mut acting = AlphaBeta::ZERO;
+        loop {
+            match check.step(&mut state, sensors(current.to_abc())) {
+                Ok(Next::Apply(voltage, flowing)) => {
+                    // What is said to flow is what flows in the middle of the period in which it acts.
+                    current += acting * (PERIOD_S / inductance);
+                    if voltage != AlphaBeta::ZERO {
+                        let along = flowing.alpha * current.alpha + flowing.beta * current.beta;
+                        assert!(along > -1e-4 && (flowing.length_squared() - 0.04).abs() < 1e-6);
+                    }
+                    acting = voltage;
+                    let Abc { a, b, c } = current.to_abc();
+                    largest = largest.max(a.abs()).max(b.abs()).max(c.abs());
+                }
+                Ok(Next::Passed) => return (Ok(()), largest),
+                Err(fault) => return (Err(fault), largest),
+            }
+        }
+    }
+
+    #[test]
+    fn right_wiring_passes_with_the_current_that_was_meant() {
+        let (result, largest) = check(0.0515, |i| i);
+        assert_eq!(result, Ok(()));
+        assert!((largest - EXPECTED_A).abs() < 0.01, "{largest}");
+        // A motor with half the inductance, or with twice of it, is still the motor.
+        for inductance in [0.027, 0.1] {
+            assert_eq!(check(inductance, |i| i).0, Ok(()), "{inductance}");
+        }
+    }
+
+    #[test]
+    fn wrong_wiring_is_named() {
+        type Sensors = fn(Abc) -> Abc;
+        let cases: [(Sensors, Fault); 9] = [
+            (|i| Abc::new(-i.a, i.b, 0.0), Fault::WiringPolarityA),
+            (|i| Abc::new(i.a, -i.b, 0.0), Fault::WiringPolarityB),
+            (|i| Abc::new(-i.a, -i.b, 0.0), Fault::WiringPolarityA),
+            (|i| Abc::new(i.b, i.a, 0.0), Fault::WiringExchanged),
+            (|i| Abc::new(i.c, i.b, 0.0), Fault::WiringExchanged),
+            (|i| Abc::new(i.a, i.c, 0.0), Fault::WiringExchanged),
+            (|i| Abc::new(0.0, i.b, 0.0), Fault::WiringNoCurrent),
+            (|i| Abc::new(i.a, 0.0, 0.0), Fault::WiringNoCurrent),
+            (|i| Abc::new(0.2 * i.a, i.b, 0.0), Fault::WiringNoCurrent),
+        ];
+        for (n, (sensors, fault)) in cases.into_iter().enumerate() {
+            assert_eq!(check(0.0515, sensors).0, Err(fault), "case {n}");
+        }
+        assert_eq!(check(0.0515, |i| Abc::new(0.3 * i.a, i.b, 0.0)).0, Ok(()));
+    }
+
+    #[test]
+    fn too_little_inductance_ends_it_within_the_bound() {
+        for share in [0.4, 0.3, 0.21] {
+            let (result, largest) = check(share * 0.0515, |i| i);
+            assert_eq!(result, Err(Fault::WiringCurrent), "{share}");
+            assert!(largest < 0.5, "{share}: {largest}");
+        }
+        // A current where none was put.
+        for bad in [Abc::new(0.06, 0.0, 0.0), Abc::new(0.0, -0.06, 0.0)] {
+            let next = WiringCheck::new(0.05).step(&mut WiringCheckState::default(), bad);
+            assert_eq!(next, Err(Fault::WiringCurrent));
+        }
+    }
 }
