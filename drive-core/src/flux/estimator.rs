@@ -303,6 +303,6 @@ mod tests {
         let (estimator, mut state) = (pii(1e-3), EstimatorState::default());
         estimator.start(&mut state);
         state.delta_i = -1.0;
-        assert!((0..1000).any(|_| estimator.track(&mut state, 2.0, 0.0) == Err(Lost)));
+        assert!((0..1000).any(|_| estimator.track(&mut state, 2.0, 0.0) == Err(TrackingLost)));
     }
 }

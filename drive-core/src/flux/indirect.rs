@@ -251,18 +251,18 @@ mod tests {
             let mut ind = indirect();
             for n in 1..=14 {
                 let expected = 1.0 + sign * 0.02 * n as f32;
-                let now = ind.track(tau_r / target).unwrap();
+                let now = ind.track_tau_r(tau_r / target).unwrap();
                 assert!(
                     (rate(&ind) - expected).abs() < 1e-5 && (tau_r / now - expected).abs() < 1e-5
                 );
             }
-            ind.track(tau_r / target).unwrap();
-            assert_eq!(ind.track(tau_r / target), Ok(tau_r / target), "it has arrived");
+            ind.track_tau_r(tau_r / target).unwrap();
+            assert_eq!(ind.track_tau_r(tau_r / target), Ok(tau_r / target), "it has arrived");
             assert!((rate(&ind) - target).abs() < 1e-6);
         }
         let mut ind = indirect();
         for beyond in [0.49 * tau_r, 2.01 * tau_r, f32::NAN] {
-            let [least, most] = ind.track(beyond).unwrap_err();
+            let [least, most] = ind.track_tau_r(beyond).unwrap_err();
             assert!((least / tau_r - 0.5).abs() < 1e-5 && (most / tau_r - 2.0).abs() < 1e-5);
         }
         assert_eq!(ind, indirect(), "what is refused changes nothing");

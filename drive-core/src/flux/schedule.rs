@@ -106,14 +106,20 @@ mod tests {
             for (i_q, x) in [(0.0, 0.1), (1.0, -0.2), (-1.0, 0.05)] {
                 let q = 0.02 * i_q + 2.0 * a * x;
                 let (error, share) =
-                    schedule.correction(&Saliency { q, carrier_squared: 0.0, i_q });
+                    schedule.angle_error(&Saliency { q, carrier_squared: 0.0, i_q });
                 assert!((error - x).abs() < 1e-5, "{error} for {x}");
                 assert_eq!(share, schedule.at(i_q).1);
             }
         }
         // Another reference; another saliency per ampere only where there is one.
         let schedule = GainSchedule::new(&ReferenceTable::default(), -0.035, 0.034, 0.7);
-        assert_eq!(schedule.with(&table, None), GainSchedule::new(&table, -0.035, 0.034, 0.7));
-        assert_eq!(schedule.with(&table, Some(0.02)), GainSchedule::new(&table, -0.035, 0.02, 0.7));
+        assert_eq!(
+            schedule.with_learned(&table, None),
+            GainSchedule::new(&table, -0.035, 0.034, 0.7)
+        );
+        assert_eq!(
+            schedule.with_learned(&table, Some(0.02)),
+            GainSchedule::new(&table, -0.035, 0.02, 0.7)
+        );
     }
 }

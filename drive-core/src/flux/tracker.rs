@@ -190,7 +190,7 @@ mod tests {
         let mut error = Angle::ZERO;
         for k in 0..periods {
             error = Angle::from_turns(truth(f64::from(k)) as f32) - state.angle;
-            let push = pll.push(error.to_radians(), share, known);
+            let push = pll.correction(error.to_radians(), share, known);
             Pll::step(&mut state, &mut rotor_freq, push, 1e-4);
         }
         (error.to_turns().into(), rotor_freq)
@@ -238,9 +238,9 @@ mod tests {
     fn no_error_counts_for_more_than_the_largest() {
         let pll = Pll::new(4.0);
         for sign in [1.0, -1.0] {
-            let most = pll.push(sign * LARGEST_ERROR, 1.0, 0.0);
-            assert_eq!(pll.push(sign * 3.0, 1.0, 0.0), most);
-            assert_ne!(pll.push(sign * 0.59, 1.0, 0.0), most);
+            let most = pll.correction(sign * LARGEST_ERROR, 1.0, 0.0);
+            assert_eq!(pll.correction(sign * 3.0, 1.0, 0.0), most);
+            assert_ne!(pll.correction(sign * 0.59, 1.0, 0.0), most);
         }
     }
 

@@ -263,7 +263,7 @@ mod tests {
             let axis = |k: f32| Angle::from_turns(k * FLUX % 1.0).unit_vector();
             state.collect(current, pending);
             match n % 10 {
-                1 | 6 => state.take(),
+                1 | 6 => state.latch_voltage(),
                 2 | 7 => prediction.expect(
                     &mut state,
                     &RotorFlux {

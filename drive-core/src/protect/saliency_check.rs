@@ -117,12 +117,12 @@ mod tests {
     use super::*;
 
     /// Periods in each phase, the last phase, and the state, with this saliency seen throughout.
-    fn run(check: &SaliencyCheck, q: f32) -> ([usize; 2], Phase, SaliencyCheckState) {
+    fn run(check: &SaliencyCheck, q: f32) -> ([usize; 2], SaliencyCheckAction, SaliencyCheckState) {
         let (mut state, mut count) = (SaliencyCheckState::default(), [0; 2]);
         for elapsed in 0..100_000 {
             match check.step(&mut state, elapsed, q) {
-                Phase::Look => count[0] += 1,
-                Phase::Restore => count[1] += 1,
+                SaliencyCheckAction::Look => count[0] += 1,
+                SaliencyCheckAction::Restore => count[1] += 1,
                 end => return (count, end, state),
             }
         }
@@ -138,7 +138,8 @@ mod tests {
                 [(1.0, true), (2.0, true), (0.31, true), (0.29, false), (-1.0, false)]
             {
                 let (count, end, state) = run(&check, 0.535 * share * expected);
-                let expected_end = if passes { Phase::Passed } else { Phase::Failed };
+                let expected_end =
+                    if passes { SaliencyCheckAction::Passed } else { SaliencyCheckAction::Failed };
                 assert_eq!(end, expected_end, "{expected} {share}");
                 assert!((state.share - share).abs() < 1e-3, "{}", state.share);
                 assert!((check.seen(&state) / (share * expected) - 1.0).abs() < 1e-3);
@@ -146,7 +147,7 @@ mod tests {
                 assert_eq!(count[0], 840);
                 assert!(!passes || count[1].abs_diff(2678) <= 1, "{count:?}");
             }
-            assert_eq!(run(&check, f32::NAN).1, Phase::Failed);
+            assert_eq!(run(&check, f32::NAN).1, SaliencyCheckAction::Failed);
         }
     }
 

@@ -206,7 +206,7 @@ mod tests {
         let mut acting = AlphaBeta::ZERO;
         loop {
             match check.step(&mut state, sensors(current.to_abc())) {
-                Ok(Next::Apply(voltage, flowing)) => {
+                Ok(WiringAction::Apply { voltage, current: flowing }) => {
                     // What is said to flow is what flows in the middle of the period in which it acts.
                     current += acting * (PERIOD_S / inductance);
                     if voltage != AlphaBeta::ZERO {
@@ -217,7 +217,7 @@ mod tests {
                     let Abc { a, b, c } = current.to_abc();
                     largest = largest.max(a.abs()).max(b.abs()).max(c.abs());
                 }
-                Ok(Next::Passed) => return (Ok(()), largest),
+                Ok(WiringAction::Passed) => return (Ok(()), largest),
                 Err(fault) => return (Err(fault), largest),
             }
         }

@@ -169,8 +169,8 @@ mod tests {
     fn updated(data: &[([Complex32; N], Complex32)]) -> Ud {
         let mut ud = Ud::new([ONE; N], P0 as f32);
         for (x, y) in data {
-            let lambda = (LAMBDA as f32, 1.0 / LAMBDA as f32);
-            ud.update(*x, *y, lambda).unwrap();
+            let forgetting = Forgetting { lambda: LAMBDA as f32, inverse: 1.0 / LAMBDA as f32 };
+            ud.update(*x, *y, forgetting).unwrap();
         }
         ud
     }
@@ -213,7 +213,7 @@ mod tests {
         assert!(rest.iter().all(|rest| rest.norm() < 1e-5), "{rest:?}");
         let (x, y) = data[3];
         let expected = double(y) - product(&x, &ud.theta);
-        let error = ud.update(x, y, (1.0, 1.0)).unwrap();
+        let error = ud.update(x, y, Forgetting::NONE).unwrap();
         assert!((double(error) - expected).norm() < 1e-6);
     }
 
@@ -236,7 +236,7 @@ mod tests {
         let mut ud = Ud::new([ONE, Complex32::ZERO, Complex32::ZERO, Complex32::ZERO], 1e-8);
         let x = [ONE, Complex32::ZERO, Complex32::ZERO, Complex32::ZERO];
         for _ in 0..1000 {
-            ud.update(x, Complex32::new(2.0, -1.0), (1.0, 1.0)).unwrap();
+            ud.update(x, Complex32::new(2.0, -1.0), Forgetting::NONE).unwrap();
         }
         let moved = ud.theta[0] - ONE;
         assert!((moved - Complex32::new(1e-5, -1e-5)).norm() < 2e-7, "{moved}");
@@ -245,12 +245,11 @@ mod tests {
     #[test]
     fn what_is_not_finite_is_said() {
         let (x, y) = data()[0];
-        let lambda = (1.0, 1.0);
         for bad in [f32::NAN, f32::INFINITY] {
             let mut spoilt = x;
             spoilt[2].im = bad;
-            assert_eq!(updated(&[]).update(spoilt, y, lambda), None);
-            assert_eq!(updated(&[]).update(x, Complex32::new(bad, 0.0), lambda), None);
+            assert_eq!(updated(&[]).update(spoilt, y, Forgetting::NONE), None);
+            assert_eq!(updated(&[]).update(x, Complex32::new(bad, 0.0), Forgetting::NONE), None);
         }
     }
 }
