@@ -115,8 +115,8 @@ pub enum NoEstimate {
     Transient,
     /// The signals do not determine tau_r (and the speed).
     PoorExcitation,
-    /// tau_r outside [`TAU_R_LIMITS`] times that of the settings, or a resistance below zero or above
-    /// three times that of the settings.
+    /// tau_r outside [`TAU_R_LIMITS`] times the setting, or a stator resistance below zero or above three
+    /// times the setting.
     OutOfRange,
 }
 
@@ -171,7 +171,7 @@ const fn squared(x: f32) -> f32 {
     x * x
 }
 
-/// Motor parameters from the settings.
+/// MotorModel parameters from the settings.
 #[derive(Clone, Copy, Debug)]
 struct MotorModel {
     r_s: f32,

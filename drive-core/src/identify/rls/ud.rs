@@ -169,8 +169,8 @@ mod tests {
     fn updated(data: &[([Complex32; N], Complex32)]) -> Ud {
         let mut ud = Ud::new([ONE; N], P0 as f32);
         for (x, y) in data {
-            let lambda = Forgetting { lambda: LAMBDA as f32, inverse: 1.0 / LAMBDA as f32 };
-            ud.update(*x, *y, lambda).unwrap();
+            let forgetting = Forgetting { lambda: LAMBDA as f32, inverse: 1.0 / LAMBDA as f32 };
+            ud.update(*x, *y, forgetting).unwrap();
         }
         ud
     }
@@ -245,12 +245,11 @@ mod tests {
     #[test]
     fn what_is_not_finite_is_said() {
         let (x, y) = data()[0];
-        let lambda = Forgetting::NONE;
         for bad in [f32::NAN, f32::INFINITY] {
             let mut spoilt = x;
             spoilt[2].im = bad;
-            assert_eq!(updated(&[]).update(spoilt, y, lambda), None);
-            assert_eq!(updated(&[]).update(x, Complex32::new(bad, 0.0), lambda), None);
+            assert_eq!(updated(&[]).update(spoilt, y, Forgetting::NONE), None);
+            assert_eq!(updated(&[]).update(x, Complex32::new(bad, 0.0), Forgetting::NONE), None);
         }
     }
 }
