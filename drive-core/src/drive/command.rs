@@ -39,7 +39,7 @@ pub enum Command {
     TestVoltage(Dq),
     /// Rotor time constant that the slip is computed with, s, as [`online`](crate::identify::online) finds it.
     /// Only with [`track_rotor`](crate::Settings::track_rotor); within
-    /// [`LIMITS`](crate::flux::indirect::LIMITS), and approached by no more than 2 % with each command.
+    /// [`TAU_R_LIMITS`](crate::flux::indirect::TAU_R_LIMITS), and approached by no more than 2 % with each command.
     RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
     Configure(Coefficients),
