@@ -369,6 +369,7 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use core::f32::consts::TAU;
 
     use super::*;

@@ -187,6 +187,7 @@ impl PredictionState {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
     use crate::math::angle::Angle;
     use crate::math::frames::Abc;

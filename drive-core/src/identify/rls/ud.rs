@@ -130,6 +130,7 @@ const fn above(i: usize, j: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
     use num_complex::Complex64;
 
