@@ -459,7 +459,7 @@ mod tests {
 
     /// Table 5, worked out by hand.
     #[test]
-    fn what_follows_from_the_parameters_of_the_motor() {
+    fn derived_parameters_of_the_motor() {
         let motor = Motor::default();
         near(motor.l_r(), 0.2047);
         near(motor.sigma_l_s(), 0.051_478_7);

@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_track_the_saliency_does_not_watch_it() {
+    fn only_the_sensorless_drive_watches_the_saliency() {
         let (encoder, injection) = (built(AngleSource::Encoder), built(AngleSource::Injection));
         assert!(encoder.saliency_check.is_none() && injection.saliency_check.is_some());
         assert!(encoder.lock_monitor.is_none() && injection.lock_monitor.is_some());

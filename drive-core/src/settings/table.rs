@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_name_the_point() {
         for (error, text) in [
             (TableError::TooShort, "a table needs two points at least"),
             (TableError::NotOdd, "point 0 must be 0 at 0 A: the table is odd"),

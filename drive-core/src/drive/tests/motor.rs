@@ -218,7 +218,7 @@ fn with_the_encoder_the_flux_is_known_and_the_torque_is_what_was_asked() {
     assert!(!Bench::started(&settings, Mode::Torque).drive.tracks_rotor());
 }
 
-/// Behind 30 A/s of ramp, whatever the sign of the torque.
+/// The ramp is 30 A/s for either sign of the torque.
 #[test]
 fn a_stop_takes_the_torque_away_by_its_ramp() {
     for i_q in [1.5, -1.5] {
@@ -258,7 +258,7 @@ fn without_a_sensor_it_trips_beyond_the_speed_that_is_tracked() {
     assert!((bench.motor.rpm() - 700.0).abs() < 15.0, "{}", bench.motor.rpm());
 }
 
-/// What is learned with the shaft locked is what the motor was made with.
+/// With the shaft locked, learning finds the parameters of the simulated motor.
 #[test]
 fn learning_finds_the_saliencies_and_the_mismatch() {
     let settings = motor_settings(AngleSource::Injection);
