@@ -313,4 +313,23 @@ mod tests {
         }
         assert!((rotor.count as i32 + 4700 * COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
     }
+
+    /// v^2 / 2 a turns are needed from v on with the deceleration a; near the goal k_x e is slower.
+    #[test]
+    fn the_braking_curve_ends_at_the_goal() {
+        let motion = motion(24.0, 12.0);
+        let (a, bend) = (0.5 * f64::from(motion.twice_braking), f64::from(motion.bend));
+        assert!((a - 12.0).abs() < 1e-5);
+        for error in [1e-4, 0.01, 0.3, 2.0, 50.0] {
+            let v = f64::from(motion.braking_curve(error));
+            assert!(
+                ((v * v / 2.0 + v * bend) / a / f64::from(error) - 1.0).abs() < 1e-5,
+                "{error}"
+            );
+            assert_eq!(f64::from(motion.braking_curve(-error)), -v);
+        }
+        let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
+        let slope = f64::from(motion.braking_curve(1e-4)) / 1e-4;
+        assert!((slope / design.k_x - 1.0).abs() < 1e-3, "{slope}");
+    }
 }

@@ -200,3 +200,34 @@ impl From<TuningError> for SettingsError {
         Self::Tuning(error)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(value: f32, expected: f32) {
+        assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
+    }
+
+    /// Table 5, worked out by hand.
+    #[test]
+    fn derived_parameters_of_the_motor() {
+        let motor = Motor::default();
+        near(motor.l_r(), 0.2047);
+        near(motor.sigma_l_s(), 0.051_478_7);
+        near(motor.coupled_inductance(), 0.153_221_3);
+        near(motor.l_m + motor.l_ls, motor.sigma_l_s() + motor.coupled_inductance());
+        near(motor.tau_r(), 0.186_090_9);
+        near(motor.torque_per_ampere(0.7), 0.321_764_7);
+        near(motor.torque_per_ampere(1.4), 0.643_529_4);
+    }
+
+    #[test]
+    fn a_line_gives_the_value_of_a_code() {
+        let line = Line { gain: 0.002, offset: -4.0 };
+        near(line.at(3000), 2.0);
+        near(line.at(0), -4.0);
+        near(line.scaled(1.5).at(3000), 3.0);
+        near(line.scaled(1.5).at(0), -6.0);
+    }
+}

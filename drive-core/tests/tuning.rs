@@ -330,3 +330,36 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_open_loops_are_those_of_the_equations() {
+    for k in 1..10 {
+        let z = Complex64::cis(0.3 * f64::from(k));
+        // Eq. 4.1 multiplied out
+        let expected = EQ_4_1.k / (z * z - z * (1.0 + EQ_4_1.p) + EQ_4_1.p);
+        assert!((EQ_4_1.response(z.arg()) / expected - 1.0).norm() < 1e-9);
+    }
+    // The position loop: the controller sees the speed and k_x times the position, and the slope of the
+    // reference is fed forward.
+    let period = 0.01;
+    for tracking in [None, Some(3.5)] {
+        let design = design_motion_loops(ACCELERATION, tracking, 60.0, period).expect("design");
+        for k in 1..20 {
+            let w = 0.15 * f64::from(k);
+            let pi = pi_response(design.k_c, design.z_c, w);
+            let slope = (1.0 - Complex64::cis(-w)) / period;
+            let smoothed =
+                slope * design.smoothing / (1.0 - (1.0 - design.smoothing) * Complex64::cis(-w));
+            let rotor = design.open_loop(w) / pi / smoothed;
+            if tracking.is_none() {
+                // A double integrator that is held over a period: T^2 a / 2 (z + 1)/(z - 1)^2
+                let z = Complex64::cis(w);
+                let held = 0.5 * period * period * ACCELERATION * (z + 1.0) / (z - 1.0).powi(2);
+                assert!((rotor / held - 1.0).norm() < 1e-9, "{w}");
+            }
+            let forward = design.k_x * slope / ACCELERATION;
+            let expected = rotor * (pi * smoothed + design.k_x * pi + forward);
+            assert!((design.open_position_loop(w) / expected - 1.0).norm() < 1e-9, "{w}");
+        }
+    }
+}

@@ -144,6 +144,7 @@ impl InverterDrop {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
     use crate::io::PERIOD_S;
 

@@ -6,6 +6,7 @@ mod motor;
 use super::*;
 use crate::math::frames::Abc;
 
+use crate::carrier::DemodulatorKind;
 use crate::io::Hardware;
 use crate::math::angle::Angle;
 use crate::settings::Line;
@@ -413,6 +414,22 @@ fn a_test_voltage_is_put_out_bounded_and_taken_back() {
     assert_eq!(d.control.references.test_voltage, volts, "refused commands change nothing");
     d.command(&Command::Stop).unwrap();
     assert!(matches!(d.command(&Command::TestVoltage(volts)), Err(Refused::State(_))));
+}
+
+/// With the injection along the flux as Ha and Sul have it, and along the quadrature axis otherwise.
+#[test]
+fn a_start_puts_the_injection_on_its_axis() {
+    for (kind, axis) in [
+        (DemodulatorKind::RmsImpedance, UnitVector { cos: 1.0, sin: 0.0 }),
+        (DemodulatorKind::Synchronous, UnitVector { cos: 0.0, sin: 1.0 }),
+    ] {
+        let mut s = settings();
+        s.injection.demodulator = kind;
+        let mut d = Drive::new(s.build().unwrap());
+        d.command(&Command::Start(Mode::Torque)).unwrap();
+        assert_eq!(d.control.references.injection_axis, axis);
+        assert_eq!(d.control.axes.injection, axis);
+    }
 }
 
 #[test]

@@ -305,4 +305,49 @@ mod tests {
         state.delta_i = -1.0;
         assert!((0..1000).any(|_| estimator.track(&mut state, 2.0, 0.0) == Err(TrackingLost)));
     }
+
+    /// Difference that is seen of a carrier that is larger along dm than along qm, on an axis that turns.
+    fn difference(demodulator: DemodulatorKind, step: f32, band_pass_lag: f32, scale: f32) -> f32 {
+        let estimator = Estimator { demodulator, band_pass_lag, ampere_per_ohm: scale, ..pii(0.1) };
+        let mut state = EstimatorState::default();
+        estimator.start(&mut state);
+        let mut mean = 0.0;
+        for k in 0..4000 {
+            let axis = Angle::from_turns((k as f32 * step) % 1.0).unit_vector();
+            let carrier = Angle::from_turns((k % 10) as f32 / 10.0).unit_vector();
+            let [dm, qm] = [0.20, 0.17].map(|amplitude: f32| amplitude * carrier.cos);
+            let along = axis.turned_by(Angle::from_degrees(-45.0).unit_vector());
+            let across = axis.turned_by(Angle::from_degrees(45.0).unit_vector());
+            let current = crate::math::frames::AlphaBeta::along(along, dm)
+                + crate::math::frames::AlphaBeta::along(across, qm);
+            let carrier = crate::carrier::injection::CarrierPeriod {
+                voltage: 50.0 * carrier.cos,
+                cos: carrier.cos,
+                sin: carrier.sin,
+                ..Default::default()
+            };
+            estimator.observe(&mut state, &CarrierSample { current, axis, carrier }, step);
+            mean += if k < 3000 { 0.0 } else { state.delta_i / 1000.0 };
+        }
+        mean
+    }
+
+    #[test]
+    fn the_lag_of_the_band_pass_is_made_up_for() {
+        // 300 rpm with two pole pairs.
+        let step = 10.0 / 6000.0;
+        let seen = |step, lag| difference(DemodulatorKind::Rectified, step, lag, 1.0);
+        let standing = seen(0.0, 8.83);
+        assert!((seen(step, 8.83) / standing - 1.0).abs() < 0.03);
+        assert!((seen(step, 0.0) / standing - 1.0).abs() > 0.3);
+    }
+
+    #[test]
+    fn an_impedance_difference_counts_by_its_scale() {
+        let [one, two] =
+            [1.0, 2.0].map(|scale| difference(DemodulatorKind::RmsImpedance, 0.0, 0.0, scale));
+        assert!(one.abs() > 1.0 && (two / one - 2.0).abs() < 1e-5, "{one} {two}");
+        let kind = DemodulatorKind::Envelope;
+        assert_eq!(difference(kind, 0.0, 0.0, 2.0), difference(kind, 0.0, 0.0, 1.0));
+    }
 }

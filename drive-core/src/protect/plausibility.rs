@@ -190,6 +190,7 @@ impl PredictionState {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
     use crate::math::angle::Angle;
     use crate::math::frames::Abc;
@@ -247,7 +248,7 @@ mod tests {
     const ROTOR: f32 = 20.0 / 6000.0;
     const FLUX: f32 = 21.0 / 6000.0;
 
-    /// What stays unexplained, V, of the motor with its rotor at [`ROTOR`], an applied voltage that turns, and
+    /// Unexplained voltage, V, of the motor with its rotor at [`ROTOR`], an applied voltage that turns, and
     /// `more` volts along phase a that nobody knows of; and when the fault came. The drive believes
     /// `believed` of the speed of the rotor.
     fn unexplained(more: f32, believed: f32) -> (AlphaBeta, Option<u32>) {
@@ -302,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_allowed_voltage_and_the_back_emf_do_not_cover_is_a_fault() {
+    fn voltage_beyond_the_allowed_one_and_the_back_emf_is_a_fault() {
         // The squares add: 15 V, and all of the back-emf.
         let most = (15.0 * 15.0 + emf() * emf()).sqrt();
         assert_eq!(unexplained(0.98 * most, 1.0).1, None);

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_before_it_has_settled_does_not_count() {
+    fn samples_before_settling_do_not_count() {
         let check = SaliencyCheck::new(-0.035, 0.186);
         let mut state = SaliencyCheckState::default();
         for elapsed in 0..841 {

@@ -197,8 +197,8 @@ mod tests {
         assert_eq!(next, Err(Fault::WiringCurrent));
     }
 
-    /// What the check says of a motor of `inductance` H where it expects 51.5 mH, with sensors that show
-    /// what `sensors` makes of the phase currents; and the largest phase current, A.
+    /// Result of the check on a motor of `inductance` H where 51.5 mH are expected, with the phase currents
+    /// as `sensors` shows them; and the largest phase current, A.
     fn check(inductance: f32, sensors: fn(Abc) -> Abc) -> (Result<(), Fault>, f32) {
         let check = WiringCheck::new(0.0515);
         let (mut state, mut current, mut largest) =
@@ -207,7 +207,7 @@ mod tests {
         loop {
             match check.step(&mut state, sensors(current.to_abc())) {
                 Ok(WiringAction::Apply { voltage, current: flowing }) => {
-                    // What is said to flow is what flows in the middle of the period in which it acts.
+                    // The announced current flows while the voltage acts.
                     current += acting * (PERIOD_S / inductance);
                     if voltage != AlphaBeta::ZERO {
                         let along = flowing.alpha * current.alpha + flowing.beta * current.beta;

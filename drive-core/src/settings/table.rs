@@ -203,4 +203,16 @@ mod tests {
             assert_eq!(CarrierTable::from_points(ratio), None, "{wrong}");
         }
     }
+
+    #[test]
+    fn errors_name_the_point() {
+        for (error, text) in [
+            (TableError::TooShort, "a table needs two points at least"),
+            (TableError::NotOdd, "point 0 must be 0 at 0 A: the table is odd"),
+            (TableError::NotIncreasing(2), "point 2: the currents must increase strictly"),
+            (TableError::TooLarge(1, 0.31), "point 1: 0.31 is outside -0.3 to 0.3"),
+        ] {
+            assert_eq!(error.to_string(), text);
+        }
+    }
 }

@@ -114,7 +114,22 @@ fn responses_of_trivial_cascades() {
     let mut state = SosState::default();
     assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
     // Unstable ones are seen as such.
-    for (a1, a2) in [(0.0, 1.0), (-2.0, 1.0), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)] {
+    for (a1, a2) in
+        [(0.0, 1.0), (-2.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)]
+    {
         assert!(!Section { a1, a2, ..Section::IDENTITY }.is_stable(), "{a1} {a2}");
     }
+}
+
+/// The gain may stand in any section.
+#[test]
+fn the_gain_of_a_cascade_can_be_put_last() {
+    let rows =
+        [[0.5, 0.2, 0.1, -0.3, 0.4], [0.25, -0.1, 0.2, 0.1, 0.2], [3.0, 1.0, 0.5, -0.5, 0.1]];
+    let (plain, last) = (Sos::from_f64(&rows), Sos::with_gain_last(&rows));
+    for k in 0..10 {
+        let w = 0.3 * f64::from(k);
+        assert!((plain.response(w) / last.response(w) - 1.0).norm() < 1e-6);
+    }
+    assert_eq!(last.sections.map(|section| section.b0), [1.0, 1.0, 0.375]);
 }

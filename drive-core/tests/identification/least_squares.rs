@@ -17,7 +17,7 @@ const SETTINGS: RlsSettings = RlsSettings::paper(180.0, 5.0);
 const SETTLE: usize = 212;
 const MEMORY: usize = 1000;
 
-/// What the machine is fed with.
+/// Voltage of the machine.
 #[derive(Clone, Copy)]
 enum Signal {
     /// 60 Hz and five more sinusoids.
@@ -157,7 +157,7 @@ fn a_phase_that_opens_is_noticed() {
 }
 
 #[test]
-fn what_says_nothing_is_never_valid() {
+fn poor_excitation_is_never_valid() {
     for signal in [Signal::OneAxis, Signal::Nothing] {
         let mut bench = Bench::new(SETTINGS);
         bench.machine.rate = 0.0; // no rotor: the current stays along the axis
@@ -202,8 +202,8 @@ fn a_sample_at_a_limit_is_left_out_and_the_filters_settle_anew() {
     }
 }
 
-/// With a covariance that lets it learn nothing, what it is said to predict is nothing: the error is the
-/// increment of the filtered current.
+/// The covariance is so small that nothing is learned and zero is predicted: the error is the increment of the
+/// filtered current.
 #[test]
 fn the_error_is_in_units_of_the_base() {
     let settings = RlsSettings { p0: 1e-3, lambda: 1.0, ..RlsSettings::paper(1000.0, 20.0) };

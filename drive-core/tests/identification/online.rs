@@ -184,7 +184,7 @@ fn it_speaks_after_three_seconds_and_again_three_seconds_after_a_transient() {
 }
 
 #[test]
-fn what_does_not_tell_the_rotor_gives_no_estimate() {
+fn poor_excitation_and_lost_samples_give_no_estimate() {
     let (settings, machine) = plain();
     // No torque, no current in the rotor.
     let mut bench = Bench::new(&settings, machine);
@@ -226,7 +226,7 @@ fn what_does_not_tell_the_rotor_gives_no_estimate() {
 }
 
 #[test]
-fn what_no_motor_of_these_settings_has_is_not_believed() {
+fn estimates_out_of_range_are_refused() {
     let unbelievable = Some(NoEstimate::OutOfRange);
     for (rotor, stator, doubt) in [
         (1.0 / 1.85, 1.0, None),
@@ -266,4 +266,22 @@ fn the_uncertainty_is_that_of_the_noise() {
     let scatter = mean(&|e| (f64::from(e.tau_r) / tau_r - 1.0).powi(2)).sqrt();
     let said = mean(&|e| e.uncertainty.into());
     assert!(said > 0.5 * scatter && said < 3.0 * scatter, "{scatter} {said}");
+}
+
+/// The bases lie between a fiftieth of the limits and the limits, for any motor.
+#[test]
+fn the_bases_are_of_the_size_of_voltage_and_current() {
+    let bases = |r_s: f32, i_d: f32| {
+        let (mut settings, _) = plain();
+        (settings.motor.r_s, settings.sequence.i_d) = (r_s, i_d);
+        let used = *Online::new(&settings).unwrap().rls().settings();
+        let limits = settings.limits;
+        assert_eq!(used.voltage_limit, limits.dc_over_v);
+        assert_eq!(used.current_limit, limits.trip_a);
+        (used.voltage_base / limits.dc_over_v, used.current_base)
+    };
+    let limits = Settings::default().limits;
+    assert_eq!(bases(5.4, 0.7), (5.4 * limits.current_a / limits.dc_over_v, 0.7));
+    assert_eq!(bases(0.01, 0.01), (0.02, 0.02 * limits.trip_a));
+    assert_eq!(bases(900.0, 3.5), (1.0, 3.5));
 }

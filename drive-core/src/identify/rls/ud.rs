@@ -145,6 +145,7 @@ const fn above(i: usize, j: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
     use num_complex::Complex64;
 
@@ -155,7 +156,7 @@ mod tests {
         Complex64::new(x.re.into(), x.im.into())
     }
 
-    /// Regressors and what they are said to give, without a law.
+    /// Random regressors and outputs.
     fn data() -> Vec<([Complex32; N], Complex32)> {
         let mut random = 1_u32;
         let mut uniform = || {
@@ -181,7 +182,7 @@ mod tests {
         x.iter().zip(z).map(|(x, z)| double(*x) * double(*z)).sum()
     }
 
-    /// P^-1 is the sum of what was taken in, and of what was known at the beginning, forgotten by lambda.
+    /// P^-1 = sum lambda^(n-k) conj(x_k) x_k^T + lambda^n / p0.
     #[test]
     fn the_covariance_is_the_inverse_of_the_information() {
         let data = data();
@@ -218,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_excited_grows_more_uncertain() {
+    fn unexcited_directions_grow_more_uncertain() {
         for left_out in 0..N {
             let mut data = data();
             for (x, _) in &mut data {
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_said() {
+    fn non_finite_input_is_reported() {
         let (x, y) = data()[0];
         for bad in [f32::NAN, f32::INFINITY] {
             let mut spoilt = x;
