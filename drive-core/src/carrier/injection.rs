@@ -222,4 +222,17 @@ mod tests {
         assert!((0.95..=1.0001).contains(&ratio), "{ratio}");
         assert!((injection.current_amplitude - 0.26).abs() < 0.01);
     }
+
+    #[test]
+    fn a_smaller_carrier_is_smaller_in_voltage_and_current() {
+        let injection = Injection::new(50.0, FirstOrder { k: 0.003_205_2, p: 0.980_053 }, 0.18);
+        let [whole, part] = [1.0, 0.6].map(|share| Carrier { share, ..Carrier::default() });
+        for index in 0..CARRIER_SAMPLES {
+            let (whole, part) = (whole.at(&injection, index), part.at(&injection, index));
+            assert_eq!(part.voltage, 0.6 * whole.voltage);
+            assert_eq!(part.mean_current, 0.6 * whole.mean_current);
+            assert_eq!(part.sampled, 0.6 * whole.sampled);
+            assert_eq!((part.cos, part.sin), (whole.cos, whole.sin));
+        }
+    }
 }
