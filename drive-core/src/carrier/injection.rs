@@ -229,4 +229,37 @@ mod tests {
         assert!((0.95..=1.0001).contains(&ratio), "{ratio}");
         assert!((injection.current_amplitude - 0.26).abs() < 0.01);
     }
+
+    #[test]
+    fn a_smaller_carrier_is_smaller_in_voltage_and_current() {
+        let injection = Injection::new(50.0, FirstOrder { k: 0.003_205_2, p: 0.980_053 }, 0.18);
+        let [whole, part] = [1.0, 0.6].map(|share| Carrier { share, ..Carrier::default() });
+        for index in 0..CARRIER_SAMPLES {
+            let (whole, part) = (whole.at(&injection, index), part.at(&injection, index));
+            assert_eq!(part.voltage, 0.6 * whole.voltage);
+            assert_eq!(part.mean_current, 0.6 * whole.mean_current);
+            assert_eq!(part.sampled, 0.6 * whole.sampled);
+            assert_eq!((part.cos, part.sin), (whole.cos, whole.sin));
+        }
+    }
+
+    /// 50 V beside 100 V: down by sixteenths to what fits, up by a 64th where an eighth more fits.
+    #[test]
+    fn the_share_is_what_fits() {
+        let injection = Injection::new(50.0, FirstOrder { k: 0.003_205_2, p: 0.980_053 }, 0.0);
+        let mut carrier = Carrier::default();
+        let mut settled = |largest: f32| {
+            let result = (0..200).map(|_| carrier.fit(&injection, Dq::new(60.0, 80.0), largest));
+            let result = result.collect::<Vec<_>>();
+            let squared = carrier.share * carrier.share;
+            assert!((carrier.per_share_squared * squared - 1.0).abs() < 1e-6);
+            assert!(carrier.is_settled() || result.last() == Some(&Err(NoRoom)));
+            (carrier.share, result.contains(&Err(NoRoom)))
+        };
+        assert_eq!(settled(150.0), (1.0, false));
+        assert_eq!(settled(140.0), (0.75, false));
+        assert_eq!(settled(144.0), (0.765_625, false));
+        assert_eq!(settled(160.0), (1.0, false));
+        assert!(settled(124.0).1);
+    }
 }

@@ -437,7 +437,7 @@ mod tests {
     fn the_axes_lead_and_lag_by_the_delays() {
         let c = built(AngleSource::Injection);
         let mut axes = Axes::default();
-        let step = 20.0 / 6000.0; // 600 rpm
+        let step = 50.0 / 6000.0;
         let ahead = UnitVector { cos: 0.0, sin: 1.0 };
         c.turn(&mut axes, step, ahead);
         let degrees = |axis: UnitVector| axis.sin.atan2(axis.cos).to_degrees();

@@ -113,11 +113,14 @@ fn responses_of_trivial_cascades() {
     assert!((delay.group_delay(0.3) - 1.0).abs() < 1e-15);
     let mut state = SosState::default();
     assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
+    assert!(Sos { sections: [Section::IDENTITY; 2] }.is_stable());
     // Unstable ones are seen as such.
     for (a1, a2) in
         [(0.0, 1.0), (-2.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)]
     {
-        assert!(!Section { a1, a2, ..Section::IDENTITY }.is_stable(), "{a1} {a2}");
+        let section = Section { a1, a2, ..Section::IDENTITY };
+        assert!(!section.is_stable(), "{a1} {a2}");
+        assert!(!Sos { sections: [Section::IDENTITY, section] }.is_stable());
     }
 }
 
