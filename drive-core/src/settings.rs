@@ -66,14 +66,14 @@ pub struct Limits {
     pub dc_under_v: f32,
     /// Speed of the rotor that trips, rpm.
     pub speed_rpm: f32,
-    /// Voltage that the model of the motor may fail to explain at standstill, V.
+    /// Largest voltage that the model of the motor does not explain at standstill, V.
     pub unexplained_v: f32,
 }
 
 impl Default for Limits {
-    /// Trip below the end of the sensors' range (4.47 A); 3.5 A plus the carrier's 0.26 A stay clear
-    /// of it. 12 V unexplained is what 3 A on 30 %
-    /// of resistance and an inductance 15 % off at a full step come to.
+    /// The trip is below the end of the sensors' range (4.47 A); 3.5 A and the carrier's 0.26 A stay clear of
+    /// it. The unexplained 12 V are 3 A on an error of 30 % of the resistance and a full step on an error of
+    /// 15 % of the inductance.
     fn default() -> Self {
         Self {
             current_a: 3.5,

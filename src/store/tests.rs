@@ -8,6 +8,8 @@ use super::*;
 use crate::settings::keys::{self, KEYS};
 use crate::settings::value::Value;
 
+mod older;
+
 /// Flash that loses power, with what a power failure leaves drawn from random bits.
 #[derive(Clone, Debug)]
 struct Fake {
@@ -267,43 +269,6 @@ fn keys_may_come_and_go() {
     let mut fake = Fake::new();
     fake.hold(0, resealed(record));
     assert_eq!(load(&mut fake), Loaded::Settings(with_r_s(7.0)));
-}
-
-/// The flash of a board that runs commit 1abee12 and has saved this record.
-fn board_of_1abee12(record: &[u8]) -> Fake {
-    let mut fake = Fake::new();
-    for (place, word) in fake.words[0].iter_mut().zip(record.chunks_exact(8)) {
-        *place = Some(u64::from_le_bytes(word.try_into().unwrap()));
-    }
-    fake
-}
-
-/// A key that is renamed must be found by the hash of its old name, too.
-#[test]
-fn records_saved_by_commit_1abee12_are_read() {
-    let defaults = include_bytes!("tests/defaults-1abee12.bin");
-    assert_eq!(load(&mut board_of_1abee12(defaults)), Loaded::Settings(board()));
-
-    let changed = include_bytes!("tests/changed-1abee12.bin");
-    let mut expected = board();
-    // The values that its console showed: none is the default.
-    for line in include_str!("tests/changed-1abee12.txt").lines() {
-        let (name, value) = line.split_once(' ').unwrap();
-        let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
-        key.set(&mut expected, key.parse(value).unwrap());
-    }
-    let fitted = |value, misfit| Fitted { value, misfit, accepted: true };
-    expected.learned = Some(Learned {
-        reference: ReferenceTable::default(),
-        carrier: Some(CarrierTable::default()),
-        points: 13,
-        asymmetry: 0.001,
-        gain_mismatch: fitted(0.01, 0.0002),
-        current_saliency: fitted(0.03, 0.02),
-        flux_saliency: -0.035,
-        accepted: true,
-    });
-    assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
 }
 
 #[test]

@@ -253,8 +253,8 @@ mod tests {
             let result = result.collect::<Vec<_>>();
             let squared = carrier.share * carrier.share;
             assert!((carrier.per_share_squared * squared - 1.0).abs() < 1e-6);
-            assert!(carrier.is_settled() || result.last() == Some(&Err(NoRoom)));
-            (carrier.share, result.contains(&Err(NoRoom)))
+            assert!(carrier.is_settled() || result.last() == Some(&Err(InsufficientHeadroom)));
+            (carrier.share, result.contains(&Err(InsufficientHeadroom)))
         };
         assert_eq!(settled(150.0), (1.0, false));
         assert_eq!(settled(140.0), (0.75, false));

@@ -1,5 +1,8 @@
 //! The coefficients of the control step, and their design from settings.
 
+#[cfg(test)]
+mod tests;
+
 use core::f32::consts::TAU;
 
 use crate::carrier::DemodulatorKind;
@@ -364,90 +367,5 @@ impl Settings {
             lag: lag_share * carrier_lag,
             band_pass_lag: lag_share * BPF_GROUP_DELAY,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::disallowed_methods)] // std functions are the reference here
-    use core::f32::consts::TAU;
-
-    use super::*;
-    use crate::drive::axes::Axes;
-
-    fn near(value: f32, expected: f32) {
-        assert!((value / expected - 1.0).abs() < 1e-4, "{value}, not {expected}");
-    }
-
-    fn built(source: AngleSource) -> Coefficients {
-        Settings { angle_source: source, ..Settings::default() }.build().unwrap()
-    }
-
-    #[test]
-    fn limits_and_times_are_those_of_the_settings_in_periods() {
-        let c = built(AngleSource::Encoder);
-        // Two pole pairs and 6 kHz; without a sensor 700 rpm.
-        near(c.protection.rotor_freq, 2000.0 / 60.0 * 2.0 / 6000.0);
-        near(built(AngleSource::Injection).protection.rotor_freq, 700.0 / 60.0 * 2.0 / 6000.0);
-        near(c.freq_per_speed, 2.0 / 6000.0);
-        near(c.protection.current_squared, 3.5 * 3.5);
-        near(c.current_lag, 0.18);
-        let s = &c.sequence;
-        assert_eq!((s.precharge, s.magnetise, s.verify), (60, 4800, 1800));
-        near(s.stop_ramp, 30.0 / 6000.0);
-    }
-
-    #[test]
-    fn the_carrier_lags_by_the_plant() {
-        // 0.053 samples, 0.9° at 600 rpm, for the motor of Table 5.
-        let plant = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
-        assert!((carrier_lag(plant) - 0.053).abs() < 5e-4, "{}", carrier_lag(plant));
-        // -d arg(1/(z - p)) / d omega, less the half sample of the hold.
-        let arg = |omega: f64| -(Complex64::cis(omega) - plant.p).arg();
-        let w = core::f64::consts::TAU / CARRIER_SAMPLES as f64;
-        let lag = -(arg(w + 1e-5) - arg(w - 1e-5)) / 2e-5 - 0.5;
-        assert!((f64::from(carrier_lag(plant)) - lag).abs() < 1e-6);
-    }
-
-    /// A saliency s makes a current difference of sqrt2 I s, and an impedance difference of 2 s V/I.
-    #[test]
-    fn impedance_and_current_difference_tell_the_same_saliency() {
-        let settings = Settings::default();
-        let c = settings.build().unwrap();
-        let (volts, amperes) = (settings.injection.amplitude_v, c.injection.current_amplitude);
-        let s = 0.035;
-        near(
-            c.estimator.ampere_per_ohm * 2.0 * s * volts / amperes,
-            core::f32::consts::SQRT_2 * amperes * s,
-        );
-    }
-
-    #[test]
-    fn only_the_sensorless_drive_watches_the_saliency() {
-        let (encoder, injection) = (built(AngleSource::Encoder), built(AngleSource::Injection));
-        assert!(encoder.saliency_check.is_none() && injection.saliency_check.is_some());
-        assert!(encoder.lock_monitor.is_none() && injection.lock_monitor.is_some());
-        assert!(encoder.noise_watch.is_none() && injection.noise_watch.is_some());
-        assert!(!encoder.inject && injection.inject);
-        assert!(!encoder.demodulate && injection.demodulate);
-    }
-
-    /// The voltage acts 1.5 periods ahead of the sample; the current is seen behind filter and sensor.
-    #[test]
-    fn the_axes_lead_and_lag_by_the_delays() {
-        let c = built(AngleSource::Injection);
-        let mut axes = Axes::default();
-        let step = 50.0 / 6000.0;
-        let ahead = UnitVector { cos: 0.0, sin: 1.0 };
-        c.turn(&mut axes, step, ahead);
-        let degrees = |axis: UnitVector| axis.sin.atan2(axis.cos).to_degrees();
-        let turned = |samples: f32| samples * step * 360.0;
-        assert!((degrees(axes.applied) - turned(1.5)).abs() < 1e-2);
-        assert!(
-            (degrees(axes.seen) + turned(1.530_4 + 5.315 * (step * TAU).powi(2) + 0.18)).abs()
-                < 1e-2
-        );
-        assert!((degrees(axes.carrier) - 90.0 + turned(0.18 + 0.053)).abs() < 1e-2);
-        assert_eq!(axes.injection, ahead);
     }
 }

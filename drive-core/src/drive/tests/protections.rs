@@ -1,0 +1,173 @@
+//! The protections of a running drive.
+
+use super::*;
+
+#[test]
+fn every_protection_switches_off_in_the_same_step() {
+    type Change = fn(&mut Sample);
+    let cases: [(Change, Fault); 14] = [
+        (|s| s.current_a = 4050, Fault::OverCurrentA),
+        (|s| s.current_b = 4050, Fault::OverCurrentB),
+        (|s| (s.current_a, s.current_b) = (3200, 3300), Fault::OverCurrentC),
+        (|s| s.current_a = 4095, Fault::SensorSaturatedA),
+        (|s| s.current_b = 0, Fault::SensorSaturatedB),
+        (|s| s.dc_link = 3700, Fault::DcLinkOverVoltage),
+        (|s| s.dc_link = 1000, Fault::DcLinkUnderVoltage),
+        (|s| s.heat_sink = 4095, Fault::OverTemperature),
+        (|s| s.encoder = 1_000_000, Fault::Encoder),
+        (|s| s.hardware = Hardware::BREAK, Fault::Break),
+        (|s| s.hardware = Hardware::ANALOG_WATCHDOG, Fault::AnalogWatchdog),
+        (|s| s.hardware = Hardware::DEADLINE_MISS, Fault::DeadlineMiss),
+        (|s| s.hardware = Hardware::CONVERTER_OVERRUN, Fault::ConverterOverrun),
+        (|s| s.hardware = Hardware::CLOCK_FAILURE, Fault::ClockFailure),
+    ];
+    for (change, fault) in cases {
+        let (mut drive, mut load) = running();
+        let mut sample = load.sample();
+        change(&mut sample);
+        assert_eq!(drive.step(&sample), Compare::OFF, "{fault}");
+        assert_eq!(drive.state(), State::Fault(fault));
+        // It stays latched, names itself, and a clear and a start bring the drive back.
+        assert_eq!(drive.step(&load.sample()), Compare::OFF);
+        assert_eq!(drive.command(&Command::Start(Mode::Torque)), Err(Refused::Fault(fault)));
+        drive.command(&Command::Clear).unwrap();
+        load = Load::new();
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque), "after {fault}");
+    }
+}
+
+#[test]
+fn over_speed_trips() {
+    // This load has no back-emf: with the check that would miss it out of the way.
+    let mut settings = settings();
+    settings.limits.unexplained_v = 1000.0;
+    let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+    drive.command(&Command::Start(Mode::Torque)).unwrap();
+    assert!(run_to(&mut drive, &mut load, State::Torque));
+    let mut sample = load.sample();
+    for _ in 0..3000 {
+        // 70 counts a period: 2520 rpm
+        sample.encoder = sample.encoder.wrapping_add(70);
+        let now = load.sample();
+        sample = Sample { encoder: sample.encoder, ..now };
+        let compare = drive.step(&sample);
+        load.advance(compare);
+    }
+    assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
+}
+
+#[test]
+fn a_stuck_current_sensor_is_found_before_the_current_runs_away() {
+    let (mut drive, mut load) = running();
+    let stuck = load.sample();
+    drive.command(&Command::Torque(1.0)).unwrap();
+    let mut largest = 0.0_f32;
+    for _ in 0..3000 {
+        let sample = Sample { current_a: stuck.current_a, ..load.sample() };
+        let compare = drive.step(&sample);
+        load.advance(compare);
+        largest = largest.max(load.current.length_squared());
+        if matches!(drive.state(), State::Fault(_)) {
+            break;
+        }
+    }
+    assert_eq!(drive.state(), State::Fault(Fault::CurrentNotAsPredicted));
+    assert!(largest < 4.47_f32 * 4.47, "{largest}");
+}
+
+#[test]
+fn a_silent_channel_is_found_by_its_carrier() {
+    for (channel, fault) in [(0, Fault::CarrierMissingA), (1, Fault::CarrierMissingB)] {
+        let mut settings = settings();
+        settings.injection.beside_encoder = true;
+        // With the other check out of the way.
+        settings.limits.unexplained_v = 1000.0;
+        let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        // The injection at 60°: 0.5 along phase a, 0.5 along phase b.
+        drive.command(&Command::TurnInjection(-30.0)).unwrap();
+        let zero = Load::new().sample();
+        let mut periods = 0;
+        while drive.state() == State::Torque && periods < 600 {
+            let mut sample = load.sample();
+            if channel == 0 && periods > 100 {
+                sample.current_a = zero.current_a;
+            } else if channel == 1 && periods > 100 {
+                sample.current_b = zero.current_b;
+            }
+            let compare = drive.step(&sample);
+            load.advance(compare);
+            periods += 1;
+        }
+        assert_eq!(drive.state(), State::Fault(fault), "channel {channel}");
+        // Three carrier periods, and up to one to the end of the running one.
+        assert!((120..=150).contains(&periods), "{periods}");
+    }
+}
+
+#[test]
+fn an_open_phase_does_not_get_past_the_start() {
+    // Open a: across phase a; open b, c: along the other two in series; all open: nowhere.
+    let axis = |degrees: f32| Some(Angle::from_degrees(degrees).unit_vector());
+    let nothing = Some(UnitVector { cos: 0.0, sin: 0.0 });
+    for (name, only) in [("a", axis(90.0)), ("b", axis(30.0)), ("c", axis(-30.0)), ("all", nothing)]
+    {
+        let mut drive = Drive::new(sensorless().build().unwrap());
+        let mut load = Load { only, ..Load::new() };
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(!run_to(&mut drive, &mut load, State::Torque), "{name}");
+        let State::Fault(fault) = drive.state() else { panic!("{name}: {}", drive.state()) };
+        println!("{name}: {fault:?}");
+        let named = [
+            Fault::CarrierMissingA,
+            Fault::CarrierMissingB,
+            Fault::CarrierWeak,
+            Fault::CurrentNotAsPredicted,
+        ];
+        assert!(named.contains(&fault), "{name}: {fault:?}");
+    }
+}
+
+#[test]
+fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
+    // 206 V leave 119 V in every direction: 100 V of carrier fit beside little, 150 V never.
+    for (amplitude, shares) in [(100.0, (0.8, 0.99)), (150.0, (0.5, 0.7))] {
+        let mut settings = settings();
+        settings.injection.beside_encoder = true;
+        settings.injection.amplitude_v = amplitude;
+        let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+        load.v_dc = 206.0;
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        // 6.2 ohm times 3.2 A are 20 V.
+        drive.command(&Command::Torque(3.1)).unwrap();
+        let mut current = 0.0;
+        for _ in 0..1200 {
+            let compare = drive.step(&load.sample());
+            load.advance(compare);
+            current = drive.telemetry().current.q;
+        }
+        let share = drive.telemetry().carrier_share;
+        assert_eq!(drive.state(), State::Torque);
+        assert!(share > shares.0 && share < shares.1, "{amplitude} V: {share}");
+        assert!((current - 3.1).abs() < 0.05, "{current}");
+        // All of it comes back with the room.
+        load.v_dc = 311.0;
+        for _ in 0..1200 {
+            let compare = drive.step(&load.sample());
+            load.advance(compare);
+        }
+        assert_eq!(drive.telemetry().carrier_share, 1.0);
+    }
+    let mut settings = settings();
+    settings.injection.beside_encoder = true;
+    settings.injection.amplitude_v = 150.0;
+    settings.limits.dc_under_v = 50.0;
+    let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+    load.v_dc = 120.0; // 69 V
+    drive.command(&Command::Start(Mode::Torque)).unwrap();
+    assert!(!run_to(&mut drive, &mut load, State::Torque));
+    assert_eq!(drive.state(), State::Fault(Fault::CarrierNoRoom));
+}

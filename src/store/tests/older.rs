@@ -1,0 +1,40 @@
+//! Records that older firmware has saved.
+
+use super::*;
+
+/// The flash of a board that runs commit 1abee12 and has saved this record.
+fn board_of_1abee12(record: &[u8]) -> Fake {
+    let mut fake = Fake::new();
+    for (place, word) in fake.words[0].iter_mut().zip(record.chunks_exact(8)) {
+        *place = Some(u64::from_le_bytes(word.try_into().unwrap()));
+    }
+    fake
+}
+
+/// A key that is renamed must be found by the hash of its old name, too.
+#[test]
+fn records_saved_by_commit_1abee12_are_read() {
+    let defaults = include_bytes!("defaults-1abee12.bin");
+    assert_eq!(load(&mut board_of_1abee12(defaults)), Loaded::Settings(board()));
+
+    let changed = include_bytes!("changed-1abee12.bin");
+    let mut expected = board();
+    // The values that its console showed: none is the default.
+    for line in include_str!("changed-1abee12.txt").lines() {
+        let (name, value) = line.split_once(' ').unwrap();
+        let key = keys::find(name).unwrap_or_else(|| panic!("no key {name}"));
+        key.set(&mut expected, key.parse(value).unwrap());
+    }
+    let fitted = |value, misfit| Fitted { value, misfit, accepted: true };
+    expected.learned = Some(Learned {
+        reference: ReferenceTable::default(),
+        carrier: Some(CarrierTable::default()),
+        points: 13,
+        asymmetry: 0.001,
+        gain_mismatch: fitted(0.01, 0.0002),
+        current_saliency: fitted(0.03, 0.02),
+        flux_saliency: -0.035,
+        accepted: true,
+    });
+    assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
+}
