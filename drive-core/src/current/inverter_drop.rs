@@ -154,7 +154,7 @@ mod tests {
         InverterDrop::new(&Motor::default(), &sequence, largest_a)
     }
 
-    /// What is found on a motor of `r_s` ohm behind a drop of `volts`.
+    /// The drop found on a motor of `r_s` ohm behind a drop of `volts`.
     fn found(r_s: f32, volts: f32, i_d: f32, largest: f32) -> f32 {
         let drop = inverter_drop(i_d, largest);
         let (tau_r, rotor) = (Motor::default().tau_r(), drop.rotor);

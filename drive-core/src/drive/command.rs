@@ -27,7 +27,7 @@ pub enum Command {
     /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
     Speed(f32),
     /// Reference of the position, mechanical turns from where the drive was started; limited to
-    /// what is counted.
+    /// the counted range.
     Position(f32),
     /// Reference of the direct-axis (magnetising) current, A peak.
     Magnetising(f32),

@@ -80,7 +80,7 @@ impl Coefficients {
                 self.watch_noise(s, 1, step.sample)
             }
             2 => {
-                self.expect(s, step);
+                self.predict(s, step);
                 self.watch_noise(s, 2, step.sample)
             }
             3 => {
@@ -98,7 +98,7 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
-                self.expect(s, step);
+                self.predict(s, step);
                 self.watch_noise(s, 3, step.sample)
             }
             8 => {
@@ -124,14 +124,14 @@ impl Coefficients {
     }
 
     /// Computes the rotor voltage that the next judgement of the current reckons with.
-    fn expect(&self, s: &mut ControlState, step: &StepResults) {
+    fn predict(&self, s: &mut ControlState, step: &StepResults) {
         let flux = RotorFlux {
             magnetising: s.indirect.magnetising,
             rotor_freq: step.rotor_freq,
             axis: step.flux_axis,
             flux_freq: step.flux_freq,
         };
-        self.prediction.expect(&mut s.prediction, &flux);
+        self.prediction.predict(&mut s.prediction, &flux);
     }
 
     /// Checks that the tracked angle is that of the flux.

@@ -142,7 +142,7 @@ impl Prediction {
 
     /// Computes the rotor voltage, V, that adds to the applied one, (L_m/L_r)(1/tau_r - j w_r) psi; called
     /// one sample before [`judge`](Self::judge).
-    pub fn expect(&self, state: &mut PredictionState, flux: &RotorFlux) {
+    pub fn predict(&self, state: &mut PredictionState, flux: &RotorFlux) {
         let rotor = Dq {
             d: self.decay * flux.magnetising,
             q: -self.emf * flux.magnetising * flux.rotor_freq,
@@ -265,7 +265,7 @@ mod tests {
             state.collect(current, pending);
             match n % 10 {
                 1 | 6 => state.latch_voltage(),
-                2 | 7 => prediction.expect(
+                2 | 7 => prediction.predict(
                     &mut state,
                     &RotorFlux {
                         magnetising: 0.7,
