@@ -16,7 +16,7 @@ use drive_core::{Accepted, Command, Mode, State};
 
 use crate::link::trace::SignalChoice;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::KEYS;
+use crate::settings::keys;
 use grammar::{HELP, Request};
 use handle::{CommandError, DriveHandle, Port};
 use line::{LineError, LineReader, OutputLine};
@@ -331,7 +331,7 @@ impl Console {
         let out = &mut self.out;
         let written = match kind {
             ListKind::Help => HELP.get(index).map(|line| out.line(format_args!("{line}"))),
-            ListKind::Settings => KEYS.get(index).map(|key| {
+            ListKind::Settings => keys::number(index).map(|key| {
                 let setting = reply::Setting::new(key, &self.settings);
                 out.line(format_args!("{setting}"));
             }),

@@ -121,8 +121,7 @@ impl fmt::Display for Report {
 mod tests {
     use drive_core::{Command, Mode};
     use hil_sim::Config;
-    use hil_sim::config::AngleSource as Source;
-    use hil_sim::rig::{Rig, drive_settings, plant_settings};
+    use hil_sim::rig::{Rig, plant_settings};
 
     use super::*;
     use heapless::spsc::Queue;
@@ -131,9 +130,9 @@ mod tests {
     /// tracking.
     fn tracked() -> (Rig, Tracking) {
         let mut config = Config::default();
-        config.angle.source = Source::Encoder;
-        let settings = Settings { track_rotor: true, ..drive_settings(&config) };
-        config.motor.rr *= 1.3;
+        config.drive.angle_source = AngleSource::Encoder;
+        let settings = Settings { track_rotor: true, ..config.drive };
+        config.motor.r_r *= 1.3;
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Torque).unwrap();
         rig.command(&Command::Torque(2.0)).unwrap();

@@ -2,7 +2,6 @@
 //! motor. [`keys`] lists them by name.
 
 pub mod keys;
-pub mod value;
 
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
@@ -28,10 +27,9 @@ pub struct CommandSettings {
     pub timeout_s: f32,
     /// Whether a start has checked the wiring since the defaults were set.
     pub wiring_checked: bool,
+    /// Whether the console sends typed characters back.
+    pub echo: bool,
 }
-
-/// Longest time-out of commands, s.
-const LONGEST_TIMEOUT_S: f32 = 3600.0;
 
 impl FirmwareSettings {
     /// The defaults: those of the drive with the numbers of this board.
@@ -78,20 +76,11 @@ impl FirmwareSettings {
         built
     }
 
-    /// Checks the values that the firmware itself uses; [`build`](Self::build) checks the drive's.
+    /// Checks every value against its range.
     ///
     /// # Errors
     /// The first value out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let (shortest, longest) = board::DEAD_TIME_RANGE_S;
-        for (name, value, min, max) in [
-            ("command.timeout_s", self.command.timeout_s, 0.0, LONGEST_TIMEOUT_S),
-            ("inverter.dead_time_s", self.drive.inverter.dead_time_s, shortest, longest),
-        ] {
-            if !(min..=max).contains(&value) {
-                return Err(SettingsError::Range { name, value, min, max });
-            }
-        }
-        Ok(())
+        keys::all().try_for_each(|key| key.check(self))
     }
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{IDEAL, ISOTROPIC, all, config, regulating_with};
-use hil_sim::rig::{drive_settings, plant_settings};
+use hil_sim::rig::plant_settings;
 use hil_sim::stats::Stats;
 
 /// Largest flux angle error (degrees) and largest relative torque error at one speed.
@@ -13,7 +13,7 @@ fn measure(rpm: f64, ignore_delays: bool) -> (f64, f64) {
     let mut changes = all(&[&IDEAL, &ISOTROPIC]);
     changes.extend(["angle.source=encoder", "load.mode=speed", speed.as_str()]);
     let config = config(&changes);
-    let mut drive = drive_settings(&config);
+    let mut drive = config.drive;
     drive.ignore_delays = ignore_delays;
     let (mut worst, mut torque_error) = (0.0_f64, 0.0_f64);
     for i_q in [-2.0, 1.0, 2.0] {

@@ -7,10 +7,10 @@ use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::settings::SettingsError;
 use drive_core::{Command, Settings};
-use hil_sim::config::{Config, Demodulator, LoadMode};
+use hil_sim::config::{Config, LoadMode};
 use hil_sim::experiments::learning;
 use hil_sim::plant::Load;
-use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
+use hil_sim::rig::{RATE_HZ, Rig, plant_settings};
 
 /// Name, and how large its signal is beside that of the rectified chain, by the gains of the filters
 /// and of the detector.
@@ -116,15 +116,15 @@ fn tracked(drive: &Settings, config: &Config) -> [(f64, f64); 2] {
 fn all_but_the_literal_chain_track() {
     for (name, gain) in ALL {
         let config = config(&[&format!("injection.demodulator={name}")]);
-        let demodulator = config.injection.demodulator;
+        let demodulator = config.drive.injection.demodulator;
         let table = learning::reference_of(demodulator, &config, 7).unwrap();
-        let mut drive = drive_settings(&config);
-        drive.injection.synchronous.reference = table;
+        let mut drive = config.drive;
+        drive.injection.synchronous.reference = Some(table);
         drive.injection.printed.learned = Some(table);
         (drive.injection.printed.k_s, drive.injection.printed.z_s) = ((0.1 / gain) as f32, 0.995);
         for (rpm, (rms, worst)) in [0, 150].into_iter().zip(tracked(&drive, &config)) {
             println!("{name}, {rpm} rpm: {rms:.2} deg rms, {worst:.2} deg");
-            if demodulator == Demodulator::Literal {
+            if demodulator == DemodulatorKind::Literal {
                 assert!(worst > 45.0, "the literal chain held the angle: {worst} deg");
             } else {
                 assert!(rms <= 2.5 && worst <= 9.0, "{name}, {rpm} rpm: {rms} {worst}");

@@ -11,7 +11,7 @@ use drive_core::identify::online::{NoEstimate, Online, SpeedInput};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
 use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 use hil_sim::plant::Load;
-use hil_sim::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
+use hil_sim::rig::{RATE_HZ, Rig, plant_settings};
 
 /// r_r grows by 30 % between 3 and 6 s.
 const CASE: WarmingCase = WarmingCase {
@@ -93,8 +93,8 @@ type Profile = [(f64, f32)];
 /// what the drive uses, relative.
 fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>, f64) {
     let mut config = config(&["angle.source=encoder"]);
-    let settings = Settings { track_rotor: true, ..drive_settings(&config) };
-    config.motor.rr *= r_r;
+    let settings = Settings { track_rotor: true, ..config.drive };
+    config.motor.r_r *= r_r;
     config.inverter.residual_v = residual;
     let mut rig = Rig::new(&plant_settings(&config), &settings, 3).unwrap();
     rig.start(Mode::Torque).unwrap();
@@ -160,9 +160,9 @@ fn every_motor_in_range_can_be_tracked() {
             for dc_over_v in [10.0, 1000.0] {
                 let mut settings = Settings::default();
                 settings.motor.r_s = r_s;
-                settings.limits.current_a = current_a;
-                settings.sequence.i_d = i_d;
-                settings.limits.dc_over_v = dc_over_v;
+                settings.limits.current_a = Some(current_a);
+                settings.sequence.i_d = Some(i_d);
+                settings.limits.dc_over_v = Some(dc_over_v);
                 assert!(Online::new(&settings).is_ok(), "{settings:?}");
             }
         }
@@ -191,7 +191,7 @@ fn what_is_not_a_signal_gives_no_estimate_and_does_no_harm() {
 #[test]
 fn the_drive_takes_a_time_constant_only_if_it_is_wanted_bounded_and_slowly() {
     let config = config(&["angle.source=encoder"]);
-    let settings = drive_settings(&config);
+    let settings = config.drive;
     let mut rig = Rig::new(&plant_settings(&config), &settings, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
     let nominal = settings.motor.tau_r();

@@ -4,7 +4,7 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{config, drive_settings, plant_settings};
+use common::{config, plant_settings};
 use drive_core::{Command, Mode, State};
 use hil_sim::Config;
 use hil_sim::plant::Load;
@@ -83,7 +83,7 @@ fn a_load_step_is_carried() {
 fn the_inertia_need_not_be_known_well() {
     for factor in [0.5, 2.0] {
         let config = config(&[FREE]);
-        let mut settings = drive_settings(&config);
+        let mut settings = config.drive;
         settings.motor.inertia *= factor;
         let mut rig = Rig::new(&plant_settings(&config), &settings, 5).unwrap();
         rig.start(Mode::Speed).unwrap();

@@ -6,7 +6,7 @@ mod common;
 use common::config;
 use drive_core::{Command, Compare, Drive, Fault, Mode, Sample, State};
 use hil_sim::plant::{Channel, CurrentFault, Plant};
-use hil_sim::rig::{drive_settings, plant_settings};
+use hil_sim::rig::plant_settings;
 
 /// What is wrong between the drive and the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ enum Wiring {
 /// way, A.
 fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
     let config = config(changes);
-    let drive_settings = drive_settings(&config);
+    let drive_settings = config.drive;
     let mut drive = Drive::new(drive_settings.build().unwrap());
     let mut plant = Plant::new(&plant_settings(&config), seed).unwrap();
     if let Wiring::Open(channel) = wiring {

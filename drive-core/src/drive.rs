@@ -55,7 +55,7 @@ pub use state::{Mode, State};
 /// let mut drive = Drive::new(Settings::default().build()?);
 /// drive.command(&Command::Start(Mode::Torque))?;
 /// // Codes of zero current and 311 V.
-/// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, ..Sample::default() };
+/// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };
 /// let compare = drive.step(&sample);
 /// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
 /// assert_eq!(drive.state(), State::Calibrating);

@@ -15,6 +15,9 @@ use bitflags::bitflags;
 /// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
 pub const PERIOD_S: f32 = 1.0 / 6000.0;
 
+/// Largest code of the 12-bit converters of dc link and heat sink.
+pub const CONVERTER_CODES: u16 = 4095;
+
 /// Whole control periods in a time in s, rounded. Not for the control step.
 pub(crate) fn periods(seconds: f32) -> u32 {
     libm::roundf(seconds / PERIOD_S) as u32
@@ -31,7 +34,8 @@ pub struct Sample {
     pub current_b: u16,
     /// Converter code of the dc-link voltage.
     pub dc_link: u16,
-    /// Converter code of the heat-sink temperature.
+    /// Converter code of the heat-sink temperature. A board without a thermistor gives a code inside the window of
+    /// [`Ntc`](crate::settings::Ntc), for example 1309 for 25 °C with the defaults.
     pub heat_sink: u16,
     /// Position counter of the quadrature encoder, four counts a line, wrapping, upwards when the
     /// rotor turns from phase a towards phase b.

@@ -10,7 +10,7 @@ use induction_drive::console::Console;
 use induction_drive::console::grammar::{HELP, LEVELS};
 use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
-use induction_drive::settings::keys::KEYS;
+use induction_drive::settings::keys;
 use libfuzzer_sys::fuzz_target;
 
 #[path = "../../src/console/tests/doubles.rs"]
@@ -63,7 +63,7 @@ fuzz_target!(|bytes: &[u8]| {
 /// What the console knows: commands, settings, and the words that follow them.
 fn words() -> Vec<&'static str> {
     let commands = HELP.iter().filter_map(|line| line.split_whitespace().next());
-    let settings = KEYS.iter().map(|key| key.name);
+    let settings = keys::all().map(|key| key.name());
     let levels = LEVELS.iter().map(|(name, _)| *name);
     let others =
         ["encoder", "injection", "learning", "yes", "no", "synchronous", "rectified", "motor"];

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::board;
-use crate::config::{Config, KEYS};
+use crate::config::{Config, Key};
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
 use crate::input::{Input, OUT};
@@ -93,11 +93,11 @@ fn list() -> String {
 fn keys() -> Table {
     let default = Config::default();
     let mut table = Table::new("", &["key", "unit", "default", "allowed", "meaning"]);
-    for key in KEYS {
-        let default = (key.get)(&default).to_string();
-        let range = key.allowed.describe("");
-        let meaning = key.doc.trim().trim_end_matches('.').to_owned();
-        let cells = [key.name.to_owned(), key.unit.to_owned(), default, range, meaning];
+    for key in Key::all() {
+        let default = key.get(&default).to_string();
+        let range = key.allowed().describe("");
+        let cells =
+            [key.assigned_name(), key.unit().to_owned(), default, range, key.help().to_owned()];
         table.row(cells.map(Cell::from));
     }
     table

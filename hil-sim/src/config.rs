@@ -1,49 +1,36 @@
-//! The configuration of an experiment: plain numbers under dotted names.
+//! The configuration of an experiment: plain numbers under dotted names, those of the console of the drive.
+//!
+//! A key is one of the bench ([`BENCH`]: the simulated motor, inverter, sensors and load) or one of the drive
+//! ([`drive_core::settings::SETTINGS`]). A name that both have sets both: the drive knows its bench. `drive.NAME` sets
+//! the drive alone, which is then wrong about the bench. Assignments count in their order; in a file, those of `drive.`
+//! come last.
 
+mod alias;
+mod key;
 mod keys;
 mod value;
 
 use std::path::Path;
 
-use drive_core::tuning;
+use drive_core::settings::Line;
 
+pub use key::Key;
 pub use keys::*;
 pub use value::{Allowed, Value};
 
-use crate::error::{Error, nearest};
+use crate::error::Error;
+use crate::rig::plant_settings;
 
-impl Key {
-    /// The key with this name.
-    ///
-    /// # Errors
-    /// [`Error::UnknownKey`] with the most similar name.
-    pub fn find(name: &str) -> Result<&'static Self, Error> {
-        KEYS.iter().find(|key| key.name == name).ok_or_else(|| Error::UnknownKey {
-            key: name.to_owned(),
-            nearest: nearest(name, KEYS.iter().map(|key| key.name)),
-        })
-    }
-
-    /// The values it can have, in words, with the unit.
-    pub fn allowed_text(&self) -> String {
-        self.allowed.describe(self.unit)
-    }
-}
-
-impl MotorConfig {
-    /// The T-equivalent circuit, ohm and H.
-    pub fn circuit(&self) -> tuning::EquivalentCircuit {
-        let Self { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *self;
-        tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr }
-    }
-}
+/// Prefix of the keys that set the drive alone.
+const DRIVE: &str = "drive.";
 
 impl Config {
     /// The defaults, changed first by the file and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
     /// [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
-    /// assignment without an equals sign, and as [`Config::set`].
+    /// assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
+    /// other: they are checked when the drive is built.
     pub fn load(file: Option<&Path>, assignments: &[String]) -> Result<Self, Error> {
         let mut config = Self::default();
         if let Some(path) = file {
@@ -51,7 +38,7 @@ impl Config {
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
             let table: toml::Table =
                 text.parse().map_err(|e: toml::de::Error| failed(e.to_string()))?;
-            config.set_table("", &table)?;
+            config.set_table(&table)?;
         }
         for assignment in assignments {
             let (key, value) =
@@ -66,138 +53,101 @@ impl Config {
     /// # Errors
     /// [`Error::UnknownKey`]; [`Error::Value`] with the key, the value and the allowed values.
     pub fn set(&mut self, name: &str, value: &Value) -> Result<(), Error> {
-        let key = Key::find(name)?;
-        (key.set)(self, value).map_err(|problem| Error::Value {
-            key: name.to_owned(),
-            value: value.to_string(),
-            problem,
-            allowed: key.allowed_text(),
-        })
+        let (name, value) = alias::today(name, value);
+        let mut changed = self.clone();
+        for key in Key::named(&name)? {
+            key.set(&mut changed, &value).map_err(|problem| Error::Value {
+                key: name.clone(),
+                value: value.to_string(),
+                problem,
+                allowed: key.allowed_text(),
+            })?;
+        }
+        if name.starts_with("measurement.") || name == "inverter.dc_link_v" {
+            changed.calibrate();
+        }
+        *self = changed;
+        Ok(())
     }
 
-    fn set_table(&mut self, prefix: &str, table: &toml::Table) -> Result<(), Error> {
-        for (name, value) in table {
-            let name = format!("{prefix}{name}");
-            match value {
-                toml::Value::Table(inner) => self.set_table(&format!("{name}."), inner)?,
-                value => self.set(&name, &Value::from_toml(value))?,
-            }
+    /// The torque current of experiments that do not bring their own, A peak.
+    pub fn iq_a(&self) -> f64 {
+        self.reference.iq_a.unwrap_or_else(|| self.amperes(1.0))
+    }
+
+    /// The simulated motor in words.
+    pub fn motor_text(&self) -> String {
+        let m = &self.motor;
+        if *m == MotorConfig::default() {
+            return "Table 5".to_owned();
         }
-        Ok(())
+        format!(
+            "r_s {} ohm, r_r {} ohm, l_ls {} H, l_lr {} H, l_m {} H, {} pole pairs",
+            m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m, m.pole_pairs
+        )
+    }
+
+    /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
+    pub fn amperes(&self, on_reference: f64) -> f64 {
+        f64::from(self.drive.share_of_rated(on_reference as f32))
+    }
+
+    /// Sets the scales of the drive to those of the sensors, without their errors.
+    pub(super) fn calibrate(&mut self) {
+        let sensors = plant_settings(self).measurement;
+        let [a, b] = sensors
+            .calibration()
+            .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 });
+        let scales = &mut self.drive.scales;
+        (scales.current_a, scales.current_b) = (a, b);
+        scales.full_scale = sensors.calibration()[0].full_scale;
+        scales.dc_link = Line { gain: sensors.dc_link_v as f32, offset: 0.0 };
+        let filter_hz = self.measurement.filter_hz;
+        scales.current_delay_s =
+            if filter_hz > 0.0 { (1.0 / (std::f64::consts::TAU * filter_hz)) as f32 } else { 0.0 };
+    }
+
+    /// Sets the keys of a table, those of the drive alone last.
+    ///
+    /// # Errors
+    /// As [`Config::set`].
+    pub fn set_table(&mut self, table: &toml::Table) -> Result<(), Error> {
+        let mut assignments = Vec::new();
+        flatten("", table, &mut assignments);
+        assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
+        assignments.iter().try_for_each(|(name, value)| self.set(name, value))
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
     pub fn changes(&self) -> Vec<String> {
-        let default = Self::default();
-        KEYS.iter()
-            .filter(|key| (key.get)(self) != (key.get)(&default))
-            .map(|key| format!("{}={}", key.name, (key.get)(self)))
-            .collect()
+        self.changes_from(&Self::default())
     }
 
-    /// The motor parameters that the drive is set to.
-    pub fn believed_motor(&self) -> MotorConfig {
-        let (motor, believed) = (&self.motor, &self.drive_motor);
-        MotorConfig {
-            rs: believed.rs.unwrap_or(motor.rs),
-            rr: believed.rr.unwrap_or(motor.rr),
-            lls: believed.lls.unwrap_or(motor.lls),
-            llr: believed.llr.unwrap_or(motor.llr),
-            lm: believed.lm.unwrap_or(motor.lm),
-            ..motor.clone()
+    /// The assignments that make this configuration of `base`.
+    pub fn changes_from(&self, base: &Self) -> Vec<String> {
+        let (mut rebuilt, mut changes) = (base.clone(), Vec::new());
+        for key in Key::all() {
+            let value = key.get(self);
+            if value != key.get(&rebuilt) {
+                let change = (key.assigned_name(), value);
+                // A value that is in the configuration is allowed.
+                let _ = rebuilt.set(&change.0, &change.1);
+                changes.push(format!("{}={}", change.0, change.1));
+            }
+        }
+        changes
+    }
+}
+
+fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, Value)>) {
+    for (name, value) in table {
+        let name = format!("{prefix}{name}");
+        match value {
+            toml::Value::Table(inner) => flatten(&format!("{name}."), inner, into),
+            value => into.push((name, Value::from_toml(value))),
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn set(assignment: &str) -> Result<Config, Error> {
-        Config::load(None, &[assignment.to_owned()])
-    }
-
-    #[test]
-    fn every_default_is_allowed_and_every_key_round_trips() {
-        for key in KEYS {
-            let mut config = Config::default();
-            let value = (key.get)(&config);
-            assert_eq!((key.set)(&mut config, &value), Ok(()), "{}", key.name);
-            assert_eq!(config, Config::default(), "{}", key.name);
-            assert!(!key.doc.trim().is_empty(), "{}", key.name);
-            // Through text, as --set has it, with a value that is not the default.
-            let text = match key.allowed {
-                Allowed::Range { min, .. } => min.to_string(),
-                Allowed::Words(words) => words[0].to_owned(),
-                Allowed::Switch => "true".to_owned(),
-            };
-            let config = set(&format!("{}={text}", key.name)).expect(key.name);
-            assert_eq!((key.get)(&config).to_string(), text, "{}", key.name);
-        }
-    }
-
-    #[test]
-    fn names_are_unique() {
-        for (i, key) in KEYS.iter().enumerate() {
-            assert!(KEYS[..i].iter().all(|other| other.name != key.name), "{}", key.name);
-        }
-    }
-
-    #[test]
-    fn just_outside_the_range_is_refused() {
-        for key in KEYS {
-            if let Allowed::Range { min, max } = key.allowed {
-                for value in [min - 1.0, max + 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                    assert!(set(&format!("{}={value}", key.name)).is_err(), "{} {value}", key.name);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn errors_name_the_key_the_value_and_the_range() {
-        let text = |assignment: &str| set(assignment).unwrap_err().to_string();
-        assert_eq!(text("motor.rs=-1"), "motor.rs = -1: out of range; allowed: 0.01 to 1000 ohm");
-        assert_eq!(
-            text("motor.rs=nan"),
-            "motor.rs = NaN: not a finite number; allowed: 0.01 to 1000 ohm"
-        );
-        assert_eq!(
-            text("motor.rs=a lot"),
-            "motor.rs = a lot: not a number; allowed: 0.01 to 1000 ohm"
-        );
-        assert_eq!(
-            text("motor.pole_pairs=1.5"),
-            "motor.pole_pairs = 1.5: not a whole number; allowed: 1 to 50"
-        );
-        assert_eq!(
-            text("angle.source=resolver"),
-            "angle.source = resolver: not one of the words; allowed: encoder, injection"
-        );
-        assert_eq!(
-            text("motor.r_s=5"),
-            "there is no key `motor.r_s`; did you mean `motor.rs`?; `keys` shows all of them"
-        );
-        assert_eq!(text("motor.rs"), "`motor.rs`: write KEY=VALUE, for example --set motor.rs=5.4");
-    }
-
-    #[test]
-    fn toml_and_assignments_say_the_same() {
-        let mut from_toml = Config::default();
-        let table = "runs = 3\nload.mode = \"speed\"\n[motor]\nrs = 6\n[drive.motor]\nrr = 1.3\n";
-        from_toml.set_table("", &table.parse().unwrap()).unwrap();
-        let changes = from_toml.changes();
-        assert_eq!(changes, ["motor.rs=6", "load.mode=speed", "drive.motor.rr=1.3", "runs=3"]);
-        assert_eq!(Config::load(None, &changes).unwrap(), from_toml);
-        assert_eq!(from_toml.believed_motor().rr, 1.3);
-        assert_eq!(from_toml.believed_motor().rs, 6.0);
-    }
-
-    #[test]
-    fn toml_of_the_wrong_type_or_name_is_refused() {
-        for bad in ["motor.rs = \"5.4\"", "motor.rs = [1]", "motor = 3", "moter.rs = 1"] {
-            let table = bad.parse().unwrap();
-            assert!(Config::default().set_table("", &table).is_err(), "{bad}");
-        }
-    }
-}
+mod tests;

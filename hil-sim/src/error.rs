@@ -35,7 +35,7 @@ pub enum Error {
         allowed: String,
     },
     /// `--set` without an equals sign.
-    #[error("`{0}`: write KEY=VALUE, for example --set motor.rs=5.4")]
+    #[error("`{0}`: write KEY=VALUE, for example --set motor.r_s=5.4")]
     Assignment(String),
     /// The configuration file cannot be read or is not TOML.
     #[error("{}: {problem}", .path.display())]

@@ -2,16 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::carrier::DemodulatorKind;
-use drive_core::io::PERIOD_S;
-use drive_core::settings::{self, PrintedChain, SynchronousTracking};
+use drive_core::io::{CONVERTER_CODES, PERIOD_S};
+use drive_core::settings::AngleSource;
 use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
 
 use crate::config::{self, Config};
 use crate::error::Error;
 use crate::plant::{
-    CalibrationLine, InverterSettings, Load, MachineSettings, MeasurementSettings,
-    MechanicsSettings, Plant, PlantSettings, SaliencySettings,
+    InverterSettings, Load, MachineSettings, MeasurementSettings, MechanicsSettings, Plant,
+    PlantSettings, SaliencySettings,
 };
 
 /// Control periods per second.
@@ -95,7 +94,7 @@ impl Rig {
     /// # Errors
     /// As [`Rig::new`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
-        Self::new(&plant_settings(config), &drive_settings(config), seed)
+        Self::new(&plant_settings(config), &config.drive, seed)
     }
 
     /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
@@ -104,11 +103,10 @@ impl Rig {
     /// As [`Rig::new`] and [`Rig::start`].
     pub fn oriented(config: &Config, seed: u64) -> Result<Self, Error> {
         let mut config = config.clone();
-        config.angle.source = config::AngleSource::Encoder;
+        config.drive.angle_source = AngleSource::Encoder;
+        config.drive.injection.beside_encoder = true;
         config.load.mode = config::LoadMode::Locked;
-        let mut drive = drive_settings(&config);
-        drive.injection.beside_encoder = true;
-        let mut rig = Self::new(&plant_settings(&config), &drive, seed)?;
+        let mut rig = Self::from_config(&config, seed)?;
         rig.start(Mode::Torque)?;
         Ok(rig)
     }
@@ -231,38 +229,49 @@ pub fn wrapped_degrees(radians: f64) -> f64 {
 /// The plant that the configuration describes.
 pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
+    // What is unset follows the dissertation's bench, in proportion.
+    let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
+    let relative_range = s.range_a / reference.range_a;
+    let relative_current = f64::from(config.drive.rated_a()) / f64::from(reference_drive.rated_a());
     PlantSettings {
         machine: MachineSettings {
-            rs: m.rs,
-            rr: m.rr,
-            lls: m.lls,
-            llr: m.llr,
-            lm: m.lm,
+            rs: m.r_s,
+            rr: m.r_r,
+            lls: m.l_ls,
+            llr: m.l_lr,
+            lm: m.l_m,
             pole_pairs: m.pole_pairs,
         },
         saliency: SaliencySettings {
             a_psi: config.saliency.a_psi,
-            b1: config.saliency.b1,
+            b1: config.saliency.b1.unwrap_or(0.036 / relative_current),
             chi: config.saliency.chi,
-            ..SaliencySettings::default()
+            hold_a: config.saliency.hold_a.unwrap_or(5.0 * relative_current),
+            psi_n: Some(config.saliency.psi_n.unwrap_or(0.7 * relative_current * m.l_m)),
         },
         inverter: InverterSettings {
-            vdc: i.vdc,
-            dead_time_us: i.dead_time_us,
+            vdc: i.dc_link_v,
+            dead_time_us: i.dead_time_s * 1e6,
             propagation_us: i.propagation_us,
             residual_v: i.residual_v,
             switched: i.switched,
             ..InverterSettings::default()
         },
         measurement: MeasurementSettings {
-            noise_a: s.noise_a,
-            lsb_a: s.lsb_a,
+            noise_a: s.noise_a.unwrap_or(reference.noise_a * relative_range),
+            range_a: s.range_a,
+            lsb_a: s.lsb_a.unwrap_or(reference.lsb_a * relative_range),
             filter_hz: s.filter_hz,
             gain_error_a: s.gain_error_a,
             gain_error_b: s.gain_error_b,
             offset_a: s.offset_a,
             offset_b: s.offset_b,
-            ..MeasurementSettings::default()
+            dc_link_v: s.dc_link_range_v.map_or(
+                reference.dc_link_v
+                    * (i.dc_link_v / reference_drive.inverter.dc_link_v as f64).max(1.0),
+                |range| range / f64::from(CONVERTER_CODES),
+            ),
+            heat_sink_code: config.drive.scales.ntc.code(s.heat_sink_c as f32),
         },
         mechanics: MechanicsSettings {
             inertia: m.inertia,
@@ -276,84 +285,5 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             },
         },
         ..PlantSettings::default()
-    }
-}
-
-/// The drive that the configuration describes, with the calibration of its converters, its dead time
-/// and the believed motor.
-pub fn drive_settings(config: &Config) -> Settings {
-    let (believed, base) = (config.believed_motor(), Settings::default());
-    let measurement = plant_settings(config).measurement;
-    let [line_a, line_b] = measurement.calibration();
-    let line = |l: CalibrationLine| drive_core::settings::Line {
-        gain: l.a_per_code as f32,
-        offset: l.a_at_zero as f32,
-    };
-    let filter_hz = config.measurement.filter_hz;
-    Settings {
-        motor: settings::Motor {
-            r_s: believed.rs as f32,
-            r_r: believed.rr as f32,
-            l_ls: believed.lls as f32,
-            l_lr: believed.llr as f32,
-            l_m: believed.lm as f32,
-            pole_pairs: believed.pole_pairs as u8,
-            inertia: believed.inertia as f32,
-        },
-        inverter: settings::Inverter {
-            dead_time_s: (config.inverter.dead_time_us * 1e-6) as f32,
-            compensate: config.inverter.compensate,
-            ..base.inverter
-        },
-        scales: settings::Scales {
-            current_a: line(line_a),
-            current_b: line(line_b),
-            full_scale: line_a.full_scale,
-            current_delay_s: if filter_hz > 0.0 { (1.0 / (TAU * filter_hz)) as f32 } else { 0.0 },
-            ..base.scales
-        },
-        angle_source: match config.angle.source {
-            config::AngleSource::Encoder => settings::AngleSource::Encoder,
-            config::AngleSource::Injection => settings::AngleSource::Injection,
-        },
-        ignore_delays: !config.angle.compensate_delays,
-        injection: settings::InjectionSettings {
-            amplitude_v: config.injection.amplitude_v as f32,
-            demodulator: match config.injection.demodulator {
-                config::Demodulator::Literal => DemodulatorKind::Literal,
-                config::Demodulator::Rectified => DemodulatorKind::Rectified,
-                config::Demodulator::RmsImpedance => DemodulatorKind::RmsImpedance,
-                config::Demodulator::Envelope => DemodulatorKind::Envelope,
-                config::Demodulator::Synchronous => DemodulatorKind::Synchronous,
-            },
-            printed: PrintedChain {
-                reference_a: config.injection.reference_a as f32,
-                k_s: config.injection.k_s as f32,
-                z_s: config.injection.z_s as f32,
-                rms_samples: config.injection.rms_samples.try_into().unwrap_or(u8::MAX),
-                ..base.injection.printed
-            },
-            synchronous: SynchronousTracking {
-                bandwidth_hz: config.injection.bandwidth_hz as f32,
-                check: config.injection.check,
-                monitor: config.injection.monitor,
-                allowed_loss: config.injection.allowed_loss as f32,
-                loss_s: config.injection.loss_s as f32,
-                tracked_rpm: config.injection.tracked_rpm as f32,
-                ..base.injection.synchronous
-            },
-            ..base.injection
-        },
-        speed: settings::SpeedSettings {
-            limit_rpm: config.speed.limit_rpm.map_or(base.speed.limit_rpm, |v| v as f32),
-            ramp_rpm_per_s: config
-                .speed
-                .ramp_rpm_per_s
-                .map_or(base.speed.ramp_rpm_per_s, |v| v as f32),
-            phase_margin_deg: config.speed.phase_margin_deg as f32,
-            ..base.speed
-        },
-        sequence: settings::Sequence { i_d: config.reference.id_a as f32, ..base.sequence },
-        ..base
     }
 }

@@ -17,7 +17,7 @@ fn bad_options_are_refused_before_the_build() {
         (&["--load", "heavy"], "load.mode = heavy: not one of the words"),
         (&["--load", "speed", "fast"], "load.speed_rpm = fast: not a number"),
         (&["--seconds", "0"], "seconds = 0: out of range; allowed: 0.001 to 3600 s"),
-        (&["--set", "motor.rs=-1"], "motor.rs = -1: out of range"),
+        (&["--set", "motor.r_s=-1"], "motor.r_s = -1: out of range"),
     ] {
         let output = board(arguments);
         let error = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -67,14 +67,20 @@ fn user_errors_say_what_is_allowed_and_write_nothing() {
     std::fs::write(folder.join("broken.toml"), "[motor\n").unwrap();
     let cases: [(&[&str], &[&str]); 11] = [
         (&["run", "filter"], &["`filter`", "did you mean `filters`?"]),
-        (&["run", "filters", "--set", "motor.r_s=5"], &["`motor.r_s`", "did you mean `motor.rs`?"]),
-        (&["run", "filters", "--set", "motor.rs=-1"], &["motor.rs = -1", "0.01 to 1000 ohm"]),
-        (&["run", "filters", "--set", "motor.rs=inf"], &["motor.rs = inf", "not a finite number"]),
+        (
+            &["run", "filters", "--set", "motor.r_x=5"],
+            &["`motor.r_x`", "did you mean `motor.r_r`?"],
+        ),
+        (&["run", "filters", "--set", "motor.r_s=-1"], &["motor.r_s = -1", "0.001 to 1000 ohm"]),
+        (
+            &["run", "filters", "--set", "motor.r_s=inf"],
+            &["motor.r_s = inf", "not a finite number"],
+        ),
         (&["run", "filters", "--set", "load.mode=sideways"], &["sideways", "locked, free, speed"]),
         (&["run", "filters", "--set", "motor.rs"], &["KEY=VALUE"]),
         (&["run", "filters", "--seconds", "-1"], &["seconds = -1", "0.001 to 3600 s"]),
         (&["run", "filters", "--seed", "-1"], &["--seed"]),
-        (&["run", "filters", "--config", "bad.toml"], &["motor.rs = 5.4", "not a number"]),
+        (&["run", "filters", "--config", "bad.toml"], &["motor.r_s = 5.4", "not a number"]),
         (&["run", "filters", "--config", "broken.toml"], &["broken.toml", "line 1"]),
         (&["report", "--config", "missing.toml"], &["missing.toml"]),
     ];
@@ -107,7 +113,7 @@ fn lists_name_every_experiment_and_key() {
         assert!(text(&list.stdout).contains(experiment.stands_for));
     }
     let keys = hil_sim(&folder, &["keys"]);
-    for key in hil_sim::config::KEYS {
-        assert!(text(&keys.stdout).contains(key.name));
+    for key in hil_sim::config::Key::all() {
+        assert!(text(&keys.stdout).contains(&key.assigned_name()));
     }
 }

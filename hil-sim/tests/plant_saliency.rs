@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use hil_sim::plant::{
     Complex, EncoderSettings, InverterSettings, Load, Machine, MachineSettings, MachineState,
     MeasurementSettings, Mechanics, MechanicsSettings, MotorModel, Plant, PlantSettings,
-    SALIENCY_CURRENT_A, SaliencySettings,
+    SaliencySettings,
 };
 
 const FREQUENCY: f64 = 600.0;
@@ -129,7 +129,7 @@ fn the_saliency_stays_below_half() {
     let mut worst = 0f64;
     for step in 0..=50 {
         for turn in 0..36 {
-            let flux = 0.02 * f64::from(step) * m.lm * SALIENCY_CURRENT_A;
+            let flux = 0.02 * f64::from(step) * m.lm * SaliencySettings::default().hold_a;
             let psi = Complex::from_polar(flux, TAU * f64::from(turn) / 36.0);
             // Four times the current that the settings are checked for.
             for i in [0.0, 1e-12, 0.7, 3.0, 5.0, 20.0] {
@@ -160,9 +160,11 @@ fn refusals_name_the_setting_its_value_and_its_range() {
         assert!(text.contains(part), "{part} in: {text}");
     }
     let text = refusal(|s| s.machine.rs = f64::NAN);
-    assert_eq!(text, "machine.rs = NaN is outside the allowed range 0.01 to 1000 ohm");
+    assert_eq!(text, "machine.rs = NaN is outside the allowed range 0.0001 to 1000 ohm");
     let text = refusal(|s| s.measurement.lsb_a = 0.0001);
-    assert_eq!(text, "measurement.lsb_a = 0.0001 is outside the allowed range 0.00014 to 0.05 A");
+    // From a range of 4.4727 A: 16 to 7 bits.
+    let begin = "measurement.lsb_a = 0.0001 is outside the allowed range 0.00013977";
+    assert!(text.starts_with(begin) && text.ends_with(" to 0.0559089175 A"), "{text}");
     type Change = fn(&mut PlantSettings);
     let others: [(&str, Change); 10] = [
         ("machine.rr", |s| s.machine.rr = 0.0),

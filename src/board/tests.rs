@@ -18,7 +18,7 @@ fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
 #[test]
 fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
     let trip = DC_LINK.at(OVER_VOLTAGE_CODE);
-    assert!(trip > settings().limits.dc_over_v && trip < DC_LINK.at(ADC_FULL_SCALE));
+    assert!(trip > settings().dc_over_v() && trip < DC_LINK.at(ADC_FULL_SCALE));
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn the_calibration_follows_the_reference() {
 #[test]
 fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
     for (line, (low, high)) in [(CURRENT_A, ANALOG_WINDOW_A), (CURRENT_B, ANALOG_WINDOW_B)] {
-        let software = settings().limits.trip_a;
+        let software = settings().trip_a();
         assert!(line.at(high) > software && line.at(low) < -software);
         assert!(line.at(high + 1) < 4.47 && line.at(low - 1) > -4.47);
     }

@@ -3,11 +3,11 @@
 use core::fmt;
 
 use drive_core::Mode;
+use drive_core::settings::value::{self, Value, ValueError};
 
 use crate::board;
 use crate::link::trace::{self, SignalChoice};
 use crate::settings::keys::{self, Key};
-use crate::settings::value::{self, Value, ValueError};
 
 /// Most records of a trace.
 const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
@@ -34,9 +34,9 @@ pub enum Request {
     /// Set the position, mechanical turns from the start.
     Position(f32),
     /// Show one setting, or all.
-    Get(Option<&'static Key>),
+    Get(Option<Key>),
     /// Change a setting.
-    Set(&'static Key, Value),
+    Set(Key, Value),
     /// List the result of the last learning.
     Learned,
     /// Save the settings, and what was learned.

@@ -5,13 +5,12 @@ use core::fmt;
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::io::PERIOD_S;
 use drive_core::settings::Scales;
-use drive_core::settings::table::STEP_A;
+use drive_core::settings::value::Value;
 
 use crate::board::CYCLES_PER_US;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
-use crate::settings::value::Value;
 
 /// Writes the status line: `stack` is the most bytes used and the size.
 ///
@@ -30,7 +29,7 @@ pub fn status(
     let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
     write!(f, "{}; i_d {:.2} A, i_q {:.2} of ", s.state, t.current.d, t.current.q)?;
     write!(f, "{:.2} A, rotor {rpm:.1} rpm electrical, dc link {dc_link:.0} V, ", t.reference.q)?;
-    write!(f, "heat sink code {} of {}; ", s.sample.heat_sink, scales.heat_sink_trip)?;
+    write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
     write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
     write!(f, "stack {used} of {size}")
 }
@@ -38,23 +37,32 @@ pub fn status(
 /// A setting with its unit and the allowed values. They are computed before anything is printed, because printing
 /// needs much stack and so does the range.
 pub struct Setting {
-    key: &'static Key,
+    key: Key,
     value: Value,
+    number: Option<f32>,
     range: Option<(f32, f32)>,
 }
 
 impl Setting {
     /// The setting of this key.
-    pub fn new(key: &'static Key, settings: &FirmwareSettings) -> Self {
-        Self { key, value: key.get(settings), range: key.range(settings) }
+    pub fn new(key: Key, settings: &FirmwareSettings) -> Self {
+        Self {
+            key,
+            value: key.get(settings),
+            number: key.number(settings),
+            range: key.range(settings),
+        }
     }
 }
 
 impl fmt::Display for Setting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}", self.key.name, self.value)?;
-        if !self.key.unit.is_empty() {
-            write!(f, " {}", self.key.unit)?;
+        write!(f, "{} = {}", self.key.name(), self.value)?;
+        if let (Value::Auto, Some(number)) = (self.value, self.number) {
+            write!(f, ": {number}")?;
+        }
+        if !self.key.unit().is_empty() {
+            write!(f, " {}", self.key.unit())?;
         }
         match (self.value, self.range) {
             (Value::Word(_), _) => {
@@ -95,7 +103,7 @@ fn fitted(f: &mut fmt::Formatter<'_>, name: &str, fitted: &Fitted) -> fmt::Resul
 /// Writes a row of the table.
 fn point(f: &mut fmt::Formatter<'_>, result: &Learned, index: usize) -> fmt::Result {
     let reference = result.reference.points()[index];
-    write!(f, "{:.2},{reference:.5},", index as f32 * STEP_A)?;
+    write!(f, "{:.2},{reference:.5},", result.reference.grid().current(index))?;
     match &result.carrier {
         Some(table) => write!(f, "{:.5}", table.points()[index]),
         // Not learned: the setting holds.

@@ -79,7 +79,7 @@ fn a_session() {
     talk.drive.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
     let status = talk.ask("status");
     assert!(status.starts_with("calibrating; i_d 0.00 A"), "{status}");
-    assert!(status.contains("dc link 311 V, heat sink code 1200 of 4000;"), "{status}");
+    assert!(status.contains("dc link 311 V, heat sink 22 degC;"), "{status}");
     assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("save"), "ok");
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.5);
@@ -108,7 +108,13 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
     // It was not got past: it is checked again.
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
     // No current in it: a motor that is not there.
-    let sample = Sample { current_a: 1838, current_b: 1832, dc_link: 2827, ..Sample::default() };
+    let sample = Sample {
+        current_a: 1838,
+        current_b: 1832,
+        dc_link: 2827,
+        heat_sink: 1309,
+        ..Sample::default()
+    };
     while !matches!(talk.drive.drive.state(), State::Fault(_)) {
         talk.drive.drive.step(&sample);
     }
@@ -147,7 +153,7 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
 #[test]
 fn settings_out_of_range_are_refused_with_the_range() {
     let mut talk = Talk::new();
-    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000");
+    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000 ohm");
     assert_eq!(talk.ask("get motor.r_s"), "motor.r_s = 5.4 ohm (0.001 to 1000)");
     assert!(talk.drive.commands.is_empty());
 }
@@ -170,7 +176,7 @@ fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
     let help = talk.say("help\n");
     assert_eq!((help.len(), help.last().unwrap().as_str()), (HELP.len() + 1, "ok"));
     let all = talk.say("get\n");
-    assert_eq!(all.len(), KEYS.len() + 1);
+    assert_eq!(all.len(), keys::COUNT + 1);
     let trace = talk.say("trace 3\n");
     assert_eq!(trace[0], "record,phi_deg,i_d,i_q,i_q_ref,v_d,v_q,delta_i,turns");
     assert_eq!(trace[1], "0,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000,0.0000");
@@ -261,7 +267,7 @@ fn status_tells_what_is_known_of_the_rotor_time_constant() {
     assert_eq!(of_the_rotor(&mut talk), None, "not while it is off");
     // One that regulates.
     let mut config = hil_sim::Config::default();
-    config.angle.source = hil_sim::config::AngleSource::Encoder;
+    config.drive.angle_source = drive_core::settings::AngleSource::Encoder;
     let mut rig = hil_sim::rig::Rig::from_config(&config, 1).unwrap();
     rig.start(Mode::Torque).unwrap();
     talk.drive.drive = rig.drive;
@@ -308,7 +314,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_eq!(talk.ask("set limits.dc_over_v 390"), "ok");
     let Some(Command::Configure(with)) = talk.drive.commands.last() else { panic!("no order") };
     let mut settings = FirmwareSettings::of_the_board();
-    settings.drive.limits.dc_over_v = 390.0;
+    settings.drive.limits.dc_over_v = Some(390.0);
     assert_ne!(*with, settings.build().unwrap());
     settings.learn(&found());
     assert_eq!(*with, settings.build().unwrap());

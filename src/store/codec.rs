@@ -18,12 +18,12 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use super::flash::SLOT_WORDS;
 use super::learned;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::{KEYS, find_id};
+use crate::settings::keys::{self, find_id};
 
 /// The layout that is written.
 pub const VERSION: u16 = 1;
 /// Double words of the longest record that is written.
-pub const WORDS: usize = FIRST + KEYS.len() + learned::WORDS;
+pub const WORDS: usize = FIRST + keys::COUNT + learned::WORDS;
 const _: () = assert!(WORDS <= SLOT_WORDS);
 /// The double word that is written last.
 pub const COMMIT: usize = 1;
@@ -97,10 +97,10 @@ fn halves(word: u64) -> (u32, u32) {
 /// The record of `settings`; the double words behind its [`length`] are erased.
 pub fn record(settings: &FirmwareSettings, sequence: u32) -> [u64; WORDS] {
     let mut words = [ERASED; WORDS];
-    for (key, word) in KEYS.iter().zip(words.iter_mut().skip(FIRST)) {
+    for (key, word) in keys::all().zip(words.iter_mut().skip(FIRST)) {
         *word = pair(key.id(), key.to_bits(settings));
     }
-    let mut entries = KEYS.len();
+    let mut entries = keys::COUNT;
     if let Some(learned) = &settings.learned {
         let values = learned::to_words(learned).into_iter().enumerate();
         for ((index, value), word) in values.zip(words.iter_mut().skip(FIRST + entries)) {
@@ -177,14 +177,14 @@ pub fn settings(
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
         if let Some(key) = find_id(id) {
-            key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name))?;
+            key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name()))?;
         } else if let Some(index) = learned::index(id) {
             words[index] = bits;
             present |= 1 << index;
         }
     }
     if present > 0 {
-        let learned = learned::from_words(&words).filter(|_| present == learned::ALL);
+        let learned = learned::from_words(&words, present);
         settings.learned = Some(learned.ok_or(Rejected::Value(learned::NAME))?);
     }
     Ok(settings)

@@ -9,19 +9,19 @@
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
 //! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier |
+//! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
 //!
-//! All but the last are in single precision.
+//! All but number 36 are in single precision.
 
 use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::settings::table::CarrierTable;
-use drive_core::settings::table::{POINTS, ReferenceTable};
+use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable};
 
 use crate::hash;
 
 /// Number of values.
-pub const WORDS: usize = FLAGS + 1;
-/// A bit for each value.
-pub const ALL: u64 = (1 << WORDS) - 1;
+pub const WORDS: usize = STEP + 1;
+/// A bit for each value that every firmware writes.
+const NEEDED: u64 = (1 << STEP) - 1;
 /// The name that their ids derive from, and that a rejection states.
 pub const NAME: &str = "learned";
 
@@ -29,6 +29,7 @@ const REFERENCE: usize = 0;
 const CARRIER: usize = REFERENCE + POINTS - 1;
 const FITS: usize = CARRIER + POINTS - 1;
 const FLAGS: usize = FITS + 6;
+const STEP: usize = FLAGS + 1;
 
 const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
@@ -68,12 +69,19 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
         | flag(gains.accepted, HAS_GAINS)
         | flag(current.accepted, HAS_CURRENT)
         | flag(learned.carrier.is_some(), HAS_CARRIER);
+    words[STEP] = learned.reference.grid().step_a().to_bits();
     words
 }
 
-/// The result with these values, if it is one that a learning accepts.
-pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
-    let carrier = CarrierTable::from_points(table(words, CARRIER, 1.0));
+/// The result with these values, if it is one that a learning accepts. `present` has a bit for each value that was
+/// read.
+pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
+    let grid = match present {
+        NEEDED => Grid::REFERENCE,
+        _ if present == NEEDED | 1 << STEP => Grid::of_step(f32::from_bits(words[STEP]))?,
+        _ => return None,
+    };
+    let carrier = CarrierTable::from_points(grid, table(words, CARRIER, 1.0));
     let value = |index: usize| f32::from_bits(words[index]);
     let flags = words[FLAGS];
     let fitted = |index, bit| Fitted {
@@ -82,7 +90,7 @@ pub fn from_words(words: &[u32; WORDS]) -> Option<Learned> {
         accepted: flags & bit != 0,
     };
     let learned = Learned {
-        reference: ReferenceTable::from_points(table(words, REFERENCE, 0.0))?,
+        reference: ReferenceTable::from_points(grid, table(words, REFERENCE, 0.0))?,
         carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
         points: (flags & 0xff) as usize,
         asymmetry: value(FITS),

@@ -1,12 +1,12 @@
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::settings::table::CarrierTable;
-use drive_core::settings::table::{POINTS, ReferenceTable};
+use drive_core::settings::table::{Grid, POINTS, ReferenceTable};
+use drive_core::settings::value::Value;
 use proptest::prelude::*;
 
 use super::learned as learned_words;
 use super::*;
-use crate::settings::keys::{self, KEYS};
-use crate::settings::value::Value;
+use crate::settings::keys;
 
 mod older;
 
@@ -100,8 +100,8 @@ fn learned(random: [f32; POINTS]) -> Learned {
     let mut carrier = random.map(|x| 1.25 + 0.75 * x);
     (reference[0], carrier[0]) = (0.0, 1.0);
     Learned {
-        reference: ReferenceTable::from_points(reference).unwrap(),
-        carrier: CarrierTable::from_points(carrier).filter(|_| random[1] > -0.5),
+        reference: ReferenceTable::from_points(Grid::REFERENCE, reference).unwrap(),
+        carrier: CarrierTable::from_points(Grid::REFERENCE, carrier).filter(|_| random[1] > -0.5),
         points: 13,
         asymmetry: 0.005 * random[2].abs(),
         gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },
@@ -153,9 +153,9 @@ fn what_is_saved_is_loaded_and_the_slots_take_turns() {
 #[test]
 fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by_older_firmware() {
     let old = codec::record(&with_r_s(7.0), 0);
-    assert_eq!(codec::length(&old), 2 + KEYS.len());
+    assert_eq!(codec::length(&old), 2 + keys::COUNT);
     // Magic, version 1 and one entry a key: what is in the flash of boards.
-    assert_eq!(old[0], (KEYS.len() as u64) << 48 | 0x0001_7672_6469);
+    assert_eq!(old[0], (keys::COUNT as u64) << 48 | 0x0001_7672_6469);
     assert!(old[codec::length(&old)..].iter().all(|word| *word == u64::MAX));
     let mut fake = Fake::new();
     save(&mut fake, &with_r_s(7.0)).unwrap();
@@ -164,9 +164,9 @@ fn a_record_without_what_was_learned_is_loaded_and_one_with_it_is_passed_over_by
     let new = codec::record(&with_learned(), 0);
     assert_eq!(codec::length(&new), codec::WORDS);
     // No key has a number that what was learned has: those who do not know it leave it alone.
-    for word in &new[2 + KEYS.len()..] {
+    for word in &new[2 + keys::COUNT..] {
         assert!(learned_words::index(*word as u32).is_some());
-        assert!(KEYS.iter().all(|key| key.id() != *word as u32));
+        assert!(keys::all().all(|key| key.id() != *word as u32));
     }
 }
 
@@ -182,7 +182,7 @@ fn what_was_learned_is_saved_and_loaded_with_its_settings_and_gone_with_the_defa
 /// Half of it, or what no learning can have found: refused by name, whatever the settings.
 #[test]
 fn what_cannot_have_been_learned_is_refused() {
-    let first = 2 + KEYS.len();
+    let first = 2 + keys::COUNT;
     let spoil: [fn(&mut u64); 3] =
         [|word| *word ^= 1, |word| *word |= 0x7f80_0000 << 32, |word| *word = u64::MAX];
     for (n, spoil) in spoil.into_iter().enumerate() {
@@ -210,7 +210,7 @@ fn sequence_numbers_wrap() {
 #[test]
 fn whenever_the_power_fails_the_old_or_the_new_set_is_there() {
     // One erasure, and every double word of the record.
-    let operations = 2 + KEYS.len() + 1;
+    let operations = 2 + keys::COUNT + 1;
     for seed in 0..20 {
         for first in 0..=operations {
             let mut fake = Fake::new();
@@ -273,7 +273,7 @@ fn keys_may_come_and_go() {
 
 #[test]
 fn a_value_that_nobody_knows_is_named() {
-    let place = KEYS.iter().position(|key| key.name == "angle_source").unwrap();
+    let place = keys::all().position(|key| key.name() == "angle_source").unwrap();
     let mut record = codec::record(&board(), 3);
     record[2 + place] ^= 1 << 40;
     let mut fake = Fake::new();
@@ -331,11 +331,11 @@ proptest! {
     }
 
     #[test]
-    fn every_value_of_every_key_survives(bits: u32, i in 0..KEYS.len()) {
+    fn every_value_of_every_key_survives(bits: u32, i in 0..keys::COUNT) {
         let mut settings = board();
-        let key = &KEYS[i];
+        let key = keys::number(i).unwrap();
         let text = match key.get(&settings) {
-            Value::Number(_) => f32::from_bits(bits).to_string(),
+            Value::Number(_) | Value::Auto => f32::from_bits(bits).to_string(),
             Value::Whole(_) => bits.to_string(),
             Value::Word(_) => key.words()[bits as usize % key.words().len()].to_owned(),
         };
@@ -349,7 +349,7 @@ proptest! {
 
     #[test]
     fn a_flipped_bit_is_found_and_the_set_before_counts(
-        word in 0..2 + KEYS.len(), bit in 0_u32..64, both: bool,
+        word in 0..2 + keys::COUNT, bit in 0_u32..64, both: bool,
     ) {
         let mut fake = Fake::new();
         save(&mut fake, &with_r_s(1.0)).unwrap();

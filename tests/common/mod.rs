@@ -3,7 +3,7 @@
 
 use drive_core::{Command, Mode, Settings};
 use hil_sim::plant::PlantSettings;
-pub use hil_sim::rig::{Rig, drive_settings, plant_settings};
+pub use hil_sim::rig::{Rig, plant_settings};
 use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
@@ -37,7 +37,7 @@ pub fn run(experiment: &str, changes: &[&str], seed: u64) -> Outcome {
 
 /// A drive that regulates torque, with `i_q` A asked for, after `settle` s.
 pub fn regulating(config: &Config, seed: u64, i_q: f32, settle: f64) -> Rig {
-    regulating_with(&plant_settings(config), &drive_settings(config), seed, i_q, settle)
+    regulating_with(&plant_settings(config), &config.drive, seed, i_q, settle)
 }
 
 /// The same by the encoder, with the shaft locked and the injection beside it.

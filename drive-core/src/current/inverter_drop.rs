@@ -15,7 +15,7 @@
 
 use crate::io::periods;
 use crate::math::frames::Dq;
-use crate::settings::{Motor, Sequence};
+use crate::settings::Motor;
 
 /// Forcing current relative to the final direct current.
 const FORCED: f32 = 1.5;
@@ -79,18 +79,18 @@ pub struct DropSample {
 }
 
 impl InverterDrop {
-    /// Plans the magnetisation of a motor with currents up to `largest_a`, A peak.
-    pub fn new(motor: &Motor, sequence: &Sequence, largest_a: f32) -> Self {
-        let room =
-            if FORCED * sequence.i_d < largest_a { FORCED } else { largest_a / sequence.i_d };
+    /// Plans the magnetisation of a motor with the direct current `i_d`, A, in `magnetise_s`, s, with currents up to
+    /// `largest_a`, A peak.
+    pub fn new(motor: &Motor, i_d: f32, magnetise_s: f32, largest_a: f32) -> Self {
+        let room = if FORCED * i_d < largest_a { FORCED } else { largest_a / i_d };
         // The flux reaches the value of the lower level when 1 - e^(-t/tau_r) = 1/forced.
         let until_s = motor.tau_r() * libm::logf(room / (room - 1.0));
-        let fits = room >= LEAST_FORCED && sequence.magnetise_s >= 2.0 * (until_s + AVERAGE_S);
+        let fits = room >= LEAST_FORCED && magnetise_s >= 2.0 * (until_s + AVERAGE_S);
         Self {
             forced: if fits { room } else { 1.0 },
             until: if fits { periods(until_s) } else { 0 },
-            from: periods(sequence.magnetise_s - AVERAGE_S),
-            end: periods(sequence.magnetise_s),
+            from: periods(magnetise_s - AVERAGE_S),
+            end: periods(magnetise_s),
             rotor: motor.r_r * (motor.l_m / motor.l_r()) * (motor.l_m / motor.l_r()),
             r_s: motor.r_s,
         }
@@ -150,8 +150,7 @@ mod tests {
 
     /// For the motor of Table 5, magnetised with `i_d` A for 0.8 s.
     fn inverter_drop(i_d: f32, largest_a: f32) -> InverterDrop {
-        let sequence = Sequence { i_d, magnetise_s: 0.8, ..Sequence::default() };
-        InverterDrop::new(&Motor::default(), &sequence, largest_a)
+        InverterDrop::new(&Motor::default(), i_d, 0.8, largest_a)
     }
 
     /// The drop found on a motor of `r_s` ohm behind a drop of `volts`.

@@ -16,8 +16,9 @@ pub struct Sensing {
     pub dc_link: Line,
     /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
     pub full_scale: u16,
-    /// Heat-sink code above which the drive trips.
-    pub heat_sink_trip: u16,
+    /// Smallest and largest code of the heat sink that do not trip: hot at one end, an open or shorted thermistor at
+    /// the other.
+    pub heat_sink: (u16, u16),
     /// Number of samples averaged for the offsets.
     pub calibration_samples: u16,
     /// Largest accepted offset, A.
@@ -72,7 +73,7 @@ impl Sensing {
             Err(Fault::SensorSaturatedA)
         } else if saturated(sample.current_b) {
             Err(Fault::SensorSaturatedB)
-        } else if sample.heat_sink > self.heat_sink_trip {
+        } else if sample.heat_sink < self.heat_sink.0 || sample.heat_sink > self.heat_sink.1 {
             Err(Fault::OverTemperature)
         } else {
             Ok(())
@@ -130,7 +131,7 @@ mod tests {
             current_b: Line::CHANNEL_B,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
-            heat_sink_trip: 4000,
+            heat_sink: (80, 4000),
             calibration_samples: 64,
             largest_offset: 0.2,
         }
@@ -186,13 +187,15 @@ mod tests {
 
     #[test]
     fn both_ends_of_the_range_are_saturated() {
-        let sample = Sample { current_a: 2000, current_b: 2000, ..Sample::default() };
+        let sample =
+            Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
         assert_eq!(sensing().check(&sample), Ok(()));
         let cases = [
             (Sample { current_a: 0, ..sample }, Err(Fault::SensorSaturatedA)),
             (Sample { current_a: 1, ..sample }, Ok(())),
             (Sample { current_b: 4095, ..sample }, Err(Fault::SensorSaturatedB)),
             (Sample { current_b: 4094, ..sample }, Ok(())),
+            (Sample { heat_sink: 79, ..sample }, Err(Fault::OverTemperature)),
             (Sample { heat_sink: 4001, ..sample }, Err(Fault::OverTemperature)),
             (Sample { heat_sink: 4000, ..sample }, Ok(())),
         ];

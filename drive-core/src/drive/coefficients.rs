@@ -24,8 +24,8 @@ use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
 use crate::protect::plausibility::Prediction;
 use crate::protect::saliency_check::SaliencyCheck;
-use crate::protect::wiring_check::WiringCheck;
-use crate::settings::{AngleSource, CurrentPlant, Settings, SettingsError};
+use crate::protect::wiring_check::{WiringCheck, WiringSettings};
+use crate::settings::{AngleSource, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
 use num_complex::Complex64;
 
@@ -35,8 +35,16 @@ const BPF_GROUP_DELAY: f32 = 8.83;
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
-/// Speed up to which the shaft counts as standing when the lock is verified, rpm.
-const STANDING_RPM: f32 = 30.0;
+/// Electrical speed up to which the shaft counts as standing when the lock is verified, turns/s: 30 rpm of four poles.
+const STANDING_HZ: f32 = 1.0;
+/// Largest accepted offset of a current sensor with the dissertation's sensors, A.
+const LARGEST_OFFSET_A: f32 = 0.2;
+/// Peak current of the pulses of the wiring check with the dissertation's motor, A.
+const WIRING_A: f32 = 0.2;
+/// Its margin for noise with the dissertation's sensors, A.
+const WIRING_NOISE_A: f32 = 0.05;
+/// Largest voltage of its pulses, V, and largest test voltage of an axis, at 311 V.
+const LARGEST_TEST_V: f32 = 60.0;
 
 /// The coefficients of the control step, designed from [`Settings`] outside the interrupt.
 // In this order: the fields of every step come first and lie together; see the state of the drive.
@@ -77,6 +85,8 @@ pub struct Coefficients {
     /// The check of a sensorless start, if it is wanted.
     pub(crate) saliency_check: Option<SaliencyCheck>,
     pub(crate) wiring: WiringCheck,
+    /// Largest test voltage of an axis, V.
+    pub(crate) largest_test_v: f32,
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
     /// Result of the design of the current controllers, d and q.
@@ -157,19 +167,10 @@ impl Settings {
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         self.check()?;
         let m = &self.motor;
-        let motor_plant = tuning::motor_plant(
-            &tuning::EquivalentCircuit {
-                r_s: f64::from(m.r_s),
-                r_r: f64::from(m.r_r),
-                l_m: f64::from(m.l_m),
-                l_ls: f64::from(m.l_ls),
-                l_lr: f64::from(m.l_lr),
-            },
-            f64::from(PERIOD_S),
-        )?;
-        let (d, q) = match self.current_plant {
-            CurrentPlant::Identified { d, q } => (d, q),
-            CurrentPlant::Motor => (motor_plant, motor_plant),
+        let motor_plant = tuning::motor_plant(&m.circuit(), f64::from(PERIOD_S))?;
+        let (d, q) = match self.current_plant.source {
+            PlantSource::Identified => (self.current_plant.d.into(), self.current_plant.q.into()),
+            PlantSource::Motor => (motor_plant, motor_plant),
         };
         let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
         let designs = [design(d)?, design(q)?];
@@ -177,34 +178,33 @@ impl Settings {
 
         let injecting =
             self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
-        let turns_per_step = |rpm: f32| rpm / 60.0 * f32::from(m.pole_pairs) * PERIOD_S;
-        let synchronous = self.angle_source == AngleSource::Injection
-            && self.injection.demodulator == DemodulatorKind::Synchronous;
         let t = &self.injection.synchronous;
-        let highest_rpm = if synchronous && t.tracked_rpm < self.limits.speed_rpm {
-            t.tracked_rpm
+        let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
+        let speed_trip = self.speed_trip_rpm();
+        let highest_rpm = if self.tracks_synchronously() {
+            f32::min(self.tracked_rpm(), speed_trip)
         } else {
-            self.limits.speed_rpm
+            speed_trip
         };
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
         let motion_design = self.motion_design()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
-        let injection = Injection::new(inj.amplitude_v, motor_plant, current_lag);
+        let injection = Injection::new(self.carrier_v(), motor_plant, current_lag);
         let (injection_turn, injection_axis) = match inj.demodulator {
             DemodulatorKind::RmsImpedance => (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 }),
             _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
         };
 
-        let lock_monitor = (synchronous && t.monitor).then(|| {
+        let lock_monitor = self.watches_lock().then(|| {
             LockMonitor::new(
-                &t.carrier,
+                &self.carrier(),
                 &LockMonitorSettings {
                     flux_saliency: t.flux_saliency,
                     smoothing_s: t.loss_s,
                     allowed: t.allowed_loss,
                     carrier_a: injection.current_amplitude,
-                    standing_freq: turns_per_step(STANDING_RPM),
+                    standing_freq: STANDING_HZ * PERIOD_S,
                     period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
                 },
             )
@@ -215,19 +215,14 @@ impl Settings {
                 current_b: self.scales.current_b,
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
-                heat_sink_trip: self.scales.heat_sink_trip,
+                heat_sink: self.scales.ntc.window(self.limits.heat_sink_c),
                 calibration_samples: periods(self.sequence.calibrate_s) as u16,
-                largest_offset: 0.2,
+                largest_offset: self.share_of_range(LARGEST_OFFSET_A),
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
-            indirect: Indirect::new(
-                m,
-                self.scales.encoder_counts,
-                self.sequence.i_d,
-                2.0 * self.limits.speed_rpm / 60.0,
-            ),
-            inject: injecting && inj.amplitude_v > 0.0,
+            indirect: Indirect::new(m, self.scales.encoder_counts, i_d, 2.0 * speed_trip / 60.0),
+            inject: injecting && self.carrier_v() > 0.0,
             demodulate: injecting,
             injection,
             injection_turn,
@@ -238,11 +233,17 @@ impl Settings {
                 let gains = [self.scales.current_a.gain, self.scales.current_b.gain];
                 NoiseWatch::new(t.flux_saliency, injection.current_amplitude, gains)
             }),
-            wiring: WiringCheck::new(m.sigma_l_s()),
+            wiring: WiringCheck::new(&WiringSettings {
+                sigma_ls: m.sigma_l_s(),
+                expected_a: self.share_of_rated(WIRING_A),
+                noise_a: self.share_of_range(WIRING_NOISE_A),
+                highest_v: self.share_of_dc_link(LARGEST_TEST_V),
+            }),
+            largest_test_v: self.share_of_dc_link(LARGEST_TEST_V),
             estimator: self.estimator(
                 lag_share,
                 current_lag + carrier_lag(motor_plant),
-                turns_per_step(self.limits.speed_rpm),
+                self.freq_of_rpm(speed_trip),
                 injection.current_amplitude,
             ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
@@ -258,28 +259,28 @@ impl Settings {
                 self.inverter.compensate,
             ),
             dead_time: if self.inverter.compensate {
-                DeadTime::new(self.inverter.dead_time_s, self.inverter.full_compensation_a)
+                DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
             } else {
                 DeadTime::NONE
             },
-            inverter_drop: InverterDrop::new(m, &self.sequence, self.limits.current_a),
-            learning: Learning::new(m, self.sequence.i_d, self.limits.current_a),
-            prediction: Prediction::new(m, motor_plant, self.limits.unexplained_v),
+            inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit),
+            learning: Learning::new(m, i_d, current_limit),
+            prediction: Prediction::new(m, motor_plant, self.unexplained_v()),
             motion: self.motion(&motion_design),
-            freq_per_speed: turns_per_step(60.0),
+            freq_per_speed: self.freq_of_rpm(60.0),
             protection: Protection {
-                trip_a: self.limits.trip_a,
-                dc_over: self.limits.dc_over_v,
-                dc_under: self.limits.dc_under_v,
-                rotor_freq: turns_per_step(highest_rpm),
-                current_squared: self.limits.current_a * self.limits.current_a,
+                trip_a: self.trip_a(),
+                dc_over: self.dc_over_v(),
+                dc_under: self.dc_under_v(),
+                rotor_freq: self.freq_of_rpm(highest_rpm),
+                current_squared: current_limit * current_limit,
             },
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
-                magnetise: periods(self.sequence.magnetise_s),
+                magnetise: periods(self.magnetise_s()),
                 verify: periods(VERIFY_S),
-                i_d: self.sequence.i_d,
-                stop_ramp: self.sequence.stop_a_per_s * PERIOD_S,
+                i_d,
+                stop_ramp: self.stop_a_per_s() * PERIOD_S,
             },
             designs,
             motion_design,
@@ -288,7 +289,7 @@ impl Settings {
 
     fn motion_design(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
-        let acceleration = m.torque_per_ampere(self.sequence.i_d) / m.inertia / TAU;
+        let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
         let tracking_hz = match self.angle_source {
             AngleSource::Encoder => None,
             AngleSource::Injection => Some(f64::from(self.injection.synchronous.bandwidth_hz)),
@@ -306,17 +307,14 @@ impl Settings {
             AngleSource::Encoder => self.scales.encoder_counts,
             AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
         };
-        let v = &self.speed;
-        let (limit, ramp) = (v.limit_rpm / 60.0, v.ramp_rpm_per_s / 60.0);
-        Motion::new(design, counts, limit, ramp, v.i_q_limit_a)
+        let (limit, ramp) = (self.speed_limit_rpm() / 60.0, self.ramp_rpm_per_s() / 60.0);
+        Motion::new(design, counts, limit, ramp, self.i_q_limit_a())
     }
 
     /// Only a sensorless start with the synchronous demodulation is checked.
     fn saliency_check(&self) -> Option<SaliencyCheck> {
         let t = &self.injection.synchronous;
-        let checked = t.check
-            && self.angle_source == AngleSource::Injection
-            && self.injection.demodulator == DemodulatorKind::Synchronous;
+        let checked = t.check && self.tracks_synchronously();
         checked.then(|| SaliencyCheck::new(t.flux_saliency, self.motor.tau_r()))
     }
 
@@ -335,10 +333,10 @@ impl Settings {
         let angle_loop = match inj.demodulator {
             DemodulatorKind::Synchronous => AngleLoop::Pll {
                 schedule: GainSchedule::new(
-                    &t.reference,
+                    &self.reference(),
                     t.flux_saliency,
-                    t.current_saliency,
-                    self.sequence.i_d,
+                    self.current_saliency(),
+                    self.i_d(),
                 ),
                 pll: Pll::new(t.bandwidth_hz),
             },
@@ -347,8 +345,8 @@ impl Settings {
                     Some(table) => Reference::Learned(table),
                     None => Reference::Constant(ConstantReference {
                         full: p.reference_a,
-                        slope: p.reference_a / p.full_reference_iq_a,
-                        from: p.full_reference_iq_a,
+                        slope: p.reference_a / self.full_reference_iq_a(),
+                        from: self.full_reference_iq_a(),
                     }),
                 },
                 tracker: Tracker::new(p.k_s, p.z_s, limit),
@@ -358,8 +356,8 @@ impl Settings {
             demodulator: inj.demodulator,
             rms_samples: p.rms_samples,
             // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
-            ampere_per_ohm: if inj.amplitude_v > 0.0 {
-                carrier_a * carrier_a / inj.amplitude_v * core::f32::consts::FRAC_1_SQRT_2
+            ampere_per_ohm: if self.carrier_v() > 0.0 {
+                carrier_a * carrier_a / self.carrier_v() * core::f32::consts::FRAC_1_SQRT_2
             } else {
                 0.0
             },

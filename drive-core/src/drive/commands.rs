@@ -11,9 +11,6 @@ use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::settings::AngleSource;
 
-/// Largest test voltage of an axis, V: a step of it moves the current by 0.2 A a period.
-const LARGEST_TEST_V: f32 = 60.0;
-
 impl Drive {
     /// Takes a command; not from within [`step`](Self::step), but between two steps.
     ///
@@ -93,9 +90,10 @@ impl Drive {
             }
             Command::TestVoltage(voltage) => {
                 self.takes_references(self.mode, voltage.d + voltage.q)?;
-                let inside = |x: f32| (-LARGEST_TEST_V..=LARGEST_TEST_V).contains(&x);
+                let max = self.c.largest_test_v;
+                let inside = |x: f32| (-max..=max).contains(&x);
                 if !(inside(voltage.d) && inside(voltage.q)) {
-                    return Err(Refused::OutOfRange { min: -LARGEST_TEST_V, max: LARGEST_TEST_V });
+                    return Err(Refused::OutOfRange { min: -max, max });
                 }
                 self.control.references.test_voltage = voltage;
                 Ok(Accepted::AsGiven)

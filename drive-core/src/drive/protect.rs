@@ -68,13 +68,16 @@ fn of_hardware(events: Hardware) -> Fault {
 mod tests {
     use super::*;
     use crate::math::frames::{Abc, AlphaBeta};
-    use crate::settings::{Limits, Settings};
+    use crate::settings::Settings;
 
     #[test]
     fn each_limit_trips_beyond_its_value_and_not_at_it() {
-        let coefficients = Settings::default().build().unwrap();
-        let Limits { trip_a, dc_over_v, dc_under_v, .. } = Limits::default();
-        let sample = Sample { current_a: 2000, current_b: 2000, ..Sample::default() };
+        let settings = Settings::default();
+        let coefficients = settings.build().unwrap();
+        let (trip_a, dc_over_v, dc_under_v) =
+            (settings.trip_a(), settings.dc_over_v(), settings.dc_under_v());
+        let sample =
+            Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
         let check = |a: f32, b: f32, dc_link: f32| {
             let (phases, current) = (Abc::new(a, b, -(a + b)), AlphaBeta::ZERO);
             coefficients.protect(&sample, &Measured { phases, current, dc_link })

@@ -11,7 +11,7 @@ use crate::carrier::DemodulatorKind;
 use crate::io::Hardware;
 use crate::math::angle::Angle;
 use crate::settings::Line;
-use crate::settings::{CurrentPlant, Settings};
+use crate::settings::{IdentifiedPlant, Settings};
 use proptest::prelude::*;
 
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
@@ -32,6 +32,7 @@ impl Load {
         let i = self.current.to_abc();
         let code = |line: Line, i: f32| ((i - line.offset) / line.gain) as u16;
         Sample {
+            heat_sink: 1309,
             current_a: code(Line::CHANNEL_A, i.a),
             current_b: code(Line::CHANNEL_B, i.b),
             dc_link: (self.v_dc / 0.11) as u16,
@@ -267,13 +268,19 @@ fn a_start_puts_the_injection_on_its_axis() {
 fn settings_out_of_range_are_refused_by_name() {
     type Change = fn(&mut Settings);
     let cases: [(Change, &str); 12] = [
-        (|s| s.speed.limit_rpm = 3000.0, "speed.limit_rpm = 3000: allowed is 1 to 2000"),
-        (|s| s.speed.phase_margin_deg = 80.0, "speed.phase_margin_deg = 80: allowed is 45 to 70"),
-        (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000"),
+        (|s| s.speed.limit_rpm = Some(3000.0), "speed.limit_rpm = 3000: allowed is 1 to 2000 rpm"),
+        (
+            |s| s.speed.phase_margin_deg = 80.0,
+            "speed.phase_margin_deg = 80: allowed is 45 to 70 deg",
+        ),
+        (|s| s.motor.r_s = f32::NAN, "motor.r_s = NaN: allowed is 0.001 to 1000 ohm"),
         (|s| s.motor.l_m = 0.0, "motor.l_m = 0"),
-        (|s| s.limits.trip_a = 5.0, "limits.trip_a = 5"),
-        (|s| s.injection.amplitude_v = -1.0, "injection.amplitude_v = -1: allowed is 0 to 150"),
-        (|s| s.sequence.i_d = 9.0, "sequence.i_d = 9"),
+        (|s| s.limits.trip_a = Some(5.0), "limits.trip_a = 5"),
+        (
+            |s| s.injection.amplitude_v = Some(-1.0),
+            "injection.amplitude_v = -1: allowed is 0 to 171.",
+        ),
+        (|s| s.sequence.i_d = Some(9.0), "sequence.i_d = 9"),
         (
             |s| s.injection.synchronous.allowed_loss = 2.0,
             "injection.allowed_loss = 2: allowed is 0.3 to 0.9",
@@ -282,17 +289,14 @@ fn settings_out_of_range_are_refused_by_name() {
         (
             |s| {
                 *s = sensorless();
-                s.sequence.magnetise_s = 0.1;
+                s.sequence.magnetise_s = Some(0.1);
             },
-            "sequence.magnetise_s = 0.1: allowed is 0.5 to 60",
+            "sequence.magnetise_s = 0.1: allowed is 0.5 to 60 s",
         ),
         (|s| s.inverter.dead_time_s = 1e-3, "inverter.dead_time_s = 0.001"),
         (
-            |s| {
-                let bad = crate::tuning::FirstOrder { k: 0.003, p: 1.5 };
-                s.current_plant = CurrentPlant::Identified { d: bad, q: bad };
-            },
-            "controllers:",
+            |s| s.current_plant.d = IdentifiedPlant { k: 0.003, p: 1.5 },
+            "current_plant.d.p = 1.5: allowed is 0 to",
         ),
     ];
     for (change, text) in cases {
@@ -310,7 +314,7 @@ fn any_sample() -> impl Strategy<Value = Sample> {
             current_a,
             current_b,
             dc_link,
-            heat_sink: 0,
+            heat_sink: 1309,
             encoder: if n < 10 { 0 } else { encoder },
             hardware: if n == 19 { Hardware::BREAK } else { Hardware::empty() },
         },
@@ -328,7 +332,7 @@ proptest! {
         let source = if injection { AngleSource::Injection } else { AngleSource::Encoder };
         let mut s = Settings { angle_source: source, ..settings() };
         s.sequence.calibrate_s = 0.001;
-        s.sequence.magnetise_s = 0.001;
+        s.sequence.magnetise_s = Some(0.001);
         let mut drive = Drive::new(s.build().unwrap());
         let quiet = Load::new().sample();
         for (n, (sample, command, value)) in samples.into_iter().enumerate() {

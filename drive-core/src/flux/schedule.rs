@@ -7,7 +7,7 @@
 //! instead of 2 |a|. The gain schedule compensates this.
 
 use crate::carrier::Saliency;
-use crate::settings::table::{POINTS, ReferenceTable, STEP_A, between, odd, place};
+use crate::settings::table::{POINTS, ReferenceTable, between, odd};
 
 /// Minimum share of the proportional gain. Only errors faster than the current loop see the steep slope in
 /// full; full compensation leaves the tracking loop too little damping at large currents. (3.5 Hz, rotor
@@ -33,7 +33,7 @@ impl GainSchedule {
     /// stator current, 1/A, and the direct current `i_d`, A.
     pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
         let share = core::array::from_fn(|n| {
-            let i_q = n as f32 * STEP_A;
+            let i_q = table.grid().current(n);
             let length = libm::sqrtf(i_d * i_d + i_q * i_q);
             // b |i| cos 2 gamma, where it adds to the slope
             let current_part = b * (i_q * i_q - i_d * i_d) / length;
@@ -65,7 +65,7 @@ impl GainSchedule {
 
     /// Reference of `q` and share of the proportional gain at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> (f32, f32) {
-        let place = place(i_q);
+        let place = self.table.grid().place(i_q);
         (odd(i_q, between(self.table.points(), place)), between(&self.share, place))
     }
 }
@@ -73,10 +73,12 @@ impl GainSchedule {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::table::Grid;
 
     #[test]
     fn lookup_is_odd_linear_and_held() {
-        let table = ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
+        let table =
+            ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
         let schedule = GainSchedule::new(&table, -0.035, 0.034, 0.7);
         for (i_q, q) in
             [(0.0, 0.0), (0.5, 0.02), (1.0, 0.04), (2.0, 0.045), (3.5, 0.05), (99.0, 0.05)]
@@ -100,7 +102,7 @@ mod tests {
     #[test]
     fn the_saliency_tells_the_angle() {
         // q = 2 a x for a small angle error x of the flux-fixed saliency a, beside the reference.
-        let table = ReferenceTable::new(&[(0.0, 0.0), (2.0, 0.04)]).unwrap();
+        let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (2.0, 0.04)]).unwrap();
         for a in [-0.035, 0.05] {
             let schedule = GainSchedule::new(&table, a, 0.034, 0.7);
             for (i_q, x) in [(0.0, 0.1), (1.0, -0.2), (-1.0, 0.05)] {

@@ -20,27 +20,28 @@
 #[cfg(test)]
 mod tests;
 
-use core::f32::consts::TAU;
+use core::f32::consts::{PI, TAU};
 
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{Dq, SQRT_3};
 use crate::settings::Motor;
-use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, STEP_A};
+use crate::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable};
 
 /// Settling time of flux and averages at a point, in rotor time constants.
 const SETTLE_T: f32 = 2.0;
-/// Minimum and maximum averaging time at a point, s. One second reduces sensor noise of 5 mA to 0.2°.
-const AVERAGE_S: (f32, f32) = (1.0, 30.0);
+/// Minimum averaging time at a point, s. One second reduces sensor noise of 5 mA to 0.2°.
+const AVERAGE_S: f32 = 1.0;
+/// Maximum averaging time, s; longer where three half turns of the flux at the smallest torque current take longer.
+const LONGEST_S: f32 = 30.0;
 /// Lag of the synchronous demodulation, samples: 19 of the averages, and 4.5 on average because they are
 /// evaluated once in ten samples.
 const LAG: f32 = 23.5;
-/// Largest quadrature voltage common to both signs of the torque current, V. The noise of the mean is
-/// below 0.05 V; a shaft at 22 rpm with the flux of the default motor gives 0.5 V.
-const MOVED_V: f32 = 0.5;
-/// Expected direct voltage of a free shaft from which on the shaft is judged, V. Half of it counts as
-/// moved.
-const JUDGED_V: f32 = 1.0;
+/// Largest quadrature voltage common to both signs of the torque current, as an electrical speed at the flux of the
+/// drive, rad/s: 22 rpm of four poles. With the dissertation's motor it is 0.5 V; the noise of the mean is below 0.05 V.
+const MOVED_RAD_PER_S: f32 = 4.66;
+/// Expected direct voltage of a free shaft from which on the shaft is judged, likewise. Half of it counts as moved.
+const JUDGED_RAD_PER_S: f32 = 9.32;
 /// A twelfth of a turn, 30°.
 const TWELFTH: Angle = Angle::from_bits(357_913_941);
 
@@ -51,9 +52,9 @@ const LARGEST_MISMATCH: f32 = 0.1;
 /// Limit of the negative-sequence component that a gain mismatch cannot cause: absolute part, and share of
 /// the component that it can cause.
 const WRONG_PHASE: (f32, f32) = (0.001, 0.25);
-/// Largest accepted current-dependent saliency, 1/A, and rms misfit of its law relative to the rms of the
-/// reference.
-const CURRENT_SALIENCY: (f32, f32) = (0.3, 0.35);
+/// Largest accepted current-dependent saliency at a current of one step of the table, and rms misfit of its law
+/// relative to the rms of the reference.
+const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
 
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +63,8 @@ pub struct Learning {
     settle: u32,
     /// Minimum and maximum averaging time, control periods.
     average: (u32, u32),
+    /// Torque currents of the table.
+    grid: Grid,
     /// Number of table points to learn, without zero.
     points: usize,
     /// Direct current, A.
@@ -164,7 +167,7 @@ pub struct Learned {
     /// (gain of current sensor a) / (gain of b) - 1, within ±0.1. Misfit: the negative-sequence part that
     /// no gain mismatch can cause, as a gain. Synchronous demodulation only.
     pub gain_mismatch: Fitted,
-    /// Saliency per ampere of stator current, 1/A, within ±0.3: least squares of the reference on
+    /// Saliency per ampere of stator current, 1/A, within ±0.075 at one step of the table: least squares of the reference on
     /// 2 i_d i_q/|i|. Misfit: rms of the residual relative to that of the reference, at most 0.35.
     pub current_saliency: Fitted,
     /// Flux-fixed saliency at nominal flux measured by the check at the start (±5 % by noise); 0 without
@@ -177,11 +180,15 @@ pub struct Learned {
 impl Learning {
     /// Learning for a motor with the direct current `i_d`, A, and currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
-        let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / STEP_A;
+        let grid = Grid::for_current(largest_a);
+        let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
+        // At a torque current i_q the flux makes a half turn in pi i_d tau_r / i_q.
+        let half_turn_s = PI * i_d * motor.tau_r() / grid.step_a();
         Self {
             settle: periods(SETTLE_T * motor.tau_r()),
-            average: (periods(AVERAGE_S.0), periods(AVERAGE_S.1)),
+            average: (periods(AVERAGE_S), periods(LONGEST_S).max(periods(3.0 * half_turn_s))),
+            grid,
             points: (most as usize).min(POINTS - 1),
             i_d,
             leakage: motor.l_ls + motor.l_m - coupled,
@@ -197,7 +204,7 @@ impl Learning {
 
     /// Torque current of a point, A.
     fn current(&self, point: usize) -> f32 {
-        let i_q = (point / 2 + 1) as f32 * STEP_A;
+        let i_q = self.grid.current(point / 2 + 1);
         if point.is_multiple_of(2) { i_q } else { -i_q }
     }
 
@@ -260,8 +267,10 @@ impl Learning {
         let direct = even.d + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
         let free_shaft_v = self.coupled * (x - first_x);
-        let follows = free_shaft_v > JUDGED_V && direct - first_v < -0.5 * free_shaft_v;
-        even.q.abs() <= MOVED_V && !follows
+        let flux = self.coupled * self.i_d;
+        let judged = free_shaft_v > JUDGED_RAD_PER_S * flux;
+        let follows = judged && direct - first_v < -0.5 * free_shaft_v;
+        even.q.abs() <= MOVED_RAD_PER_S * flux && !follows
     }
 
     /// Evaluates all points.
@@ -300,7 +309,7 @@ impl Learning {
                 if n > 0 && even.abs() > asymmetry {
                     asymmetry = even.abs();
                 }
-                let i_q = n as f32 * STEP_A;
+                let i_q = self.grid.current(n);
                 let x = 2.0 * self.i_d * i_q / libm::sqrtf(self.i_d * self.i_d + i_q * i_q);
                 xx += x * x;
                 xq += x * held;
@@ -315,7 +324,7 @@ impl Learning {
             value,
             misfit,
             accepted: normalised
-                && value.abs() <= CURRENT_SALIENCY.0
+                && value.abs() * self.grid.step_a() <= CURRENT_SALIENCY.0
                 && misfit <= CURRENT_SALIENCY.1,
         };
         let mut ratio = [1.0; POINTS];
@@ -326,10 +335,10 @@ impl Learning {
             }
             *place = held;
         }
-        let reference = ReferenceTable::from_points(q);
+        let reference = ReferenceTable::from_points(self.grid, q);
         Learned {
             reference: reference.unwrap_or_default(),
-            carrier: CarrierTable::from_points(ratio),
+            carrier: CarrierTable::from_points(self.grid, ratio),
             points: self.points,
             asymmetry,
             gain_mismatch,
@@ -351,7 +360,7 @@ impl Learned {
             && self.asymmetry <= ASYMMETRY
             && (1..POINTS).contains(&self.points)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)
-            && within(&self.current_saliency, CURRENT_SALIENCY.0)
+            && within(&self.current_saliency, CURRENT_SALIENCY.0 / self.reference.grid().step_a())
             && self.flux_saliency.is_finite()
     }
 

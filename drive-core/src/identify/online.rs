@@ -215,7 +215,8 @@ impl Online {
     /// # Errors
     /// [`RlsError`] of the recursive least squares; never with settings that [`Settings::build`] accepts.
     pub fn new(settings: &Settings) -> Result<Self, RlsError> {
-        let (m, limits) = (&settings.motor, &settings.limits);
+        let m = &settings.motor;
+        let (i_d, trip_a, dc_over_v) = (settings.i_d(), settings.trip_a(), settings.dc_over_v());
         let synchronous = &settings.injection.synchronous;
         let l_s = m.l_m + m.l_ls;
         let motor = MotorModel {
@@ -224,17 +225,17 @@ impl Online {
             sigma_l_s: l_s - m.l_m * m.l_m / m.l_r(),
             l_s,
             flux_saliency: synchronous.flux_saliency,
-            current_saliency: synchronous.current_saliency,
-            steady_squared: squared(STEADY_CURRENT * settings.sequence.i_d),
+            current_saliency: settings.current_saliency(),
+            steady_squared: squared(STEADY_CURRENT * i_d),
         };
         let rls = Rls::new(RlsSettings {
             lambda: LAMBDA,
             p0: P0,
             corner: TAU * CORNER_HZ * SAMPLE_S,
-            voltage_base: between(limits.current_a * m.r_s, limits.dc_over_v),
-            current_base: between(settings.sequence.i_d, limits.trip_a),
-            voltage_limit: limits.dc_over_v,
-            current_limit: limits.trip_a,
+            voltage_base: between(settings.current_limit_a() * m.r_s, dc_over_v),
+            current_base: between(i_d, trip_a),
+            voltage_limit: dc_over_v,
+            current_limit: trip_a,
         })?;
         let mut online = Self {
             rls,

@@ -32,7 +32,7 @@
 
 use crate::carrier::Saliency;
 use crate::fault::Fault;
-use crate::settings::table::{CarrierTable, POINTS, between, place};
+use crate::settings::table::{CarrierTable, Grid, POINTS, between};
 
 /// Coefficients of the monitor.
 ///
@@ -64,6 +64,8 @@ use crate::settings::table::{CarrierTable, POINTS, between, place};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LockMonitor {
+    /// Torque currents of the carrier table.
+    grid: Grid,
     /// 1 / ratio^2 of the carrier table.
     inverse_square: [f32; POINTS],
     /// 1 / |a|.
@@ -138,6 +140,7 @@ impl LockMonitor {
     pub fn new(table: &CarrierTable, s: &LockMonitorSettings) -> Self {
         let least = LEAST_CARRIER * s.carrier_a;
         Self {
+            grid: table.grid(),
             inverse_square: inverse_square(table),
             per_saliency: 1.0 / s.flux_saliency.abs(),
             smoothing: s.period_s / (s.smoothing_s + s.period_s),
@@ -150,7 +153,7 @@ impl LockMonitor {
 
     /// Replaces the carrier table by a learned one.
     pub fn set_carrier_table(&mut self, table: &CarrierTable) {
-        self.inverse_square = inverse_square(table);
+        (self.grid, self.inverse_square) = (table.grid(), inverse_square(table));
     }
 
     /// Evaluates one carrier period.
@@ -192,7 +195,7 @@ impl LockMonitor {
 
     /// 1 / ratio^2 at a quadrature current `i_q`, A.
     fn inverse_square(&self, i_q: f32) -> f32 {
-        between(&self.inverse_square, place(i_q))
+        between(&self.inverse_square, self.grid.place(i_q))
     }
 
     /// Whether the electrical speed `rotor_freq`, turns per control period, counts as standstill.

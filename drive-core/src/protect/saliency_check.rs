@@ -23,6 +23,8 @@ pub struct SaliencyCheck {
     restore: u32,
     /// Threshold of the mean saliency, with its sign.
     least: f32,
+    /// Mean saliency over the decaying flux at 60°, relative to the saliency at nominal flux.
+    seen_share: f32,
     /// 1 / expected mean saliency.
     per_expected: f32,
     /// 1 / number of averaged samples.
@@ -50,37 +52,49 @@ pub enum SaliencyCheckAction {
     Failed,
 }
 
-/// Settling time, s; with [`AVERAGE_S`] below the rotor time constant.
+/// Settling time of the averages of the demodulation, s.
 const SETTLE_S: f32 = 0.020;
-/// Averaging time, s.
-const AVERAGE_S: f32 = 0.120;
-/// Mean saliency over the decaying flux at 60°, relative to the saliency at nominal flux.
-const SEEN_SHARE: f32 = 0.535;
-/// Threshold relative to the saliency of the settings. The mean is 0.54 with the full saliency, 0.27 with
-/// half of it, 0.05 with a tenth and 0 without, each ±0.024 rms by noise of 5 mA. The threshold lies midway
-/// between a tenth and half, more than four standard deviations from both. (A longer average would contain
-/// less flux.)
-const LEAST_SHARE: f32 = 0.161;
+/// Delay of the averages, s: they show the flux of this much earlier.
+const DELAY_S: f32 = 0.004;
+/// Averaging time in rotor time constants, and its limits, s. A longer average would contain less flux.
+const AVERAGE_T: f32 = 0.645;
+const AVERAGE_S: (f32, f32) = (0.03, 0.4);
+/// Threshold relative to the mean that the saliency of the settings gives: midway between a tenth and half of it. With
+/// 3.5 % of the dissertation's motor both are more than four standard deviations away, by noise of 5 mA.
+const LEAST_SHARE: f32 = 0.3;
 /// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
 const RESTORE_T: f32 = 2.4;
+
+/// Mean saliency seen at 60° over a window of length w of the decaying flux, relative to the saliency at nominal flux.
+///
+/// The flux-fixed saliency is taken to follow 2 r/(1 + r) with the square r = e^(-2t/tau_r) of the relative flux. The
+/// mean from t_0 to t_1 = t_0 + w is 0.866 (tau_r/w) ln((1 + e^(-2 t_0/tau_r)) / (1 + e^(-2 t_1/tau_r))): 0.54 with the
+/// dissertation's motor.
+fn seen_share(window: f32, tau_r: f32) -> f32 {
+    let begin = SETTLE_S - DELAY_S;
+    let sum = |t: f32| 1.0 + libm::expf(-2.0 * t / tau_r);
+    0.5 * SQRT_3 * tau_r / window * libm::logf(sum(begin) / sum(begin + window))
+}
 
 impl SaliencyCheck {
     /// Check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
     pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
-        let average = periods(AVERAGE_S);
+        let window = (AVERAGE_T * tau_r).clamp(AVERAGE_S.0, AVERAGE_S.1);
+        let (average, seen_share) = (periods(window), seen_share(window, tau_r));
         Self {
             settle: periods(SETTLE_S),
             average,
             restore: periods(RESTORE_T * tau_r),
-            least: LEAST_SHARE * flux_saliency,
-            per_expected: 1.0 / (SEEN_SHARE * flux_saliency),
+            least: LEAST_SHARE * seen_share * flux_saliency,
+            seen_share,
+            per_expected: 1.0 / (seen_share * flux_saliency),
             per_average: 1.0 / average as f32,
         }
     }
 
     /// Flux-fixed saliency at nominal flux measured by a finished check.
     pub fn seen(&self, state: &SaliencyCheckState) -> f32 {
-        state.sum / (SEEN_SHARE * self.average as f32)
+        state.sum / (self.seen_share * self.average as f32)
     }
 
     /// Injection axis in the flux frame during [`SaliencyCheckAction::Look`]: 60° ahead of the flux.
@@ -133,17 +147,17 @@ mod tests {
     fn enough_saliency_of_the_right_sign_passes() {
         for expected in [-0.035, 0.05] {
             let check = SaliencyCheck::new(expected, 0.186);
-            // The mean over the decaying flux is 0.535 of the saliency; 0.3 of what is expected is enough.
+            // The mean over the decaying flux is 0.5402 of the saliency; 0.3 of what is expected is enough.
             for (share, passes) in
                 [(1.0, true), (2.0, true), (0.31, true), (0.29, false), (-1.0, false)]
             {
-                let (count, end, state) = run(&check, 0.535 * share * expected);
+                let (count, end, state) = run(&check, 0.5402 * share * expected);
                 let expected_end =
                     if passes { SaliencyCheckAction::Passed } else { SaliencyCheckAction::Failed };
                 assert_eq!(end, expected_end, "{expected} {share}");
                 assert!((state.share - share).abs() < 1e-3, "{}", state.share);
                 assert!((check.seen(&state) / (share * expected) - 1.0).abs() < 1e-3);
-                // 20 ms to settle, 120 ms to look, 2.4 time constants to restore.
+                // 20 ms to settle, 0.645 time constants to look, 2.4 time constants to restore.
                 assert_eq!(count[0], 840);
                 assert!(!passes || count[1].abs_diff(2678) <= 1, "{count:?}");
             }
@@ -159,6 +173,6 @@ mod tests {
             let q = if elapsed < 120 || elapsed == 840 { 9.0 } else { -0.5 * 0.035 };
             check.step(&mut state, elapsed, q);
         }
-        assert!((state.share - 0.5 / 0.535).abs() < 1e-3, "{}", state.share);
+        assert!((state.share - 0.5 / 0.5402).abs() < 1e-3, "{}", state.share);
     }
 }

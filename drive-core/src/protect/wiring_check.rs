@@ -1,5 +1,5 @@
 //! Wiring check: verifies assignment and polarity of the current sensors, once, before the flux is built up,
-//! with voltage pulses so short that no current reaches 0.5 A.
+//! with voltage pulses so short that no current reaches a seventh of the rated one.
 //!
 //! Each phase in turn gets a positive and a negative voltage pulse along its axis. Over so short a time the
 //! motor acts as its transient inductance: the current of that phase rises to a known peak, those of the
@@ -16,26 +16,20 @@
 //! turns the other way.
 //!
 //! # Current bound
-//! The pulses are designed for [`EXPECTED_A`] with the inductance of the settings. Every sample is checked
-//! against the current that half that inductance gives, plus a margin for noise. A motor with at least half
-//! the inductance therefore stays below 0.4 A, whatever the sensors report. With less inductance, a working
-//! sensor ends the pulse at the next sample, which keeps the current below 0.5 A down to a fifth.
+//! The pulses are designed for an expected current with the inductance of the settings: 0.2 A with the
+//! dissertation's motor, in proportion to the rated current. Every sample is checked against the current that half
+//! that inductance gives, plus a margin for noise. A motor with at least half the inductance therefore stays below
+//! twice the expected current, whatever the sensors report. With less inductance, a working sensor ends the pulse at
+//! the next sample, which keeps the current below 2.5 times the expected one down to a fifth.
 
 use crate::fault::Fault;
 use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta};
 
-/// Peak current of the pulses with the inductance of the settings, A.
-pub const EXPECTED_A: f32 = 0.2;
-/// Peak current with half the inductance, A.
-const LARGEST_A: f32 = 2.0 * EXPECTED_A;
-/// Margin for noise and the residual current of the previous pulse, A: ten times 5 mA rms.
-const NOISE_A: f32 = 0.05;
-/// Threshold of a response relative to [`EXPECTED_A`]: half the response with twice the inductance.
+/// Peak current with half the inductance, relative to the expected one.
+const LARGEST: f32 = 2.0;
+/// Threshold of a response relative to the expected one: half the response with twice the inductance.
 const LEAST_SHARE: f32 = 0.25;
-/// Largest voltage of a pulse, V: available at the lowest dc link in use; a larger inductance gets a longer
-/// pulse. It is far above the voltage lost by the dead time (4 V).
-const HIGHEST_V: f32 = 60.0;
 /// Shortest rise, periods: its first sample can still end the pulse if the current rises too fast.
 const SHORTEST_RISE: u32 = 2;
 /// Longest rise, periods: beyond, the resistance dominates the response.
@@ -50,6 +44,10 @@ const PULSES_PER_ROUND: u32 = 6;
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WiringCheck {
+    /// Peak current with the inductance of the settings, A.
+    expected: f32,
+    /// Margin for noise and the residual current of the previous pulse, A.
+    noise: f32,
     /// Amplitude of the pulses, V peak.
     volts: f32,
     /// Duration of the rise and of the fall, periods.
@@ -88,14 +86,29 @@ const AXES: [AlphaBeta; 3] = [
     AlphaBeta { alpha: -0.5, beta: -0.866_025_4 },
 ];
 
+/// Motor and bounds of the check.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WiringSettings {
+    /// Transient inductance of the motor, H.
+    pub sigma_ls: f32,
+    /// Peak current of the pulses with this inductance, A.
+    pub expected_a: f32,
+    /// Margin for noise and the residual current of the previous pulse, A: ten times the rms of the noise.
+    pub noise_a: f32,
+    /// Largest voltage of a pulse, V: available at the lowest dc link in use, and far above the voltage lost by the
+    /// dead time; a larger inductance gets a longer pulse.
+    pub highest_v: f32,
+}
+
 impl WiringCheck {
-    /// Check for a motor with the transient inductance `sigma_ls`, H.
-    pub fn new(sigma_ls: f32) -> Self {
-        let volt_periods = EXPECTED_A * sigma_ls / PERIOD_S;
-        let rise = (volt_periods / HIGHEST_V) as u32 + 1;
+    /// Designs the pulses.
+    pub fn new(s: &WiringSettings) -> Self {
+        let volt_periods = s.expected_a * s.sigma_ls / PERIOD_S;
+        let rise = (volt_periods / s.highest_v) as u32 + 1;
         let rise = rise.clamp(SHORTEST_RISE, LONGEST_RISE);
         let volts = volt_periods / rise as f32;
-        Self { volts: if volts < HIGHEST_V { volts } else { HIGHEST_V }, rise }
+        let volts = if volts < s.highest_v { volts } else { s.highest_v };
+        Self { expected: s.expected_a, noise: s.noise_a, volts, rise }
     }
 
     /// Processes one sample of the phase currents, A.
@@ -108,7 +121,7 @@ impl WiringCheck {
         // The voltage computed in period n acts from sample n + 1 on and shows in sample n + 2.
         let risen = state.period.saturating_sub(1);
         let share = if risen < self.rise { risen as f32 / self.rise as f32 } else { 1.0 };
-        let allowed = LARGEST_A * share + NOISE_A;
+        let allowed = LARGEST * self.expected * share + self.noise;
         // NaN fails the comparison.
         if !(phases.a.abs() < allowed && phases.b.abs() < allowed) {
             return Err(Fault::WiringCurrent);
@@ -128,39 +141,39 @@ impl WiringCheck {
         } else {
             0.0
         };
-        let flowing = if state.period <= 2 * self.rise { sign * EXPECTED_A } else { 0.0 };
+        let flowing = if state.period <= 2 * self.rise { sign * self.expected } else { 0.0 };
         state.period += 1;
         if state.period >= 2 * self.rise + REST {
             state.period = 0;
             state.pulse += 1;
             if state.pulse >= PULSES_PER_ROUND * ROUNDS {
-                return judge(&state.answers).map_or(Ok(WiringAction::Passed), Err);
+                return self.judge(&state.answers).map_or(Ok(WiringAction::Passed), Err);
             }
         }
         let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
         Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
     }
-}
 
-/// Evaluates the responses; the fault, if any.
-fn judge(answers: &[[f32; 2]; 3]) -> Option<Fault> {
-    let [a, b, c] = *answers;
-    let least = LEAST_SHARE * EXPECTED_A * (2 * ROUNDS) as f32;
-    // Responses of a sensor to its own phase and to the two others.
-    let sensors = [
-        ([a[0], b[0], c[0]], Fault::WiringPolarityA),
-        ([b[1], a[1], c[1]], Fault::WiringPolarityB),
-    ];
-    let silent = |[x, y, z]: [f32; 3]| x.abs() < least && y.abs() < least && z.abs() < least;
-    let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
-    let [(at_a, _), (at_b, _)] = sensors;
-    if silent(at_a) || silent(at_b) {
-        return Some(Fault::WiringNoCurrent);
+    /// Evaluates the responses; the fault, if any.
+    fn judge(&self, answers: &[[f32; 2]; 3]) -> Option<Fault> {
+        let [a, b, c] = *answers;
+        let least = LEAST_SHARE * self.expected * (2 * ROUNDS) as f32;
+        // Responses of a sensor to its own phase and to the two others.
+        let sensors = [
+            ([a[0], b[0], c[0]], Fault::WiringPolarityA),
+            ([b[1], a[1], c[1]], Fault::WiringPolarityB),
+        ];
+        let silent = |[x, y, z]: [f32; 3]| x.abs() < least && y.abs() < least && z.abs() < least;
+        let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
+        let [(at_a, _), (at_b, _)] = sensors;
+        if silent(at_a) || silent(at_b) {
+            return Some(Fault::WiringNoCurrent);
+        }
+        if exchanged(at_a) || exchanged(at_b) {
+            return Some(Fault::WiringExchanged);
+        }
+        sensors.into_iter().find(|([own, ..], _)| *own < 0.0).map(|(_, fault)| fault)
     }
-    if exchanged(at_a) || exchanged(at_b) {
-        return Some(Fault::WiringExchanged);
-    }
-    sensors.into_iter().find(|([own, ..], _)| *own < 0.0).map(|(_, fault)| fault)
 }
 
 #[cfg(test)]
@@ -168,11 +181,24 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const EXPECTED_A: f32 = 0.2;
+    const HIGHEST_V: f32 = 60.0;
+
+    /// The pulses for the dissertation's motor and board.
+    fn pulses(sigma_ls: f32) -> WiringCheck {
+        WiringCheck::new(&WiringSettings {
+            sigma_ls,
+            expected_a: EXPECTED_A,
+            noise_a: 0.05,
+            highest_v: HIGHEST_V,
+        })
+    }
+
     proptest! {
         /// Whatever is measured, it ends, and a voltage is never higher than asked for.
         #[test]
         fn it_ends(sigma_ls in 1e-6_f32..100.0, bits: [u32; 16]) {
-            let check = WiringCheck::new(sigma_ls);
+            let check = pulses(sigma_ls);
             let mut state = WiringCheckState::default();
             let longest = (2 * LONGEST_RISE + REST) * PULSES_PER_ROUND * ROUNDS;
             let ends = (0..longest).any(|n| {
@@ -191,7 +217,7 @@ mod tests {
 
     #[test]
     fn not_a_number_is_no_current() {
-        let check = WiringCheck::new(0.05);
+        let check = pulses(0.05);
         let nan = Abc::new(f32::NAN, 0.0, 0.0);
         let next = check.step(&mut WiringCheckState::default(), nan);
         assert_eq!(next, Err(Fault::WiringCurrent));
@@ -200,7 +226,7 @@ mod tests {
     /// Result of the check on a motor of `inductance` H where 51.5 mH are expected, with the phase currents
     /// as `sensors` shows them; and the largest phase current, A.
     fn check(inductance: f32, sensors: fn(Abc) -> Abc) -> (Result<(), Fault>, f32) {
-        let check = WiringCheck::new(0.0515);
+        let check = pulses(0.0515);
         let (mut state, mut current, mut largest) =
             (WiringCheckState::default(), AlphaBeta::ZERO, 0.0_f32);
         let mut acting = AlphaBeta::ZERO;
@@ -263,7 +289,7 @@ mod tests {
         }
         // A current where none was put.
         for bad in [Abc::new(0.06, 0.0, 0.0), Abc::new(0.0, -0.06, 0.0)] {
-            let next = WiringCheck::new(0.05).step(&mut WiringCheckState::default(), bad);
+            let next = pulses(0.05).step(&mut WiringCheckState::default(), bad);
             assert_eq!(next, Err(Fault::WiringCurrent));
         }
     }

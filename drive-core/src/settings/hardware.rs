@@ -1,22 +1,32 @@
 //! Timer, power stage, converters and encoder.
 
+use super::Ntc;
+
 /// The timer and the power stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inverter {
     /// Value at which the counter turns round: 14167 at 170 MHz and 6 kHz.
     pub top: u16,
+    /// Nominal voltage of the dc link, V.
+    pub dc_link_v: f32,
     /// Dead time, s.
     pub dead_time_s: f32,
     /// Whether the dead time is compensated.
     pub compensate: bool,
-    /// Phase current from which on the compensation is full, A.
-    pub full_compensation_a: f32,
+    /// Phase current from which on the compensation is full, A; unset: by rule.
+    pub full_compensation_a: Option<f32>,
 }
 
 impl Default for Inverter {
-    /// Section 3.9; full compensation from 30 mA on: three times the spread of noise and prediction.
+    /// Section 3.9; 220 V rectified.
     fn default() -> Self {
-        Self { top: 14_167, dead_time_s: 2.2e-6, compensate: true, full_compensation_a: 0.03 }
+        Self {
+            top: 14_167,
+            dc_link_v: 311.0,
+            dead_time_s: 2.2e-6,
+            compensate: true,
+            full_compensation_a: None,
+        }
     }
 }
 
@@ -58,8 +68,8 @@ pub struct Scales {
     pub dc_link: Line,
     /// Largest code of the current channels.
     pub full_scale: u16,
-    /// Heat-sink code above which the drive trips.
-    pub heat_sink_trip: u16,
+    /// Thermistor of the heat sink.
+    pub ntc: Ntc,
     /// Delay of the analog filters of the currents, s.
     pub current_delay_s: f32,
     /// Encoder counts per mechanical turn, four a line.
@@ -74,7 +84,7 @@ impl Default for Scales {
             current_b: Line::CHANNEL_B,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
-            heat_sink_trip: 4000,
+            ntc: Ntc::default(),
             current_delay_s: 30e-6,
             encoder_counts: 10_000,
         }

@@ -10,8 +10,8 @@ pub struct PrintedChain {
     /// [`full_reference_iq_a`](Self::full_reference_iq_a) on. It must be odd in i_q, so it follows
     /// the sign of i_q, and goes through zero linearly.
     pub reference_a: f32,
-    /// Current on the quadrature axis from which on the reference is full, A.
-    pub full_reference_iq_a: f32,
+    /// Current on the quadrature axis from which on the reference is full, A; unset: by rule.
+    pub full_reference_iq_a: Option<f32>,
     /// Gain k_s of the tracker, rad/A (Eq. 3.44).
     pub k_s: f32,
     /// Zero z_s of the tracker (Eq. 3.44).
@@ -28,7 +28,7 @@ impl Default for PrintedChain {
     fn default() -> Self {
         Self {
             reference_a: 0.010,
-            full_reference_iq_a: 1.0,
+            full_reference_iq_a: None,
             k_s: 0.132_546,
             z_s: 0.90,
             learned: None,
@@ -45,39 +45,38 @@ pub struct SynchronousTracking {
     /// Saliency fixed to the flux at the nominal magnetising current. Negative: the inductance along
     /// the flux is the larger one.
     pub flux_saliency: f32,
-    /// Saliency per ampere of stator current, 1/A; for the gain schedule.
-    pub current_saliency: f32,
-    /// Reference of the saliency over the torque current, learned with the shaft locked.
-    pub reference: ReferenceTable,
+    /// Saliency per ampere of stator current, 1/A, for the gain schedule; unset: by rule.
+    pub current_saliency: Option<f32>,
+    /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
+    pub reference: Option<ReferenceTable>,
     /// Whether a start checks the saliency of the motor (see [`crate::protect::saliency_check`]). Without
     /// the check a start assumes it, and a shaft at standstill.
     pub check: bool,
     /// Whether the lock is verified at a start and watched (see [`crate::protect::lock_monitor`]).
     pub monitor: bool,
-    /// Carrier current over the torque current, learned with the shaft locked; for the monitor.
-    pub carrier: CarrierTable,
+    /// Carrier current over the torque current, learned with the shaft locked, for the monitor; unset: guessed.
+    pub carrier: Option<CarrierTable>,
     /// Allowed loss of the lock monitor: missing share of the flux-fixed saliency; 1 is zero flux.
     pub allowed_loss: f32,
     /// Time constant of the mean loss, s.
     pub loss_s: f32,
-    /// Mechanical speed that trips, rpm: the range in which the angle is tracked.
-    pub tracked_rpm: f32,
+    /// Mechanical speed that trips, rpm, the end of the range in which the angle is tracked; unset: by rule.
+    pub tracked_rpm: Option<f32>,
 }
 
 impl Default for SynchronousTracking {
-    /// For the simulated motor; see [`ReferenceTable::default`].
     fn default() -> Self {
         Self {
             bandwidth_hz: 3.5,
             flux_saliency: -0.035,
-            current_saliency: 0.0338,
-            reference: ReferenceTable::default(),
+            current_saliency: None,
+            reference: None,
             check: true,
             monitor: true,
-            carrier: CarrierTable::default(),
+            carrier: None,
             allowed_loss: 0.55,
             loss_s: 0.08,
-            tracked_rpm: 700.0,
+            tracked_rpm: None,
         }
     }
 }
@@ -85,8 +84,8 @@ impl Default for SynchronousTracking {
 /// The injection and the tracking of the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InjectionSettings {
-    /// Amplitude of the injected voltage, V peak; 0 for none.
-    pub amplitude_v: f32,
+    /// Amplitude of the injected voltage, V peak, 0 for none; unset: by rule.
+    pub amplitude_v: Option<f32>,
     /// Demodulation of the carrier current.
     pub demodulator: DemodulatorKind,
     /// Settings of the chain of the dissertation.
@@ -101,7 +100,7 @@ impl Default for InjectionSettings {
     /// 50 V (28 % of the largest voltage) is an assumption; the dissertation gives no amplitude.
     fn default() -> Self {
         Self {
-            amplitude_v: 50.0,
+            amplitude_v: None,
             demodulator: DemodulatorKind::default(),
             printed: PrintedChain::default(),
             synchronous: SynchronousTracking::default(),

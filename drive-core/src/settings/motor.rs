@@ -1,5 +1,7 @@
 //! The parameters of the motor.
 
+use crate::tuning::EquivalentCircuit;
+
 /// The motor: T-equivalent circuit per phase (Figure 21), star, SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motor {
@@ -35,6 +37,17 @@ impl Default for Motor {
 }
 
 impl Motor {
+    /// The equivalent circuit in double precision, for the design of the controllers.
+    pub fn circuit(&self) -> EquivalentCircuit {
+        EquivalentCircuit {
+            r_s: self.r_s.into(),
+            r_r: self.r_r.into(),
+            l_m: self.l_m.into(),
+            l_ls: self.l_ls.into(),
+            l_lr: self.l_lr.into(),
+        }
+    }
+
     /// Rotor inductance, H.
     pub fn l_r(&self) -> f32 {
         self.l_m + self.l_lr

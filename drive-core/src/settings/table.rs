@@ -4,23 +4,67 @@ use core::fmt;
 
 /// Number of points of a table, from i_q = 0 on.
 pub const POINTS: usize = 16;
-/// Distance of the points, A.
-pub const STEP_A: f32 = 0.25;
+/// The largest regulated current lies at this multiple of the distance of the points.
+const STEPS: f32 = 14.0;
+
+/// The torque currents of the points: 0, a step, two steps, and so on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    step_a: f32,
+    per_step: f32,
+}
+
+impl Grid {
+    /// The points of the dissertation's motor.
+    pub const REFERENCE: Self = Self { step_a: 0.25, per_step: 4.0 };
+
+    /// Points `step_a` apart, A; `None` unless that is a positive number.
+    pub fn of_step(step_a: f32) -> Option<Self> {
+        let per_step = 1.0 / step_a;
+        let usable = step_a > 0.0 && per_step > 0.0 && per_step.is_finite();
+        usable.then_some(Self { step_a, per_step })
+    }
+
+    /// Points for currents up to `largest_a`, A peak, a positive number.
+    pub fn for_current(largest_a: f32) -> Self {
+        Self { step_a: largest_a / STEPS, per_step: STEPS / largest_a }
+    }
+
+    /// Distance of the points, A.
+    pub fn step_a(self) -> f32 {
+        self.step_a
+    }
+
+    /// Torque current at point `n`, A.
+    pub fn current(self, n: usize) -> f32 {
+        n as f32 * self.step_a
+    }
+
+    /// Interval that contains |i_q|, A, and the position in it, 0 to 1. The last value is held beyond the end.
+    pub(crate) fn place(self, i_q: f32) -> (usize, f32) {
+        let x = i_q.abs() * self.per_step;
+        // Saturating cast.
+        let n = (x as usize).min(POINTS - 2);
+        let past = x - n as f32;
+        (n, if past < 1.0 { past } else { 1.0 })
+    }
+}
 /// Largest accepted saliency.
 const LARGEST: f32 = 0.3;
 
 /// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last.
 ///
 /// ```
-/// use drive_core::settings::table::ReferenceTable;
+/// use drive_core::settings::table::{Grid, ReferenceTable};
 ///
-/// let table = ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.02), (2.0, 0.03)])?;
+/// let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.02), (2.0, 0.03)])?;
 /// assert!((table.at(0.5) - 0.01).abs() < 1e-6 && (table.at(-1.5) + 0.025).abs() < 1e-6);
 /// assert_eq!(table.at(3.5), 0.03);
 /// # Ok::<(), drive_core::settings::table::TableError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceTable {
+    grid: Grid,
     q: [f32; POINTS],
 }
 
@@ -58,7 +102,7 @@ impl ReferenceTable {
     ///
     /// # Errors
     /// See [`TableError`].
-    pub fn new(points: &[(f32, f32)]) -> Result<Self, TableError> {
+    pub fn new(grid: Grid, points: &[(f32, f32)]) -> Result<Self, TableError> {
         let first = points.first().ok_or(TableError::TooShort)?;
         if *first != (0.0, 0.0) {
             return Err(TableError::NotOdd);
@@ -76,24 +120,28 @@ impl ReferenceTable {
                 return Err(TableError::TooLarge(n + 1, pair[1].1));
             }
         }
-        Ok(Self { q: sampled(points) })
+        Ok(Self { grid, q: sampled(grid, points) })
     }
 
-    /// Table from its values at multiples of [`STEP_A`]; `None` when the first is not 0 or any is beyond
-    /// ±0.3.
-    pub fn from_points(q: [f32; POINTS]) -> Option<Self> {
+    /// Table from its values at the points of `grid`; `None` when the first is not 0 or any is beyond ±0.3.
+    pub fn from_points(grid: Grid, q: [f32; POINTS]) -> Option<Self> {
         let believable = q.iter().all(|q| (-LARGEST..=LARGEST).contains(q));
-        (q[0] == 0.0 && believable).then_some(Self { q })
+        (q[0] == 0.0 && believable).then_some(Self { grid, q })
     }
 
-    /// The values at multiples of [`STEP_A`].
+    /// The torque currents of the points.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The values at the points.
     pub fn points(&self) -> &[f32; POINTS] {
         &self.q
     }
 
     /// Reference at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> f32 {
-        odd(i_q, between(&self.q, place(i_q)))
+        odd(i_q, between(&self.q, self.grid.place(i_q)))
     }
 }
 
@@ -105,15 +153,23 @@ impl Default for ReferenceTable {
             0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
             0.04356, 0.04345, 0.04328, 0.04308, 0.04308, 0.04308,
         ];
-        Self { q: LEARNED }
+        Self { grid: Grid::REFERENCE, q: LEARNED }
     }
 }
 
-/// Samples the line through `points` `(i_q in A, value)` at multiples of [`STEP_A`]; constant beyond the
-/// last. At least two points with increasing currents.
-pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
+impl ReferenceTable {
+    /// The default in proportion to the largest regulated current, A peak: a beginning until the motor's own is
+    /// learned.
+    pub fn guessed(largest_a: f32) -> Self {
+        Self { grid: Grid::for_current(largest_a), ..Self::default() }
+    }
+}
+
+/// Samples the line through `points` `(i_q in A, value)` on a grid; constant beyond the last. At least two points
+/// with increasing currents.
+pub(crate) fn sampled(grid: Grid, points: &[(f32, f32)]) -> [f32; POINTS] {
     core::array::from_fn(|n| {
-        let i_q = n as f32 * STEP_A;
+        let i_q = grid.current(n);
         match points.windows(2).find(|pair| i_q <= pair[1].0) {
             Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
             None => points[points.len() - 1].1,
@@ -121,17 +177,7 @@ pub(crate) fn sampled(points: &[(f32, f32)]) -> [f32; POINTS] {
     })
 }
 
-/// Interval of the tables that contains |i_q|, A, and the position in it, 0 to 1. The last value is held
-/// beyond the end.
-pub(crate) fn place(i_q: f32) -> (usize, f32) {
-    let x = i_q.abs() * (1.0 / STEP_A);
-    // Saturating cast.
-    let n = (x as usize).min(POINTS - 2);
-    let past = x - n as f32;
-    (n, if past < 1.0 { past } else { 1.0 })
-}
-
-/// Linear interpolation of a table at a [`place`].
+/// Linear interpolation of a table at a [`place`](Grid::place).
 pub(crate) fn between(table: &[f32; POINTS], (n, past): (usize, f32)) -> f32 {
     table[n] + (table[n + 1] - table[n]) * past
 }
@@ -147,18 +193,23 @@ const RATIO: (f32, f32) = (0.5, 2.0);
 /// Carrier current over i_q as a ratio to that at i_q = 0; even.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CarrierTable {
+    grid: Grid,
     ratio: [f32; POINTS],
 }
 
 impl CarrierTable {
-    /// Table from its values at multiples of [`STEP_A`]; `None` when the first is not 1 or any is outside
-    /// 0.5 to 2.
-    pub fn from_points(ratio: [f32; POINTS]) -> Option<Self> {
+    /// Table from its values at the points of `grid`; `None` when the first is not 1 or any is outside 0.5 to 2.
+    pub fn from_points(grid: Grid, ratio: [f32; POINTS]) -> Option<Self> {
         let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
-        (ratio[0] == 1.0 && believable).then_some(Self { ratio })
+        (ratio[0] == 1.0 && believable).then_some(Self { grid, ratio })
     }
 
-    /// The values at multiples of [`STEP_A`].
+    /// The torque currents of the points.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The values at the points.
     pub fn points(&self) -> &[f32; POINTS] {
         &self.ratio
     }
@@ -172,7 +223,14 @@ impl Default for CarrierTable {
             1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,
             1.11946, 1.13211, 1.14488, 1.15781, 1.15781, 1.15781,
         ];
-        Self { ratio: LEARNED }
+        Self { grid: Grid::REFERENCE, ratio: LEARNED }
+    }
+}
+
+impl CarrierTable {
+    /// As [`ReferenceTable::guessed`].
+    pub fn guessed(largest_a: f32) -> Self {
+        Self { grid: Grid::for_current(largest_a), ..Self::default() }
     }
 }
 
@@ -182,7 +240,7 @@ mod tests {
 
     #[test]
     fn tables_are_checked() {
-        let new = ReferenceTable::new;
+        let new = |points: &[(f32, f32)]| ReferenceTable::new(Grid::REFERENCE, points);
         assert_eq!(new(&[]), Err(TableError::TooShort));
         assert_eq!(new(&[(0.0, 0.0)]), Err(TableError::TooShort));
         assert_eq!(new(&[(0.0, 0.01), (1.0, 0.02)]), Err(TableError::NotOdd));
@@ -195,12 +253,15 @@ mod tests {
     #[test]
     fn a_carrier_table_begins_with_one_and_has_believable_ratios() {
         let mut ratio = [1.1; POINTS];
-        assert_eq!(CarrierTable::from_points(ratio), None);
+        assert_eq!(CarrierTable::from_points(Grid::REFERENCE, ratio), None);
         ratio[0] = 1.0;
-        assert_eq!(CarrierTable::from_points(ratio).map(|t| *t.points()), Some(ratio));
+        assert_eq!(
+            CarrierTable::from_points(Grid::REFERENCE, ratio).map(|t| *t.points()),
+            Some(ratio)
+        );
         for wrong in [0.49, 2.1, f32::NAN] {
             ratio[15] = wrong;
-            assert_eq!(CarrierTable::from_points(ratio), None, "{wrong}");
+            assert_eq!(CarrierTable::from_points(Grid::REFERENCE, ratio), None, "{wrong}");
         }
     }
 

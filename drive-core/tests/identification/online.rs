@@ -100,7 +100,7 @@ fn known() -> SpeedInput {
 fn plain() -> (Settings, Machine) {
     let mut settings = Settings::default();
     settings.injection.synchronous.flux_saliency = 0.0;
-    settings.injection.synchronous.current_saliency = 0.0;
+    settings.injection.synchronous.current_saliency = Some(0.0);
     let machine = Machine::new(&settings.motor, OMEGA_M);
     (settings, machine)
 }
@@ -143,7 +143,7 @@ fn with_a_flux_that_moves_the_speed_is_found_too() {
 fn the_saliency_is_taken_into_account() {
     let (mut settings, mut machine) = plain();
     let synchronous = &mut settings.injection.synchronous;
-    (synchronous.flux_saliency, synchronous.current_saliency) = (0.1, 0.05);
+    (synchronous.flux_saliency, synchronous.current_saliency) = (0.1, Some(0.05));
     let (d, q) = (f64::from(CURRENT.d), f64::from(CURRENT.q));
     let square = d * d + q * q;
     machine.sigma_l_s *= 1.0 + 0.05 * square.sqrt() + 0.1 * (d * d - q * q) / square;
@@ -273,15 +273,14 @@ fn the_uncertainty_is_that_of_the_noise() {
 fn the_bases_are_of_the_size_of_voltage_and_current() {
     let bases = |r_s: f32, i_d: f32| {
         let (mut settings, _) = plain();
-        (settings.motor.r_s, settings.sequence.i_d) = (r_s, i_d);
+        (settings.motor.r_s, settings.sequence.i_d) = (r_s, Some(i_d));
         let used = *Online::new(&settings).unwrap().rls().settings();
-        let limits = settings.limits;
-        assert_eq!(used.voltage_limit, limits.dc_over_v);
-        assert_eq!(used.current_limit, limits.trip_a);
-        (used.voltage_base / limits.dc_over_v, used.current_base)
+        assert_eq!(used.voltage_limit, settings.dc_over_v());
+        assert_eq!(used.current_limit, settings.trip_a());
+        (used.voltage_base / settings.dc_over_v(), used.current_base)
     };
-    let limits = Settings::default().limits;
-    assert_eq!(bases(5.4, 0.7), (5.4 * limits.current_a / limits.dc_over_v, 0.7));
-    assert_eq!(bases(0.01, 0.01), (0.02, 0.02 * limits.trip_a));
+    let settings = Settings::default();
+    assert_eq!(bases(5.4, 0.7), (5.4 * settings.current_limit_a() / settings.dc_over_v(), 0.7));
+    assert_eq!(bases(0.01, 0.01), (0.02, 0.02 * settings.trip_a()));
     assert_eq!(bases(900.0, 3.5), (1.0, 3.5));
 }

@@ -42,7 +42,7 @@ pub use encoder::{Encoder, EncoderFault, EncoderSettings};
 pub use error::PlantError;
 pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
-pub use machine::{Machine, MachineSettings, MachineState, SALIENCY_CURRENT_A, SaliencySettings};
+pub use machine::{Machine, MachineSettings, MachineState, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
 

@@ -15,7 +15,7 @@
 //! With `a_psi = b1 = chi = 0` this is Eq. 2.9 with the rotor currents eliminated, term by term. A
 //! positive `s` means low impedance along its axis. The size of the saliency is an assumption:
 //! nothing in the source measures it. The factor `2/(1 + r)`, one at `psi_n`, saturates the flux
-//! part at `2 |a_psi|`; the current part is held at its value for [`SALIENCY_CURRENT_A`] beyond
+//! part at `2 |a_psi|`; the current part is held at its value for `hold_a` beyond
 //! that current, so that `|s|` stays below one whatever the currents.
 //! Iron loss, slotting, skin effect and the saturation of the main flux are absent.
 
@@ -24,8 +24,6 @@ use serde::{Deserialize, Serialize};
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
 
-/// Current up to which the current part of the saliency grows, A peak.
-pub const SALIENCY_CURRENT_A: f64 = 5.0;
 /// Largest length of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
 /// Corner of the filter that splits off the high-frequency current for the `chi` term, rad/s.
@@ -71,19 +69,21 @@ pub struct SaliencySettings {
     /// Resistive part of Eq. 3.8, as a factor of it: 0 is none, 1 as printed. Acts well above
     /// 60 Hz only.
     pub chi: f64,
+    /// Current up to which the current part grows, A peak; beyond, it is held.
+    pub hold_a: f64,
     /// Flux at which `a_psi` holds, Wb; not given, it is that of a direct current of 0.7 A.
     pub psi_n: Option<f64>,
 }
 
 impl Default for SaliencySettings {
     fn default() -> Self {
-        Self { a_psi: -0.035, b1: 0.036, chi: 0.0, psi_n: None }
+        Self { a_psi: -0.035, b1: 0.036, chi: 0.0, hold_a: 5.0, psi_n: None }
     }
 }
 
 impl SaliencySettings {
     /// No saliency: the textbook machine.
-    pub const NONE: Self = Self { a_psi: 0.0, b1: 0.0, chi: 0.0, psi_n: None };
+    pub const NONE: Self = Self { a_psi: 0.0, b1: 0.0, chi: 0.0, hold_a: 5.0, psi_n: None };
 }
 
 /// Electrical state of the machine.
@@ -112,6 +112,7 @@ pub struct Machine {
     torque_factor: f64,
     two_a_psi: f64,
     b1: f64,
+    hold_a: f64,
     psi_n_squared: f64,
     half_chi_r: f64,
 }
@@ -120,21 +121,22 @@ impl Machine {
     /// The machine with these settings.
     ///
     /// Refused are values that are not finite or outside the range named in the error, and
-    /// saliency that could reach `|s| > 0.5` with any current up to 5 A and any flux up to
-    /// `lm` 5 A. (The largest `|s|` is the sum of the largest lengths of its two parts, as their
+    /// saliency that could reach `|s| > 0.5` with any current up to `hold_a` and any flux up to
+    /// that of `hold_a`. (The largest `|s|` is the sum of the largest lengths of its two parts, as their
     /// directions are independent; the flux part grows with the flux.)
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
-        check("machine.rs", m.rs, 0.01..=1000.0, "ohm")?;
-        check("machine.rr", m.rr, 0.01..=1000.0, "ohm")?;
-        check("machine.lls", m.lls, 1e-5..=10.0, "H")?;
-        check("machine.llr", m.llr, 1e-5..=10.0, "H")?;
-        check("machine.lm", m.lm, 1e-4..=100.0, "H")?;
+        check("machine.rs", m.rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", m.rr, 1e-4..=1000.0, "ohm")?;
+        check("machine.lls", m.lls, 1e-7..=10.0, "H")?;
+        check("machine.llr", m.llr, 1e-7..=10.0, "H")?;
+        check("machine.lm", m.lm, 1e-5..=100.0, "H")?;
         check("machine.pole_pairs", f64::from(m.pole_pairs), 1.0..=50.0, "")?;
         check("saliency.a_psi", s.a_psi, -0.25..=0.25, "")?;
-        check("saliency.b1", s.b1, -0.1..=0.1, "1/A")?;
+        check("saliency.hold_a", s.hold_a, 0.01..=10_000.0, "A")?;
+        check("saliency.b1", s.b1, -50.0..=50.0, "1/A")?;
         check("saliency.chi", s.chi, 0.0..=10.0, "")?;
         let psi_n = s.psi_n.unwrap_or(0.7 * m.lm);
         check("saliency.psi_n", psi_n, 1e-4..=100.0, "Wb")?;
@@ -157,6 +159,7 @@ impl Machine {
             torque_factor: 1.5 * pole_pairs * coupling,
             two_a_psi: 2.0 * s.a_psi,
             b1: s.b1,
+            hold_a: s.hold_a,
             psi_n_squared: psi_n * psi_n,
             half_chi_r: 0.5 * s.chi * m.rr * coupling * coupling,
         })
@@ -191,7 +194,7 @@ impl Machine {
         let length = square(x.i).sqrt();
         let current_part = if length > NO_CURRENT {
             let inverse = 1.0 / length;
-            self.b1 * inverse.min(SALIENCY_CURRENT_A * inverse * inverse)
+            self.b1 * inverse.min(self.hold_a * inverse * inverse)
         } else {
             0.0
         };
@@ -281,9 +284,9 @@ fn refuse_singular(
     s: &SaliencySettings,
     psi_n: f64,
 ) -> Result<(), PlantError> {
-    let r = (m.lm * SALIENCY_CURRENT_A / psi_n).powi(2);
+    let r = (m.lm * s.hold_a / psi_n).powi(2);
     let per_a_psi = 2.0 * r / (1.0 + r);
-    let (flux_part, current_part) = (s.a_psi.abs() * per_a_psi, s.b1.abs() * SALIENCY_CURRENT_A);
+    let (flux_part, current_part) = (s.a_psi.abs() * per_a_psi, s.b1.abs() * s.hold_a);
     let saliency = flux_part + current_part;
     if saliency <= SALIENCY_LIMIT {
         return Ok(());
@@ -293,7 +296,7 @@ fn refuse_singular(
         ("saliency.a_psi", s.a_psi, (rest / per_a_psi).min(0.25), "")
     } else {
         let rest = (SALIENCY_LIMIT - flux_part).max(0.0);
-        ("saliency.b1", s.b1, rest / SALIENCY_CURRENT_A, "1/A")
+        ("saliency.b1", s.b1, rest / s.hold_a, "1/A")
     };
     Err(PlantError::TooSalient { key, value, min: -max, max, unit, saliency })
 }

@@ -23,6 +23,8 @@ const FULL_SCALE: f64 = 4095.0;
 pub struct MeasurementSettings {
     /// Gaussian noise of each current channel, A rms.
     pub noise_a: f64,
+    /// End of the range of channel A, A; B in proportion.
+    pub range_a: f64,
     /// Current per code of channel A, A; B in proportion. A finer converter has more codes over the
     /// same range, up to 16 bits.
     pub lsb_a: f64,
@@ -52,6 +54,7 @@ impl MeasurementSettings {
     /// The measurement of the reference board.
     const REFERENCE: Self = Self {
         noise_a: 0.005,
+        range_a: -CALIBRATION[0].1,
         lsb_a: CALIBRATION[0].0,
         filter_hz: 5305.0,
         gain_error_a: 0.0,
@@ -59,7 +62,7 @@ impl MeasurementSettings {
         offset_a: 0.0,
         offset_b: 0.0,
         dc_link_v: 0.11,
-        heat_sink_code: 1000,
+        heat_sink_code: 1309,
     };
 
     /// No noise, no filter, 16 bits.
@@ -68,10 +71,11 @@ impl MeasurementSettings {
 
     /// The calibration of channels A and B without their gain and offset errors, as the drive is set.
     pub fn calibration(&self) -> [CalibrationLine; 2] {
-        let finer = CALIBRATION[0].0 / self.lsb_a;
+        let wider = self.range_a / -CALIBRATION[0].1;
+        let finer = wider * CALIBRATION[0].0 / self.lsb_a;
         CALIBRATION.map(|(a_per_code, a_at_zero)| CalibrationLine {
-            a_per_code: a_per_code / finer,
-            a_at_zero,
+            a_per_code: wider * a_per_code / finer,
+            a_at_zero: wider * a_at_zero,
             full_scale: (FULL_SCALE * finer).round() as u16,
         })
     }
@@ -175,7 +179,9 @@ impl Sensors {
     /// [`PlantError::OutOfRange`].
     pub fn new(s: &MeasurementSettings) -> Result<Self, PlantError> {
         check("measurement.noise_a", s.noise_a, 0.0..=10.0, "A")?;
-        check("measurement.lsb_a", s.lsb_a, 0.000_14..=0.05, "A")?;
+        check("measurement.range_a", s.range_a, 0.01..=5000.0, "A")?;
+        // 7 to 16 bits.
+        check("measurement.lsb_a", s.lsb_a, s.range_a / 32_000.0..=s.range_a / 80.0, "A")?;
         check("measurement.filter_hz", s.filter_hz, 0.0..=1e6, "Hz")?;
         check("measurement.gain_error_a", s.gain_error_a, -0.5..=0.5, "")?;
         check("measurement.gain_error_b", s.gain_error_b, -0.5..=0.5, "")?;

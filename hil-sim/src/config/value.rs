@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Value {
     /// A number.
     Number(f64),
-    /// `true` or `false`.
+    /// `yes` or `no`; also `true` or `false`, as TOML has it.
     Switch(bool),
     /// A word.
     Word(String),
@@ -24,10 +24,15 @@ impl Value {
         let text = text.trim();
         match (text.parse(), text) {
             (Ok(number), _) => Self::Number(number),
-            (_, "true") => Self::Switch(true),
-            (_, "false") => Self::Switch(false),
+            (_, "true" | "yes") => Self::Switch(true),
+            (_, "false" | "no") => Self::Switch(false),
             _ => Self::Word(text.to_owned()),
         }
+    }
+
+    /// From a number in single precision: the shortest decimal fraction that stands for it.
+    pub fn of_single(number: f32) -> Self {
+        number.to_string().parse().map_or(Self::Unset, Self::Number)
     }
 
     /// From a TOML value; a date or an array becomes a word, which no key takes.
@@ -46,7 +51,7 @@ impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(number) => write!(f, "{number}"),
-            Self::Switch(on) => write!(f, "{on}"),
+            Self::Switch(on) => f.write_str(if *on { "yes" } else { "no" }),
             Self::Word(word) => f.write_str(word),
             Self::Unset => f.write_str("-"),
         }
@@ -65,7 +70,7 @@ pub enum Allowed {
     },
     /// One of these words.
     Words(&'static [&'static str]),
-    /// `true` or `false`.
+    /// `yes` or `no`.
     Switch,
 }
 
@@ -75,7 +80,7 @@ impl Allowed {
         match self {
             Self::Range { min, max } => format!("{min} to {max} {unit}").trim_end().to_owned(),
             Self::Words(words) => words.join(", "),
-            Self::Switch => "true, false".to_owned(),
+            Self::Switch => "yes, no".to_owned(),
         }
     }
 }
@@ -123,7 +128,7 @@ impl Field for bool {
     fn from_value(value: &Value, _: &Allowed) -> Result<Self, &'static str> {
         match value {
             Value::Switch(on) => Ok(*on),
-            _ => Err("neither true nor false"),
+            _ => Err("neither yes nor no"),
         }
     }
 }

@@ -7,10 +7,11 @@ mod model;
 use super::bode::{Bode, frequencies, largest_pole};
 use super::torque::assumptions;
 use super::{Context, Experiment};
-use crate::config::{Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::RATE_HZ;
+use crate::rig::{RATE_HZ, plant_settings};
+use drive_core::carrier::DemodulatorKind;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, PRINTED_PII, Pii, TABLE_6};
 use num_complex::Complex64;
@@ -34,15 +35,15 @@ const LEAK: f64 = 0.0100 * 0.944_061;
 /// A demodulation whose angle plant is identified.
 struct Demodulation {
     name: &'static str,
-    demodulator: Demodulator,
+    demodulator: DemodulatorKind,
     /// Unit of a thousandth of the signal.
     unit: &'static str,
 }
 
 const DEMODULATIONS: [Demodulation; 3] = [
-    Demodulation { name: "literal", demodulator: Demodulator::Literal, unit: "mA" },
-    Demodulation { name: "rectified", demodulator: Demodulator::Rectified, unit: "mA" },
-    Demodulation { name: "synchronous", demodulator: Demodulator::Synchronous, unit: "10^-3" },
+    Demodulation { name: "literal", demodulator: DemodulatorKind::Literal, unit: "mA" },
+    Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, unit: "mA" },
+    Demodulation { name: "synchronous", demodulator: DemodulatorKind::Synchronous, unit: "10^-3" },
 ];
 
 /// Identification at one torque current.
@@ -158,13 +159,13 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
     let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit);
     let title = format!("Two plants: {}", demodulation.name);
     let mut table = Table::new(title, &[]).note(match demodulation.demodulator {
-            Demodulator::Literal => {
+            DemodulatorKind::Literal => {
                 "Predicted: the leak of the fundamental, -sqrt2 0.01 0.944 |i| sin(x + gamma) with x the \
                  axis seen from the current's frame: slope sqrt2 0.00944 iq while the current is held; \
                  none when the current turns with the axis. The loop is closed around the second: it \
                  has no gain."
             }
-            Demodulator::Synchronous => {
+            DemodulatorKind::Synchronous => {
                 "Predicted: q = -Im(s e^(-2j theta)) with s = a e^(2j phi2) + b |i| e^(2j arg i): slope \
                  2(|a| - b |i| cos 2 gamma) while the current is held, 2|a| once it has turned with the \
                  axis. The first is what a fast error meets and what section 3.11 identifies; the second \
@@ -175,22 +176,23 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
                  of the chain, 0.945 2/pi 0.944. "
             }
         });
-    let (id, s) = (config.reference.id_a, &config.saliency);
-    let inductance = config.motor.lls + config.motor.llr; // near sigma L_s
-    let carrier = config.injection.amplitude_v / (std::f64::consts::TAU * 600.0 * inductance);
+    let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
+    let inductance = config.motor.l_ls + config.motor.l_lr; // near sigma L_s
+    let carrier =
+        f64::from(config.drive.carrier_v()) / (std::f64::consts::TAU * 600.0 * inductance);
     for ((iq, ..), p) in TABLE_6.iter().zip(points) {
         let length = id.hypot(*iq);
         let cos_2_gamma = (id * id - iq * iq) / (length * length);
         let flux_part = 2.0 * s.a_psi.abs();
         let current_part = -2.0 * s.b1 * length * cos_2_gamma;
         let scale = match demodulation.demodulator {
-            Demodulator::Rectified => {
+            DemodulatorKind::Rectified => {
                 2f64.sqrt() * carrier * 0.9452 * std::f64::consts::FRAC_2_PI * 0.944_061
             }
             _ => 1.0,
         };
         let predicted = match demodulation.demodulator {
-            Demodulator::Literal => [2f64.sqrt() * LEAK * iq, 0.0],
+            DemodulatorKind::Literal => [2f64.sqrt() * LEAK * iq, 0.0],
             _ => [scale * (flux_part + current_part), scale * flux_part],
         };
         let (held, slow) = (p.held_gain(), p.slow_gain());
@@ -251,7 +253,7 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
     rows("Table 6", &printed, true);
     for (demodulation, points) in all {
         let plants: Vec<Model> = points.iter().map(|p| p.models[1]).collect();
-        rows(demodulation.name, &plants, demodulation.demodulator != Demodulator::Synchronous);
+        rows(demodulation.name, &plants, demodulation.demodulator != DemodulatorKind::Synchronous);
     }
     table
 }
@@ -284,7 +286,7 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         .zip(points)
         .map(|((iq, ..), p)| (format!("{iq} A"), scaled(p.models[1])))
         .chain(
-            (demodulation.demodulator != Demodulator::Synchronous)
+            (demodulation.demodulator != DemodulatorKind::Synchronous)
                 .then(|| ("Table 6, 1.5 A".into(), scaled(Model::printed(DESIGN_ROW)))),
         )
         .collect();

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use drive_core::{Command, Mode, State};
 
 use super::{Context, Experiment};
-use crate::config::{AngleSource, LoadMode};
+use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;
+use drive_core::settings::AngleSource;
 
 /// Figures 28 and 29.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -63,7 +64,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.tables.push(table);
     let i = &context.config.inverter;
-    let lost = i.vdc * i.dead_time_us * 1e-6 * RATE_HZ;
+    let lost = i.dc_link_v * i.dead_time_s * RATE_HZ;
     outcome.metrics.set("lost_voltage_per_phase_v", lost);
     let title = "What the dead time does to voltage and current";
     outcome
@@ -79,9 +80,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<Case, Error> {
     let mut config = context.config.clone();
-    config.angle.source = AngleSource::Encoder;
+    config.drive.angle_source = AngleSource::Encoder;
     config.inverter.switched = true;
-    config.inverter.compensate = compensate;
+    config.drive.inverter.compensate = compensate;
     // No compensation knows the residual drop; this experiment is about the dead time alone.
     config.inverter.residual_v = 0.0;
     config.load.mode = LoadMode::Speed;

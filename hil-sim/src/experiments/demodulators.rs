@@ -109,7 +109,8 @@ fn findings(
     seed: u64,
 ) -> Result<DemodulationResults, Error> {
     let mut isotropic = config.clone();
-    (isotropic.saliency.a_psi, isotropic.saliency.b1, isotropic.saliency.chi) = (0.0, 0.0, 0.0);
+    (isotropic.saliency.a_psi, isotropic.saliency.b1, isotropic.saliency.chi) =
+        (0.0, Some(0.0), 0.0);
     let map = |saliency: bool| {
         let variant = Variant {
             name: demodulation.name,
@@ -117,7 +118,7 @@ fn findings(
             demodulator: demodulation.demodulator,
             saliency,
             inject: true,
-            compensate: config.angle.compensate_delays,
+            compensate: !config.drive.ignore_delays,
         };
         IQ_A.par_iter()
             .map(|&iq| injection_map::curve(config, seed, variant, iq))

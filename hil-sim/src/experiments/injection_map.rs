@@ -3,11 +3,12 @@
 use drive_core::Command;
 
 use super::{Context, Experiment};
-use crate::config::{Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::Rig;
 use crate::stats::Stats;
+use drive_core::carrier::DemodulatorKind;
 
 /// Figure 19.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -31,7 +32,7 @@ const AVERAGE_S: f64 = 0.05;
 pub(super) struct Variant {
     pub name: &'static str,
     pub title: &'static str,
-    pub demodulator: Demodulator,
+    pub demodulator: DemodulatorKind,
     pub saliency: bool,
     pub inject: bool,
     /// Whether the delay of the demodulation is compensated.
@@ -41,7 +42,7 @@ pub(super) struct Variant {
 const LITERAL: Variant = Variant {
     name: "literal",
     title: "As printed, motor with saliency",
-    demodulator: Demodulator::Literal,
+    demodulator: DemodulatorKind::Literal,
     saliency: true,
     inject: true,
     compensate: false,
@@ -49,7 +50,7 @@ const LITERAL: Variant = Variant {
 const RECTIFIED: Variant = Variant {
     name: "rectified",
     title: "Rectified, delay compensated, motor with saliency",
-    demodulator: Demodulator::Rectified,
+    demodulator: DemodulatorKind::Rectified,
     saliency: true,
     inject: true,
     compensate: true,
@@ -113,7 +114,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             outcome.metrics.set(name, at(curve, 90.0));
         }
     }
-    outcome.tables.push(table(&curves, context.config.reference.id_a));
+    outcome.tables.push(table(&curves, f64::from(context.config.drive.i_d())));
     let isotropic = &curves[IQ_A.len()..2 * IQ_A.len()];
     let silent = &curves[2 * IQ_A.len()..3 * IQ_A.len()];
     let same =
@@ -140,13 +141,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 /// belongs along the flux, theta is counted from 90° ahead of it.
 pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Result<Curve, Error> {
     let mut config = config.clone();
-    config.injection.demodulator = variant.demodulator;
-    config.angle.compensate_delays = variant.compensate;
+    config.drive.injection.demodulator = variant.demodulator;
+    config.drive.ignore_delays = !variant.compensate;
     if !variant.saliency {
-        (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, 0.0, 0.0);
+        (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, Some(0.0), 0.0);
     }
     if !variant.inject {
-        config.injection.amplitude_v = 0.0;
+        config.drive.injection.amplitude_v = Some(0.0);
     }
     let mut rig = Rig::oriented(&config, seed)?;
     rig.command(&Command::Torque(iq as f32))?;

@@ -1,7 +1,6 @@
 //! The drive learns the reference of its angle tracking.
 
 use drive_core::identify::learning::Fitted;
-use drive_core::settings::table::STEP_A;
 
 use super::torque::assumptions;
 use super::{Context, Experiment, learning};
@@ -25,7 +24,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .iter()
         .take(learned.points + 1)
         .enumerate()
-        .map(|(n, &q)| (n as f64 * f64::from(STEP_A), f64::from(q)))
+        .map(|(n, &q)| (f64::from(learned.reference.grid().current(n)), f64::from(q)))
         .collect();
     let mut table = Table::new(
         "Over the torque current",

@@ -1,13 +1,14 @@
 //! A drive that learns its tracking reference on a simulated motor with the shaft locked.
 
 use drive_core::identify::learning::Learned;
-use drive_core::settings::table::ReferenceTable;
+use drive_core::settings::table::{Grid, ReferenceTable};
 use drive_core::{Command, Mode, State};
 
-use crate::config::{Config, Demodulator, LoadMode};
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::rig::Rig;
 use crate::stats::Stats;
+use drive_core::carrier::DemodulatorKind;
 
 /// Longest learning run, s: 30 points of 31 s at most, and the start.
 const LONGEST_S: u32 = 1000;
@@ -57,12 +58,12 @@ const AVERAGE_S: f64 = 0.5;
 /// # Errors
 /// [`Error::Refused`] when the configuration or a value of the table is refused, or the drive stops.
 pub fn reference_of(
-    demodulator: Demodulator,
+    demodulator: DemodulatorKind,
     config: &Config,
     seed: u64,
 ) -> Result<ReferenceTable, Error> {
     let mut config = config.clone();
-    config.injection.demodulator = demodulator;
+    config.drive.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed)?;
     // The table is odd.
     let mut points = vec![(0.0, 0.0)];
@@ -76,5 +77,5 @@ pub fn reference_of(
             points.push((i_q, signal.mean() as f32));
         }
     }
-    ReferenceTable::new(&points).map_err(Error::refused)
+    ReferenceTable::new(Grid::REFERENCE, &points).map_err(Error::refused)
 }

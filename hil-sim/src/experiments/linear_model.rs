@@ -85,19 +85,19 @@ impl LinearModel {
         let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
         let circuit = tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr };
         let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
-        let tracking = &settings.injection.synchronous;
         let schedule = GainSchedule::new(
-            &tracking.reference,
-            tracking.flux_saliency,
-            tracking.current_saliency,
-            settings.sequence.i_d,
+            &settings.reference(),
+            settings.injection.synchronous.flux_saliency,
+            settings.current_saliency(),
+            settings.i_d(),
         );
         // Over half the distance of the table's points to either side.
-        let (before, after) = (schedule.at(i_q as f32 - 0.125), schedule.at(i_q as f32 + 0.125));
+        let half = 0.5 * settings.reference().grid().step_a();
+        let (before, after) = (schedule.at(i_q as f32 - half), schedule.at(i_q as f32 + half));
         let l_r = machine.llr + machine.lm;
         let pole_pairs = f64::from(machine.pole_pairs);
         Ok(Self {
-            i_d: settings.sequence.i_d.into(),
+            i_d: settings.i_d().into(),
             i_q,
             t_r: [l_r / machine.rr, settings.motor.tau_r().into()],
             torque: 1.5 * pole_pairs * machine.lm * machine.lm / l_r,
@@ -106,7 +106,7 @@ impl LinearModel {
             plant,
             current: built.designs[1],
             speed: built.motion_design,
-            w_n: TAU * f64::from(tracking.bandwidth_hz),
+            w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
             share: schedule.at(i_q as f32).1.into(),
             apparent_angle: f64::from(schedule.per_saliency * (after.0 - before.0)) / 0.25,
         })
@@ -192,7 +192,7 @@ impl MovingAverage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_core::settings::table::ReferenceTable;
+    use drive_core::settings::table::{Grid, ReferenceTable};
 
     fn linear(i_q: f64, settings: &Settings) -> LinearModel {
         let (machine, mechanics) = (MachineSettings::default(), MechanicsSettings::default());
@@ -210,7 +210,7 @@ mod tests {
         settings.injection.synchronous.bandwidth_hz = 6.0;
         // No saliency of the current: its transient looks like an angle.
         settings.injection.synchronous.reference =
-            ReferenceTable::new(&[(0.0, 0.0), (1.0, 0.0)]).unwrap();
+            ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.0)]).ok();
         let response = linear(0.01, &settings).response(Disturbance::TorqueCurrent(0.1), 0.4);
         let t_r = 0.2047 / 1.1;
         let wrong = 0.1 * (1.0 - 0.9) / (t_r * 0.7);

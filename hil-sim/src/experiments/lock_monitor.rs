@@ -180,7 +180,7 @@ impl Trials<'_> {
     }
 
     fn over_speed(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let limit = self.context.config.injection.tracked_rpm + ESTIMATE_RPM;
+        let limit = f64::from(self.context.config.drive.tracked_rpm()) + ESTIMATE_RPM;
         let trials: Vec<OverSpeedTrial> = self.all("over-speed", 11, self.runs, |_, seed| {
             trials::over_speed(self.context.config, seed, limit)
         })?;

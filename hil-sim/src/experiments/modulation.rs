@@ -71,7 +71,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let inverter = Inverter {
         modulator: Modulator::new(settings.top, settings.dead_time_s, false),
         top: f64::from(settings.top),
-        vdc: context.config.inverter.vdc,
+        vdc: context.config.inverter.dc_link_v,
     };
     let mut outcome = Outcome::default();
     outcome.figures.push(vectors(&inverter));

@@ -9,6 +9,7 @@ use super::{Context, Experiment};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::rig::plant_settings;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -108,18 +109,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn spread(config: &Config, random: &mut Xoshiro256PlusPlus) -> Config {
     let mut drawn = config.clone();
     let mut factor = |largest: f64| 1.0 + random.random_range(-largest..=largest);
-    let (spread, believed) = (&config.spread, config.believed_motor());
-    let motor = &mut drawn.drive_motor;
-    for (place, value) in [
-        (&mut motor.rs, believed.rs),
-        (&mut motor.rr, believed.rr),
-        (&mut motor.lls, believed.lls),
-        (&mut motor.llr, believed.llr),
-        (&mut motor.lm, believed.lm),
-    ] {
-        *place = Some(value * factor(spread.motor));
+    let (spread, motor) = (&config.spread, &mut drawn.drive.motor);
+    for place in [&mut motor.r_s, &mut motor.r_r, &mut motor.l_ls, &mut motor.l_lr, &mut motor.l_m]
+    {
+        *place = (f64::from(*place) * factor(spread.motor)) as f32;
     }
-    drawn.measurement.noise_a *= factor(spread.noise);
+    let noise_a = plant_settings(config).measurement.noise_a;
+    drawn.measurement.noise_a = Some(noise_a * factor(spread.noise));
     drawn.measurement.gain_error_a += factor(spread.gain) - 1.0;
     drawn.measurement.gain_error_b += factor(spread.gain) - 1.0;
     drawn

@@ -2,9 +2,10 @@
 
 use super::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use drive_core::settings::AngleSource;
 
 /// Not in the sources: the recursive estimate in use.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -40,7 +41,7 @@ const RESIDUALS: [f64; 3] = [0.0, 0.2, 0.5];
 
 /// The dead time's voltage: 2.2 us of 6 kHz of the dc link.
 fn residual(config: &Config, share: f64) -> f64 {
-    share * config.inverter.vdc * config.inverter.dead_time_us * 6e-3
+    share * config.inverter.dc_link_v * config.inverter.dead_time_s * 6e3
 }
 
 /// Means over the end of a run.
@@ -99,7 +100,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = context.in_parallel("online-tracking", &jobs, |_, &job| {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;
         let mut config = context.config.clone();
-        config.angle.source = source;
+        config.drive.angle_source = source;
         config.inverter.residual_v = residual(&config, share);
         let seconds = SECONDS;
         let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };

@@ -3,11 +3,12 @@
 use drive_core::{Command, Mode};
 
 use super::{Context, Experiment};
-use crate::config::{AngleSource, LoadMode};
+use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::Rig;
 use crate::stats::Stats;
+use drive_core::settings::AngleSource;
 
 /// Section 2.3.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -72,8 +73,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orientation, Error> {
     let mut config = context.config.clone();
-    config.angle.source = AngleSource::Encoder;
-    config.angle.compensate_delays = compensate;
+    config.drive.angle_source = AngleSource::Encoder;
+    config.drive.ignore_delays = !compensate;
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = rpm;
     let mut rig = Rig::from_config(&config, context.seed)?;

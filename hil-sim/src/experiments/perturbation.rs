@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config, LoadMode};
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
+use crate::rig::{RATE_HZ, Rig, plant_settings};
 use crate::stats::Stats;
+use drive_core::settings::AngleSource;
 
 /// Section 5.2 names it as work to be done.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -85,10 +86,8 @@ fn peak(of: &[f64]) -> f64 {
 /// The configuration of a case: the drive believes the resistance that the experiment was given.
 fn configured(config: &Config, case: &StepCase) -> Config {
     let mut config = config.clone();
-    let believed = config.believed_motor().rr;
-    config.drive_motor.rr = Some(believed);
-    config.motor.rr *= case.warmer;
-    config.angle.source = AngleSource::Injection;
+    config.motor.r_r *= case.warmer;
+    config.drive.angle_source = AngleSource::Injection;
     config.load.torque_nm = 0.0;
     config.load.mode = match case.disturbance {
         Disturbance::Load(_) => LoadMode::Free,
@@ -133,10 +132,10 @@ fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f6
 
 fn measure(config: &Config, case: StepCase, seed: u64) -> Result<StepResponse, Error> {
     let config = configured(config, &case);
-    let (plant, drive) = (plant_settings(&config), drive_settings(&config));
+    let (plant, drive) = (plant_settings(&config), config.drive);
     // Where the drive ends up: there it is for most of the response.
     let i_q = match case.disturbance {
-        Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.sequence.i_d)),
+        Disturbance::Load(nm) => nm / f64::from(drive.motor.torque_per_ampere(drive.i_d())),
         Disturbance::TorqueCurrent(by) => case.from + by,
     };
     let linear = LinearModel::new(&plant.machine, &plant.mechanics, &drive, i_q)?;

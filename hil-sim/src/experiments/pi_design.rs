@@ -57,7 +57,7 @@ const IDENTIFIED: [Identified; 3] = [
 ];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let motor = context.config.believed_motor().circuit();
+    let motor = context.config.drive.motor.circuit();
     let physical = motor_plant(&motor, PERIOD_S).map_err(Error::refused)?;
     let mut outcome = Outcome::default();
     let rules = IDENTIFIED.map(|i| rule_3_8(i.plant, PERIOD_S).map(|rule| (i, rule)));

@@ -6,12 +6,13 @@ use drive_core::tuning::{FirstOrder, design_current_loop, motor_plant, rule_3_8}
 use drive_core::{AlphaBeta, Command, Dq, Mode};
 
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config, LoadMode};
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::identification::arx::{Arx, Orders, fit};
 use crate::identification::signals::Prbs;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{RATE_HZ, Rig};
+use drive_core::settings::AngleSource;
 
 /// Sections 3.7, 3.8 and 3.10, appendix A.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -176,7 +177,7 @@ fn first_order(
 
 fn bench(context: &Context<'_>) -> Result<Rig, Error> {
     let mut config = context.config.clone();
-    config.angle.source = AngleSource::Encoder;
+    config.drive.angle_source = AngleSource::Encoder;
     config.load.mode = LoadMode::Locked;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
@@ -184,7 +185,7 @@ fn bench(context: &Context<'_>) -> Result<Rig, Error> {
 }
 
 fn physical(config: &Config) -> Result<FirstOrder, Error> {
-    motor_plant(&config.believed_motor().circuit(), 1.0 / RATE_HZ).map_err(Error::refused)
+    motor_plant(&config.drive.motor.circuit(), 1.0 / RATE_HZ).map_err(Error::refused)
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use drive_core::{Command, Mode};
 
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config, LoadMode};
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
 use crate::rig::{Point, Rig};
 use crate::stats::Stats;
+use drive_core::settings::AngleSource;
 
 /// Figure 37.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -25,8 +26,8 @@ pub const TURNS: f64 = 5.0;
 pub const ARRIVED: f64 = 1.0 / 360.0;
 /// With the encoder: the largest speed of section 4.1, and the acceleration by 2.7 A. Without it the
 /// drive's own, lower ones hold.
-const ENCODER_LIMIT_RPM: f64 = 1440.0;
-const ENCODER_RAMP_RPM_PER_S: f64 = 700.0;
+const ENCODER_LIMIT_RPM: f32 = 1440.0;
+const ENCODER_RAMP_RPM_PER_S: f32 = 700.0;
 
 /// A position step of five turns with this source of the angle. Times and positions count from the
 /// step.
@@ -40,10 +41,10 @@ pub fn step(
     seconds: f64,
 ) -> Result<Vec<Point>, Error> {
     let mut config = config.clone();
-    config.angle.source = source;
+    config.drive.angle_source = source;
     if source == AngleSource::Encoder {
-        config.speed.limit_rpm.get_or_insert(ENCODER_LIMIT_RPM);
-        config.speed.ramp_rpm_per_s.get_or_insert(ENCODER_RAMP_RPM_PER_S);
+        config.drive.speed.limit_rpm.get_or_insert(ENCODER_LIMIT_RPM);
+        config.drive.speed.ramp_rpm_per_s.get_or_insert(ENCODER_RAMP_RPM_PER_S);
     }
     if config.load.mode == LoadMode::Locked {
         config.load.mode = LoadMode::Free;

@@ -4,10 +4,12 @@ use drive_core::{Command, Fault, Mode, State};
 
 use super::torque::assumptions;
 use super::{Context, Experiment};
-use crate::config::{AngleSource, Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::{RATE_HZ, Rig};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::settings::AngleSource;
 
 /// Not in the source: without saliency its method cannot work, and nothing would tell.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -53,8 +55,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 /// Whether the drive starts on this motor.
 fn accepts(config: &Config, seed: u64) -> Result<bool, Error> {
     let mut config = config.clone();
-    config.angle.source = AngleSource::Injection;
-    config.injection.demodulator = Demodulator::Synchronous;
+    config.drive.angle_source = AngleSource::Injection;
+    config.drive.injection.demodulator = DemodulatorKind::Synchronous;
     let mut rig = Rig::from_config(&config, seed)?;
     rig.command(&Command::Start(Mode::Torque))?;
     for _ in 0..(10.0 * RATE_HZ) as u32 {

@@ -8,12 +8,13 @@ use drive_core::{Mode, State};
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
 use super::{Context, Experiment, learning};
-use crate::config::{AngleSource, Config, LoadMode};
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, drive_settings, means_over, plant_settings};
+use crate::rig::{Point, Rig, means_over, plant_settings};
 use crate::stats::{Stats, StraightLine};
+use drive_core::settings::AngleSource;
 
 /// The aim that section 5.2 states.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -68,15 +69,13 @@ fn hold(
     seconds: f64,
 ) -> Result<HeldPosition, Error> {
     let mut config = config.clone();
-    config.angle.source = AngleSource::Injection;
+    config.drive.angle_source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
     config.load.torque_nm = 0.0;
-    let believed = config.believed_motor().rr;
-    config.drive_motor.rr = Some(believed);
-    config.motor.rr = believed * belief.0;
-    let mut drive = drive_settings(&config);
+    config.motor.r_r = f64::from(config.drive.motor.r_r) * belief.0;
+    let mut drive = config.drive;
     if belief.1 {
-        drive.injection.synchronous.reference = learning::learned(&config, seed)?.reference;
+        drive.injection.synchronous.reference = Some(learning::learned(&config, seed)?.reference);
     }
     let mut rig = Rig::new(&plant_settings(&config), &drive, seed)?;
     rig.start(Mode::Position)?;

@@ -9,7 +9,7 @@ use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::plant::Load;
-use crate::rig::{Rig, drive_settings, plant_settings};
+use crate::rig::{Rig, plant_settings};
 use crate::stats::Stats;
 
 /// Operating point and seed of a run.
@@ -42,7 +42,7 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
-    let mut rig = without_torque(&drive_settings(config), config, case)?;
+    let mut rig = without_torque(&config.drive, config, case)?;
     rig.command(&Command::Torque(case.iq as f32))?;
     Ok(rig)
 }
@@ -53,7 +53,7 @@ fn without_torque(drive: &Settings, config: &Config, case: OperatingPoint) -> Re
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
     let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
-    if config.drive.learn {
+    if config.prepare.learn {
         learning::learn(&mut rig)?;
     }
     rig.start(Mode::Torque)?;
@@ -72,7 +72,7 @@ fn without_torque(drive: &Settings, config: &Config, case: OperatingPoint) -> Re
 /// # Errors
 /// When the configuration is refused or the drive does not start.
 pub fn steady_run(config: &Config, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
-    steady_run_of(&drive_settings(config), config, case, seconds)
+    steady_run_of(&config.drive, config, case, seconds)
 }
 
 /// The same with a drive that is set otherwise than the configuration says.

@@ -4,12 +4,13 @@
 use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode, State};
 
-use crate::config::{Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::{Context, Experiment};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
-use crate::rig::{Point, RATE_HZ, Rig, means_over};
+use crate::rig::{Point, RATE_HZ, Rig, means_over, plant_settings};
 use crate::stats::Stats;
+use drive_core::carrier::DemodulatorKind;
 
 /// Figure 38.
 pub const STEPS: Experiment = Experiment {
@@ -42,7 +43,7 @@ const LEVEL_S: f64 = 1.0;
 /// Steps of the torque reference, Figure 38.
 fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
     let level_s = context.seconds.map_or(LEVEL_S, |s| s / LEVELS.len() as f64);
-    let iq = context.config.reference.iq_a;
+    let iq = context.config.iq_a();
     let profile = |t: f64| iq * LEVELS[((t / level_s) as usize).min(LEVELS.len() - 1)];
     let run = Run::new(context, level_s * LEVELS.len() as f64, profile)?;
 
@@ -57,7 +58,7 @@ fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
 /// Ramp of the torque reference, Figure 39: `reference.iq_a`, up to twice that, hold, and back.
 fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
     let scale = context.seconds.map_or(1.0, |s| s / 9.0);
-    let iq = context.config.reference.iq_a;
+    let iq = context.config.iq_a();
     let profile = |t: f64| {
         let t = t / scale;
         iq * (1.0 + ((t - 2.0) / 2.0).clamp(0.0, 1.0) - ((t - 6.0) / 2.0).clamp(0.0, 1.0))
@@ -74,7 +75,7 @@ fn ramp(context: &Context<'_>) -> Result<Outcome, Error> {
 /// Record of one run; times count from the first torque reference.
 struct Run {
     points: Vec<Point>,
-    demodulator: Demodulator,
+    demodulator: DemodulatorKind,
     fault: Option<String>,
     notes: Vec<String>,
 }
@@ -114,7 +115,7 @@ impl Run {
             State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
             _ => None,
         };
-        Ok(Self { points, demodulator: context.config.injection.demodulator, fault, notes })
+        Ok(Self { points, demodulator: context.config.drive.injection.demodulator, fault, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {
@@ -176,7 +177,7 @@ impl Run {
                 )),
             )
             .panel(match self.demodulator {
-                Demodulator::Synchronous => Panel::new(x, "saliency (10^-3)")
+                DemodulatorKind::Synchronous => Panel::new(x, "saliency (10^-3)")
                     .with(Series::line("q, as demodulated", line(|p| p.saliency * 1e3))),
                 _ => Panel::new(x, "current difference (mA)")
                     .with(Series::line("delta_i", line(|p| p.delta_i * 1e3))),
@@ -195,9 +196,9 @@ fn eq_4_4(p: &Point) -> f64 {
 
 /// Assumptions of the simulated plant, for the remarks of an outcome.
 pub fn assumptions(config: &Config) -> Vec<String> {
-    let s = &config.saliency;
+    let (s, motor) = (plant_settings(config).saliency, config.motor_text());
     vec![format!(
-        "Simulated motor of Table 5 with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
+        "Simulated motor: {motor}, with a flux-fixed saliency of {:.2} % at nominal flux and {:.2} \
          %/A by the current. Nothing in the source measures the saliency: every angle error here is a \
          statement about this simulated motor.",
         s.a_psi * 100.0,

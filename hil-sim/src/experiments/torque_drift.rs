@@ -90,7 +90,7 @@ fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<Held
     let mut rig = at_speed(context.config, case)?;
     rig.run(1.0, |_| {});
     let mut held = HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0 };
-    let (id, lm) = (context.config.reference.id_a, context.config.motor.lm);
+    let (id, lm) = (f64::from(context.config.drive.i_d()), context.config.motor.l_m);
     for _ in 0..MEANS {
         let (mut torque, mut angle) = (Stats::default(), Stats::default());
         rig.run(mean_s, |p| {

@@ -28,8 +28,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut whole = Outcome::default();
     for (prefix, experiment, warmer) in PARTS {
         let mut config = context.config.clone();
-        config.drive_motor.rr = Some(config.believed_motor().rr);
-        config.motor.rr *= warmer;
+        config.motor.r_r *= warmer;
         let progress = context.progress.clone();
         let part = (experiment.run)(&Context { config: &config, progress, ..*context })?;
         for (name, value) in part.metrics.iter() {

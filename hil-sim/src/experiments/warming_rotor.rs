@@ -5,12 +5,13 @@ use std::f64::consts::TAU;
 use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 use drive_core::{Command, Mode};
 
-use crate::config::{AngleSource, Config};
+use crate::config::Config;
 use crate::error::Error;
 use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
 use crate::plant::{Load, PlantSettings};
-use crate::rig::{RATE_HZ, Rig, drive_settings, plant_settings};
+use crate::rig::{RATE_HZ, Rig, plant_settings};
+use drive_core::settings::AngleSource;
 
 /// Calls of `refine` per second.
 const REFINES_PER_S: f64 = 10.0;
@@ -57,7 +58,7 @@ pub struct WarmingMoment {
 /// # Errors
 /// [`Error::Refused`] when the plant or the drive refuses the case, or the drive stops.
 pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<WarmingMoment>, Error> {
-    let settings = drive_core::Settings { track_rotor: case.used, ..drive_settings(config) };
+    let settings = drive_core::Settings { track_rotor: case.used, ..config.drive };
     let plant = plant_settings(config);
     let start = PlantSettings {
         mechanics: crate::plant::MechanicsSettings { load: Load::Locked, ..plant.mechanics },
@@ -75,8 +76,8 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
     }
     rig.run(1.0, |_| {});
 
-    let (pole_pairs, i_d) = (f64::from(plant.machine.pole_pairs), config.reference.id_a);
-    let encoder = config.angle.source == AngleSource::Encoder;
+    let (pole_pairs, i_d) = (f64::from(plant.machine.pole_pairs), f64::from(config.drive.i_d()));
+    let encoder = config.drive.angle_source == AngleSource::Encoder;
     let block = (RATE_HZ / REFINES_PER_S) as usize;
     let mut moments = Vec::new();
     for n in 0..(case.seconds * REFINES_PER_S) as usize {

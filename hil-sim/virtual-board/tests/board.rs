@@ -129,7 +129,7 @@ fn a_flipped_bit_in_code_or_coefficients_ends_it() -> Result<()> {
             pair.board.image().symbol("__eccm")?.address - 4
         } else {
             let region = pair.board.addresses().coefficients;
-            let i_d = Some(pair.shadow.settings().sequence.i_d.to_bits());
+            let i_d = Some(pair.shadow.settings().i_d().to_bits());
             let mut words = (region.address..region.end()).step_by(4);
             words.find(|at| pair.board.word(*at) == i_d).context("no direct current")?
         };

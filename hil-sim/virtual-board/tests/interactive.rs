@@ -177,7 +177,7 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     let config = Config::default();
     let m = &config.motor;
     let flux = mean_within(&report.series("rotor flux (Wb)/motor"), from, to);
-    let expected = 1.5 * f64::from(m.pole_pairs) * m.lm / (m.lm + m.llr) * flux * 1.0;
+    let expected = 1.5 * f64::from(m.pole_pairs) * m.l_m / (m.l_m + m.l_lr) * flux * 1.0;
     let seen = mean_within(&torque, from, to);
     println!("torque {seen:.3} Nm, by the equation {expected:.3} Nm, flux {flux:.3} Wb");
     assert!((seen / expected - 1.0).abs() < 0.1, "{seen} {expected}");

@@ -83,7 +83,7 @@ fn mean(points: &[Point], of: impl Fn(&Point) -> f64) -> Stats {
 /// one seed to the next, and the end of a position step by 0.1 degrees, which would hide the difference.
 fn quiet() -> Config {
     let mut config = Config::default();
-    config.measurement.noise_a = 0.0;
+    config.measurement.noise_a = Some(0.0);
     config
 }
 
@@ -133,7 +133,7 @@ fn torque_steps() -> Result<()> {
 fn position_step() -> Result<()> {
     let mut config = quiet();
     config.load.mode = LoadMode::Free;
-    config.angle.source = hil_sim::config::AngleSource::Encoder;
+    config.drive.angle_source = drive_core::settings::AngleSource::Encoder;
     let steps = [("position 5", Command::Position(5.0), 30_000)];
     let [board, host] = both(&config, Mode::Position, &["angle encoder"], &steps, 22)?;
     let figures = [board, host].map(|points| {

@@ -34,7 +34,7 @@ fn status(pair: &mut Pair) -> Result<(f64, bool)> {
 #[test]
 fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     let mut config = Config::default();
-    config.motor.rr *= 1.3;
+    config.motor.r_r *= 1.3;
     let mut pair = common::pair(&config, 31)?;
     for line in ["angle encoder", "set track_rotor yes", "start torque"] {
         pair.order(line)?;

@@ -44,7 +44,7 @@ impl FakeDrive {
         Self {
             drive,
             running: true,
-            sample: Sample::default(),
+            sample: Sample { heat_sink: 1309, ..Sample::default() },
             records: 0,
             commands: Vec::new(),
             saved: None,

@@ -23,7 +23,7 @@ fn limits_and_times_are_those_of_the_settings_in_periods() {
     near(c.protection.current_squared, 3.5 * 3.5);
     near(c.current_lag, 0.18);
     let s = &c.sequence;
-    assert_eq!((s.precharge, s.magnetise, s.verify), (60, 4800, 1800));
+    assert_eq!((s.precharge, s.magnetise, s.verify), (60, 5583, 1800));
     near(s.stop_ramp, 30.0 / 6000.0);
 }
 
@@ -44,7 +44,7 @@ fn the_carrier_lags_by_the_plant() {
 fn impedance_and_current_difference_tell_the_same_saliency() {
     let settings = Settings::default();
     let c = settings.build().unwrap();
-    let (volts, amperes) = (settings.injection.amplitude_v, c.injection.current_amplitude);
+    let (volts, amperes) = (settings.carrier_v(), c.injection.current_amplitude);
     let s = 0.035;
     near(
         c.estimator.ampere_per_ohm * 2.0 * s * volts / amperes,

@@ -51,6 +51,7 @@ impl Motor {
         let code = |line: Line, i: f64| ((i as f32 - line.offset) / line.gain).round() as u16;
         let count = self.theta / core::f64::consts::TAU * 5000.0;
         Sample {
+            heat_sink: 1309,
             current_a: code(Line::CHANNEL_A, self.gain_a * self.current.re),
             current_b: code(Line::CHANNEL_B, b),
             dc_link: (V_DC / 0.11).round() as u16,
@@ -83,9 +84,7 @@ impl Motor {
             let e = v - f64::from(m.r_s) * i - d_flux;
             let turned = |x: Complex64| x * x / x.norm_sqr().max(1e-12);
             let s = self.flux_saliency * turned(flux)
-                + f64::from(self.settings.injection.synchronous.current_saliency)
-                    * i.norm()
-                    * turned(i);
+                + f64::from(self.settings.current_saliency()) * i.norm() * turned(i);
             let di = (e + s * e.conj()) / (f64::from(m.sigma_l_s()) * (1.0 - s.norm_sqr()));
             self.current += di * h;
             self.flux += d_flux * h;
@@ -302,6 +301,7 @@ fn learning_finds_the_saliencies_and_the_mismatch() {
 fn the_carrier_is_what_was_asked_for_and_stays_out_of_the_current_loop() {
     let mut settings = motor_settings(AngleSource::Encoder);
     settings.injection.beside_encoder = true;
+    settings.sequence.magnetise_s = Some(0.8);
     let mut carriers = [0.0; 2];
     for (carrier, dead_v) in carriers.iter_mut().zip([0.0, 2.2e-6 * 6000.0 * V_DC]) {
         settings.inverter.compensate = dead_v > 0.0;

@@ -41,7 +41,7 @@ fn every_protection_switches_off_in_the_same_step() {
 fn over_speed_trips() {
     // This load has no back-emf: with the check that would miss it out of the way.
     let mut settings = settings();
-    settings.limits.unexplained_v = 1000.0;
+    settings.limits.unexplained_v = Some(1000.0);
     let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
     drive.command(&Command::Start(Mode::Torque)).unwrap();
     assert!(run_to(&mut drive, &mut load, State::Torque));
@@ -82,7 +82,7 @@ fn a_silent_channel_is_found_by_its_carrier() {
         let mut settings = settings();
         settings.injection.beside_encoder = true;
         // With the other check out of the way.
-        settings.limits.unexplained_v = 1000.0;
+        settings.limits.unexplained_v = Some(1000.0);
         let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
@@ -136,7 +136,7 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
     for (amplitude, shares) in [(100.0, (0.8, 0.99)), (150.0, (0.5, 0.7))] {
         let mut settings = settings();
         settings.injection.beside_encoder = true;
-        settings.injection.amplitude_v = amplitude;
+        settings.injection.amplitude_v = Some(amplitude);
         let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
         load.v_dc = 206.0;
         drive.command(&Command::Start(Mode::Torque)).unwrap();
@@ -163,8 +163,8 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
     }
     let mut settings = settings();
     settings.injection.beside_encoder = true;
-    settings.injection.amplitude_v = 150.0;
-    settings.limits.dc_under_v = 50.0;
+    settings.injection.amplitude_v = Some(150.0);
+    settings.limits.dc_under_v = Some(50.0);
     let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
     load.v_dc = 120.0; // 69 V
     drive.command(&Command::Start(Mode::Torque)).unwrap();

@@ -2,10 +2,11 @@
 
 use drive_core::Command;
 
-use crate::config::{Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::identification::signals::Prbs;
 use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
+use drive_core::carrier::DemodulatorKind;
 
 /// The sequence: 8 bits as in section 3.10, each value held for 10 ms, so that the excitation lies where
 /// the loop works. (Held for one sample or for 3 ms, the delay of the filters, for which Eq. 3.43 has no
@@ -35,9 +36,14 @@ pub struct Record {
 }
 
 /// Orientation by the encoder, shaft locked, injection beside it, current settled.
-fn oriented(config: &Config, demodulator: Demodulator, iq: f64, seed: u64) -> Result<Rig, Error> {
+fn oriented(
+    config: &Config,
+    demodulator: DemodulatorKind,
+    iq: f64,
+    seed: u64,
+) -> Result<Rig, Error> {
     let mut config = config.clone();
-    config.injection.demodulator = demodulator;
+    config.drive.injection.demodulator = demodulator;
     let mut rig = Rig::oriented(&config, seed)?;
     rig.command(&Command::Torque(iq as f32))?;
     rig.run(0.8, |_| {});
@@ -54,7 +60,7 @@ fn turn(rig: &mut Rig, radians: f64) -> Result<(), Error> {
 /// As [`Rig::oriented`].
 pub fn sequence(
     config: &Config,
-    demodulator: Demodulator,
+    demodulator: DemodulatorKind,
     iq: f64,
     seed: u64,
 ) -> Result<Record, Error> {
@@ -94,7 +100,7 @@ pub struct StepResponses {
 /// As [`Rig::oriented`].
 pub fn steps(
     config: &Config,
-    demodulator: Demodulator,
+    demodulator: DemodulatorKind,
     iq: f64,
     seed: u64,
 ) -> Result<StepResponses, Error> {
@@ -164,7 +170,7 @@ mod tests {
     use super::*;
 
     /// Slow gain with the axis alone and with the current, by the demodulation.
-    fn gains(demodulator: Demodulator, iq: f64) -> [f64; 2] {
+    fn gains(demodulator: DemodulatorKind, iq: f64) -> [f64; 2] {
         let responses = steps(&Config::default(), demodulator, iq, 5).unwrap();
         [&responses.alone, &responses.with_current]
             .map(|r| r[SLOW].iter().sum::<f64>() / SLOW.len() as f64)
@@ -173,14 +179,14 @@ mod tests {
     #[test]
     fn the_leak_turns_with_the_current_and_the_flux_does_not() {
         // The leak: sqrt2 * 0.01 * 0.944 * iq while the current is held, nothing when it turns along.
-        let [held, slow] = gains(Demodulator::Literal, 2.0);
+        let [held, slow] = gains(DemodulatorKind::Literal, 2.0);
         let leak = 2f64.sqrt() * 0.01 * 0.944_061 * 2.0;
         assert!((held / leak - 1.0).abs() < 0.03, "{held} {leak}");
         assert!(slow.abs() < 0.05 * leak, "{slow}");
 
         // The saliency: 2 (|a| + b |i| |cos 2 gamma|) and 2 |a|. The chord over 4° and the part that dead time
         // and noise leave take some tenths.
-        let [held, slow] = gains(Demodulator::Synchronous, 2.0);
+        let [held, slow] = gains(DemodulatorKind::Synchronous, 2.0);
         let cos_2_gamma = (4.0 - 0.49) / (4.0 + 0.49);
         let fast = 2.0 * (0.035 + 0.036 * 4.49_f64.sqrt() * cos_2_gamma);
         println!("held {held} of {fast}, slow {slow} of 0.07");

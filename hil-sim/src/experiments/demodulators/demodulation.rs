@@ -3,10 +3,10 @@
 use drive_core::Settings;
 use drive_core::settings::table::ReferenceTable;
 
-use crate::config::{Config, Demodulator};
+use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::learning;
-use crate::rig::drive_settings;
+use drive_core::carrier::DemodulatorKind;
 
 /// A demodulation.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +14,7 @@ pub struct Demodulation {
     /// How the configuration names it.
     pub name: &'static str,
     /// Which.
-    pub demodulator: Demodulator,
+    pub demodulator: DemodulatorKind,
     /// How much larger its signal is than that of the rectified chain for the same saliency, by the
     /// gains of filters and detectors: the printed gain k_s, divided by it, makes the same loop.
     pub gain: f64,
@@ -34,31 +34,31 @@ const PRINTED_REFERENCE_A: f64 = 0.010;
 pub const DEMODULATIONS: [Demodulation; 5] = [
     Demodulation {
         name: "literal",
-        demodulator: Demodulator::Literal,
+        demodulator: DemodulatorKind::Literal,
         gain: 1.0,
         constant_a: PRINTED_REFERENCE_A,
     },
     Demodulation {
         name: "rectified",
-        demodulator: Demodulator::Rectified,
+        demodulator: DemodulatorKind::Rectified,
         gain: 1.0,
         constant_a: PRINTED_REFERENCE_A,
     },
     Demodulation {
         name: "rms-impedance",
-        demodulator: Demodulator::RmsImpedance,
+        demodulator: DemodulatorKind::RmsImpedance,
         gain: PP / BPF / RECTIFIED,
         constant_a: 0.0,
     },
     Demodulation {
         name: "envelope",
-        demodulator: Demodulator::Envelope,
+        demodulator: DemodulatorKind::Envelope,
         gain: BPF / RECTIFIED,
         constant_a: PRINTED_REFERENCE_A * BPF / RECTIFIED,
     },
     Demodulation {
         name: "synchronous",
-        demodulator: Demodulator::Synchronous,
+        demodulator: DemodulatorKind::Synchronous,
         gain: 1.0,
         constant_a: 0.0,
     },
@@ -73,15 +73,15 @@ impl Demodulation {
     /// The configuration with this demodulation.
     pub fn config(&self, config: &Config) -> Config {
         let mut config = config.clone();
-        config.injection.demodulator = self.demodulator;
+        config.drive.injection.demodulator = self.demodulator;
         // A motor without saliency must be measured, not refused.
-        config.injection.check = false;
+        config.drive.injection.synchronous.check = false;
         config
     }
 
     /// Unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
-        if self.demodulator == Demodulator::Synchronous { "10^-3" } else { "mA" }
+        if self.demodulator == DemodulatorKind::Synchronous { "10^-3" } else { "mA" }
     }
 
     /// The reference that it learns on this motor.
@@ -100,9 +100,9 @@ impl Demodulation {
         config: &Config,
         learned: ReferenceTable,
     ) -> Option<Settings> {
-        let mut drive = drive_settings(&self.config(config));
-        if self.demodulator == Demodulator::Synchronous {
-            drive.injection.synchronous.reference = learned;
+        let mut drive = self.config(config).drive;
+        if self.demodulator == DemodulatorKind::Synchronous {
+            drive.injection.synchronous.reference = Some(learned);
             return (kind == ReferenceKind::Retuned).then_some(drive);
         }
         let printed = &mut drive.injection.printed;

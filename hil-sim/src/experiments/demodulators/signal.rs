@@ -86,8 +86,8 @@ pub fn delay(
     seed: u64,
 ) -> Result<f64, Error> {
     let mut config = config.clone();
-    config.measurement.noise_a = 0.0;
-    config.measurement.lsb_a = 0.000_14;
+    config.measurement.noise_a = Some(0.0);
+    config.measurement.lsb_a = Some(0.000_14);
     let mut rig = oriented(demodulation, &config, iq, seed)?;
     let plant = plant_settings(&config);
     let mut response = [0.0; AFTER];

@@ -164,8 +164,8 @@ fn load_step(
     look: &mut impl FnMut(&Point),
 ) -> Result<Rig, Error> {
     let mut rig = at_speed(config, OperatingPoint { iq: 0.0, ..case })?;
-    let motor = &crate::rig::drive_settings(config).motor;
-    let per_ampere = f64::from(motor.torque_per_ampere(config.reference.id_a as f32));
+    let motor = &config.drive.motor;
+    let per_ampere = f64::from(motor.torque_per_ampere(config.drive.i_d()));
     let k_p = f64::from(motor.inertia) * SPEED_LOOP / per_ampere;
     let (mut integral, mut estimate) = (0.0, case.rpm);
     rig.set_load(Load::Free { torque: 0.0 })?;

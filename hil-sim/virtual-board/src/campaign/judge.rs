@@ -41,7 +41,7 @@ pub struct Outcome {
 /// Bad gate signals; another failure of the model.
 pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
-    let trip = f64::from(induction_drive::board::settings().limits.trip_a);
+    let trip = f64::from(induction_drive::board::settings().trip_a());
     let mut outcome = Outcome::default();
     board.went_off = None;
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;

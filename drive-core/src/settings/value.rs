@@ -7,6 +7,8 @@ use core::fmt;
 pub enum Value {
     /// A finite number.
     Number(f32),
+    /// The number that the rule of the setting gives; see [`rules`](super::rules).
+    Auto,
     /// A whole number.
     Whole(u32),
     /// One of the setting's words.
@@ -17,17 +19,23 @@ impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number(value) => value.fmt(f),
+            Self::Auto => f.write_str(AUTO),
             Self::Whole(value) => value.fmt(f),
             Self::Word(word) => f.write_str(word),
         }
     }
 }
 
+/// Text of [`Value::Auto`].
+pub const AUTO: &str = "auto";
+
 /// Reason why a text is not a value of a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValueError {
     /// Not a finite number.
     Number,
+    /// Neither a finite number nor `auto`.
+    NumberOrAuto,
     /// Not a whole number up to this one.
     Whole(u32),
     /// Not one of these words.
@@ -38,6 +46,7 @@ impl fmt::Display for ValueError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Number => f.write_str("not a number"),
+            Self::NumberOrAuto => write!(f, "neither a number nor `{AUTO}`"),
             Self::Whole(max) => write!(f, "not a whole number from 0 to {max}"),
             Self::Word(words) => {
                 f.write_str("not one of:")?;
@@ -51,6 +60,41 @@ impl fmt::Display for ValueError {
 pub fn number(text: &str) -> Option<f32> {
     text.parse().ok().filter(|value: &f32| value.is_finite())
 }
+
+/// A type whose values are written as words.
+pub trait Words: Copy + 'static {
+    /// The words.
+    const WORDS: &'static [&'static str];
+    /// The place of this value in [`WORDS`](Self::WORDS).
+    fn place(self) -> usize;
+    /// The value at a place in [`WORDS`](Self::WORDS); the first behind their end.
+    fn at(place: usize) -> Self;
+
+    /// The word of this value.
+    fn word(self) -> &'static str {
+        Self::WORDS[self.place()]
+    }
+}
+
+/// Implements [`Words`] for an enumeration or a `bool`.
+macro_rules! words {
+    ($type:ty { $($value:pat => $make:expr, $word:literal;)+ }) => {
+        impl $crate::settings::value::Words for $type {
+            const WORDS: &'static [&'static str] = &[$($word),+];
+            fn place(self) -> usize {
+                let word = match self { $($value => $word),+ };
+                Self::WORDS.iter().position(|known| *known == word).unwrap_or(0)
+            }
+            fn at(place: usize) -> Self {
+                const VALUES: &[$type] = &[$($make),+];
+                VALUES.get(place).copied().unwrap_or(VALUES[0])
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+words!(bool { false => false, "no"; true => true, "yes"; });
 
 #[cfg(test)]
 mod tests {

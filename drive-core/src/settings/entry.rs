@@ -1,0 +1,264 @@
+//! A row of a table of settings.
+
+use super::SettingsError;
+use super::value::{AUTO, Value, ValueError, number as parsed};
+
+/// When a changed setting takes effect, and who may change it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Anybody, while the outputs are off; at once.
+    WhileOff,
+    /// Anybody, while the outputs are off; from the next reset on, once saved: the hardware locks it until then.
+    FromReset,
+    /// Only the code of the board: a property of its hardware.
+    Board,
+}
+
+/// A setting of the settings `S`: name, unit, help, range, and the way to its value.
+pub struct Entry<S: 'static> {
+    /// Name at the console, in files and, hashed, in the flash.
+    pub name: &'static str,
+    /// Unit; empty if there is none.
+    pub unit: &'static str,
+    /// Meaning, one sentence without its full stop.
+    pub help: &'static str,
+    /// Who may change it, and when.
+    pub change: Change,
+    /// Whether learned values hold for this value only.
+    pub learned: bool,
+    access: Access<S>,
+    range: Range<S>,
+}
+
+/// The way to a value.
+pub enum Access<S> {
+    /// A number.
+    Number {
+        /// Reads it.
+        get: fn(&S) -> f32,
+        /// Writes it.
+        set: fn(&mut S, f32),
+    },
+    /// A number that follows a rule unless it is set.
+    Auto {
+        /// Reads what was set.
+        get: fn(&S) -> Option<f32>,
+        /// Writes it; `None` returns to the rule.
+        set: fn(&mut S, Option<f32>),
+        /// Reads the number in effect.
+        effective: fn(&S) -> f32,
+    },
+    /// A whole number.
+    Whole {
+        /// Reads it.
+        get: fn(&S) -> u32,
+        /// Writes it; at most the largest number of the range.
+        set: fn(&mut S, u32),
+    },
+    /// A word; see [`Words`](super::value::Words).
+    Word {
+        /// The words.
+        words: &'static [&'static str],
+        /// Reads its place.
+        get: fn(&S) -> usize,
+        /// Writes its place.
+        set: fn(&mut S, usize),
+    },
+}
+
+enum Range<S> {
+    Fixed(f32, f32),
+    /// The range depends on other settings.
+    Beside(fn(&S) -> (f32, f32)),
+}
+
+impl<S> Entry<S> {
+    /// A setting that anybody may change while the outputs are off. Give a number its range, too.
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        access: Access<S>,
+        help: &'static str,
+    ) -> Self {
+        let range = Range::Fixed(0.0, 0.0);
+        Self { name, unit, help, change: Change::WhileOff, learned: false, access, range }
+    }
+
+    /// Accepted from `min` to `max`, both included.
+    pub const fn from_to(mut self, min: f32, max: f32) -> Self {
+        self.range = Range::Fixed(min, max);
+        self
+    }
+
+    /// Accepted in a range that depends on other settings.
+    pub const fn beside(mut self, range: fn(&S) -> (f32, f32)) -> Self {
+        self.range = Range::Beside(range);
+        self
+    }
+
+    /// Learned values hold for this value only.
+    pub const fn learned(mut self) -> Self {
+        self.learned = true;
+        self
+    }
+
+    /// Changed by others, or at another time.
+    pub const fn changed(mut self, change: Change) -> Self {
+        self.change = change;
+        self
+    }
+
+    /// The value.
+    pub fn get(&self, settings: &S) -> Value {
+        match self.access {
+            Access::Number { get, .. } => Value::Number(get(settings)),
+            Access::Auto { get, .. } => get(settings).map_or(Value::Auto, Value::Number),
+            Access::Whole { get, .. } => Value::Whole(get(settings)),
+            Access::Word { words, get, .. } => {
+                Value::Word(words.get(get(settings)).copied().unwrap_or_default())
+            }
+        }
+    }
+
+    /// The number in effect: that of the rule for `auto`; `None` for a word.
+    pub fn number(&self, settings: &S) -> Option<f32> {
+        match self.access {
+            Access::Number { get, .. } => Some(get(settings)),
+            Access::Auto { effective, .. } => Some(effective(settings)),
+            Access::Whole { get, .. } => Some(get(settings) as f32),
+            Access::Word { .. } => None,
+        }
+    }
+
+    /// Sets a value of this setting's type; a value of another type changes nothing. The range is checked by
+    /// [`check`](Self::check), since it may depend on other settings that are still to be set.
+    pub fn set(&self, settings: &mut S, value: Value) {
+        match (&self.access, value) {
+            (Access::Number { set, .. }, Value::Number(value)) => set(settings, value),
+            (Access::Auto { set, .. }, Value::Number(value)) => set(settings, Some(value)),
+            (Access::Auto { set, .. }, Value::Auto) => set(settings, None),
+            (Access::Whole { set, .. }, Value::Whole(value)) => set(settings, value),
+            (Access::Word { words, set, .. }, Value::Word(word)) => {
+                if let Some(place) = words.iter().position(|known| *known == word) {
+                    set(settings, place);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The value that a text stands for.
+    ///
+    /// # Errors
+    /// The text is not a value of this setting.
+    pub fn parse(&self, text: &str) -> Result<Value, ValueError> {
+        match self.access {
+            Access::Number { .. } => parsed(text).map(Value::Number).ok_or(ValueError::Number),
+            Access::Auto { .. } if text == AUTO => Ok(Value::Auto),
+            Access::Auto { .. } => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
+            Access::Whole { .. } => {
+                let max = self.largest_whole();
+                let value = text.parse().ok().filter(|value| *value <= max);
+                value.map(Value::Whole).ok_or(ValueError::Whole(max))
+            }
+            Access::Word { words, .. } => {
+                let word = words.iter().find(|word| **word == text);
+                word.map(|word| Value::Word(word)).ok_or(ValueError::Word(words))
+            }
+        }
+    }
+
+    /// Checks the value in effect against its range. Words are always right.
+    ///
+    /// # Errors
+    /// [`SettingsError::Range`].
+    pub fn check(&self, settings: &S) -> Result<(), SettingsError> {
+        let (Some(value), Some((min, max))) = (self.number(settings), self.range(settings)) else {
+            return Ok(());
+        };
+        // NaN fails the comparison.
+        if value >= min && value <= max {
+            return Ok(());
+        }
+        Err(SettingsError::Range { name: self.name, unit: self.unit, value, min, max })
+    }
+
+    /// The range beside the present settings, `(min, max)`; `None` for a word.
+    pub fn range(&self, settings: &S) -> Option<(f32, f32)> {
+        match (&self.access, &self.range) {
+            (Access::Word { .. }, _) => None,
+            (_, Range::Fixed(min, max)) => Some((*min, *max)),
+            (_, Range::Beside(range)) => Some(range(settings)),
+        }
+    }
+
+    /// The words that may be set; none for a number.
+    pub fn words(&self) -> &'static [&'static str] {
+        match self.access {
+            Access::Word { words, .. } => words,
+            _ => &[],
+        }
+    }
+
+    /// Whether the setting follows a rule unless it is set.
+    pub fn has_rule(&self) -> bool {
+        matches!(self.access, Access::Auto { .. })
+    }
+
+    /// Whether two sets of settings have the same value in effect. A value that is not a number is never the same.
+    pub fn same(&self, one: &S, other: &S) -> bool {
+        match self.access {
+            Access::Word { get, .. } => get(one) == get(other),
+            _ => self.number(one) == self.number(other),
+        }
+    }
+
+    /// The largest whole number that the range ever allows; larger ones may not fit the type of the setting.
+    fn largest_whole(&self) -> u32 {
+        match self.range {
+            Range::Fixed(_, max) => max as u32,
+            Range::Beside(_) => u32::MAX,
+        }
+    }
+}
+
+macro_rules! number {
+    ($name:literal, $($path:ident).+, $unit:literal, $help:literal) => {
+        Entry::new($name, $unit, Access::Number {
+            get: |s: &Settings| s.$($path).+,
+            set: |s, value| s.$($path).+ = value,
+        }, $help)
+    };
+}
+
+macro_rules! auto {
+    ($name:literal, $($path:ident).+, $effective:path, $unit:literal, $help:literal) => {
+        Entry::new($name, $unit, Access::Auto {
+            get: |s: &Settings| s.$($path).+,
+            set: |s, value| s.$($path).+ = value,
+            effective: $effective,
+        }, $help)
+    };
+}
+
+macro_rules! whole {
+    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
+        Entry::new($name, "", Access::Whole {
+            get: |s: &Settings| s.$($path).+ as u32,
+            // At most the largest of the range: see `parse`.
+            set: |s, value| s.$($path).+ = value as $type,
+        }, $help)
+    };
+}
+
+macro_rules! word {
+    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
+        Entry::new($name, "", Access::Word {
+            words: <$type as Words>::WORDS,
+            get: |s: &Settings| s.$($path).+.place(),
+            set: |s, place| s.$($path).+ = <$type as Words>::at(place),
+        }, $help)
+    };
+}
+
+pub(super) use {auto, number, whole, word};

@@ -1,0 +1,114 @@
+//! The table of the settings: name, unit, range, help, who may change it, and whether learned values depend on it.
+//!
+//! Console, saved record, checks, keys of the simulator and documentation come from this table. To add a setting, add a
+//! field with its default to the structure it belongs to, and a row here.
+
+use super::entry::{Access, Change, Entry, auto, number, whole, word};
+use super::value::Words;
+use super::{AngleSource, PlantSource, Settings};
+use crate::carrier::DemodulatorKind;
+use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
+use crate::io::PERIOD_S;
+
+/// The settings of the drive, in the order in which they are shown.
+#[rustfmt::skip] // a row a setting
+pub static SETTINGS: &[Entry<Settings>] = &[
+    number!("motor.r_s", motor.r_s, "ohm", "stator resistance of a phase").from_to(0.001, 1000.0).learned(),
+    number!("motor.r_r", motor.r_r, "ohm", "rotor resistance, referred to the stator").from_to(0.001, 1000.0).learned(),
+    number!("motor.l_ls", motor.l_ls, "H", "leakage inductance of the stator").from_to(1e-6, 10.0).learned(),
+    number!("motor.l_lr", motor.l_lr, "H", "leakage inductance of the rotor, referred to the stator").from_to(1e-6, 10.0).learned(),
+    number!("motor.l_m", motor.l_m, "H", "magnetising inductance").from_to(1e-5, 100.0).learned(),
+    whole!("motor.pole_pairs", motor.pole_pairs: u8, "pairs of poles").from_to(1.0, 50.0).learned(),
+    number!("motor.inertia", motor.inertia, "kg m2", "inertia of rotor and load; for the speed loop").from_to(1e-7, 1000.0),
+
+    number!("nameplate.power_w", nameplate.power_w, "W", "rated power at the shaft").from_to(1.0, 1e6),
+    number!("nameplate.voltage_v", nameplate.voltage_v, "V", "rated voltage between lines, rms").from_to(5.0, 1000.0),
+    number!("nameplate.current_a", nameplate.current_a, "A", "rated current of a line, rms; the rules take their currents from it").from_to(0.01, 1000.0),
+    number!("nameplate.frequency_hz", nameplate.frequency_hz, "Hz", "rated frequency").from_to(5.0, 400.0),
+    number!("nameplate.speed_rpm", nameplate.speed_rpm, "rpm", "rated speed of the shaft").from_to(1.0, 24_000.0),
+
+    whole!("inverter.top", inverter.top: u16, "count at which the timer turns round").from_to(1000.0, 65_534.0).changed(Change::Board).learned(),
+    number!("inverter.dc_link_v", inverter.dc_link_v, "V", "nominal voltage of the dc link").from_to(10.0, 1000.0),
+    number!("inverter.dead_time_s", inverter.dead_time_s, "s", "time with both switches of a leg off, at every change").from_to(0.0, 6e-6).changed(Change::FromReset).learned(),
+    word!("inverter.compensate", inverter.compensate: bool, "whether the dead time is compensated").learned(),
+    auto!("inverter.full_compensation_a", inverter.full_compensation_a, Settings::full_compensation_a, "A", "phase current from which on the compensation is full").from_to(1e-4, 100.0).learned(),
+
+    number!("scales.current_a.gain", scales.current_a.gain, "A", "current a per code").from_to(1e-6, 1.0).learned(),
+    number!("scales.current_a.offset", scales.current_a.offset, "A", "current a at code 0").from_to(-1000.0, 1000.0).learned(),
+    number!("scales.current_b.gain", scales.current_b.gain, "A", "current b per code").from_to(1e-6, 1.0).learned(),
+    number!("scales.current_b.offset", scales.current_b.offset, "A", "current b at code 0").from_to(-1000.0, 1000.0).learned(),
+    number!("scales.dc_link.gain", scales.dc_link.gain, "V", "dc link per code").from_to(1e-4, 10.0).learned(),
+    number!("scales.dc_link.offset", scales.dc_link.offset, "V", "dc link at code 0").from_to(-100.0, 100.0).learned(),
+    whole!("scales.full_scale", scales.full_scale: u16, "largest code of the currents").from_to(100.0, 65_535.0).changed(Change::Board),
+    number!("scales.current_delay_s", scales.current_delay_s, "s", "delay of the analog filters of the currents").from_to(0.0, 5.0 * PERIOD_S).learned(),
+    whole!("scales.encoder_counts", scales.encoder_counts: u32, "counts of the encoder a turn, four a line").from_to(16.0, 1e7),
+    number!("scales.ntc.ohm_25", scales.ntc.ohm_25, "ohm", "thermistor of the heat sink at 25 degC").from_to(10.0, 1e6),
+    number!("scales.ntc.beta_k", scales.ntc.beta_k, "K", "its B constant").from_to(1000.0, 10_000.0),
+    number!("scales.ntc.divider_ohm", scales.ntc.divider_ohm, "ohm", "resistor in series with it").from_to(10.0, 1e6),
+    word!("scales.ntc.to_ground", scales.ntc.to_ground: bool, "whether the thermistor is the one at ground"),
+
+    word!("angle_source", angle_source: AngleSource, "source of the flux angle"),
+    word!("current_plant", current_plant.source: PlantSource, "plant that the current controllers are designed for"),
+    number!("current_plant.d.k", current_plant.d.k, "A/V", "identified plant k/(z - p) of the direct axis").from_to(1e-6, 10.0),
+    number!("current_plant.d.p", current_plant.d.p, "", "its pole").from_to(0.0, 0.999_99),
+    number!("current_plant.q.k", current_plant.q.k, "A/V", "identified plant k/(z - p) of the quadrature axis").from_to(1e-6, 10.0),
+    number!("current_plant.q.p", current_plant.q.p, "", "its pole").from_to(0.0, 0.999_99),
+    word!("ignore_delays", ignore_delays: bool, "whether known delays are left uncompensated, as in the dissertation").learned(),
+    word!("track_rotor", track_rotor: bool, "whether the rotor time constant is tracked while running"),
+
+    auto!("injection.amplitude_v", injection.amplitude_v, Settings::carrier_v, "V", "peak of the injected voltage; 0 for none").beside(carrier_range).learned(),
+    word!("injection.demodulator", injection.demodulator: DemodulatorKind, "demodulation of the carrier current").learned(),
+    number!("injection.reference_a", injection.printed.reference_a, "A", "reference of the current difference; not synchronous").from_to(-1.0, 1.0).learned(),
+    auto!("injection.full_reference_iq_a", injection.printed.full_reference_iq_a, Settings::full_reference_iq_a, "A", "torque current from which on that reference is full").from_to(0.01, 1000.0).learned(),
+    number!("injection.k_s", injection.printed.k_s, "rad/A", "gain of the tracker (Eq. 3.44); not synchronous").from_to(0.0, 100.0),
+    number!("injection.z_s", injection.printed.z_s, "", "its zero").from_to(0.0, 1.0),
+    whole!("injection.rms_samples", injection.printed.rms_samples: u8, "length of the filters of rms-impedance").from_to(MIN_RMS_SAMPLES as f32, MAX_RMS_SAMPLES as f32).learned(),
+    number!("injection.bandwidth_hz", injection.synchronous.bandwidth_hz, "Hz", "natural frequency of the tracking loop").from_to(0.1, 30.0),
+    // Near zero the loop would have no gain. With a positive value the current-dependent part would oppose it.
+    number!("injection.flux_saliency", injection.synchronous.flux_saliency, "", "saliency fixed to the flux").from_to(-0.3, -0.001),
+    auto!("injection.current_saliency", injection.synchronous.current_saliency, Settings::current_saliency, "1/A", "saliency per ampere of stator current").from_to(-30.0, 30.0).learned(),
+    word!("injection.check", injection.synchronous.check: bool, "whether a start checks the saliency of the motor"),
+    word!("injection.monitor", injection.synchronous.monitor: bool, "whether the lock is verified and watched"),
+    number!("injection.allowed_loss", injection.synchronous.allowed_loss, "", "share of the flux-fixed saliency that may be missing").from_to(0.3, 0.9),
+    number!("injection.loss_s", injection.synchronous.loss_s, "s", "time constant of the mean of that share").from_to(0.01, 1.0),
+    auto!("injection.tracked_rpm", injection.synchronous.tracked_rpm, Settings::tracked_rpm, "rpm", "speed that trips without an encoder").from_to(1.0, 20_000.0),
+    word!("injection.beside_encoder", injection.beside_encoder: bool, "whether the carrier is injected beside an encoder"),
+
+    // A trip level beyond the sensors' range would never be reached.
+    auto!("limits.trip_a", limits.trip_a, Settings::trip_a, "A", "phase current that trips").beside(|s| (0.05, s.sensor_range_a())),
+    auto!("limits.current_a", limits.current_a, Settings::current_limit_a, "A", "largest current that is regulated, peak").beside(|s| (0.01, s.trip_a())),
+    auto!("limits.dc_over_v", limits.dc_over_v, Settings::dc_over_v, "V", "dc link above which the drive trips").beside(|s| (10.0, s.dc_link_range_v())),
+    auto!("limits.dc_under_v", limits.dc_under_v, Settings::dc_under_v, "V", "dc link below which it trips while the outputs are on").beside(|s| (5.0, s.dc_over_v())),
+    auto!("limits.speed_rpm", limits.speed_rpm, Settings::speed_trip_rpm, "rpm", "speed of the shaft that trips").from_to(1.0, 20_000.0),
+    auto!("limits.unexplained_v", limits.unexplained_v, Settings::unexplained_v, "V", "largest voltage that the motor model does not explain at standstill").from_to(0.01, 1000.0),
+    number!("limits.heat_sink_c", limits.heat_sink_c, "degC", "temperature of the heat sink that trips").from_to(0.0, 150.0),
+
+    number!("sequence.calibrate_s", sequence.calibrate_s, "s", "time of the offset calibration").from_to(0.001, 10.0),
+    number!("sequence.precharge_s", sequence.precharge_s, "s", "time with the low sides on").from_to(0.0, 10.0),
+    auto!("sequence.magnetise_s", sequence.magnetise_s, Settings::magnetise_s, "s", "time with direct current alone").beside(magnetise_range),
+    auto!("sequence.i_d", sequence.i_d, Settings::i_d, "A", "direct (magnetising) current, peak").beside(|s| (0.01, s.current_limit_a())).learned(),
+    auto!("sequence.stop_a_per_s", sequence.stop_a_per_s, Settings::stop_a_per_s, "A/s", "slope of the torque current at a stop").from_to(0.1, 1e5),
+
+    auto!("speed.i_q_limit_a", speed.i_q_limit_a, Settings::i_q_limit_a, "A", "largest torque current of speed and position mode").beside(|s| (0.01, s.current_limit_a())),
+    auto!("speed.limit_rpm", speed.limit_rpm, Settings::speed_limit_rpm, "rpm", "largest speed that is asked for").beside(|s| (1.0, s.speed_trip_rpm())),
+    auto!("speed.ramp_rpm_per_s", speed.ramp_rpm_per_s, Settings::ramp_rpm_per_s, "rpm/s", "largest acceleration that is asked for").from_to(1.0, 1e5),
+    // Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
+    number!("speed.phase_margin_deg", speed.phase_margin_deg, "deg", "phase margin of the speed loop: more is calmer and slower").from_to(45.0, 70.0),
+];
+
+/// The setting with this name.
+pub fn find(name: &str) -> Option<&'static Entry<Settings>> {
+    SETTINGS.iter().find(|entry| entry.name == name)
+}
+
+/// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.
+fn carrier_range(s: &Settings) -> (f32, f32) {
+    (if s.watches_lock() { 0.003 * s.inverter.dc_link_v } else { 0.0 }, 0.55 * s.inverter.dc_link_v)
+}
+
+/// The lock monitor measures its baseline during magnetisation; with the saliency check also while the flux is
+/// restored.
+fn magnetise_range(s: &Settings) -> (f32, f32) {
+    let needs_baseline = s.watches_lock() && !s.injection.synchronous.check;
+    (if needs_baseline { 0.5 } else { 0.0 }, 60.0)
+}

@@ -1,0 +1,30 @@
+//! The nameplate of the motor.
+
+/// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
+/// drive from it; see [`rules`](super::rules).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nameplate {
+    /// Power at the shaft, W.
+    pub power_w: f32,
+    /// Voltage between lines, V rms.
+    pub voltage_v: f32,
+    /// Current of a line, A rms.
+    pub current_a: f32,
+    /// Frequency, Hz.
+    pub frequency_hz: f32,
+    /// Speed, rpm.
+    pub speed_rpm: f32,
+}
+
+impl Default for Nameplate {
+    /// Table 3.
+    fn default() -> Self {
+        Self {
+            power_w: 1100.0,
+            voltage_v: 380.0,
+            current_a: 2.56,
+            frequency_hz: 60.0,
+            speed_rpm: 1720.0,
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! The rules: settings that follow from the nameplate, the motor, the sensors' range and the dc link, unless they are
+//! set.
+//!
+//! Each rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it
+//! depends on. On that motor the rules give these numbers back.
+//!
+//! | setting | on the dissertation's motor | in proportion to |
+//! |---|---|---|
+//! | `limits.trip_a` | 4.3 A | rated current; at most 0.962 of the sensors' range |
+//! | `limits.current_a` | 3.5 A | rated current; at most 0.814 of the trip |
+//! | `speed.i_q_limit_a` | 3 A | `limits.current_a` |
+//! | `sequence.i_d` | 0.7 A | rated current |
+//! | `sequence.stop_a_per_s` | 30 A/s | rated current |
+//! | `sequence.magnetise_s` | 0.93 s | rotor time constant: five of them, 0.8 s at least |
+//! | `inverter.full_compensation_a` | 30 mA | the sensors' range |
+//! | `injection.amplitude_v` | 50 V | see [`Settings::carrier_v`] |
+//! | `injection.full_reference_iq_a` | 1 A | rated current |
+//! | `injection.current_saliency` | 0.0338 1/A | inverse of the rated current |
+//! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
+//! | `speed.limit_rpm`, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
+//! | `limits.speed_rpm` | 2000 rpm | rated speed |
+//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range |
+//! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
+
+use core::f32::consts::{SQRT_2, TAU};
+
+use super::Settings;
+use super::table::{CarrierTable, ReferenceTable};
+use crate::io::{CONVERTER_CODES, PERIOD_S};
+
+/// Rated current of the dissertation's motor, A peak (Table 3, star).
+const RATED_A: f32 = 2.56 * SQRT_2;
+/// Its rated speed, rpm.
+const RATED_RPM: f32 = 1720.0;
+/// Its pole pairs.
+const POLE_PAIRS: f32 = 2.0;
+/// Nominal dc link of its inverter, V.
+const DC_LINK_V: f32 = 311.0;
+/// End of the range of its current sensors, A.
+const RANGE_A: f32 = 4.472_713_4;
+/// Frequency of the carrier, Hz.
+const CARRIER_HZ: f32 = 600.0;
+
+/// The value that was set or, if none was, that of the rule, rounded to four digits.
+fn or_rule(set: Option<f32>, rule: impl FnOnce() -> f32) -> f32 {
+    set.unwrap_or_else(|| {
+        let value = f64::from(rule());
+        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs())) - 3.0);
+        (libm::round(value / last) * last) as f32
+    })
+}
+
+impl Settings {
+    /// Rated current, A peak.
+    pub fn rated_a(&self) -> f32 {
+        SQRT_2 * self.nameplate.current_a
+    }
+
+    /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
+    pub fn share_of_rated(&self, on_reference: f32) -> f32 {
+        on_reference / RATED_A * self.rated_a()
+    }
+
+    /// A current that is `on_reference`, A, with the dissertation's sensors, in proportion to the sensors' range: for
+    /// thresholds above noise and steps of the converter.
+    pub fn share_of_range(&self, on_reference: f32) -> f32 {
+        on_reference / RANGE_A * self.sensor_range_a()
+    }
+
+    /// A voltage that is `on_reference`, V, with the dissertation's inverter, in proportion to the dc link: for what
+    /// dead time and drop of the inverter cause.
+    pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
+        on_reference / DC_LINK_V * self.inverter.dc_link_v
+    }
+
+    /// Largest phase current that both sensors can measure in both directions, A.
+    pub fn sensor_range_a(&self) -> f32 {
+        let s = &self.scales;
+        let end = |line: super::Line| f32::min(-line.offset, line.at(s.full_scale));
+        f32::min(end(s.current_a), end(s.current_b))
+    }
+
+    /// Largest dc link that the converter can measure, V.
+    pub fn dc_link_range_v(&self) -> f32 {
+        self.scales.dc_link.at(CONVERTER_CODES)
+    }
+
+    /// Phase current that trips, A.
+    pub fn trip_a(&self) -> f32 {
+        let rule = || f32::min(self.share_of_rated(4.3), 0.962 * self.sensor_range_a());
+        or_rule(self.limits.trip_a, rule)
+    }
+
+    /// Largest current that is regulated, A peak: the carrier and the noise stay clear of the trip.
+    pub fn current_limit_a(&self) -> f32 {
+        let rule = || f32::min(self.share_of_rated(3.5), 0.814 * self.trip_a());
+        or_rule(self.limits.current_a, rule)
+    }
+
+    /// Largest torque current of speed and position mode, A peak.
+    pub fn i_q_limit_a(&self) -> f32 {
+        or_rule(self.speed.i_q_limit_a, || 3.0 / 3.5 * self.current_limit_a())
+    }
+
+    /// Direct (magnetising) current, A peak. 0.7 A is that of section 3.10.
+    pub fn i_d(&self) -> f32 {
+        let rule = || f32::min(self.share_of_rated(0.7), self.current_limit_a());
+        or_rule(self.sequence.i_d, rule)
+    }
+
+    /// Slope of the torque current at a stop, A/s.
+    pub fn stop_a_per_s(&self) -> f32 {
+        or_rule(self.sequence.stop_a_per_s, || self.share_of_rated(30.0))
+    }
+
+    /// Time with direct current alone, s: the flux is within 1 % after five rotor time constants.
+    pub fn magnetise_s(&self) -> f32 {
+        or_rule(self.sequence.magnetise_s, || f32::max(0.8, 5.0 * self.motor.tau_r()))
+    }
+
+    /// Phase current from which on the dead time is compensated in full, A: three times the spread of noise and
+    /// prediction.
+    pub fn full_compensation_a(&self) -> f32 {
+        or_rule(self.inverter.full_compensation_a, || self.share_of_range(0.03))
+    }
+
+    /// Peak of the injected voltage, V, from the reactance X = ω σL_s of the leakage at the carrier.
+    ///
+    /// The angle error is noise over saliency and carrier current, so the rule asks for a current, 0.26 A of the
+    /// dissertation's motor. The remainder of the dead time sets a floor in volts: 50 V at 311 V, where 0.35 A of that
+    /// motor reach it; with more, phases b and c would cross zero at a start, where the drop of the inverter is uncertain.
+    /// The voltage is between 20 and 110 V at 311 V.
+    pub fn carrier_v(&self) -> f32 {
+        let rule = || {
+            let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
+            let wanted = self.share_of_rated(0.257_65) * reactance;
+            let floor =
+                f32::min(self.share_of_dc_link(50.0), self.share_of_rated(0.35) * reactance);
+            let (low, high) = (self.share_of_dc_link(20.0), self.share_of_dc_link(110.0));
+            f32::min(f32::max(f32::max(wanted, floor), low), high)
+        };
+        or_rule(self.injection.amplitude_v, rule)
+    }
+
+    /// Torque current from which on the constant reference of the current difference is full, A peak.
+    pub fn full_reference_iq_a(&self) -> f32 {
+        let set = self.injection.printed.full_reference_iq_a;
+        or_rule(set, || self.share_of_rated(1.0))
+    }
+
+    /// Saliency per ampere of stator current, 1/A; for the gain schedule until it is learned.
+    pub fn current_saliency(&self) -> f32 {
+        let set = self.injection.synchronous.current_saliency;
+        or_rule(set, || 0.0338 * RATED_A / self.rated_a())
+    }
+
+    /// Reference of the saliency over the torque current.
+    pub fn reference(&self) -> ReferenceTable {
+        let guess = || ReferenceTable::guessed(self.current_limit_a());
+        self.injection.synchronous.reference.unwrap_or_else(guess)
+    }
+
+    /// Carrier current over the torque current.
+    pub fn carrier(&self) -> CarrierTable {
+        let guess = || CarrierTable::guessed(self.current_limit_a());
+        self.injection.synchronous.carrier.unwrap_or_else(guess)
+    }
+
+    /// Mechanical speed that trips without an encoder, rpm: the range in which the angle is tracked.
+    pub fn tracked_rpm(&self) -> f32 {
+        or_rule(self.injection.synchronous.tracked_rpm, || self.share_of_poles(700.0))
+    }
+
+    /// Largest speed that is asked for, rpm. Without a sensor the angle is good to 300 rpm on four poles; with an
+    /// encoder it may be larger.
+    pub fn speed_limit_rpm(&self) -> f32 {
+        or_rule(self.speed.limit_rpm, || self.share_of_poles(300.0))
+    }
+
+    /// Largest acceleration that is asked for, rpm/s. Without a sensor the angle lags by 5.7 degrees while the speed
+    /// changes by 300 rpm/s (four poles, tracking loop of 4 Hz).
+    pub fn ramp_rpm_per_s(&self) -> f32 {
+        or_rule(self.speed.ramp_rpm_per_s, || self.share_of_poles(300.0))
+    }
+
+    /// Speed of the shaft that trips, rpm.
+    pub fn speed_trip_rpm(&self) -> f32 {
+        let rule = || 2000.0 / RATED_RPM * self.nameplate.speed_rpm;
+        or_rule(self.limits.speed_rpm, rule)
+    }
+
+    /// Dc link above which the drive trips, V.
+    pub fn dc_over_v(&self) -> f32 {
+        let rule = || f32::min(self.share_of_dc_link(400.0), 0.95 * self.dc_link_range_v());
+        or_rule(self.limits.dc_over_v, rule)
+    }
+
+    /// Dc link below which the drive trips while the outputs are on, V.
+    pub fn dc_under_v(&self) -> f32 {
+        or_rule(self.limits.dc_under_v, || self.share_of_dc_link(200.0))
+    }
+
+    /// Largest voltage that the model of the motor does not explain at standstill, V: an error of 26 % of the stator
+    /// resistance at the current limit, and 2.3 % of the dc link for dead time and drop of the inverter.
+    pub fn unexplained_v(&self) -> f32 {
+        let rule = || 0.26 * self.current_limit_a() * self.motor.r_s + self.share_of_dc_link(7.086);
+        or_rule(self.limits.unexplained_v, rule)
+    }
+
+    /// Whether the lock monitor runs.
+    pub(crate) fn watches_lock(&self) -> bool {
+        self.tracks_synchronously() && self.injection.synchronous.monitor
+    }
+
+    /// Whether the angle comes from the synchronous demodulation.
+    pub(crate) fn tracks_synchronously(&self) -> bool {
+        self.angle_source == super::AngleSource::Injection
+            && self.injection.demodulator == crate::carrier::DemodulatorKind::Synchronous
+    }
+
+    /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
+    fn share_of_poles(&self, on_reference: f32) -> f32 {
+        on_reference * POLE_PAIRS / f32::from(self.motor.pole_pairs)
+    }
+
+    /// A mechanical speed, rpm, in electrical turns per control period.
+    pub(crate) fn freq_of_rpm(&self, rpm: f32) -> f32 {
+        rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(value: f32, expected: f32) {
+        assert!((value / expected - 1.0).abs() < 1e-3, "{value}, not {expected}");
+    }
+
+    /// The numbers that the drive had before it had rules.
+    #[test]
+    fn the_rules_give_the_numbers_of_the_dissertations_motor() {
+        let s = Settings::default();
+        for (value, expected) in [
+            (s.trip_a(), 4.3),
+            (s.current_limit_a(), 3.5),
+            (s.i_q_limit_a(), 3.0),
+            (s.i_d(), 0.7),
+            (s.stop_a_per_s(), 30.0),
+            (s.full_compensation_a(), 0.03),
+            (s.carrier_v(), 50.0),
+            (s.full_reference_iq_a(), 1.0),
+            (s.current_saliency(), 0.0338),
+            (s.tracked_rpm(), 700.0),
+            (s.speed_limit_rpm(), 300.0),
+            (s.ramp_rpm_per_s(), 300.0),
+            (s.speed_trip_rpm(), 2000.0),
+            (s.dc_over_v(), 400.0),
+            (s.dc_under_v(), 200.0),
+            (s.unexplained_v(), 12.0),
+        ] {
+            near(value, expected);
+        }
+        near(s.magnetise_s(), 5.0 * 0.186_09);
+    }
+
+    /// A motor of twice the voltage and half the current, and one of the same voltage and twice the current, have the
+    /// thresholds of the reference in proportion.
+    #[test]
+    fn the_rules_scale_with_the_motor() {
+        let mut s = Settings::default();
+        let scaled = |s: &mut Settings, volts: f32, amperes: f32| {
+            let impedance = volts / amperes;
+            for z in [&mut s.motor.r_s, &mut s.motor.r_r] {
+                *z *= impedance;
+            }
+            for z in [&mut s.motor.l_ls, &mut s.motor.l_lr, &mut s.motor.l_m] {
+                *z *= impedance;
+            }
+            s.nameplate.current_a *= amperes;
+            s.inverter.dc_link_v *= volts;
+            s.scales.dc_link = s.scales.dc_link.scaled(volts);
+            s.scales.current_a = s.scales.current_a.scaled(amperes);
+            s.scales.current_b = s.scales.current_b.scaled(amperes);
+        };
+        scaled(&mut s, 0.154, 20.0);
+        near(s.trip_a(), 86.0);
+        near(s.current_limit_a(), 70.0);
+        near(s.i_d(), 14.0);
+        near(s.carrier_v(), 7.7);
+        near(s.dc_over_v(), 61.6);
+        near(s.unexplained_v(), 1.848);
+        near(s.magnetise_s(), 5.0 * 0.186_09);
+        assert!(s.check().is_ok());
+    }
+
+    #[test]
+    fn small_sensors_lower_the_limits() {
+        let mut s = Settings::default();
+        s.nameplate.current_a *= 10.0;
+        near(s.trip_a(), 0.962 * 4.472_713);
+        near(s.current_limit_a(), 0.814 * s.trip_a());
+    }
+}

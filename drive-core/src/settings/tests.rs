@@ -1,0 +1,192 @@
+use proptest::prelude::*;
+
+use super::entry::{Change, Entry};
+use super::value::Value;
+use super::*;
+use crate::carrier::DemodulatorKind;
+
+fn near(value: f32, expected: f32) {
+    assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
+}
+
+/// Table 5, worked out by hand.
+#[test]
+fn derived_parameters_of_the_motor() {
+    let motor = Motor::default();
+    near(motor.l_r(), 0.2047);
+    near(motor.sigma_l_s(), 0.051_478_7);
+    near(motor.coupled_inductance(), 0.153_221_3);
+    near(motor.l_m + motor.l_ls, motor.sigma_l_s() + motor.coupled_inductance());
+    near(motor.tau_r(), 0.186_090_9);
+    near(motor.torque_per_ampere(0.7), 0.321_764_7);
+    near(motor.torque_per_ampere(1.4), 0.643_529_4);
+}
+
+#[test]
+fn a_line_gives_the_value_of_a_code() {
+    let line = Line { gain: 0.002, offset: -4.0 };
+    near(line.at(3000), 2.0);
+    near(line.at(0), -4.0);
+    near(line.scaled(1.5).at(3000), 3.0);
+    near(line.scaled(1.5).at(0), -6.0);
+}
+
+#[test]
+fn what_a_learning_depends_on_is_compared_and_nothing_else() {
+    let changed = |change: fn(&mut Settings)| {
+        let mut settings = Settings::default();
+        change(&mut settings);
+        settings.shares_learning_with(&Settings::default())
+    };
+    let same: [fn(&mut Settings); 6] = [
+        |_| {},
+        |s| s.motor.inertia = 1.0,
+        |s| s.limits.trip_a = Some(4.0),
+        |s| s.angle_source = AngleSource::Encoder,
+        |s| s.injection.synchronous.bandwidth_hz = 2.0,
+        |s| s.speed.limit_rpm = Some(100.0),
+    ];
+    assert!(same.into_iter().all(changed));
+    let other: [fn(&mut Settings); 10] = [
+        |s| s.motor.r_r = 1.4,
+        |s| s.motor.pole_pairs = 3,
+        |s| s.inverter.compensate = false,
+        |s| s.scales.current_b.gain *= 1.01,
+        |s| s.scales.current_delay_s = 0.0,
+        |s| s.ignore_delays = true,
+        |s| s.sequence.i_d = Some(0.6),
+        |s| s.injection.amplitude_v = Some(60.0),
+        |s| s.injection.demodulator = DemodulatorKind::Envelope,
+        |s| s.injection.synchronous.current_saliency = Some(0.02),
+    ];
+    assert!(!other.into_iter().any(changed));
+    // Not-a-number is never the same.
+    assert!(!changed(|s| s.motor.r_s = f32::NAN));
+}
+
+/// Another value of a setting, inside its range.
+fn another(entry: &Entry<Settings>, settings: &Settings) -> Value {
+    match (entry.get(settings), entry.range(settings)) {
+        (Value::Word(word), _) => {
+            let words = entry.words();
+            let place = words.iter().position(|other| *other == word).unwrap();
+            Value::Word(words[(place + 1) % words.len()])
+        }
+        (Value::Whole(value), Some((min, _))) => {
+            Value::Whole(if value as f32 == min { value + 1 } else { min as u32 })
+        }
+        (_, Some((min, max))) => Value::Number(0.25 * min + 0.75 * max),
+        (_, None) => unreachable!("{}", entry.name),
+    }
+}
+
+/// Paths of all numbers and words in the settings, with their values, from the debug text.
+fn fields(settings: &Settings) -> Vec<(String, String)> {
+    let text = format!("{settings:#?}");
+    let (mut path, mut fields): (Vec<&str>, Vec<(String, String)>) = (Vec::new(), Vec::new());
+    for line in text.lines().skip(1).map(str::trim) {
+        match line.split_once(": ") {
+            Some((name, rest)) if rest.ends_with('{') => path.push(name),
+            Some((name, rest)) => {
+                let full = path.iter().chain([&name]).copied().collect::<Vec<_>>().join(".");
+                fields.push((full, rest.to_owned()));
+            }
+            None if line.starts_with('}') => drop(path.pop()),
+            // The value of an `Option`, on lines of its own.
+            None => fields.last_mut().unwrap().1.push_str(line),
+        }
+    }
+    fields
+}
+
+/// Every field but the tables is a row, and a row moves its field alone.
+#[test]
+fn the_table_is_complete() {
+    let before = Settings::default();
+    let mut missing: Vec<String> = fields(&before).into_iter().map(|(path, _)| path).collect();
+    for entry in SETTINGS {
+        let mut after = before;
+        let value = another(entry, &before);
+        entry.set(&mut after, value);
+        assert_eq!(entry.get(&after), value, "{}", entry.name);
+        let pairs = fields(&before).into_iter().zip(fields(&after));
+        let moved: Vec<String> =
+            pairs.filter(|(one, other)| one != other).map(|(one, _)| one.0).collect();
+        assert_eq!(moved.len(), 1, "{} moves {moved:?}", entry.name);
+        missing.retain(|path| *path != moved[0]);
+    }
+    let tables = [
+        "injection.printed.learned",
+        "injection.synchronous.reference",
+        "injection.synchronous.carrier",
+    ];
+    assert_eq!(missing, tables);
+}
+
+#[test]
+fn names_are_unique_and_every_default_is_in_its_range() {
+    let settings = Settings::default();
+    for entry in SETTINGS {
+        assert!(core::ptr::eq(find(entry.name).unwrap(), entry), "{}", entry.name);
+        assert_eq!(entry.check(&settings), Ok(()));
+        assert!(!entry.help.is_empty() && !entry.help.ends_with('.'), "{}", entry.name);
+        assert_eq!(entry.words().is_empty(), entry.range(&settings).is_some(), "{}", entry.name);
+    }
+    assert!(find("motor").is_none());
+    assert_eq!(find("inverter.dead_time_s").unwrap().change, Change::FromReset);
+}
+
+/// A value outside the range is named with the range and the unit; beyond both ends, and not-a-number.
+#[test]
+fn values_out_of_range_are_named() {
+    for entry in SETTINGS {
+        let good = Settings::default();
+        let Some((min, max)) = entry.range(&good) else { continue };
+        for bad in [f32::NAN, f32::INFINITY, min - 1.0 - 0.1 * min.abs(), max * 1.1 + 1.0] {
+            let mut settings = good;
+            match entry.get(&good) {
+                Value::Whole(_) if bad.is_finite() => entry.set(&mut settings, Value::Whole(0)),
+                Value::Whole(_) => continue,
+                _ => entry.set(&mut settings, Value::Number(bad)),
+            }
+            let error = entry.check(&settings).unwrap_err().to_string();
+            assert!(error.starts_with(entry.name) && error.contains("allowed is"), "{error}");
+            assert!(error.ends_with(entry.unit), "{error}");
+        }
+    }
+}
+
+#[test]
+fn auto_is_a_value_of_what_has_a_rule() {
+    for entry in SETTINGS {
+        let mut settings = Settings::default();
+        assert_eq!(entry.parse("auto").is_ok(), entry.has_rule(), "{}", entry.name);
+        if entry.has_rule() {
+            let by_rule = entry.number(&settings);
+            entry.set(&mut settings, another(entry, &Settings::default()));
+            assert_ne!(entry.number(&settings), by_rule, "{}", entry.name);
+            entry.set(&mut settings, entry.parse("auto").unwrap());
+            assert_eq!(entry.number(&settings), by_rule);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_a_value_or_refused(text in ".*", i in 0..SETTINGS.len()) {
+        let mut settings = Settings::default();
+        if let Ok(value) = SETTINGS[i].parse(&text) {
+            SETTINGS[i].set(&mut settings, value);
+            prop_assert_eq!(SETTINGS[i].get(&settings), value);
+        }
+    }
+
+    #[test]
+    fn values_survive_the_way_through_text(bits in 0_u32..4_000_000, i in 0..SETTINGS.len()) {
+        for text in [(bits as f32 * 1e-3).to_string(), bits.to_string()] {
+            if let Ok(value) = SETTINGS[i].parse(&text) {
+                prop_assert_eq!(SETTINGS[i].parse(&value.to_string()), Ok(value));
+            }
+        }
+    }
+}

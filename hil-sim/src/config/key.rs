@@ -1,0 +1,149 @@
+//! A key of either table.
+
+use drive_core::Settings;
+use drive_core::settings::entry::Entry;
+use drive_core::settings::value as drive;
+use drive_core::settings::{SETTINGS, find};
+
+use super::{Allowed, BENCH, BenchKey, Config, DRIVE, Value};
+use crate::error::{Error, nearest};
+
+/// A key of the bench or of the drive.
+#[derive(Clone, Copy)]
+pub enum Key {
+    /// A key of the bench.
+    Bench(&'static BenchKey),
+    /// A setting of the drive.
+    Drive(&'static Entry<Settings>),
+}
+
+fn on_bench(name: &str) -> Option<&'static BenchKey> {
+    BENCH.iter().find(|key| key.name == name)
+}
+
+impl Key {
+    /// All keys of both tables, those of the bench first.
+    pub fn all() -> impl Iterator<Item = Self> {
+        BENCH.iter().map(Self::Bench).chain(SETTINGS.iter().map(Self::Drive))
+    }
+
+    /// The keys that an assignment to `name` sets, one or two.
+    ///
+    /// # Errors
+    /// [`Error::UnknownKey`] with the most similar name.
+    pub fn named(name: &str) -> Result<Vec<Self>, Error> {
+        let (bench, drive) = match name.strip_prefix(DRIVE) {
+            Some(name) => (None, find(name)),
+            None => (on_bench(name), find(name)),
+        };
+        let keys: Vec<_> =
+            bench.map(Self::Bench).into_iter().chain(drive.map(Self::Drive)).collect();
+        if keys.is_empty() {
+            let known = Self::all().map(Self::name);
+            return Err(Error::UnknownKey { key: name.to_owned(), nearest: nearest(name, known) });
+        }
+        Ok(keys)
+    }
+
+    /// Name in its table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bench(key) => key.name,
+            Self::Drive(entry) => entry.name,
+        }
+    }
+
+    /// The name to which an assignment sets this key alone, or with the bench's of the same name.
+    pub fn assigned_name(self) -> String {
+        match self {
+            Self::Drive(entry) if on_bench(entry.name).is_some() => {
+                format!("{DRIVE}{}", entry.name)
+            }
+            _ => self.name().to_owned(),
+        }
+    }
+
+    /// Unit, empty for a pure number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Bench(key) => key.unit,
+            Self::Drive(entry) => entry.unit,
+        }
+    }
+
+    /// Meaning.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Bench(key) => key.doc.trim().trim_end_matches('.'),
+            Self::Drive(entry) => entry.help,
+        }
+    }
+
+    /// The values it can have. Those of the drive are checked beside the other settings when it is built; their range
+    /// here is that of the defaults.
+    pub fn allowed(self) -> Allowed {
+        match self {
+            Self::Bench(key) => key.allowed,
+            Self::Drive(entry) => match entry.range(&Settings::default()) {
+                Some((min, max)) => Allowed::Range { min: double(min), max: double(max) },
+                None => Allowed::Words(entry.words()),
+            },
+        }
+    }
+
+    /// The values it can have, in words, with the unit.
+    pub fn allowed_text(self) -> String {
+        let auto =
+            if matches!(self, Self::Drive(entry) if entry.has_rule()) { ", or auto" } else { "" };
+        format!("{}{auto}", self.allowed().describe(self.unit()))
+    }
+
+    /// Reads it.
+    pub fn get(self, config: &Config) -> Value {
+        match self {
+            Self::Bench(key) => (key.get)(config),
+            Self::Drive(entry) => match entry.get(&config.drive) {
+                drive::Value::Number(value) => Value::of_single(value),
+                drive::Value::Whole(value) => Value::Number(value.into()),
+                drive::Value::Word(word) => Value::Word(word.to_owned()),
+                drive::Value::Auto => Value::Word(drive::AUTO.to_owned()),
+            },
+        }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// The reason why the value is not allowed.
+    pub fn set(self, config: &mut Config, value: &Value) -> Result<(), &'static str> {
+        match self {
+            Self::Bench(key) => (key.set)(config, value),
+            Self::Drive(entry) => {
+                let text = match value {
+                    Value::Switch(on) => drive::Words::word(*on).to_owned(),
+                    other => other.to_string(),
+                };
+                let value = entry.parse(&text).map_err(reason)?;
+                entry.set(&mut config.drive, value);
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The shortest decimal fraction that stands for a number in single precision.
+fn double(number: f32) -> f64 {
+    match Value::of_single(number) {
+        Value::Number(number) => number,
+        _ => number.into(),
+    }
+}
+
+fn reason(error: drive::ValueError) -> &'static str {
+    match error {
+        drive::ValueError::Number => "not a finite number",
+        drive::ValueError::NumberOrAuto => "neither a finite number nor auto",
+        drive::ValueError::Whole(_) => "not a whole number in the range",
+        drive::ValueError::Word(_) => "not one of the words",
+    }
+}

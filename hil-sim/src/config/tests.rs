@@ -1,0 +1,157 @@
+use super::*;
+
+fn set(assignment: &str) -> Result<Config, Error> {
+    let mut config = Config::default();
+    let (key, value) = assignment.split_once('=').unwrap();
+    config.set(key, &Value::from_text(value))?;
+    Ok(config)
+}
+
+#[test]
+fn every_default_is_allowed_and_every_key_round_trips() {
+    assert_eq!(Config::default().changes(), [""; 0]);
+    assert!(Config::default().drive.check().is_ok());
+    for key in Key::all() {
+        let (mut config, name) = (Config::default(), key.name());
+        let value = key.get(&config);
+        assert_eq!(key.set(&mut config, &value), Ok(()), "{name}");
+        assert_eq!(config, Config::default(), "{name}");
+        assert!(!key.help().is_empty(), "{name}");
+        // Through text, as --set has it, with a value that is not the default.
+        let text = match key.allowed() {
+            Allowed::Range { max, .. } => max.to_string(),
+            Allowed::Words(words) => words[0].to_owned(),
+            Allowed::Switch => "yes".to_owned(),
+        };
+        let config = set(&format!("{}={text}", key.assigned_name())).expect(name);
+        let found = key.get(&config).to_string();
+        let same = found == text
+            || found.parse::<f64>().unwrap() as f32 == text.parse::<f64>().unwrap() as f32;
+        assert!(same, "{name}: {found}, not {text}");
+        // The changes make the same configuration again.
+        let again = Config::load(None, &config.changes());
+        assert_eq!(again.expect(name), config, "{name}");
+    }
+}
+
+#[test]
+fn names_are_unique() {
+    let names: Vec<String> = Key::all().map(Key::assigned_name).collect();
+    for (i, name) in names.iter().enumerate() {
+        assert!(!names[..i].contains(name), "{name}");
+    }
+}
+
+#[test]
+fn just_outside_the_range_is_refused() {
+    for key in BENCH {
+        if let Allowed::Range { min, max } = key.allowed {
+            for value in [min - 1.0, max + 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(set(&format!("{}={value}", key.name)).is_err(), "{} {value}", key.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn errors_name_the_key_the_value_and_the_range() {
+    let text =
+        |assignment: &str| Config::load(None, &[assignment.to_owned()]).unwrap_err().to_string();
+    assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.001 to 1000 ohm");
+    assert_eq!(
+        text("motor.r_s=nan"),
+        "motor.r_s = NaN: not a finite number; allowed: 0.001 to 1000 ohm"
+    );
+    assert_eq!(
+        text("motor.r_s=a lot"),
+        "motor.r_s = a lot: not a number; allowed: 0.001 to 1000 ohm"
+    );
+    assert_eq!(
+        text("motor.pole_pairs=1.5"),
+        "motor.pole_pairs = 1.5: not a whole number; allowed: 1 to 50"
+    );
+    assert_eq!(
+        text("angle_source=resolver"),
+        "angle_source = resolver: not one of the words; allowed: encoder, injection"
+    );
+    assert_eq!(
+        text("motor.r_x=5"),
+        "there is no key `motor.r_x`; did you mean `motor.r_r`?; `keys` shows all of them"
+    );
+    assert_eq!(text("motor.r_s"), "`motor.r_s`: write KEY=VALUE, for example --set motor.r_s=5.4");
+    assert_eq!(
+        text("sequence.i_d=much"),
+        "sequence.i_d = much: neither a finite number nor auto; allowed: 0.01 to 3.5 A, or auto"
+    );
+    assert_eq!(
+        text("drive.load.mode=free"),
+        "there is no key `drive.load.mode`; `keys` shows all of them"
+    );
+}
+
+#[test]
+fn toml_and_assignments_say_the_same() {
+    let mut from_toml = Config::default();
+    let table = "runs = 3\nload.mode = \"speed\"\n[motor]\nr_s = 6\n[drive.motor]\nr_r = 1.3\n";
+    from_toml.set_table(&table.parse().unwrap()).unwrap();
+    let changes = from_toml.changes();
+    assert_eq!(changes, ["motor.r_s=6", "load.mode=speed", "runs=3", "drive.motor.r_r=1.3"]);
+    assert_eq!(Config::load(None, &changes).unwrap(), from_toml);
+    // The drive knows its motor, but for what it is told.
+    assert_eq!((from_toml.drive.motor.r_s, from_toml.drive.motor.r_r), (6.0, 1.3));
+    assert_eq!((from_toml.motor.r_s, from_toml.motor.r_r), (6.0, 1.1));
+}
+
+#[test]
+fn toml_of_the_wrong_type_or_name_is_refused() {
+    for bad in ["motor.r_s = \"5.4\"", "motor.r_s = [1]", "motor = 3", "moter.r_s = 1"] {
+        let table = bad.parse().unwrap();
+        assert!(Config::default().set_table(&table).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn old_names_are_accepted() {
+    let old = [
+        "motor.rs=6",
+        "motor.rr=1.2",
+        "motor.lls=0.03",
+        "motor.llr=0.02",
+        "motor.lm=0.2",
+        "drive.motor.rs=5",
+        "inverter.vdc=300",
+        "inverter.dead_time_us=3",
+        "angle.source=encoder",
+        "angle.compensate_delays=false",
+        "reference.id_a=0.9",
+        "drive.learn=true",
+    ];
+    let today = [
+        "motor.r_s=6",
+        "motor.r_r=1.2",
+        "motor.l_ls=0.03",
+        "motor.l_lr=0.02",
+        "motor.l_m=0.2",
+        "drive.motor.r_s=5",
+        "inverter.dc_link_v=300",
+        "inverter.dead_time_s=0.000003",
+        "angle_source=encoder",
+        "ignore_delays=yes",
+        "sequence.i_d=0.9",
+        "prepare.learn=yes",
+    ];
+    let load = |all: [&str; 12]| Config::load(None, &all.map(str::to_owned)).unwrap();
+    assert_eq!(load(old), load(today));
+    assert_eq!(load(old).drive.motor.r_s, 5.0);
+}
+
+#[test]
+fn the_scales_of_the_drive_follow_the_sensors() {
+    let config = set("measurement.range_a=50").unwrap();
+    assert!((config.drive.sensor_range_a() - 50.0).abs() < 1e-3);
+    let sensors = plant_settings(&config).measurement;
+    assert!((sensors.noise_a / 0.005 - 50.0 / 4.4727).abs() < 1e-3);
+    let config = set("inverter.dc_link_v=540").unwrap();
+    assert!((config.drive.dc_link_range_v() - 450.45 * 540.0 / 311.0).abs() < 0.1);
+    assert!((config.drive.dc_over_v() - 400.0 * 540.0 / 311.0).abs() < 0.1);
+}
