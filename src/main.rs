@@ -58,9 +58,9 @@ fn main() {
         "\
 This is the firmware of the drive; it runs on an STM32G474, not on this computer.
 
-    cargo firmware   builds the image for the board
-    cargo flash      builds it, writes it through a debug probe and shows its log
-    cargo sim        runs the same drive against a simulated motor, here
+    cargo firmware      builds the image for the board
+    cargo xtask flash   builds it, writes it through a debug probe and shows its log
+    cargo sim           runs the same drive against a simulated motor, here
 
 Flashing needs probe-rs: cargo install probe-rs-tools --locked
 Before flashing: mains off, and pull-down resistors at the gate inputs of the power stage."

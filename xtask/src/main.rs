@@ -1,4 +1,4 @@
-//! Developer tasks: `cargo xtask`, `cargo firmware`, `cargo flash`.
+//! Developer tasks: `cargo xtask`, `cargo firmware`.
 
 mod board;
 mod budget;
@@ -35,7 +35,7 @@ enum Task {
     Test,
     /// Builds and checks the image for the board (also: cargo firmware)
     Firmware,
-    /// Builds the image, writes it through a debug probe and shows its log (also: cargo flash)
+    /// Builds the image, writes it through a debug probe and shows its log
     Flash,
     /// Builds the image and tests it on the virtual board
     Board,
