@@ -11,6 +11,7 @@ use crate::config::{Config, Key};
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
 use crate::input::{Input, OUT};
+use crate::motors::Motor;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::progress::Progress;
 use crate::report::{self, Section};
@@ -31,6 +32,11 @@ enum Command {
     List,
     /// Every key that --set and a configuration file take, with unit, default and range
     Keys,
+    /// Every motor that --motor takes; with a name: its numbers, their sources, and the lines for the console
+    Motors {
+        /// Name of the motor, or a file that ends in .toml
+        name: Option<String>,
+    },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run {
         /// Name of the experiment, as `list` shows it
@@ -66,6 +72,10 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         None => run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, None, false),
         Some(Command::List) => say(&list()),
+        Some(Command::Motors { name: None }) => say(&report::table(&motors())),
+        Some(Command::Motors { name: Some(name) }) => {
+            Motor::find(&name).and_then(|motor| say(&motor_text(&motor)?))
+        }
         Some(Command::Keys) => say(&report::table(&keys())),
         Some(Command::Run { name, input, out, json }) => experiments::named(&name)
             .into_iter()
@@ -88,6 +98,46 @@ fn list() -> String {
         text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
     }
     text
+}
+
+fn motors() -> Table {
+    let mut table = Table::new("", &["motor", "rated data", "numbers"]);
+    for motor in Motor::all() {
+        let recalled = motor.source.iter().filter(|source| source.unverified);
+        let keys: Vec<_> = recalled.flat_map(|source| source.keys.clone()).collect();
+        let numbers = match keys[..] {
+            [] => "all with a source".to_owned(),
+            _ => format!("unverified: {}", keys.join(", ")),
+        };
+        table.row([motor.name, motor.title, numbers].map(Cell::from));
+    }
+    table
+}
+
+fn motor_text(motor: &Motor) -> Result<String, Error> {
+    let mut config = Config::default();
+    motor.apply(&mut config)?;
+    let mut table = Table::new("", &["key", "value", "unit", "source"]);
+    for (key, value) in motor.settings() {
+        let unit = Key::named(&key)?.first().map_or("", |key| key.unit()).to_owned();
+        let source = motor.source_of(&key).map_or(String::new(), |source| {
+            format!("{}{}", if source.unverified { "UNVERIFIED: " } else { "" }, source.from)
+        });
+        table.row([key, value.to_string(), unit, source].map(Cell::from));
+    }
+    let m = config.drive.motor;
+    Ok(format!(
+        "{}: {}\n\n{}\n\n{}\nLeakage inductance {:.4} mH, rotor time constant {:.0} ms, carrier {:.1} V.\n\n\
+         At the console, with the scales of your board:\n{}\n",
+        motor.name,
+        motor.title,
+        motor.about.trim(),
+        report::table(&table),
+        1e3 * m.sigma_l_s(),
+        1e3 * m.tau_r(),
+        config.drive.carrier_v(),
+        motor.console_lines().join("\n"),
+    ))
 }
 
 fn keys() -> Table {

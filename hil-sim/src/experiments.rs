@@ -150,7 +150,8 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
         Error::UnknownExperiment {
             name: name.to_owned(),
-            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name)),
+            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name))
+                .map(str::to_owned),
         }
     })
 }

@@ -231,6 +231,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
     // What is unset follows the dissertation's bench, in proportion.
     let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
+    let relative_voltage = i.dc_link_v / f64::from(reference_drive.inverter.dc_link_v);
     let relative_range = s.range_a / reference.range_a;
     let relative_current = f64::from(config.drive.rated_a()) / f64::from(reference_drive.rated_a());
     PlantSettings {
@@ -253,7 +254,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             vdc: i.dc_link_v,
             dead_time_us: i.dead_time_s * 1e6,
             propagation_us: i.propagation_us,
-            residual_v: i.residual_v,
+            residual_v: i.residual_v.unwrap_or(1.64 * relative_voltage),
             switched: i.switched,
             ..InverterSettings::default()
         },
@@ -266,11 +267,11 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             gain_error_b: s.gain_error_b,
             offset_a: s.offset_a,
             offset_b: s.offset_b,
-            dc_link_v: s.dc_link_range_v.map_or(
-                reference.dc_link_v
-                    * (i.dc_link_v / reference_drive.inverter.dc_link_v as f64).max(1.0),
-                |range| range / f64::from(CONVERTER_CODES),
-            ),
+            dc_link_v: s
+                .dc_link_range_v
+                .map_or(reference.dc_link_v * relative_voltage.max(1.0), |range| {
+                    range / f64::from(CONVERTER_CODES)
+                }),
             heat_sink_code: config.drive.scales.ntc.code(s.heat_sink_c as f32),
         },
         mechanics: MechanicsSettings {

@@ -149,8 +149,8 @@ keys! {
         /// Time from the command to the first switch (section 3.9).
         propagation_us: f64 = 2.2, [0 .. 10], "us";
         /// Further voltage per phase that goes with the sign of the current and that no compensation
-        /// knows of; 40 % of the dead time's (assumed).
-        residual_v: f64 = 1.64, [0 .. 20], "V";
+        /// knows of; unset: 1.64 V at 311 V, 40 % of the dead time's (assumed), in proportion to the dc link.
+        residual_v: Option<f64> = None, [0 .. 20], "V";
         /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
         switched: bool = false, [switch], "";
     }

@@ -84,7 +84,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.inverter.switched = true;
     config.drive.inverter.compensate = compensate;
     // No compensation knows the residual drop; this experiment is about the dead time alone.
-    config.inverter.residual_v = 0.0;
+    config.inverter.residual_v = Some(0.0);
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
     let mut rig = Rig::from_config(&config, context.seed)?;

@@ -101,7 +101,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;
         let mut config = context.config.clone();
         config.drive.angle_source = source;
-        config.inverter.residual_v = residual(&config, share);
+        config.inverter.residual_v = Some(residual(&config, share));
         let seconds = SECONDS;
         let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
         simulate(&config, &case, context.seed)
