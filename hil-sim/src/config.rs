@@ -12,7 +12,7 @@ mod value;
 
 use std::path::Path;
 
-use drive_core::settings::Line;
+use drive_core::settings::{Line, Settings};
 
 pub use key::Key;
 pub use keys::*;
@@ -107,6 +107,19 @@ impl Config {
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
     pub fn amperes(&self, on_reference: f64) -> f64 {
         f64::from(self.drive.share_of_rated(on_reference as f32))
+    }
+
+    /// A torque that is `on_reference`, Nm, on the dissertation's motor, in proportion to the torque of the current limit.
+    pub fn newton_metres(&self, on_reference: f64) -> f64 {
+        let largest = |drive: &Settings| {
+            f64::from(drive.motor.torque_per_ampere(drive.i_d()) * drive.current_limit_a())
+        };
+        on_reference * largest(&self.drive) / largest(&Settings::default())
+    }
+
+    /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
+    pub fn rpm(&self, on_reference: f64) -> f64 {
+        on_reference * 2.0 / f64::from(self.motor.pole_pairs)
     }
 
     /// Sets the scales of the drive to those of the sensors, without their errors.

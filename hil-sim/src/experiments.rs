@@ -18,6 +18,7 @@ mod learn_reference;
 pub mod learning;
 mod linear_model;
 mod lock_monitor;
+mod machines;
 mod modulation;
 mod monte_carlo;
 mod motor_tests;
@@ -118,6 +119,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     speed_profile::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    machines::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     tracking::EXPERIMENT,

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::carrier::DemodulatorKind;
+use drive_core::identify::learning::Learned;
 use drive_core::io::{CONVERTER_CODES, PERIOD_S};
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
@@ -12,6 +14,11 @@ use crate::plant::{
     InverterSettings, Load, MachineSettings, MeasurementSettings, MechanicsSettings, Plant,
     PlantSettings, SaliencySettings,
 };
+
+/// Longest learning, s: 30 points of 31 s at most, and the start.
+const LONGEST_LEARNING_S: u32 = 1000;
+/// Time at rest after a learning, in rotor time constants.
+const REST_T: f64 = 8.0;
 
 /// Control periods per second.
 pub const RATE_HZ: f64 = 6000.0;
@@ -89,12 +96,44 @@ impl Rig {
         })
     }
 
-    /// The bench that the configuration describes.
+    /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
+    /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`].
+    /// As [`Rig::new`] and [`Rig::learn`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
-        Self::new(&plant_settings(config), &config.drive, seed)
+        let plant = plant_settings(config);
+        let mut rig = Self::new(&plant, &config.drive, seed)?;
+        let injecting = config.drive.angle_source == AngleSource::Injection;
+        let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
+        if config.prepare.learn && injecting && tracks {
+            rig.set_load(Load::Locked)?;
+            rig.learn()?;
+            // The flux decays.
+            rig.run(REST_T * f64::from(config.drive.motor.tau_r()), |_| {});
+            rig.set_load(plant.mechanics.load)?;
+            rig.periods = 0;
+        }
+        Ok(rig)
+    }
+
+    /// Lets the drive learn; the shaft must be locked. The drive is off afterwards and uses the learned values.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
+    pub fn learn(&mut self) -> Result<Learned, Error> {
+        self.command(&Command::Start(Mode::Learning))?;
+        for _ in 0..LONGEST_LEARNING_S {
+            self.run(1.0, |_| {});
+            match (self.drive.state(), self.drive.learned()) {
+                (State::Off, Some(learned)) => return Ok(*learned),
+                (State::Fault(fault), _) => {
+                    return Err(Error::Refused(format!("the drive does not learn: {fault}")));
+                }
+                _ => {}
+            }
+        }
+        Err(Error::Refused(format!("the drive does not learn: it is {}", self.drive.state())))
     }
 
     /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
@@ -279,7 +318,9 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             friction: m.friction,
             load: match config.load.mode {
                 config::LoadMode::Locked => Load::Locked,
-                config::LoadMode::Free => Load::Free { torque: config.load.torque_nm },
+                config::LoadMode::Free => {
+                    Load::Free { torque: config.load.torque_nm.unwrap_or(0.0) }
+                }
                 config::LoadMode::Speed => {
                     Load::Speed { speed: config.load.speed_rpm * TAU / 60.0 }
                 }

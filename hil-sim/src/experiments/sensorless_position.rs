@@ -71,7 +71,7 @@ fn hold(
     let mut config = config.clone();
     config.drive.angle_source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
-    config.load.torque_nm = 0.0;
+    config.load.torque_nm = None;
     config.motor.r_r = f64::from(config.drive.motor.r_r) * belief.0;
     let mut drive = config.drive;
     if belief.1 {
