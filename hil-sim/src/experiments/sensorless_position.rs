@@ -176,7 +176,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks = assumptions(config);
     outcome.remarks.push(
         "The position is the flux angle less the integral of the slip. The injection observes the \
-         flux; nothing observes the rotor inside it, so an error of the slip, i_q/(tau_r i_d), is an \
+         flux; nothing observes the rotor inside it, so an error of the slip, i_q/(τ_r i_d), is an \
          error of the speed: at 1 A, 1 % of rotor resistance is 2.2 mechanical degrees per second, \
          whatever the estimator. What is not of the resistance comes from the angle error: by one \
          degree at 1 A the slip is 16 electrical degrees per second off."

@@ -43,7 +43,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     rig.start(Mode::Speed)?;
     let start = rig.time();
     let mut points: Vec<Point> = Vec::new();
-    let mut wanted = Vec::new();
+    let (mut wanted, mut events) = (Vec::new(), Vec::new());
+    let mut load = 0.0;
     let (mut steady, mut seen) = (Stats::default(), Stats::default());
     for (rpm, torque, seconds) in PROFILE {
         if matches!(rig.drive.state(), State::Fault(_)) {
@@ -53,6 +54,11 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         rig.set_load(Load::Free { torque })?;
         let (begin, seconds) = (rig.time() - start, seconds * scale);
         wanted.extend([(begin, rpm), (begin + seconds, rpm)]);
+        if torque != load {
+            load = torque;
+            let text = if load == 0.0 { "load off".into() } else { format!("load {load} Nm") };
+            events.push((begin, text));
+        }
         let from = begin + seconds - SETTLED_S * scale;
         rig.run(seconds, |p| {
             let p = Point { t: p.t - start, ..*p };
@@ -66,7 +72,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
-    let stopped = matches!(rig.drive.state(), State::Fault(_));
+    let stopped = match rig.drive.state() {
+        State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
+        _ => None,
+    };
     let m = &mut outcome.metrics;
     m.set("angle_error_rms_deg", error.rms());
     m.set("angle_error_max_deg", error.largest());
@@ -74,26 +83,35 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("speed_error_mean_rpm", steady.mean());
     m.set("speed_estimate_error_rms_rpm", seen.rms());
     m.set("speed_max_rpm", points.iter().map(|p| p.speed_rpm).fold(0.0, f64::max));
-    m.set("lost", f64::from(u8::from(stopped || error.largest() > LOST_DEG)));
+    m.set("lost", f64::from(u8::from(stopped.is_some() || error.largest() > LOST_DEG)));
 
     let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";
+    let end = points.last().map_or(0.0, |p| p.t);
+    events.extend(stopped.iter().map(|fault| (end, fault.clone())));
+    outcome.faults.extend(stopped);
     outcome.figures.push(
-        Figure::new("profile", "Speed profile with a reversal and a load of 0.6 Nm", "section 5.2")
-            .panel(
-                Panel::new(x, "speed (rpm)")
-                    .with(Series::line("rotor", line(|p| p.speed_rpm)))
-                    .with(Series::line("estimated", line(|p| p.speed_estimate_rpm)))
-                    .with(Series::reference("asked for", wanted)),
+        Figure {
+            events,
+            ..Figure::new(
+                "profile",
+                "Speed profile with a reversal and a load of 0.6 Nm",
+                "section 5.2",
             )
-            .panel(
-                Panel::new(x, "quadrature current (A)")
-                    .with(Series::line("measured", line(|p| p.iq))),
-            )
-            .panel(
-                Panel::new(x, "angle error (° electrical)")
-                    .with(Series::line("true minus estimated", line(|p| p.angle_error_deg))),
-            ),
+        }
+        .panel(
+            Panel::new(x, "speed (rpm)")
+                .with(Series::line("rotor", line(|p| p.speed_rpm)))
+                .with(Series::line("estimated", line(|p| p.speed_estimate_rpm)))
+                .with(Series::reference("asked for", wanted)),
+        )
+        .panel(
+            Panel::new(x, "quadrature current (A)").with(Series::line("measured", line(|p| p.iq))),
+        )
+        .panel(
+            Panel::new(x, "angle error (° electrical)")
+                .with(Series::line("true minus estimated", line(|p| p.angle_error_deg))),
+        ),
     );
     outcome.remarks = assumptions(&config);
     outcome.remarks.push("The load of 0.6 Nm acts from 3 s to 10 s.".into());

@@ -79,6 +79,8 @@ pub struct Panel {
     pub y_range: Option<(f64, f64)>,
     /// One unit is as long on either axis.
     pub equal_axes: bool,
+    /// The values are 0 for off and 1 for on.
+    pub switch: bool,
 }
 
 impl Panel {
@@ -103,6 +105,12 @@ impl Panel {
     pub fn y_range(mut self, low: f64, high: f64) -> Self {
         self.y_range = Some((low, high));
         self
+    }
+
+    /// With 0 for off and 1 for on, and no other labels.
+    pub fn switch(mut self) -> Self {
+        self.switch = true;
+        self.y_range(-0.1, 1.1)
     }
 
     /// With a unit as long on either axis.

@@ -74,6 +74,9 @@ fn settings(changed: &[(String, String)]) -> String {
     }
 }
 
+/// Metrics in a list that is too long to stand before the figures.
+const LONG_LIST: usize = 24;
+
 fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> {
     let outcome = section.outcome;
     let (name, about) = (escape(section.name), prose(section.about));
@@ -86,7 +89,11 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
     if let Some(lost) = outcome.lost() {
         let _ = writeln!(body, "<p class=\"lost\">{}</p>", prose(&lost));
     }
-    write_metrics(body, &outcome.metrics);
+    // Long lists do not stand between the reader and the figures.
+    let is_long = outcome.metrics.iter().count() > LONG_LIST;
+    if !is_long {
+        write_metrics(body, &outcome.metrics);
+    }
     if let Some(steps) = &outcome.steps {
         write_table(body, &Table::of_steps(steps));
     }
@@ -106,6 +113,9 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
     }
     for table in &outcome.tables {
         write_table(body, table);
+    }
+    if is_long {
+        write_metrics(body, &outcome.metrics);
     }
     for (title, text) in &outcome.texts {
         let _ = writeln!(body, "<h3>{}</h3>\n<pre>{}</pre>", escape(title), escape(text));

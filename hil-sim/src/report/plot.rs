@@ -11,6 +11,7 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 use super::envelope::envelope;
+use super::prose::signs;
 use crate::error::Error;
 use crate::outcome::{Figure, Panel, Style};
 use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legend, legend_height};
@@ -27,7 +28,7 @@ const HEIGHT: i32 = 190 * SCALE;
 const LEFT: i32 = 72 * SCALE;
 const RIGHT: i32 = 20 * SCALE;
 /// Space below a plot area: with the labels of the horizontal axis, and without.
-const LABELS: i32 = 46 * SCALE;
+const LABELS: i32 = 43 * SCALE;
 const GAP: i32 = 6 * SCALE;
 /// Space above a plot area.
 const ABOVE: i32 = 8 * SCALE;
@@ -206,29 +207,33 @@ where
 {
     let mut chart = chart.build_cartesian_2d(x, y.clone())?;
     let unlabelled = |_: &f64| String::new();
-    let is_switch = panel.series.iter().flat_map(|s| &s.points).all(|p| p.1 == 0.0 || p.1 == 1.0);
     let mut mesh = chart.configure_mesh();
-    mesh.label_style(font(12)).axis_desc_style(font(13)).axis_style(pen(GREY, SCALE));
+    mesh.label_style(font(12)).axis_desc_style(font(12)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
-    mesh.x_labels(10).y_labels(if is_switch { 2 } else { 7 });
-    mesh.y_desc(&panel.y_label).y_label_formatter(&number);
+    mesh.x_labels(10).y_labels(if panel.switch { 2 } else { 7 });
+    mesh.y_desc(signs(&panel.y_label)).y_label_formatter(&number);
     mesh.set_all_tick_mark_size(3 * SCALE);
     if frame.has_x_labels {
-        mesh.x_desc(&panel.x_label).x_label_formatter(&number);
+        mesh.x_desc(signs(&panel.x_label)).x_label_formatter(&number);
     } else {
         mesh.x_label_formatter(&unlabelled);
     }
     mesh.draw()?;
     let area = chart.plotting_area();
-    let dashed = |line, dash, pen| DashedPathElement::new(line, dash, 4 * SCALE, pen);
+    let dashed = |line, dash, pen| DashedPathElement::new(line, dash, dash, pen);
     for &x in &frame.events {
         area.draw(&dashed(vec![(x, y.start), (x, y.end)], 2 * SCALE, pen(GREY, SCALE)))?;
     }
     // References and limits lie above the curves.
     let (above, below): (Vec<_>, Vec<_>) =
         above::places(panel).partition(|(_, series)| dash(series.style).is_some());
+    let has_reference = above.iter().any(|(_, series)| series.style == Style::Reference);
     for (place, series) in below.into_iter().chain(above) {
-        let pen = pen_of(series.style, place);
+        let mut pen = pen_of(series.style, place);
+        if has_reference && series.style == Style::Line {
+            // The reference shows on it.
+            pen.color = pen.color.mix(0.6);
+        }
         for part in series.points.split(|p| !is_drawn(panel, *p)) {
             if series.style == Style::Points {
                 chart.draw_series(part.iter().map(|p| Circle::new(*p, MARKER, pen)))?;
@@ -250,8 +255,9 @@ fn number(value: &f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "\u{2212}")
 }
 
+/// A font of this size in pixels; plotters writes its sizes divided by 1.24.
 fn font(size: i32) -> TextStyle<'static> {
-    ("sans-serif", size * SCALE).into_font().color(&INK)
+    ("sans-serif", 1.24 * f64::from(size * SCALE)).into_font().color(&INK)
 }
 
 fn pen(colour: RGBColor, width: i32) -> ShapeStyle {

@@ -10,6 +10,7 @@ use super::{
     Area, Failure, LEFT, MARKER, RIGHT, SCALE, WIDTH, colours, dash, font, is_coloured, pen, pen_of,
 };
 use crate::outcome::{Panel, Series, Style};
+use crate::report::prose::signs;
 
 /// Height of a row of the legend.
 const LEGEND_ROW: i32 = 20 * SCALE;
@@ -56,10 +57,10 @@ pub fn draw_legend(area: &Area<'_>, entries: &[Entry<'_>]) -> Result<(), Failure
             (Style::Points, _) => cell.draw(&Circle::new((13 * SCALE, middle), MARKER, pen))?,
             (_, None) => cell.draw(&PathElement::new(sample, pen))?,
             (_, Some(dash)) => {
-                cell.draw(&DashedPathElement::new(sample, dash, 4 * SCALE, pen))?;
+                cell.draw(&DashedPathElement::new(sample, dash, dash, pen))?;
             }
         }
-        cell.draw(&Text::new(name.to_owned(), (32 * SCALE, middle - 6 * SCALE), font(12)))?;
+        cell.draw(&Text::new(signs(name), (32 * SCALE, middle - 6 * SCALE), font(12)))?;
     }
     Ok(())
 }
@@ -109,7 +110,7 @@ pub fn draw_labels(area: &Area<'_>, labels: &[Label<'_>]) -> Result<(), Failure>
         area.draw(&PathElement::new([(*x, top), (*x, bottom)], pen(colours::GREY, SCALE)))?;
         let (side, gap) = if *ends { (HPos::Right, -3 * SCALE) } else { (HPos::Left, 3 * SCALE) };
         let font = font(11).pos(Pos::new(side, VPos::Top));
-        area.draw(&Text::new((*text).to_owned(), (x + gap, top), font))?;
+        area.draw(&Text::new(signs(text), (x + gap, top), font))?;
     }
     Ok(())
 }
