@@ -1,4 +1,5 @@
 //! The command line.
+#![deny(clippy::use_debug)]
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
