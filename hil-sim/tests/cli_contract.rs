@@ -119,6 +119,9 @@ fn a_lost_run_names_its_fault_and_prints_no_nan() {
     assert!(printed.contains(fault), "{fault}");
     let events = object["events"]["profile"].as_array().expect("events");
     assert_eq!(events.last().expect("an event")[1], fault, "{events:?}");
+    // It comes with the load, at 3 s, not at the end of the part of the profile, at 5 s.
+    let stop = events.last().and_then(|event| event[0].as_f64()).expect("a time");
+    assert!((3.0..3.5).contains(&stop), "{events:?}");
 }
 
 #[test]

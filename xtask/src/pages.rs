@@ -44,8 +44,7 @@ pub fn pages() -> Result<()> {
             let page = Page { folder: &folder, name, view, width, dark };
             wrong.extend(page.picture()?.complaint(&format!("{name}, {view}")));
         }
-        let mut pdf = "--print-to-pdf=".to_owned();
-        pdf.push_str(&folder.join(format!("{name}.pdf")).to_string_lossy());
+        let pdf = format!("--print-to-pdf={}", folder.join(format!("{name}.pdf")).display());
         let page = folder.join(format!("{name}.html"));
         chromium(&folder, &page, &["--no-pdf-header-footer", &pdf])?;
     }

@@ -311,7 +311,7 @@ fn remarks() -> Vec<String> {
          600 Hz and 1200 Hz, and an average over one carrier period takes them out."
             .into(),
         "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
-         filters (injection.rms_samples). Their impedance difference is shown as the current \
+         filters (`injection.rms_samples`). Their impedance difference is shown as the current \
          difference that it stands for, I²/(√2 V) amperes an ohm (0.94 mA/Ω with 50 V on the \
          motor of Table 5), and θ is counted from 90° ahead of the flux, so that the maps compare."
             .into(),

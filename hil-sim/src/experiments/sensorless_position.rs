@@ -202,9 +202,7 @@ fn step_figure(without: &[Point], with: &[Point]) -> Figure {
     };
     Figure::new("step", "Position step without and with the encoder", "Figure 37")
         .panel(panel("position (° mechanical)", |p| p.turns * 360.0))
-        .panel(panel("position seen minus true (° mechanical)", |p| {
-            (p.turns_estimate - p.turns) * 360.0
-        }))
+        .panel(panel("seen − true (° mechanical)", |p| (p.turns_estimate - p.turns) * 360.0))
         .panel(panel("speed (rpm)", |p| p.speed_rpm))
         .panel(panel("quadrature current (A)", |p| p.iq))
         .panel(panel("flux angle error (° electrical)", |p| p.angle_error_deg))
@@ -215,8 +213,8 @@ fn drift_figure(held: &[HeldPosition]) -> Figure {
     let mut figure = Figure::new("drift", title, "");
     for belief in BELIEFS {
         let pct = (belief.0 - 1.0) * 100.0;
-        let learned = if belief.1 { ", learned so" } else { "" };
-        let label = format!("position (°), r_r +{pct:.0} %{learned}");
+        let learned = if belief.1 { ", learned" } else { "" };
+        let label = format!("position, r_r +{pct:.0} %{learned} (°)");
         let mut panel = Panel::new("time (s)", label);
         for h in held.iter().filter(|h| h.belief == belief) {
             panel = panel.with(Series::line(format!("{} Nm", h.load_nm), h.track.clone()));

@@ -87,8 +87,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";
-    let end = points.last().map_or(0.0, |p| p.t);
-    events.extend(stopped.iter().map(|fault| (end, fault.clone())));
+    // From the stop on the drive's telemetry stands still.
+    let standing = |p: &&Point| points.last().is_some_and(|last| last.iq == p.iq);
+    let stop = points.iter().rev().take_while(standing).last().map_or(0.0, |p| p.t);
+    events.extend(stopped.iter().map(|fault| (stop, fault.clone())));
     outcome.faults.extend(stopped);
     outcome.figures.push(
         Figure {

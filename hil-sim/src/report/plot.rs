@@ -30,6 +30,8 @@ const RIGHT: i32 = 20 * SCALE;
 /// Space below a plot area: with the labels of the horizontal axis, and without.
 const LABELS: i32 = 43 * SCALE;
 const GAP: i32 = 6 * SCALE;
+/// Size of texts.
+const TEXT_PX: f64 = 12.0;
 /// Space above a plot area.
 const ABOVE: i32 = 8 * SCALE;
 
@@ -208,10 +210,11 @@ where
     let mut chart = chart.build_cartesian_2d(x, y.clone())?;
     let unlabelled = |_: &f64| String::new();
     let mut mesh = chart.configure_mesh();
-    mesh.label_style(font(12)).axis_desc_style(font(12)).axis_style(pen(GREY, SCALE));
+    mesh.label_style(font(TEXT_PX)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
     mesh.x_labels(10).y_labels(if panel.switch { 2 } else { 7 });
     mesh.y_desc(signs(&panel.y_label)).y_label_formatter(&number);
+    mesh.axis_desc_style(font_beside(&panel.y_label));
     mesh.set_all_tick_mark_size(3 * SCALE);
     if frame.has_x_labels {
         mesh.x_desc(signs(&panel.x_label)).x_label_formatter(&number);
@@ -251,13 +254,23 @@ where
 
 /// A label of an axis, with at most six decimals.
 fn number(value: &f64) -> String {
-    let text = format!("{:.6}", value + 0.0);
-    text.trim_end_matches('0').trim_end_matches('.').replace('-', "\u{2212}")
+    let text = format!("{value:.6}");
+    match text.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_owned(),
+        number => signs(number),
+    }
 }
 
 /// A font of this size in pixels; plotters writes its sizes divided by 1.24.
-fn font(size: i32) -> TextStyle<'static> {
-    ("sans-serif", 1.24 * f64::from(size * SCALE)).into_font().color(&INK)
+fn font(size: f64) -> TextStyle<'static> {
+    ("sans-serif", 1.24 * size * f64::from(SCALE)).into_font().color(&INK)
+}
+
+/// The font of a label beside a plot: smaller than others where a long text has no room otherwise.
+fn font_beside(text: &str) -> TextStyle<'static> {
+    const ROOM_PX: f64 = 204.0;
+    const WIDTH_OF_LETTER: f64 = 0.6;
+    font((ROOM_PX / (WIDTH_OF_LETTER * text.chars().count() as f64)).min(TEXT_PX))
 }
 
 fn pen(colour: RGBColor, width: i32) -> ShapeStyle {

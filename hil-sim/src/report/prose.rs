@@ -63,7 +63,7 @@ fn typeset(text: &str) -> String {
     while let Some(&letter) = letters.get(k) {
         let rest = &letters[k + 1..];
         let (tag, of): (_, fn(&&char) -> bool) = match letter {
-            '_' => ("sub", |c| c.is_alphanumeric()),
+            '_' => ("sub", |c| c.is_alphabetic() || c.is_ascii_digit()),
             _ => ("sup", |c| c.is_ascii_digit()),
         };
         let index: String = rest.iter().take_while(of).collect();
@@ -97,7 +97,7 @@ mod tests {
             ("i_q, V_dc t_d / T", "i<sub>q</sub>, V<sub>dc</sub> t<sub>d</sub> / T"),
             ("x^2 < L_m/L_r", "x<sup>2</sup> &lt; L<sub>m</sub>/L<sub>r</sub>"),
             ("angle_error_deg, tau_r_error", "angle_error_deg, tau_r_error"),
-            ("sigma_l_s/tau_r", "σ l<sub>s</sub>/τ<sub>r</sub>"),
+            ("sigma_l_s/tau_r, L_m²", "σ l<sub>s</sub>/τ<sub>r</sub>, L<sub>m</sub>²"),
             ("`--set i_q=-1` adds", "<code>--set i_q=-1</code> adds"),
         ] {
             assert_eq!(prose(text), html);

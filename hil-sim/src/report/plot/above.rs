@@ -7,7 +7,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{
-    Area, Failure, LEFT, MARKER, RIGHT, SCALE, WIDTH, colours, dash, font, is_coloured, pen, pen_of,
+    Area, Failure, LEFT, MARKER, RIGHT, SCALE, TEXT_PX, WIDTH, colours, dash, font, is_coloured,
+    pen, pen_of,
 };
 use crate::outcome::{Panel, Series, Style};
 use crate::report::prose::signs;
@@ -60,7 +61,7 @@ pub fn draw_legend(area: &Area<'_>, entries: &[Entry<'_>]) -> Result<(), Failure
                 cell.draw(&DashedPathElement::new(sample, dash, dash, pen))?;
             }
         }
-        cell.draw(&Text::new(signs(name), (32 * SCALE, middle - 6 * SCALE), font(12)))?;
+        cell.draw(&Text::new(signs(name), (32 * SCALE, middle - 6 * SCALE), font(TEXT_PX)))?;
     }
     Ok(())
 }
@@ -109,7 +110,7 @@ pub fn draw_labels(area: &Area<'_>, labels: &[Label<'_>]) -> Result<(), Failure>
         let top = row * EVENT_ROW + 2 * SCALE;
         area.draw(&PathElement::new([(*x, top), (*x, bottom)], pen(colours::GREY, SCALE)))?;
         let (side, gap) = if *ends { (HPos::Right, -3 * SCALE) } else { (HPos::Left, 3 * SCALE) };
-        let font = font(11).pos(Pos::new(side, VPos::Top));
+        let font = font(TEXT_PX - 1.0).pos(Pos::new(side, VPos::Top));
         area.draw(&Text::new(signs(text), (x + gap, top), font))?;
     }
     Ok(())
