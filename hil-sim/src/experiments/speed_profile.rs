@@ -93,27 +93,22 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     events.extend(stopped.iter().map(|fault| (stop, fault.clone())));
     outcome.faults.extend(stopped);
     outcome.figures.push(
-        Figure {
-            events,
-            ..Figure::new(
-                "profile",
-                "Speed profile with a reversal and a load of 0.6 Nm",
-                "section 5.2",
+        Figure::new("profile", "Speed profile with a reversal and a load of 0.6 Nm", "section 5.2")
+            .events(events)
+            .panel(
+                Panel::new(x, "speed (rpm)")
+                    .with(Series::line("rotor", line(|p| p.speed_rpm)))
+                    .with(Series::line("estimated", line(|p| p.speed_estimate_rpm)))
+                    .with(Series::reference("asked for", wanted)),
             )
-        }
-        .panel(
-            Panel::new(x, "speed (rpm)")
-                .with(Series::line("rotor", line(|p| p.speed_rpm)))
-                .with(Series::line("estimated", line(|p| p.speed_estimate_rpm)))
-                .with(Series::reference("asked for", wanted)),
-        )
-        .panel(
-            Panel::new(x, "quadrature current (A)").with(Series::line("measured", line(|p| p.iq))),
-        )
-        .panel(
-            Panel::new(x, "angle error (° electrical)")
-                .with(Series::line("true minus estimated", line(|p| p.angle_error_deg))),
-        ),
+            .panel(
+                Panel::new(x, "quadrature current (A)")
+                    .with(Series::line("measured", line(|p| p.iq))),
+            )
+            .panel(
+                Panel::new(x, "angle error (° electrical)")
+                    .with(Series::line("true minus estimated", line(|p| p.angle_error_deg))),
+            ),
     );
     outcome.remarks = assumptions(&config);
     outcome.remarks.push("The load of 0.6 Nm acts from 3 s to 10 s.".into());

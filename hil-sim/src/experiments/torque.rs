@@ -51,10 +51,15 @@ fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
         .map(|n| run.level(iq * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
         .collect();
     outcome.steps = Some(steps);
-    let figure = outcome.figures.iter_mut();
+    let end = run.points.last().map_or(0.0, |p| p.t);
     let levels = LEVELS.iter().enumerate().skip(1);
-    let step = |(n, level)| (n as f64 * level_s, format!("{:.2} A", iq * level));
-    figure.for_each(|figure| figure.events.extend(levels.clone().map(step)));
+    let events = levels
+        .map(|(n, level)| (n as f64 * level_s, format!("{:.2} A", iq * level)))
+        .filter(|event| event.0 < end);
+    if let Some(figure) = outcome.figures.first_mut() {
+        // Before a fault, which ends the run.
+        figure.events.splice(0..0, events);
+    }
     Ok(outcome)
 }
 

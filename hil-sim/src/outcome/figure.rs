@@ -44,9 +44,9 @@ impl Figure {
         self
     }
 
-    /// With one more event.
-    pub fn event(mut self, x: f64, text: impl Into<String>) -> Self {
-        self.events.push((x, text.into()));
+    /// With more events.
+    pub fn events(mut self, events: impl IntoIterator<Item = (f64, String)>) -> Self {
+        self.events.extend(events);
         self
     }
 

@@ -144,7 +144,8 @@ mod tests {
         outcome.tables.push(table);
         let panel = Panel::new("time (s)", "current (A)");
         let panel = panel.with(Series::line("actual", vec![(0.0, 1.0), (1.0, 2.0)]));
-        let figure = Figure::new("step", "A step", "Figure 38").panel(panel).event(0.5, "stop");
+        let figure =
+            Figure::new("step", "A step", "Figure 38").panel(panel).events([(0.5, "stop".into())]);
         outcome.figures.push(figure);
         outcome.faults.push("fault 4: dc link above its limit".into());
         let changes = ["motor.rs=6", "load.mode=free", "drive.learn=true"].map(String::from);

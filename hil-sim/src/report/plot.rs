@@ -375,7 +375,8 @@ mod tests {
             parts.iter().map(|part| part.matches("stroke=\"#787878\"").count()).collect::<Vec<_>>()
         };
         let without = dashes(&figure);
-        figure = figure.event(2.0, "start").event(2.1, "load on").event(99.0, "outside");
+        let events = [(2.0, "start"), (2.1, "load on"), (99.0, "outside")];
+        figure = figure.events(events.map(|(x, text)| (x, text.into())));
         let svg = svg(&figure).unwrap();
         let texts = texts(&svg);
         assert_eq!(texts.iter().filter(|text| **text == "start").count(), 1);

@@ -30,7 +30,7 @@ pub fn outcome(
     m.set("phase_current_peak_a", record.peak_current);
     m.set("worst_interrupt_cycles", f64::from(record.worst_cycles));
     outcome.faults = faults(lines);
-    outcome.figures.push(Figure { events: events(lines), ..figure(record) });
+    outcome.figures.push(figure(record).events(events(lines)));
     let text = |wanted: fn(Source) -> bool| {
         let lines = lines.iter().filter(|line| wanted(line.source));
         lines.map(|line| format!("{line}\n")).collect::<String>()
