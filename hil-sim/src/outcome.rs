@@ -147,15 +147,16 @@ impl Origin {
 }
 
 impl Outcome {
-    /// Whether the drive was lost, in words with its faults; nothing for a run that ended as it should.
+    /// Whether the drive was lost or stopped itself, in words with its faults; nothing for a run that ended
+    /// as it should.
     pub fn lost(&self) -> Option<String> {
+        let lost = self.metrics.get("lost");
+        let whether = if lost.is_some() { "Lost" } else { "The drive stopped itself" };
         match self.faults.as_slice() {
-            [] if self.metrics.get("lost") == Some(1.0) => Some(
-                "Lost: the drive stopped itself, or its flux angle was wrong beyond recovery."
-                    .into(),
-            ),
-            [] => None,
-            faults => Some(format!("Lost: {}.", faults.join("; "))),
+            [] => (lost == Some(1.0)).then(|| {
+                format!("{whether}: the drive stopped itself, or its flux angle was wrong beyond recovery.")
+            }),
+            faults => Some(format!("{whether}: {}.", faults.join("; "))),
         }
     }
 }
@@ -193,6 +194,10 @@ mod tests {
     fn a_lost_run_is_lost_in_words() {
         let mut outcome = Outcome::default();
         assert_eq!(outcome.lost(), None);
+        outcome.faults.push("fault 4: dc link above its limit".into());
+        let session = outcome.lost().unwrap();
+        assert_eq!(session, "The drive stopped itself: fault 4: dc link above its limit.");
+        outcome.faults.clear();
         outcome.metrics.set("lost", 1.0);
         assert!(outcome.lost().unwrap().starts_with("Lost: the drive stopped"));
         outcome.faults.push("fault 26: the angle is not tracked".into());

@@ -4,7 +4,7 @@
 //! frame's page measures: the pages themselves have no scripts.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
@@ -136,7 +136,7 @@ impl Measured {
 
 /// Output of Chromium for a page.
 fn chromium(folder: &Path, page: &Path, options: &[&str]) -> Result<String> {
-    let profile: PathBuf = folder.join("profile");
+    let profile = folder.join("profile");
     let output = Command::new("chromium")
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
         .arg(format!("--user-data-dir={}", profile.display()))

@@ -94,16 +94,16 @@ fn write_table(text: &mut String, table: &Table) {
     text.push('\n');
 }
 
-/// Longest line of a paragraph.
+/// Longest line of a paragraph, characters.
 const WIDTH: usize = 100;
 
-/// A paragraph in lines of at most [`WIDTH`] characters, indented by `indent` columns.
+/// A paragraph in lines of at most 100 characters, indented by `indent` columns.
 pub fn paragraph(text: &str, indent: usize) -> String {
     let indent = " ".repeat(indent);
     wrap(text, &indent, &indent)
 }
 
-/// Breaks a paragraph into lines of at most [`WIDTH`] characters, each behind one of the two indents.
+/// Breaks a paragraph into lines of at most 100 characters, each behind one of the two indents.
 fn wrap(paragraph: &str, first: &str, others: &str) -> String {
     let mut text = first.to_owned();
     let mut used = first.chars().count();

@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::outcome::{Figure, Panel, Style};
 use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legend, legend_height};
 pub use colours::style;
-use colours::{GREY, GRID, INK, PALETTE};
+use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
 
 /// Drawing units per pixel of the page. plotters draws in whole units: finer ones keep curves smooth.
 const SCALE: i32 = 4;
@@ -272,35 +272,6 @@ fn font_beside(text: &str) -> TextStyle<'static> {
     const WIDTH_OF_LETTER: f64 = 0.6;
     font((ROOM_PX / (WIDTH_OF_LETTER * text.chars().count() as f64)).min(TEXT_PX))
 }
-
-fn pen(colour: RGBColor, width: i32) -> ShapeStyle {
-    colour.stroke_width(width as u32)
-}
-
-fn pen_of(style: Style, place: usize) -> ShapeStyle {
-    match style {
-        Style::Line | Style::Points => pen(PALETTE[place % PALETTE.len()], 2 * SCALE),
-        Style::Reference => pen(INK, SCALE),
-        Style::Limit => pen(GREY, SCALE),
-    }
-}
-
-/// Whether a series has a colour of its own.
-fn is_coloured(style: Style) -> bool {
-    matches!(style, Style::Line | Style::Points)
-}
-
-/// Length of the dashes of a dashed line.
-fn dash(style: Style) -> Option<i32> {
-    match style {
-        Style::Line | Style::Points => None,
-        Style::Reference => Some(7 * SCALE),
-        Style::Limit => Some(3 * SCALE),
-    }
-}
-
-/// Radius of a marker.
-const MARKER: i32 = 7 * SCALE / 2;
 
 #[cfg(test)]
 mod tests {

@@ -6,10 +6,8 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{
-    Area, Failure, LEFT, MARKER, RIGHT, SCALE, TEXT_PX, WIDTH, colours, dash, font, is_coloured,
-    pen, pen_of,
-};
+use super::colours::{self, MARKER, dash, is_coloured, pen, pen_of};
+use super::{Area, Failure, LEFT, RIGHT, SCALE, TEXT_PX, WIDTH, font};
 use crate::outcome::{Panel, Series, Style};
 use crate::report::prose::signs;
 

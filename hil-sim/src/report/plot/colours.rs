@@ -1,6 +1,9 @@
-//! Colours of a figure on white paper and in the dark.
+//! Colours of a figure on white paper and in the dark, and strokes.
 
-use plotters::style::RGBColor;
+use plotters::style::{Color as _, RGBColor, ShapeStyle};
+
+use super::SCALE;
+use crate::outcome::Style;
 
 /// Colours that can be told apart with any colour vision (Okabe and Ito).
 pub const PALETTE: [RGBColor; 7] = [
@@ -35,3 +38,32 @@ pub fn style() -> String {
         rules.collect::<String>()
     )
 }
+
+pub fn pen(colour: RGBColor, width: i32) -> ShapeStyle {
+    colour.stroke_width(width as u32)
+}
+
+pub fn pen_of(style: Style, place: usize) -> ShapeStyle {
+    match style {
+        Style::Line | Style::Points => pen(PALETTE[place % PALETTE.len()], 2 * SCALE),
+        Style::Reference => pen(INK, SCALE),
+        Style::Limit => pen(GREY, SCALE),
+    }
+}
+
+/// Whether a series has a colour of its own.
+pub fn is_coloured(style: Style) -> bool {
+    matches!(style, Style::Line | Style::Points)
+}
+
+/// Length of the dashes of a dashed line.
+pub fn dash(style: Style) -> Option<i32> {
+    match style {
+        Style::Line | Style::Points => None,
+        Style::Reference => Some(7 * SCALE),
+        Style::Limit => Some(3 * SCALE),
+    }
+}
+
+/// Radius of a marker.
+pub const MARKER: i32 = 7 * SCALE / 2;
