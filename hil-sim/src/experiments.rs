@@ -1,4 +1,5 @@
 //! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
+#![deny(clippy::use_debug)]
 
 mod adc_calibration;
 mod angle_identification;

@@ -47,7 +47,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     rig.start(Mode::Speed)?;
     let start = rig.time();
     let mut points: Vec<Point> = Vec::new();
-    let mut wanted = Vec::new();
+    let (mut wanted, mut events) = (Vec::new(), Vec::new());
+    let mut acting = 0.0;
     let (mut steady, mut seen) = (Stats::default(), Stats::default());
     for (speed, load, seconds) in PROFILE {
         let (rpm, torque) = (speed * largest_rpm, load * load_nm);
@@ -58,6 +59,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         rig.set_load(Load::Free { torque })?;
         let (begin, seconds) = (rig.time() - start, seconds * scale);
         wanted.extend([(begin, rpm), (begin + seconds, rpm)]);
+        if torque != acting {
+            acting = torque;
+            let text =
+                if torque == 0.0 { "load off".into() } else { format!("load {torque:.2} Nm") };
+            events.push((begin, text));
+        }
         let from = begin + seconds - SETTLED_S * scale;
         rig.run(seconds, |p| {
             let p = Point { t: p.t - start, ..*p };
@@ -71,7 +78,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
-    let stopped = matches!(rig.drive.state(), State::Fault(_));
+    let stopped = match rig.drive.state() {
+        State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
+        _ => None,
+    };
     let m = &mut outcome.metrics;
     m.set("angle_error_rms_deg", error.rms());
     m.set("angle_error_max_deg", error.largest());
@@ -79,16 +89,22 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("speed_error_mean_rpm", steady.mean());
     m.set("speed_estimate_error_rms_rpm", seen.rms());
     m.set("speed_max_rpm", points.iter().map(|p| p.speed_rpm).fold(0.0, f64::max));
-    m.set("lost", f64::from(u8::from(stopped || error.largest() > LOST_DEG)));
+    m.set("lost", f64::from(u8::from(stopped.is_some() || error.largest() > LOST_DEG)));
 
     let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";
+    // From the stop on the drive's telemetry stands still.
+    let standing = |p: &&Point| points.last().is_some_and(|last| last.iq == p.iq);
+    let stop = points.iter().rev().take_while(standing).last().map_or(0.0, |p| p.t);
+    events.extend(stopped.iter().map(|fault| (stop, fault.clone())));
+    outcome.faults.extend(stopped);
     outcome.figures.push(
         Figure::new(
             "profile",
             &format!("Speed profile with a reversal and a load of {load_nm:.2} Nm"),
             "section 5.2",
         )
+        .events(events)
         .panel(
             Panel::new(x, "speed (rpm)")
                 .with(Series::line("rotor", line(|p| p.speed_rpm)))
