@@ -95,7 +95,7 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
     let mut config = config(&["angle.source=encoder"]);
     let settings = Settings { track_rotor: true, ..config.drive };
     config.motor.r_r *= r_r;
-    config.inverter.residual_v = residual;
+    config.inverter.residual_v = Some(residual);
     let mut rig = Rig::new(&plant_settings(&config), &settings, 3).unwrap();
     rig.start(Mode::Torque).unwrap();
     for n in 1..=100 {

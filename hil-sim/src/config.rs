@@ -12,27 +12,32 @@ mod value;
 
 use std::path::Path;
 
-use drive_core::settings::Line;
+use drive_core::settings::{Line, Settings};
 
 pub use key::Key;
 pub use keys::*;
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
+use crate::motors::Motor;
 use crate::rig::plant_settings;
 
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
 
 impl Config {
-    /// The defaults, changed first by the file and then by the assignments `KEY=VALUE`, in order.
+    /// The defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
-    /// [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
+    /// As [`Config::of_motor`], [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
     /// assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
     /// other: they are checked when the drive is built.
-    pub fn load(file: Option<&Path>, assignments: &[String]) -> Result<Self, Error> {
-        let mut config = Self::default();
+    pub fn load(
+        motor: Option<&str>,
+        file: Option<&Path>,
+        assignments: &[String],
+    ) -> Result<Self, Error> {
+        let mut config = Self::of_motor(motor)?;
         if let Some(path) = file {
             let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
@@ -44,6 +49,18 @@ impl Config {
             let (key, value) =
                 assignment.split_once('=').ok_or_else(|| Error::Assignment(assignment.clone()))?;
             config.set(key.trim(), &Value::from_text(value))?;
+        }
+        Ok(config)
+    }
+
+    /// The defaults with a motor; see [`Motor::find`].
+    ///
+    /// # Errors
+    /// As [`Motor::find`] and [`Motor::apply`].
+    pub fn of_motor(name: Option<&str>) -> Result<Self, Error> {
+        let mut config = Self::default();
+        if let Some(name) = name {
+            Motor::find(name)?.apply(&mut config)?;
         }
         Ok(config)
     }
@@ -92,6 +109,19 @@ impl Config {
         f64::from(self.drive.share_of_rated(on_reference as f32))
     }
 
+    /// A torque that is `on_reference`, Nm, on the dissertation's motor, in proportion to the torque of the current limit.
+    pub fn newton_metres(&self, on_reference: f64) -> f64 {
+        let largest = |drive: &Settings| {
+            f64::from(drive.motor.torque_per_ampere(drive.i_d()) * drive.current_limit_a())
+        };
+        on_reference * largest(&self.drive) / largest(&Settings::default())
+    }
+
+    /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
+    pub fn rpm(&self, on_reference: f64) -> f64 {
+        on_reference * 2.0 / f64::from(self.motor.pole_pairs)
+    }
+
     /// Sets the scales of the drive to those of the sensors, without their errors.
     pub(super) fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
@@ -112,10 +142,7 @@ impl Config {
     /// # Errors
     /// As [`Config::set`].
     pub fn set_table(&mut self, table: &toml::Table) -> Result<(), Error> {
-        let mut assignments = Vec::new();
-        flatten("", table, &mut assignments);
-        assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
-        assignments.iter().try_for_each(|(name, value)| self.set(name, value))
+        flattened(table).iter().try_for_each(|(name, value)| self.set(name, value))
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
@@ -137,6 +164,14 @@ impl Config {
         }
         changes
     }
+}
+
+/// The assignments of a table, those of the drive alone last.
+pub fn flattened(table: &toml::Table) -> Vec<(String, Value)> {
+    let mut assignments = Vec::new();
+    flatten("", table, &mut assignments);
+    assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
+    assignments
 }
 
 fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, Value)>) {

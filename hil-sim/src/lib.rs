@@ -3,10 +3,12 @@
 pub mod board;
 pub mod cli;
 pub mod config;
+pub mod console;
 pub mod error;
 pub mod experiments;
 pub mod identification;
 pub mod input;
+pub mod motors;
 pub mod outcome;
 pub mod progress;
 pub mod report;

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::carrier::DemodulatorKind;
+use drive_core::identify::learning::Learned;
 use drive_core::io::{CONVERTER_CODES, PERIOD_S};
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
@@ -12,6 +14,11 @@ use crate::plant::{
     InverterSettings, Load, MachineSettings, MeasurementSettings, MechanicsSettings, Plant,
     PlantSettings, SaliencySettings,
 };
+
+/// Longest learning, s: 30 points of 31 s at most, and the start.
+const LONGEST_LEARNING_S: u32 = 1000;
+/// Time at rest after a learning, in rotor time constants.
+const REST_T: f64 = 8.0;
 
 /// Control periods per second.
 pub const RATE_HZ: f64 = 6000.0;
@@ -89,12 +96,44 @@ impl Rig {
         })
     }
 
-    /// The bench that the configuration describes.
+    /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
+    /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`].
+    /// As [`Rig::new`] and [`Rig::learn`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
-        Self::new(&plant_settings(config), &config.drive, seed)
+        let plant = plant_settings(config);
+        let mut rig = Self::new(&plant, &config.drive, seed)?;
+        let injecting = config.drive.angle_source == AngleSource::Injection;
+        let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
+        if config.prepare.learn && injecting && tracks {
+            rig.set_load(Load::Locked)?;
+            rig.learn()?;
+            // The flux decays.
+            rig.run(REST_T * f64::from(config.drive.motor.tau_r()), |_| {});
+            rig.set_load(plant.mechanics.load)?;
+            rig.periods = 0;
+        }
+        Ok(rig)
+    }
+
+    /// Lets the drive learn; the shaft must be locked. The drive is off afterwards and uses the learned values.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
+    pub fn learn(&mut self) -> Result<Learned, Error> {
+        self.command(&Command::Start(Mode::Learning))?;
+        for _ in 0..LONGEST_LEARNING_S {
+            self.run(1.0, |_| {});
+            match (self.drive.state(), self.drive.learned()) {
+                (State::Off, Some(learned)) => return Ok(*learned),
+                (State::Fault(fault), _) => {
+                    return Err(Error::Refused(format!("the drive does not learn: {fault}")));
+                }
+                _ => {}
+            }
+        }
+        Err(Error::Refused(format!("the drive does not learn: it is {}", self.drive.state())))
     }
 
     /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
@@ -231,6 +270,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
     // What is unset follows the dissertation's bench, in proportion.
     let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
+    let relative_voltage = i.dc_link_v / f64::from(reference_drive.inverter.dc_link_v);
     let relative_range = s.range_a / reference.range_a;
     let relative_current = f64::from(config.drive.rated_a()) / f64::from(reference_drive.rated_a());
     PlantSettings {
@@ -253,7 +293,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             vdc: i.dc_link_v,
             dead_time_us: i.dead_time_s * 1e6,
             propagation_us: i.propagation_us,
-            residual_v: i.residual_v,
+            residual_v: i.residual_v.unwrap_or(1.64 * relative_voltage),
             switched: i.switched,
             ..InverterSettings::default()
         },
@@ -266,11 +306,11 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             gain_error_b: s.gain_error_b,
             offset_a: s.offset_a,
             offset_b: s.offset_b,
-            dc_link_v: s.dc_link_range_v.map_or(
-                reference.dc_link_v
-                    * (i.dc_link_v / reference_drive.inverter.dc_link_v as f64).max(1.0),
-                |range| range / f64::from(CONVERTER_CODES),
-            ),
+            dc_link_v: s
+                .dc_link_range_v
+                .map_or(reference.dc_link_v * relative_voltage.max(1.0), |range| {
+                    range / f64::from(CONVERTER_CODES)
+                }),
             heat_sink_code: config.drive.scales.ntc.code(s.heat_sink_c as f32),
         },
         mechanics: MechanicsSettings {
@@ -278,7 +318,9 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             friction: m.friction,
             load: match config.load.mode {
                 config::LoadMode::Locked => Load::Locked,
-                config::LoadMode::Free => Load::Free { torque: config.load.torque_nm },
+                config::LoadMode::Free => {
+                    Load::Free { torque: config.load.torque_nm.unwrap_or(0.0) }
+                }
                 config::LoadMode::Speed => {
                     Load::Speed { speed: config.load.speed_rpm * TAU / 60.0 }
                 }

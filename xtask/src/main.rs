@@ -9,6 +9,7 @@ mod image;
 mod lines;
 mod map;
 mod modules;
+mod pages;
 mod paths;
 mod prove;
 mod rooms;
@@ -75,6 +76,9 @@ enum Task {
     },
     /// Builds the pages in docs/. Gets mdbook from crates.io
     Book,
+    /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
+    /// the text of a plot is too small
+    Pages,
     /// Long proofs in shards, which a later call continues. Lists them, or does one
     Prove {
         /// Name of the proof
@@ -114,6 +118,7 @@ fn run(task: Task) -> Result<()> {
         Task::Rooms => rooms::check(),
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book(),
+        Task::Pages => pages::pages(),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }

@@ -21,7 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;
 
-/// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) psi i_q.
+/// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) ψ i_q.
 type Orientation = (f64, f64);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -34,8 +34,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let mut table = Table::new("Field orientation over speed", &[]).note(format!(
-        "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m^2/L_r belongs; \
-         the torque is compared with 3/2 P (L_m/L_r) psi i_q."
+        "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
+         the torque is compared with 3/2 P (L_m/L_r) ψ i_q."
     ));
     let mut lines = [Vec::new(), Vec::new()];
     for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {

@@ -88,7 +88,7 @@ fn configured(config: &Config, case: &StepCase) -> Config {
     let mut config = config.clone();
     config.motor.r_r *= case.warmer;
     config.drive.angle_source = AngleSource::Injection;
-    config.load.torque_nm = 0.0;
+    config.load.torque_nm = None;
     config.load.mode = match case.disturbance {
         Disturbance::Load(_) => LoadMode::Free,
         Disturbance::TorqueCurrent(_) => LoadMode::Locked,

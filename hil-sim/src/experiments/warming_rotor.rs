@@ -65,7 +65,9 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         ..plant
     };
     let mut rig = Rig::new(&start, &settings, seed)?;
-    let mut online = Online::new(&settings).map_err(|e| Error::Refused(format!("{e:?}")))?;
+    let mut online = Online::new(&settings).map_err(|_| {
+        Error::Refused("the settings do not suit the estimation of the rotor time constant".into())
+    })?;
     rig.start(Mode::Torque)?;
     rig.command(&Command::Torque(case.iq_a as f32))?;
     let steps = 1 + (100.0 * case.speed_rpm.abs() / RAMP_RPM_PER_S) as u32;
