@@ -40,7 +40,7 @@ impl Firmware {
         match words[..] {
             ["help"] => "status   the state\r\nset KEY VALUE  sets\r\nok\r\n".into(),
             ["status"] => "fault 4: dc link above its limit\r\noff; i_d 0.00 A\r\n".into(),
-            ["trace", ..] => "time_s,i_q_a,v_q_v\r\n0,1,20\r\n0.1,2,30\r\nok\r\n".into(),
+            ["trace", ..] => "t_s,i_q_a,v_q_v\r\n0,1,20\r\n0.1,2,30\r\nok\r\n".into(),
             ["get"] => listed(&|(name, value)| format!("{name} = {value} ohm (0.1 to 9)")),
             ["backup"] if self.recent => listed(&|(name, value)| format!("set {name} {value}")),
             ["describe"] if self.recent => {
@@ -173,9 +173,9 @@ fn the_last_trace_is_plotted() {
     assert!(err.contains("no trace yet"), "{err}");
     let (code, out, err) = texts(&console(&port, &["trace 2", &plot]));
     assert_eq!(code, Some(0), "{err}");
-    assert!(out.contains("time_s,i_q_a,v_q_v") && out.contains("2 records in"), "{out}");
+    assert!(out.contains("t_s,i_q_a,v_q_v") && out.contains("2 records in"), "{out}");
     let svg = std::fs::read_to_string(file).unwrap();
-    assert!(svg.contains("i_q (A)") && svg.contains("v_q (V)") && svg.contains("time (s)"));
+    assert!(svg.contains("i_q (A)") && svg.contains("v_q (V)") && svg.contains("t (s)"));
 }
 
 #[test]

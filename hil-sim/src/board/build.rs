@@ -122,7 +122,9 @@ mod tests {
         let said = AtomicU32::new(0);
         let work_for = |ms| {
             said.store(0, Ordering::Relaxed);
-            let say = |_| drop(said.fetch_add(1, Ordering::Relaxed));
+            let say = |_| {
+                said.fetch_add(1, Ordering::Relaxed);
+            };
             while_saying(Duration::from_millis(200), say, || {
                 std::thread::sleep(Duration::from_millis(ms));
             });

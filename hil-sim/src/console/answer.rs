@@ -1,19 +1,23 @@
 //! The lines that answer a command: one, or many that end with `ok`. Lines that the drive says unasked can come at any
 //! time.
 
-/// Beginnings of lines that the drive says unasked: after a reset, about faults, learning and silence.
-const UNASKED: [&str; 8] = [
+/// Beginnings of lines that the drive says unasked, those of the firmware's announcements and of its greeting, and of
+/// the one that comes before an answer that takes a while.
+const UNASKED: [&str; 11] = [
     "induction-drive ",
     "fault ",
-    "learned:",
-    "learning",
-    "refused:",
-    "progress",
-    "stopped:",
-    "not stopped:",
+    "running: ",
+    "off: ",
+    "stopped: ",
+    "learning: ",
+    "learned: ",
+    "refused: ",
+    "trace: ",
+    "applied",
+    "designing...",
 ];
 /// Commands that are answered with many lines.
-const LISTS: [&str; 5] = ["help", "describe", "backup", "learned", "trace"];
+const LISTS: [&str; 7] = ["help", "h", "?", "describe", "backup", "learned", "trace"];
 
 /// The meaning of a line while an answer is awaited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +37,11 @@ pub fn is_unasked(line: &str) -> bool {
     UNASKED.iter().any(|beginning| line.starts_with(beginning))
 }
 
+/// Whether an answer says that the firmware does not know the command.
+pub fn is_unknown_command(error: &str) -> bool {
+    error.contains("no such command")
+}
+
 /// Whether a line refuses a command.
 pub fn is_error(line: &str) -> bool {
     line.starts_with("error:")
@@ -43,12 +52,14 @@ pub fn is_error(line: &str) -> bool {
 pub struct Awaited {
     command: String,
     begun: bool,
+    /// Whether its lines so far are those of a list.
+    many: bool,
 }
 
 impl Awaited {
     /// The answer to a command that has just been sent.
     pub fn new(command: &str) -> Self {
-        Self { command: command.trim().to_owned(), begun: false }
+        Self { command: command.trim().to_owned(), begun: false, many: false }
     }
 
     /// Whether the answer can take minutes: a trace is first recorded.
@@ -69,11 +80,14 @@ impl Awaited {
         if ends || is_error(line) {
             return Meaning::Last;
         }
-        if is_unasked(line) {
+        // `faults 4` is answered with `fault 4: ...`, without the advice of the announcement.
+        let explained = self.word() == "faults" && !line.contains("; likely: ");
+        if is_unasked(line) && !explained {
             return Meaning::Unasked;
         }
         self.begun = true;
-        if self.is_list(line) { Meaning::Answer } else { Meaning::Last }
+        self.many = self.is_list(line);
+        if self.many { Meaning::Answer } else { Meaning::Last }
     }
 
     /// Whether further lines follow this line of the answer.
@@ -82,8 +96,12 @@ impl Awaited {
             ("get", None) => true,
             // One setting, or all whose names begin so.
             ("get", Some((_, name))) => {
-                line.split_once(" = ").is_some_and(|(key, _)| key.starts_with(&format!("{name}.")))
+                self.many || {
+                    let key = line.split_once(" = ").map(|(key, _)| key);
+                    key.is_some_and(|key| key != name.trim() && key.starts_with(name.trim()))
+                }
             }
+            ("faults", _) => self.many || !line.starts_with("none "),
             (word, _) => LISTS.contains(&word),
         }
     }
@@ -112,7 +130,10 @@ mod tests {
     fn a_list_ends_with_ok_or_at_once_with_an_error() {
         assert_eq!(meanings("help", &["help", "start [MODE]  begins", "ok"])[1..], [Answer, Last]);
         assert_eq!(meanings("get", &["a = 1", "b = 2", "ok"]), [Answer, Answer, Last]);
-        assert_eq!(meanings("get motor", &["motor.r_s = 1", "ok"]), [Answer, Last]);
+        assert_eq!(
+            meanings("get mot", &["motor.r_s = 1", "motor.r_r = 2", "ok"])[1..],
+            [Answer, Last]
+        );
         assert_eq!(meanings("learned", &["ok: nothing learned"]), [Last]);
         assert_eq!(meanings("describe", &["error: no such command"]), [Last]);
     }
@@ -121,7 +142,16 @@ mod tests {
     fn the_echo_and_unasked_lines_are_no_answer() {
         let lines = ["start", "fault 4: dc link above its limit", "ok"];
         assert_eq!(meanings("start", &lines), [Echo, Unasked, Last]);
-        assert_eq!(meanings("faults", &["latched: fault 4, dc link"]), [Last]);
+        let causes = ["latched: fault 4, dc link", "cause 1: the brake", "cure: a resistor", "ok"];
+        assert_eq!(meanings("faults", &causes), [Answer, Answer, Answer, Last]);
+        assert_eq!(meanings("faults", &["none latched; last run: power"]), [Last]);
+        assert_eq!(
+            meanings("faults 4", &["fault 4: dc link", "cause 1: x", "ok"])[..2],
+            [Answer; 2]
+        );
+        let news = "fault 4: dc link; likely: the brake; type 'clear'";
+        assert_eq!(meanings("faults 4", &[news, "fault 4: dc link"]), [Unasked, Answer]);
+        assert_eq!(meanings("apply", &["designing...", "off: stopped", "ok"])[..2], [Unasked; 2]);
         assert_eq!(meanings("version", &["0.1.0 1abee12"]), [Last]);
     }
 }

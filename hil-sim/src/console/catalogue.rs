@@ -61,7 +61,7 @@ impl Catalogue {
                 all.extend(own.map(str::to_owned));
                 all
             }
-            ["get"] => names(&self.settings),
+            ["get" | "describe"] => names(&self.settings),
             // Names and values in turn.
             ["set", .., name] if before.len().is_multiple_of(2) => words(&self.settings, name),
             ["set", ..] => names(&self.settings),
@@ -72,17 +72,24 @@ impl Catalogue {
     }
 }
 
-/// The commands of `help`: usage and, behind two spaces, the meaning.
+/// The commands of `help`: usage and, behind two spaces, the meaning. Words in lower case behind the name can be typed;
+/// others stand for something.
 fn commands(help: &Answer) -> Vec<Known> {
+    let mut commands: Vec<Known> = Vec::new();
     let usages = help.contents().iter().filter_map(|line| Some(line.split_once("  ")?.0));
-    let commands = usages.filter_map(|usage| {
+    for usage in usages {
         let mut parts = usage.split_whitespace();
-        let name = parts.next()?.to_owned();
-        let choices = parts.filter(|part| part.contains('|'));
-        let words = choices.flat_map(|part| part.trim_matches(['[', ']', '(', ')']).split('|'));
-        Some(Known { name, words: words.map(str::to_owned).collect() })
-    });
-    commands.collect()
+        let Some(name) = parts.next() else { continue };
+        let choices = parts.next().unwrap_or_default().trim_matches(['[', ']']).split('|');
+        let literal =
+            |word: &&str| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase());
+        let words = choices.filter(literal).map(str::to_owned);
+        match commands.iter_mut().find(|known| known.name == name) {
+            Some(known) => known.words.extend(words),
+            None => commands.push(Known { name: name.to_owned(), words: words.collect() }),
+        }
+    }
+    commands
 }
 
 /// The setting of a line of `describe`, a JSON object.
@@ -116,6 +123,8 @@ mod tests {
             "stop                    ends",
             "log off|warn            how much goes to the log",
             "set KEY VALUE           changes a setting",
+            "trace N [NAME]          records",
+            "trace [off]             ends it",
             "one line in, one line out",
             "ok",
         ];
@@ -140,6 +149,9 @@ mod tests {
             ("!r", 0, &["!restore"]),
             ("start s", 6, &["speed"]),
             ("log ", 4, &["off", "warn"]),
+            ("tr", 0, &["trace"]),
+            ("trace ", 6, &["off"]),
+            ("describe mo", 9, &["motor.r_s"]),
             ("get mo", 4, &["motor.r_s"]),
             ("set ", 4, &["motor.r_s", "sequence.i_d", "angle_source"]),
             ("set angle_source e", 17, &["encoder"]),

@@ -16,6 +16,9 @@ const UNITS: [(&str, &str); 10] = [
     ("_c", "°C"),
 ];
 
+/// Names of the first column: the time from the trigger, or the number of the record.
+const HEADS: [&str; 2] = ["t_s", "record"];
+
 /// A table of numbers whose first column is the time or the number of the record.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -36,8 +39,7 @@ impl Collector {
         let numbers: Result<Vec<f64>, _> = fields.iter().map(|field| field.parse()).collect();
         match numbers {
             Ok(row) if row.len() == self.trace.names.len() => self.trace.rows.push(row),
-            // Names, at least two, without spaces: no sentence.
-            Err(_) if fields.len() > 1 && fields.iter().all(|field| is_name(field)) => {
+            Err(_) if HEADS.contains(&fields[0]) => {
                 let names = fields.into_iter().map(str::to_owned).collect();
                 self.trace = Trace { names, rows: Vec::new() };
             }
@@ -49,11 +51,6 @@ impl Collector {
     pub fn last(&self) -> Option<Trace> {
         (!self.trace.rows.is_empty()).then(|| self.trace.clone())
     }
-}
-
-fn is_name(field: &str) -> bool {
-    let begins = field.starts_with(|c: char| c.is_ascii_alphabetic());
-    begins && field.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 impl Trace {
@@ -94,7 +91,7 @@ fn unit(name: &str) -> &'static str {
     known.map_or("", |(_, unit)| unit)
 }
 
-/// A name with its unit in parentheses: `time (s)` for `time_s`.
+/// A name with its unit in parentheses: `speed (rpm)` for `speed_rpm`.
 fn label(name: &str) -> String {
     match UNITS.iter().find(|(ending, _)| name.ends_with(ending)) {
         Some((ending, unit)) => format!("{} ({unit})", &name[..name.len() - ending.len()]),
@@ -116,7 +113,7 @@ mod tests {
     fn a_trace_is_found_among_other_lines() {
         let lines = [
             "off; i_d 0.00 A, i_q 0.00 of 0.00 A",
-            "time_s,i_d_a,i_q_a,turns",
+            "t_s,i_d_a,i_q_a,turns",
             "-0.0001,0.5,1.25,0",
             "fault 4: dc link above its limit, see the page",
             "0.0000,0.6,1.5,0.25",
@@ -124,17 +121,18 @@ mod tests {
         ];
         let figure = trace(&lines).unwrap().figure();
         let labels: Vec<_> = figure.panels.iter().map(|p| (&*p.x_label, &*p.y_label)).collect();
-        assert_eq!(labels, [("time (s)", "A"), ("time (s)", "turns")]);
+        assert_eq!(labels, [("t (s)", "A"), ("t (s)", "turns")]);
         let currents: Vec<_> = figure.panels[0].series.iter().map(|s| s.points.clone()).collect();
         assert_eq!(currents, [[(-0.0001, 0.5), (0.0, 0.6)], [(-0.0001, 1.25), (0.0, 1.5)]]);
         let svg = crate::report::svg(&figure).unwrap();
-        assert!(svg.contains("i_q_a") && svg.contains("time (s)"));
+        assert!(svg.contains("i_q_a") && svg.contains("t (s)"));
     }
 
     #[test]
     fn the_last_trace_counts_and_a_head_alone_is_none() {
         assert_eq!(trace(&["record,i_d", "ok"]), None);
         assert_eq!(trace(&["1,2,3"]), None);
+        assert_eq!(trace(&["i_q,reference,carrier", "0,1,2", "ok"]), None, "what was learned");
         let last = trace(&["record,i_d", "0,1", "ok", "record,i_q", "0,2", "1,3", "ok"]).unwrap();
         assert_eq!((last.records(), last.figure().panels[0].y_label.as_str()), (2, "i_q"));
     }

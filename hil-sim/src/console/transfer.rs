@@ -1,5 +1,6 @@
 //! Settings to and from a file: lines that are sent one by one.
 
+use super::answer::is_unknown_command;
 use super::link::{Answer, Link, LinkError};
 
 /// Why a restore has stopped.
@@ -26,11 +27,13 @@ pub enum RestoreError {
 /// every line of `get`.
 ///
 /// # Errors
-/// The drive does not answer, or answers both commands with an error, which is the inner one.
+/// The drive does not answer. The inner one is the answer of a drive that refuses.
 pub fn backup(link: &mut Link) -> Result<Result<Vec<String>, String>, LinkError> {
     let answer = link.ask("backup", |_| ())?;
-    if answer.error().is_none() {
-        return Ok(Ok(answer.contents().to_vec()));
+    match answer.error() {
+        None => return Ok(Ok(answer.contents().to_vec())),
+        Some(error) if !is_unknown_command(error) => return Ok(Err(error.to_owned())),
+        Some(_) => {}
     }
     let answer = link.ask("get", |_| ())?;
     Ok(match answer.error() {

@@ -62,7 +62,7 @@ fn run(options: &Options) -> Result<()> {
     let set_lines = virtual_board::Options::set_lines(&config);
     if !set_lines.is_empty() {
         say(
-            "The image has other settings than this motor and its sensors need. With the drive off:",
+            "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",
         );
         set_lines.iter().for_each(|line| say(&format!("    {line}")));
     }
