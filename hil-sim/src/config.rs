@@ -123,8 +123,9 @@ impl Config {
         on_reference * (2.0 / f64::from(self.motor.pole_pairs))
     }
 
-    /// Sets the scales of the drive to those of the sensors, without their errors.
-    pub(super) fn calibrate(&mut self) {
+    /// Sets the scales of the drive to those of the sensors, without their errors; after a direct change of
+    /// `measurement` or of the dc link.
+    pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
         let [a, b] = sensors
             .calibration()

@@ -89,6 +89,7 @@ pub fn delay(
     config.measurement.noise_a = Some(0.0);
     // 16 bits.
     config.measurement.lsb_a = Some(0.000_14 / 4.472_713_4 * config.measurement.range_a);
+    config.calibrate();
     let mut rig = oriented(demodulation, &config, iq, seed)?;
     let plant = plant_settings(&config);
     let mut response = [0.0; AFTER];
