@@ -106,7 +106,8 @@ impl Config {
 
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
     pub fn amperes(&self, on_reference: f64) -> f64 {
-        f64::from(self.drive.share_of_rated(on_reference as f32))
+        let relative = f64::from(self.drive.rated_a()) / f64::from(Settings::default().rated_a());
+        on_reference * relative
     }
 
     /// A torque that is `on_reference`, Nm, on the dissertation's motor, in proportion to the torque of the current limit.
@@ -114,16 +115,17 @@ impl Config {
         let largest = |drive: &Settings| {
             f64::from(drive.motor.torque_per_ampere(drive.i_d()) * drive.current_limit_a())
         };
-        on_reference * largest(&self.drive) / largest(&Settings::default())
+        on_reference * (largest(&self.drive) / largest(&Settings::default()))
     }
 
     /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
     pub fn rpm(&self, on_reference: f64) -> f64 {
-        on_reference * 2.0 / f64::from(self.motor.pole_pairs)
+        on_reference * (2.0 / f64::from(self.motor.pole_pairs))
     }
 
-    /// Sets the scales of the drive to those of the sensors, without their errors.
-    pub(super) fn calibrate(&mut self) {
+    /// Sets the scales of the drive to those of the sensors, without their errors; after a direct change of
+    /// `measurement` or of the dc link.
+    pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
         let [a, b] = sensors
             .calibration()

@@ -94,11 +94,11 @@ fn csv_has_a_file_for_every_figure_and_table() {
 #[test]
 fn a_page_names_itself_its_origin_and_its_settings() {
     let folder = folder("origin");
-    let arguments = ["run", "adc-calibration", "--seed", "5", "--set", "motor.rs=6"];
+    let arguments = ["run", "adc-calibration", "--seed", "5", "--set", "motor.r_s=6"];
     assert_eq!(hil_sim(&folder, &arguments).status.code(), Some(0));
     let page = std::fs::read_to_string(folder.join("out/adc-calibration.html")).unwrap();
     let version = format!("hil-sim {}", env!("CARGO_PKG_VERSION"));
-    for part in ["<title>adc-calibration – ", &version, "UTC with seed 5", "motor.rs = 6"] {
+    for part in ["<title>adc-calibration – ", &version, "UTC with seed 5", "motor.r_s = 6"] {
         assert!(page.contains(part), "{part}");
     }
 }

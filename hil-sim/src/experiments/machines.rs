@@ -168,7 +168,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "verdict",
     ];
     let title = if draws { "Machines, the worst first" } else { "The motor" };
-    let mut table = Table::new(title, &heads).note(&format!(
+    let mut table = Table::new(title, &heads).note(format!(
         "Good: every run within {}° rms and {}° at most, none lost.",
         GOOD_DEG.0, GOOD_DEG.1
     ));

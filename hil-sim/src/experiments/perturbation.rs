@@ -40,6 +40,21 @@ struct StepCase {
     warmer: f64,
 }
 
+impl StepCase {
+    /// The case in proportion to the motor and the pole pairs of a configuration.
+    fn scaled(self, config: &Config) -> Self {
+        let (disturbance, from) = match self.disturbance {
+            Disturbance::Load(nm) => {
+                (Disturbance::Load(config.newton_metres(nm)), config.rpm(self.from))
+            }
+            Disturbance::TorqueCurrent(by) => {
+                (Disturbance::TorqueCurrent(config.amperes(by)), config.amperes(self.from))
+            }
+        };
+        Self { disturbance, from, ..self }
+    }
+}
+
 const fn load(name: &'static str, rpm: f64, nm: f64) -> StepCase {
     StepCase { name, disturbance: Disturbance::Load(nm), from: rpm, warmer: 1.0 }
 }
@@ -171,6 +186,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let bar = context.progress.bar("perturbation", CASES.len() as u64);
     let mut results = Vec::with_capacity(CASES.len());
     for case in CASES {
+        let case = case.scaled(context.config);
         results.push(measure(context.config, case, context.seed)?);
         bar.advance(1);
     }
@@ -178,7 +194,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
     let mut table = Table::new(title, &[]).note(
-        "The mean before the step is taken away, but not from the largest single error, which has \
+        "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \
+         taken away, but not from the largest single error, which has \
          noise and bias in it.",
     );
     let is_load = |m: &&StepResponse| matches!(m.case.disturbance, Disturbance::Load(_));

@@ -113,8 +113,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let without = step(config, AngleSource::Injection, seed, step_s)?;
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
+    let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
     let cases: Vec<(f64, (f64, bool))> =
-        BELIEFS.iter().flat_map(|&b| LOADS_NM.iter().map(move |&l| (l, b))).collect();
+        BELIEFS.iter().flat_map(|&b| loads.iter().map(move |&l| (l, b))).collect();
     let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
         hold(config, seed.wrapping_add(number), load, belief, hold_s)
     })?;
