@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
@@ -26,6 +26,9 @@ const SLICE: u32 = 30;
 const BEFORE: u64 = PERIOD / 8;
 /// Later than this, time that was lost is not made up for: the board would race.
 const LATE: Duration = Duration::from_millis(100);
+
+/// A session without a person shows its time after this long without a line.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
 /// Why a session has ended.
 #[derive(Debug)]
@@ -102,12 +105,21 @@ impl Session {
     /// Goes on until something ends it; every line is shown when it comes.
     pub fn run(&mut self, mut show: impl FnMut(&Line)) -> End {
         let (mut clock, mut since) = (Instant::now(), self.board.time());
+        let mut said = Instant::now();
+        let alone = self.inputs.script.is_some() || !self.inputs.paced;
         let end = loop {
             let shown = self.lines.len();
             let end = self.slice().unwrap_or_else(|error| Some(End::Failed(error)));
             self.lines[shown..].iter().for_each(&mut show);
             if let Some(end) = end {
                 break end;
+            }
+            if self.lines.len() > shown {
+                said = Instant::now();
+            } else if alone && said.elapsed() >= SIGN_OF_LIFE {
+                said = Instant::now();
+                let text = "simulating".to_owned();
+                show(&Line { time: self.board.time(), source: Source::Board, text });
             }
             if self.inputs.paced {
                 let due = Duration::from_secs_f64(self.board.time() - since);
@@ -152,15 +164,10 @@ impl Session {
         }
         let typed = self.pty.read()?;
         self.send(&typed);
-        loop {
-            match self.inputs.terminal.try_recv() {
-                Ok(line) => {
-                    if let Some(end) = self.enter(&line) {
-                        return Ok(Some(end));
-                    }
-                }
-                // Without the terminal, script and pseudo-terminal go on.
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
+        // Without the terminal, script and pseudo-terminal go on.
+        while let Ok(line) = self.inputs.terminal.try_recv() {
+            if let Some(end) = self.enter(&line) {
+                return Ok(Some(end));
             }
         }
         if let Some(script) = &mut self.inputs.script {
