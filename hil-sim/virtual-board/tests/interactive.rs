@@ -9,6 +9,9 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use hil_sim::Config;
+use hil_sim::console::catalogue::Catalogue;
+use hil_sim::console::link::Link;
+use hil_sim::console::session::{Flow, Session};
 use serde_json::Value;
 
 /// Longest wait for an answer on a busy machine; an answer takes 20 ms of simulated time.
@@ -52,15 +55,20 @@ struct Talk {
     said: Receiver<String>,
 }
 
+/// Starts a board: the process, its output, and its port.
+fn begin(mut command: Command) -> (Child, BufReader<ChildStdout>, File) {
+    let mut board = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut shown = BufReader::new(board.stdout.take().unwrap());
+    let mut first = String::new();
+    shown.read_line(&mut first).unwrap();
+    let path = first.trim().strip_prefix("console: ").expect(&first);
+    let port = OpenOptions::new().read(true).write(true).open(path).expect(path);
+    (board, shown, port)
+}
+
 impl Talk {
-    fn new(mut command: Command) -> Self {
-        let mut board =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
-        let mut shown = BufReader::new(board.stdout.take().unwrap());
-        let mut first = String::new();
-        shown.read_line(&mut first).unwrap();
-        let path = first.trim().strip_prefix("console: ").expect(&first);
-        let port = OpenOptions::new().read(true).write(true).open(path).expect(path);
+    fn new(command: Command) -> Self {
+        let (board, shown, port) = begin(command);
         let said = lines(port.try_clone().unwrap());
         Self { board, shown, port, said }
     }
@@ -277,6 +285,34 @@ fn what_is_wrong_is_named_before_anything_begins() {
     let program = env!("CARGO_BIN_EXE_board");
     let limited = ["-c", "ulimit -n 4; exec \"$0\"", program];
     refused(&Command::new("sh").args(limited).output().unwrap(), 1, &["pseudo-terminal"]);
+}
+
+/// `cargo sim console` finds the commands and settings of the image, restores a file and plots a trace.
+#[test]
+fn the_console_program_understands_the_image() {
+    let folder = folder("console");
+    let (mut board, _shown, port) = begin(command(&folder, &[]));
+    let link = Link::new(port.try_clone().unwrap(), port, |_: &str| ());
+    let mut session = Session::new(link);
+    let catalogue = Catalogue::read(session.link()).unwrap();
+    assert!(catalogue.settings() > 50);
+    for (line, word) in [("rel", "relock"), ("set motor.r_", "motor.r_s"), ("log w", "warn")] {
+        assert!(catalogue.complete(line).1.iter().any(|found| found == word), "{line}");
+    }
+    let file = folder.join("settings.txt").display().to_string();
+    let restore = format!("!restore {file}");
+    std::fs::write(&file, "set command.timeout_s 77\nset command.timeout_s soon\n").unwrap();
+    let why = session.enter(&restore, |_| ()).unwrap_err().to_string();
+    assert!(why.contains("settings.txt, line 2: `set command.timeout_s soon`: error:"), "{why}");
+    let mut said = Vec::new();
+    session.enter("get command.timeout_s", |line| said.push(line.to_owned())).unwrap();
+    assert!(said[0].starts_with("command.timeout_s = 77"), "{said:?}");
+    let plot = folder.join("trace.svg");
+    assert_eq!(session.enter("trace 20 2 i_q dc_link", |_| ()).unwrap(), Flow::Next);
+    session.enter(&format!("!plot {}", plot.display()), |line| said.push(line.to_owned())).unwrap();
+    assert!(said[1].starts_with("20 records in") && plot.exists(), "{said:?}");
+    board.kill().unwrap();
+    board.wait().unwrap();
 }
 
 /// A session with a script, as fast as it goes; exit code and all that it showed.
