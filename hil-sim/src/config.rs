@@ -8,6 +8,8 @@
 mod alias;
 mod key;
 mod keys;
+pub mod motors;
+mod plant;
 mod value;
 
 use std::path::Path;
@@ -16,11 +18,11 @@ use drive_core::settings::{Line, Settings};
 
 pub use key::Key;
 pub use keys::*;
+pub use plant::plant_settings;
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
-use crate::motors::Motor;
-use crate::rig::plant_settings;
+use motors::Motor;
 
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
