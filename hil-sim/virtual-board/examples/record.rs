@@ -71,14 +71,14 @@ fn record(name: &str, config: &Config, seed: u64, steps: &[Step]) -> Result<()> 
     let mut pair = Pair::new(Image::built()?, Options::new(config, seed))?;
     let mut record = Record::default();
     for (line, state, periods) in steps {
-        if line.starts_with("start") && !pair.shadow.everything().command.wiring_checked {
+        if line.starts_with("start") && !pair.shadow.firmware_settings().command.wiring_checked {
             record.given.push("check wiring".into());
         }
         record.given.push((*line).into());
-        pair.board.heard();
+        pair.board.take_console();
         pair.board.type_line(line);
         pair.shadow.type_line(line)?;
-        let mut run = |pair: &mut Pair, periods: u64, record: &mut Record| -> Result<()> {
+        let run = |pair: &mut Pair, periods: u64, record: &mut Record| -> Result<()> {
             let mut failed = Ok(());
             pair.run(periods, |_, period| {
                 if failed.is_ok() {
@@ -90,7 +90,7 @@ fn record(name: &str, config: &Config, seed: u64, steps: &[Step]) -> Result<()> 
         let mut answer = String::new();
         while !answer.ends_with('\n') {
             run(&mut pair, 1, &mut record)?;
-            answer += &pair.board.heard();
+            answer += &pair.board.take_console();
         }
         println!("{name}: {line}: {}", answer.trim());
         while state.is_some_and(|state| pair.shadow.drive.state() != state) {
