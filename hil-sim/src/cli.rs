@@ -8,12 +8,12 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::board;
+use crate::config::motors::Motor;
 use crate::config::{Config, Key};
 use crate::console;
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
 use crate::input::{Input, OUT};
-use crate::motors::Motor;
 use crate::outcome::{self, Cell, Origin, Outcome, Table};
 use crate::progress::Progress;
 use crate::report::{self, Section};

@@ -8,9 +8,9 @@ use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::plant_settings;
 
 /// Not a figure of the source: whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment {

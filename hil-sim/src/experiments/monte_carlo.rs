@@ -7,9 +7,9 @@ use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::plant_settings;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
 pub const EXPERIMENT: Experiment = Experiment {

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
 use super::{Context, Experiment};
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::rig::{RATE_HZ, Rig};
 use crate::stats::Stats;
 use drive_core::settings::AngleSource;
 

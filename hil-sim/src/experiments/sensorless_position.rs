@@ -8,11 +8,12 @@ use drive_core::{Mode, State};
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
 use super::{Context, Experiment, learning};
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, means_over, plant_settings};
+use crate::rig::{Point, Rig, means_over};
 use crate::stats::{Stats, StraightLine};
 use drive_core::settings::AngleSource;
 

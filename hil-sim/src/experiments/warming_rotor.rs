@@ -5,12 +5,13 @@ use std::f64::consts::TAU;
 use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 use drive_core::{Command, Mode};
 
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
 use crate::plant::Load;
-use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::rig::{RATE_HZ, Rig};
 use drive_core::settings::AngleSource;
 
 /// Calls of `refine` per second.

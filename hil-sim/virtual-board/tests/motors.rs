@@ -2,7 +2,7 @@
 
 use drive_core::settings::find;
 use hil_sim::Config;
-use hil_sim::motors::Motor;
+use hil_sim::config::motors::Motor;
 use hil_sim::plant::Plant;
 use induction_drive::board;
 use virtual_board::Options;

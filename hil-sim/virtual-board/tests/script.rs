@@ -75,7 +75,7 @@ fn a_text_that_must_not_come_is_watched_for() {
     let (typed, end) = play(script, &[(1.1, "ok"), (3.5, "fault 4")]);
     assert_eq!((typed.len(), end.is_ok()), (3, true), "it comes later");
     let why = failure(script, &[(1.1, "ok"), (2.5, "fault 4")]);
-    assert!(why.contains("line 2: `expect not 2s fault`: the text has come"), "{why}");
+    assert!(why.contains("line 2: `expect not 2s fault`: said `fault 4`"), "{why}");
 }
 
 #[test]

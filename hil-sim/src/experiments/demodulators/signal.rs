@@ -4,8 +4,9 @@ use drive_core::Command;
 
 use super::demodulation::Demodulation;
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
-use crate::rig::{Rig, plant_settings};
+use crate::rig::Rig;
 use crate::stats::Stats;
 
 /// Half of the turn over which the slope is taken, degrees.

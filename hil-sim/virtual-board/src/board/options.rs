@@ -24,7 +24,7 @@ pub struct Options {
 impl Options {
     /// The plant that a configuration describes, with the sensors and the dead time of this board.
     pub fn plant(config: &Config) -> PlantSettings {
-        let mut plant = hil_sim::rig::plant_settings(config);
+        let mut plant = hil_sim::config::plant_settings(config);
         // The converters have another reference than the source's; their codes cover the range of the sensors.
         let gain = f64::from(firmware_board::CURRENT_A.gain / Line::CHANNEL_A.gain);
         let source = MeasurementSettings::default();

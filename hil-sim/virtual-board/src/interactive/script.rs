@@ -127,8 +127,9 @@ impl Script {
         steps.take_while(|step| !step.types()).any(|step| step.awaits(line))
     }
 
-    fn came(&self, text: &str) -> bool {
-        self.answers.iter().any(|line| line.contains(text))
+    /// A line with this text since the last typed one.
+    fn answer(&self, text: &str) -> Option<&str> {
+        self.answers.iter().map(String::as_str).find(|line| line.contains(text))
     }
 
     /// A failure at a step, in words.
@@ -165,16 +166,19 @@ impl Script {
             Step::For(text) if passed > PATIENCE_S => {
                 return Err(anyhow!(self.silence(text, PATIENCE_S)));
             }
-            Step::Expect(_, text) if self.came(text) => Due::Nothing,
+            Step::Expect(_, text) if self.answer(text).is_some() => Due::Nothing,
             Step::Expect(within, text) if passed > *within => {
                 failed = Some(self.silence(text, *within));
                 Due::Nothing
             }
-            Step::ExpectNot(_, text) if self.came(text) => {
-                failed = Some(self.failure(Some(self.next), "the text has come"));
-                Due::Nothing
-            }
-            Step::ExpectNot(during, _) if passed > *during => Due::Nothing,
+            Step::ExpectNot(during, text) => match self.answer(text) {
+                Some(line) => {
+                    failed = Some(self.failure(Some(self.next), &format!("said `{line}`")));
+                    Due::Nothing
+                }
+                None if passed > *during => Due::Nothing,
+                None => return Ok(Due::Nothing),
+            },
             _ => return Ok(Due::Nothing),
         };
         if let Some(why) = failed.take_if(|_| self.strict) {
