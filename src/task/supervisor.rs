@@ -185,7 +185,7 @@ impl Supervisor {
         {
             stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
             if self.level >= Level::Error {
-                defmt::error!("fault {}: {}", fault.code(), fault.meaning());
+                defmt::error!("fault {}: {}", fault.code(), fault.text());
             }
         }
         if self.level >= Level::Warn {
