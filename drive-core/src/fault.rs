@@ -158,7 +158,7 @@ faults! {
             "pull-up of the break input missing or too weak, or its wire off",
             "a fault inside the chip: lock-up, supply below 2.8 V, flash error",
         ],
-        "find the cause in the power stage; the log repeats the event as long as the input is low";
+        "find the cause in the power stage, then clear; the fault comes back as long as the input is low";
     AnalogWatchdog = 21, "over-current seen by the analog watchdog", OVER_CURRENT.0, OVER_CURRENT.1;
     DeadlineMiss = 22, "the control interrupt missed its deadline",
         &[
