@@ -74,7 +74,7 @@ fn a_shaft_that_moves_is_refused() {
     for load in [Load::Free { torque: 0.0 }, Load::Speed { speed: 6.0 }] {
         let mut rig = Rig::from_config(&config, 5).unwrap();
         rig.set_load(load).unwrap();
-        let error = learning::learn(&mut rig).unwrap_err().to_string();
+        let error = rig.learn().unwrap_err().to_string();
         println!("{load:?} after {:.1} s: {error}", rig.time());
         assert_eq!(rig.drive.state(), State::Fault(Fault::ShaftNotLocked));
         assert!(rig.drive.learned().is_none());
@@ -113,7 +113,7 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
     let changes = ["injection.demodulator=rectified"];
     for seed in 1..=2 {
         let mut rig = Rig::from_config(&config(&changes), seed).unwrap();
-        learning::learn(&mut rig).unwrap();
+        rig.learn().unwrap();
         let (mut squares, mut count, mut largest) = (0.0, 0.0, 0.0_f64);
         for i_q in [1.0, 2.0, 3.0, -0.75, -1.5, -2.5] {
             rig.start(Mode::Torque).unwrap();

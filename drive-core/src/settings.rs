@@ -21,7 +21,7 @@ pub mod value;
 use core::fmt;
 
 use self::value::words;
-use crate::tuning::{FirstOrder, TuningError};
+use crate::tuning::TuningError;
 
 pub use hardware::{Inverter, Line, Scales};
 pub use injection::{InjectionSettings, PrintedChain, SynchronousTracking};
@@ -43,31 +43,25 @@ pub enum AngleSource {
 /// The plant that the current controllers are designed for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PlantSource {
-    /// First-order plants identified on the motor with the filters in place (Eq. 3.41 and 3.42).
-    Identified,
-    /// The plant computed from the parameters of the motor: 0.1 degrees better than the identified ones, in the worst
-    /// of 400 runs of `monte-carlo`.
+    /// First-order plants identified on the motor with the filters in place (section 3.7).
     #[default]
+    Identified,
+    /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
+    /// with it.
     Motor,
 }
 
-/// An identified plant k / (z - p) at 6 kHz.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// An identified plant k / (z - p) at 6 kHz. Unset values follow [`rules`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IdentifiedPlant {
     /// Gain, A/V.
-    pub k: f32,
+    pub k: Option<f32>,
     /// Pole.
-    pub p: f32,
-}
-
-impl From<IdentifiedPlant> for FirstOrder {
-    fn from(plant: IdentifiedPlant) -> Self {
-        Self { k: plant.k.into(), p: plant.p.into() }
-    }
+    pub p: Option<f32>,
 }
 
 /// The plants of the current controllers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CurrentPlant {
     /// The one in use.
     pub source: PlantSource,
@@ -75,17 +69,6 @@ pub struct CurrentPlant {
     pub d: IdentifiedPlant,
     /// Identified plant of the quadrature axis.
     pub q: IdentifiedPlant,
-}
-
-impl Default for CurrentPlant {
-    /// By the motor; the identified plants are those of the dissertation.
-    fn default() -> Self {
-        Self {
-            source: PlantSource::default(),
-            d: IdentifiedPlant { k: 0.002_837, p: 0.9511 },
-            q: IdentifiedPlant { k: 0.003_721, p: 0.9503 },
-        }
-    }
 }
 
 words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });

@@ -1,4 +1,5 @@
 //! The command line.
+#![deny(clippy::use_debug)]
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,11 +8,12 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::board;
+use crate::config::motors::Motor;
 use crate::config::{Config, Key};
 use crate::error::Error;
 use crate::experiments::{self, Context, EXPERIMENTS, Experiment};
 use crate::input::{Input, OUT};
-use crate::outcome::{Cell, Outcome, Table};
+use crate::outcome::{self, Cell, Origin, Outcome, Table};
 use crate::progress::Progress;
 use crate::report::{self, Section};
 
@@ -31,6 +33,11 @@ enum Command {
     List,
     /// Every key that --set and a configuration file take, with unit, default and range
     Keys,
+    /// Every motor that --motor takes; with a name: its numbers, their sources, and the lines for the console
+    Motors {
+        /// Name of the motor, or a file that ends in .toml
+        name: Option<String>,
+    },
     /// Run one experiment: print its tables, write its page and its plots as SVG files
     Run {
         /// Name of the experiment, as `list` shows it
@@ -40,9 +47,12 @@ enum Command {
         /// Folder of the page [default: out; with --json no page unless this is given]
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Print one JSON object and nothing else
+        /// Print one JSON object and nothing else; of a group, one with all in a list
         #[arg(long)]
         json: bool,
+        /// Folder of CSV files, one a figure and one a table [default: none]
+        #[arg(long, value_name = "DIR")]
+        csv: Option<PathBuf>,
     },
     /// Run all experiments into one page
     Report {
@@ -64,12 +74,18 @@ enum Command {
 /// has to be changed.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        None => run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, None, false),
+        None => {
+            run(experiments::DEFAULT, &Input { seed: 1, ..Input::default() }, &Output::default())
+        }
         Some(Command::List) => say(&list()),
+        Some(Command::Motors { name: None }) => say(&report::table(&motors())),
+        Some(Command::Motors { name: Some(name) }) => {
+            Motor::find(&name).and_then(|motor| say(&motor_text(&motor)?))
+        }
         Some(Command::Keys) => say(&report::table(&keys())),
-        Some(Command::Run { name, input, out, json }) => experiments::named(&name)
-            .into_iter()
-            .try_for_each(|name| run(name, &input, out.clone(), json)),
+        Some(Command::Run { name, input, out, json, csv }) => {
+            run(&name, &input, &Output { out, json, csv })
+        }
         Some(Command::Report { input, out }) => full_report(&input, &out),
         Some(Command::Board(options)) => board::become_board(&options),
     };
@@ -88,6 +104,46 @@ fn list() -> String {
         text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
     }
     text
+}
+
+fn motors() -> Table {
+    let mut table = Table::new("", &["motor", "rated data", "numbers"]);
+    for motor in Motor::all() {
+        let recalled = motor.source.iter().filter(|source| source.unverified);
+        let keys: Vec<_> = recalled.flat_map(|source| source.keys.clone()).collect();
+        let numbers = match keys[..] {
+            [] => "all with a source".to_owned(),
+            _ => format!("unverified: {}", keys.join(", ")),
+        };
+        table.row([motor.name, motor.title, numbers].map(Cell::from));
+    }
+    table
+}
+
+fn motor_text(motor: &Motor) -> Result<String, Error> {
+    let mut config = Config::default();
+    motor.apply(&mut config)?;
+    let mut table = Table::new("", &["key", "value", "unit", "source"]);
+    for (key, value) in motor.settings() {
+        let unit = Key::named(&key)?.first().map_or("", |key| key.unit()).to_owned();
+        let source = motor.source_of(&key).map_or(String::new(), |source| {
+            format!("{}{}", if source.unverified { "UNVERIFIED: " } else { "" }, source.from)
+        });
+        table.row([key, value.to_string(), unit, source].map(Cell::from));
+    }
+    let m = config.drive.motor;
+    Ok(format!(
+        "{}: {}\n\n{}\n\n{}\nLeakage inductance {:.4} mH, rotor time constant {:.0} ms, carrier {:.1} V.\n\n\
+         At the console, with the scales of your board:\n{}\n",
+        motor.name,
+        motor.title,
+        motor.about.trim(),
+        report::table(&table),
+        1e3 * m.sigma_l_s(),
+        1e3 * m.tau_r(),
+        config.drive.carrier_v(),
+        motor.console_lines().join("\n"),
+    ))
 }
 
 fn keys() -> Table {
@@ -123,31 +179,56 @@ fn section<'a>(
     }
 }
 
-fn run(name: &str, input: &Input, out: Option<PathBuf>, json: bool) -> Result<(), Error> {
+/// Where the results of a run go.
+#[derive(Default)]
+struct Output {
+    out: Option<PathBuf>,
+    json: bool,
+    csv: Option<PathBuf>,
+}
+
+/// Runs the experiment of this name, or all of a group.
+fn run(name: &str, input: &Input, output: &Output) -> Result<(), Error> {
+    let names = experiments::named(name);
+    let objects: Vec<_> =
+        names.iter().map(|name| run_one(name, input, output)).collect::<Result<_, _>>()?;
+    match objects.as_slice() {
+        _ if !output.json => Ok(()),
+        [object] => say(&format!("{object}\n")),
+        objects => say(&format!("{}\n", outcome::group(objects))),
+    }
+}
+
+/// Runs an experiment, writes its files and prints its results; returns the JSON object if that is wanted.
+fn run_one(name: &str, input: &Input, output: &Output) -> Result<String, Error> {
     let experiment = experiments::find(name)?;
     let config = input.config()?;
     let outcome = (experiment.run)(&context(&config, input.seed))?;
-    let folder = out.or_else(|| (!json).then(|| OUT.into()));
+    let origin = Origin::new(input.seed, &config.changes());
+    let folder = output.out.clone().or_else(|| (!output.json).then(|| OUT.into()));
     let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
     if let (Some(folder), Some(path)) = (&folder, &path) {
-        let page =
-            report::page("Induction drive", &[section(experiment, input, &config, &outcome)])?;
-        report::write_whole(path, &page)?;
+        let section = section(experiment, input, &config, &outcome);
+        report::write_whole(path, &report::page("Induction drive", &origin, &[section])?)?;
         for figure in &outcome.figures {
             let file = folder.join(format!("{name}-{}.svg", figure.name));
             report::write_whole(&file, &report::svg(figure)?)?;
         }
     }
-    if json {
-        let object = outcome.to_json(name, input.seed);
-        return say(&(object.map_err(|e| Error::Internal(e.to_string()))? + "\n"));
+    if let Some(folder) = &output.csv {
+        for (file, text) in report::csv(&outcome)? {
+            report::write_whole(&folder.join(format!("{name}-{file}")), &text)?;
+        }
+    }
+    if output.json {
+        return outcome.to_json(name, &origin).map_err(|e| Error::Internal(e.to_string()));
     }
     let Experiment { about, stands_for, .. } = experiment;
     let mut text = format!("{name}: {about} ({stands_for})\n\n{}", report::text(&outcome));
     if let Some(path) = path {
         text.push_str(&format!("\nReport: {}\n", path.display()));
     }
-    say(&text)
+    say(&text).map(|()| String::new())
 }
 
 fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
@@ -160,8 +241,12 @@ fn full_report(input: &Input, out: &Path) -> Result<(), Error> {
         .zip(&outcomes)
         .map(|(experiment, outcome)| section(experiment, input, &config, outcome))
         .collect();
+    let origin = Origin::new(input.seed, &config.changes());
     let path = out.join("report.html");
-    report::write_whole(&path, &report::page("Induction drive: all experiments", &sections)?)?;
+    report::write_whole(
+        &path,
+        &report::page("Induction drive: all experiments", &origin, &sections)?,
+    )?;
     say(&format!("Report: {}\n", path.display()))
 }
 

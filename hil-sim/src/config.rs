@@ -8,31 +8,38 @@
 mod alias;
 mod key;
 mod keys;
+pub mod motors;
+mod plant;
 mod value;
 
 use std::path::Path;
 
-use drive_core::settings::Line;
+use drive_core::settings::{Line, Settings};
 
 pub use key::Key;
 pub use keys::*;
+pub use plant::plant_settings;
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
-use crate::rig::plant_settings;
+use motors::Motor;
 
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
 
 impl Config {
-    /// The defaults, changed first by the file and then by the assignments `KEY=VALUE`, in order.
+    /// The defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
-    /// [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
+    /// As [`Config::of_motor`], [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
     /// assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
     /// other: they are checked when the drive is built.
-    pub fn load(file: Option<&Path>, assignments: &[String]) -> Result<Self, Error> {
-        let mut config = Self::default();
+    pub fn load(
+        motor: Option<&str>,
+        file: Option<&Path>,
+        assignments: &[String],
+    ) -> Result<Self, Error> {
+        let mut config = Self::of_motor(motor)?;
         if let Some(path) = file {
             let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
             let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
@@ -44,6 +51,18 @@ impl Config {
             let (key, value) =
                 assignment.split_once('=').ok_or_else(|| Error::Assignment(assignment.clone()))?;
             config.set(key.trim(), &Value::from_text(value))?;
+        }
+        Ok(config)
+    }
+
+    /// The defaults with a motor; see [`Motor::find`].
+    ///
+    /// # Errors
+    /// As [`Motor::find`] and [`Motor::apply`].
+    pub fn of_motor(name: Option<&str>) -> Result<Self, Error> {
+        let mut config = Self::default();
+        if let Some(name) = name {
+            Motor::find(name)?.apply(&mut config)?;
         }
         Ok(config)
     }
@@ -89,11 +108,30 @@ impl Config {
 
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
     pub fn amperes(&self, on_reference: f64) -> f64 {
-        f64::from(self.drive.share_of_rated(on_reference as f32))
+        let relative = f64::from(self.drive.rated_a()) / f64::from(Settings::default().rated_a());
+        on_reference * relative
     }
 
-    /// Sets the scales of the drive to those of the sensors, without their errors.
-    pub(super) fn calibrate(&mut self) {
+    /// A load torque that is `on_reference`, Nm, on the dissertation's motor. A step of it accelerates the shaft as there,
+    /// electrically, because the tracking of the angle follows a limited acceleration; and it is not a larger share of
+    /// the torque at the current limit.
+    pub fn newton_metres(&self, on_reference: f64) -> f64 {
+        let relative = |of: fn(&Settings) -> f32| {
+            f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
+        };
+        let torque = relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
+        let inertia = relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
+        on_reference * torque.min(inertia)
+    }
+
+    /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
+    pub fn rpm(&self, on_reference: f64) -> f64 {
+        on_reference * (2.0 / f64::from(self.motor.pole_pairs))
+    }
+
+    /// Sets the scales of the drive to those of the sensors, without their errors; after a direct change of
+    /// `measurement` or of the dc link.
+    pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
         let [a, b] = sensors
             .calibration()
@@ -112,10 +150,7 @@ impl Config {
     /// # Errors
     /// As [`Config::set`].
     pub fn set_table(&mut self, table: &toml::Table) -> Result<(), Error> {
-        let mut assignments = Vec::new();
-        flatten("", table, &mut assignments);
-        assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
-        assignments.iter().try_for_each(|(name, value)| self.set(name, value))
+        flattened(table).iter().try_for_each(|(name, value)| self.set(name, value))
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.
@@ -137,6 +172,14 @@ impl Config {
         }
         changes
     }
+}
+
+/// The assignments of a table, those of the drive alone last.
+pub fn flattened(table: &toml::Table) -> Vec<(String, Value)> {
+    let mut assignments = Vec::new();
+    flatten("", table, &mut assignments);
+    assignments.sort_by_key(|(name, _)| name.starts_with(DRIVE));
+    assignments
 }
 
 fn flatten(prefix: &str, table: &toml::Table, into: &mut Vec<(String, Value)>) {

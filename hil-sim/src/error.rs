@@ -12,7 +12,15 @@ pub enum Error {
         /// The name that was given.
         name: String,
         /// The experiment with the most similar name.
-        nearest: Option<&'static str>,
+        nearest: Option<String>,
+    },
+    /// No motor has this name.
+    #[error("there is no motor `{name}`{}; `motors` shows all of them, and a name that ends in .toml is a file", did_you_mean(.nearest))]
+    UnknownMotor {
+        /// The name that was given.
+        name: String,
+        /// The motor with the most similar name.
+        nearest: Option<String>,
     },
     /// No key has this name.
     #[error("there is no key `{key}`{}; `keys` shows all of them", did_you_mean(.nearest))]
@@ -20,7 +28,7 @@ pub enum Error {
         /// The name that was given.
         key: String,
         /// The key with the most similar name.
-        nearest: Option<&'static str>,
+        nearest: Option<String>,
     },
     /// A key cannot have this value.
     #[error("{key} = {value}: {problem}; allowed: {allowed}")]
@@ -81,12 +89,12 @@ impl Error {
     }
 }
 
-fn did_you_mean(nearest: &Option<&'static str>) -> String {
-    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
 /// The name most similar to `name`, regardless of case, if one is similar enough to be a misspelling.
-pub fn nearest(name: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
+pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     known
         .map(|candidate| (strsim::levenshtein(&name.to_lowercase(), candidate), candidate))
         .filter(|&(distance, candidate)| distance <= 2 + candidate.len() / 4)

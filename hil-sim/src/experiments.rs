@@ -1,4 +1,5 @@
 //! The experiments. Each is one function from a [`Context`] to an [`Outcome`].
+#![deny(clippy::use_debug)]
 
 mod adc_calibration;
 mod angle_identification;
@@ -18,6 +19,7 @@ mod learn_reference;
 pub mod learning;
 mod linear_model;
 mod lock_monitor;
+mod machines;
 mod modulation;
 mod monte_carlo;
 mod motor_tests;
@@ -118,6 +120,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     speed_profile::EXPERIMENT,
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
+    machines::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     tracking::EXPERIMENT,
@@ -150,7 +153,8 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
     EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
         Error::UnknownExperiment {
             name: name.to_owned(),
-            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name)),
+            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name))
+                .map(str::to_owned),
         }
     })
 }

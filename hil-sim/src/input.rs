@@ -10,6 +10,9 @@ use crate::error::Error;
 /// The options that describe a simulation.
 #[derive(Args, Default)]
 pub struct Input {
+    /// Motor with the inverter and the sensors that suit it: a name that `motors` shows, or a file that ends in .toml
+    #[arg(long, value_name = "NAME")]
+    pub motor: Option<String>,
     /// Configuration file, TOML
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -33,7 +36,8 @@ impl Input {
     /// # Errors
     /// As [`Config::load`] and [`Config::set`].
     pub fn config(&self) -> Result<Config, Error> {
-        let mut config = Config::load(self.config.as_deref(), &self.assignments)?;
+        let mut config =
+            Config::load(self.motor.as_deref(), self.config.as_deref(), &self.assignments)?;
         if let Some(seconds) = self.seconds {
             config.set("seconds", &Value::Number(seconds))?;
         }
@@ -43,7 +47,14 @@ impl Input {
     /// The command line that repeats `cargo sim WHAT` with this configuration.
     pub fn command(&self, what: &str, config: &Config) -> String {
         let mut command = format!("cargo sim {what} --seed {}", self.seed);
-        for change in config.changes() {
+        let mut base = Config::default();
+        if let Some(name) = &self.motor
+            && let Ok(config) = Config::of_motor(Some(name))
+        {
+            command.push_str(&format!(" --motor {name}"));
+            base = config;
+        }
+        for change in config.changes_from(&base) {
             command.push_str(&format!(" --set {change}"));
         }
         command

@@ -1,11 +1,15 @@
 //! The outcome of an experiment: numbers, tables and figures, and their JSON form.
+#![deny(clippy::use_debug)]
 
 mod figure;
+mod json;
+pub mod name;
 mod table;
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde::ser::{Serialize, Serializer};
 
-pub use figure::{Figure, Panel, Series, Style};
+pub use figure::{Curve, Figure, Panel, Series, Style};
+pub use json::{SCHEMA_VERSION, group};
 pub use table::{Cell, Table};
 
 /// The outcome of an experiment.
@@ -25,6 +29,9 @@ pub struct Outcome {
     pub texts: Vec<(String, String)>,
     /// Remarks for the reader: differences from the source, assumptions, limits.
     pub remarks: Vec<String>,
+    /// Texts of the faults with which the drive stopped itself when it should have gone on; none for a run
+    /// that ended as it should.
+    pub faults: Vec<String>,
 }
 
 /// Numbers by name, in the order in which they were added.
@@ -51,10 +58,24 @@ impl Metrics {
         self.0.iter().map(|(name, value)| (name.as_str(), *value))
     }
 
+    /// A number for the reader: `yes` or `no` for a metric that is called `lost`, four digits otherwise.
+    pub fn cell(name: &str, value: f64) -> Cell {
+        match value {
+            0.0 if is_flag(name) => Cell::from("no"),
+            1.0 if is_flag(name) => Cell::from("yes"),
+            whole if whole.fract() == 0.0 && whole.abs() < 1e6 => Cell::fixed(whole, 0),
+            other => Cell::significant(other, 4),
+        }
+    }
+
     /// Whether there are no numbers.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
+}
+
+fn is_flag(name: &str) -> bool {
+    name == "lost" || name.ends_with("_lost")
 }
 
 impl Serialize for Metrics {
@@ -107,114 +128,42 @@ impl Entry {
     }
 }
 
-/// The one JSON object of an experiment.
-#[derive(serde::Serialize)]
-struct Json<'a> {
-    experiment: &'a str,
-    seed: u64,
-    metrics: &'a Metrics,
-    series: AllSeries<'a>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    steps: &'a Option<Vec<Step>>,
-    #[serde(skip_serializing_if = "Rows::is_empty")]
-    table: Rows<'a>,
+/// Seed and settings that an outcome comes from.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// Names and values of the settings that were changed.
+    pub settings: Vec<(String, String)>,
 }
 
-/// Content of `table` in JSON.
-#[derive(serde::Serialize)]
-#[serde(untagged)]
-enum Rows<'a> {
-    Tables(&'a [Table]),
-    Entries(&'a [Entry]),
-}
-
-impl Rows<'_> {
-    fn is_empty(&self) -> bool {
-        matches!(self, Self::Tables([]) | Self::Entries([]))
-    }
-}
-
-struct AllSeries<'a>(&'a [Figure]);
-
-impl Serialize for AllSeries<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(serde::Serialize)]
-        struct Points<'a> {
-            x_label: &'a str,
-            y_label: &'a str,
-            x: Vec<f64>,
-            y: Vec<f64>,
-        }
-        let mut map = serializer.serialize_map(None)?;
-        for figure in self.0 {
-            for panel in &figure.panels {
-                for series in &panel.series {
-                    let key = format!("{}/{}/{}", figure.name, panel.y_label, series.name);
-                    let (x, y) = series.points.iter().copied().unzip();
-                    let (x_label, y_label) = (&panel.x_label, &panel.y_label);
-                    map.serialize_entry(&key, &Points { x_label, y_label, x, y })?;
-                }
-            }
-        }
-        map.end()
+impl Origin {
+    /// With the settings that were changed, each `NAME=VALUE`.
+    pub fn new(seed: u64, changes: &[String]) -> Self {
+        let pairs = changes.iter().filter_map(|change| change.split_once('='));
+        let settings = pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
+        Self { seed, settings }
     }
 }
 
 impl Outcome {
-    /// The one JSON object: `experiment`, `seed`, `metrics`, `series`, and where there are any
-    /// `steps` and `table`. A number that is not finite becomes `null`.
-    ///
-    /// # Errors
-    /// As [`serde_json::to_string`].
-    pub fn to_json(&self, experiment: &str, seed: u64) -> serde_json::Result<String> {
-        serde_json::to_string(&Json {
-            experiment,
-            seed,
-            metrics: &self.metrics,
-            series: AllSeries(&self.figures),
-            steps: &self.steps,
-            table: match self.entries.as_slice() {
-                [] => Rows::Tables(&self.tables),
-                entries => Rows::Entries(entries),
-            },
-        })
+    /// Whether the drive was lost or stopped itself, in words with its faults; nothing for a run that ended
+    /// as it should.
+    pub fn lost(&self) -> Option<String> {
+        let lost = self.metrics.get("lost");
+        let whether = if lost.is_some() { "Lost" } else { "The drive stopped itself" };
+        match self.faults.as_slice() {
+            [] => (lost == Some(1.0)).then(|| {
+                format!("{whether}: the drive stopped itself, or its flux angle was wrong beyond recovery.")
+            }),
+            faults => Some(format!("{whether}: {}.", faults.join("; "))),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn json_is_one_object_with_the_agreed_names() {
-        let mut outcome = Outcome::default();
-        outcome.metrics.set("speed_rpm", 12.5);
-        outcome.metrics.set("lost", f64::NAN);
-        let step = Step { iq_ref_a: 1.0, iq_a: 0.9, torque_nm: 0.3, angle_error_mean_deg: 5.0 };
-        outcome.steps = Some(vec![step]);
-        let mut table = Table::new("Levels", &["name", "value"]);
-        table.row([Cell::from("a"), Cell::fixed(1.23456, 2)]);
-        outcome.tables.push(table);
-        let panel = Panel::new("time (s)", "current (A)");
-        let panel = panel.with(Series::line("actual", vec![(0.0, 1.0), (1.0, 2.0)]));
-        outcome.figures.push(Figure::new("step", "A step", "Figure 38").panel(panel));
-        let text = outcome.to_json("torque-steps", 7).unwrap();
-        let object: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(object["experiment"], "torque-steps");
-        assert_eq!(object["seed"], 7);
-        assert_eq!(object["metrics"]["speed_rpm"], 12.5);
-        assert!(object["metrics"]["lost"].is_null());
-        assert_eq!(object["steps"][0]["torque_nm"], 0.3);
-        assert_eq!(object["table"][0]["rows"][0][1], 1.23456);
-        assert_eq!(object["series"]["step/current (A)/actual"]["y"][1], 2.0);
-        assert!(!text.contains('\n'));
-    }
-
-    #[test]
-    fn what_there_is_none_of_is_left_out() {
-        let text = Outcome::default().to_json("filters", 1).unwrap();
-        assert_eq!(text, r#"{"experiment":"filters","seed":1,"metrics":{},"series":{}}"#);
-    }
 
     #[test]
     fn numbers_are_rounded_for_reading_only() {
@@ -224,5 +173,34 @@ mod tests {
         assert_eq!(Cell::significant(0.0, 3).text(), "0.00");
         assert_eq!(Cell::fixed(-0.0001, 2).text(), "0.00");
         assert_eq!(Cell::fixed(-1.5, 1).text(), "-1.5");
+        assert_eq!(Cell::fixed(f64::NAN, 1).text(), "none");
+    }
+
+    #[test]
+    fn metrics_are_shown_in_words_and_sensible_digits() {
+        for (name, value, text) in [
+            ("lost", 1.0, "yes"),
+            ("learned_steps_lost", 0.0, "no"),
+            ("lost_runs", 1.0, "1"),
+            ("runs", 100.0, "100"),
+            ("angle_error_rms_deg", 1.63447, "1.634"),
+            ("angle_error_rms_deg", f64::NAN, "none"),
+        ] {
+            assert_eq!(Metrics::cell(name, value).text(), text, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_lost_run_is_lost_in_words() {
+        let mut outcome = Outcome::default();
+        assert_eq!(outcome.lost(), None);
+        outcome.faults.push("fault 4: dc link above its limit".into());
+        let session = outcome.lost().unwrap();
+        assert_eq!(session, "The drive stopped itself: fault 4: dc link above its limit.");
+        outcome.faults.clear();
+        outcome.metrics.set("lost", 1.0);
+        assert!(outcome.lost().unwrap().starts_with("Lost: the drive stopped"));
+        outcome.faults.push("fault 26: the angle is not tracked".into());
+        assert_eq!(outcome.lost().unwrap(), "Lost: fault 26: the angle is not tracked.");
     }
 }

@@ -1,14 +1,18 @@
-//! Results for people: tables on the console, one page with plots, and files written whole.
+//! Results for people: tables on the console, one page with plots, CSV, and files written whole.
+#![deny(clippy::use_debug)]
 
 mod console;
+mod csv;
 mod envelope;
 mod page;
 mod plot;
+mod prose;
 
 use std::io::Write as _;
 use std::path::Path;
 
 pub use console::{paragraph, table, text};
+pub use csv::csv;
 pub use page::{Section, page};
 pub use plot::svg;
 

@@ -2,16 +2,20 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::io::{CONVERTER_CODES, PERIOD_S};
+use drive_core::carrier::DemodulatorKind;
+use drive_core::identify::learning::Learned;
+use drive_core::io::PERIOD_S;
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
 
-use crate::config::{self, Config};
+use crate::config::{self, Config, plant_settings};
 use crate::error::Error;
-use crate::plant::{
-    InverterSettings, Load, MachineSettings, MeasurementSettings, MechanicsSettings, Plant,
-    PlantSettings, SaliencySettings,
-};
+use crate::plant::{Load, Plant, PlantSettings};
+
+/// Longest learning, s: 30 points of 31 s at most, and the start.
+const LONGEST_LEARNING_S: u32 = 1000;
+/// Time at rest after a learning, in rotor time constants.
+const REST_T: f64 = 8.0;
 
 /// Control periods per second.
 pub const RATE_HZ: f64 = 6000.0;
@@ -89,12 +93,44 @@ impl Rig {
         })
     }
 
-    /// The bench that the configuration describes.
+    /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
+    /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`].
+    /// As [`Rig::new`] and [`Rig::learn`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
-        Self::new(&plant_settings(config), &config.drive, seed)
+        let plant = plant_settings(config);
+        let mut rig = Self::new(&plant, &config.drive, seed)?;
+        let injecting = config.drive.angle_source == AngleSource::Injection;
+        let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
+        if config.prepare.learn && injecting && tracks {
+            rig.set_load(Load::Locked)?;
+            rig.learn()?;
+            // The flux decays.
+            rig.run(REST_T * f64::from(config.drive.motor.tau_r()), |_| {});
+            rig.set_load(plant.mechanics.load)?;
+            rig.periods = 0;
+        }
+        Ok(rig)
+    }
+
+    /// Lets the drive learn; the shaft must be locked. The drive is off afterwards and uses the learned values.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
+    pub fn learn(&mut self) -> Result<Learned, Error> {
+        self.command(&Command::Start(Mode::Learning))?;
+        for _ in 0..LONGEST_LEARNING_S {
+            self.run(1.0, |_| {});
+            match (self.drive.state(), self.drive.learned()) {
+                (State::Off, Some(learned)) => return Ok(*learned),
+                (State::Fault(fault), _) => {
+                    return Err(Error::Refused(format!("the drive does not learn: {fault}")));
+                }
+                _ => {}
+            }
+        }
+        Err(Error::Refused(format!("the drive does not learn: it is {}", self.drive.state())))
     }
 
     /// A drive that regulates torque by the encoder, with the shaft locked and the injection beside it.
@@ -224,66 +260,4 @@ pub fn means_over(
 pub fn wrapped_degrees(radians: f64) -> f64 {
     let turns = radians / TAU;
     (turns - turns.round()) * 360.0
-}
-
-/// The plant that the configuration describes.
-pub fn plant_settings(config: &Config) -> PlantSettings {
-    let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
-    // What is unset follows the dissertation's bench, in proportion.
-    let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
-    let relative_range = s.range_a / reference.range_a;
-    let relative_current = f64::from(config.drive.rated_a()) / f64::from(reference_drive.rated_a());
-    PlantSettings {
-        machine: MachineSettings {
-            rs: m.r_s,
-            rr: m.r_r,
-            lls: m.l_ls,
-            llr: m.l_lr,
-            lm: m.l_m,
-            pole_pairs: m.pole_pairs,
-        },
-        saliency: SaliencySettings {
-            a_psi: config.saliency.a_psi,
-            b1: config.saliency.b1.unwrap_or(0.036 / relative_current),
-            chi: config.saliency.chi,
-            hold_a: config.saliency.hold_a.unwrap_or(5.0 * relative_current),
-            psi_n: Some(config.saliency.psi_n.unwrap_or(0.7 * relative_current * m.l_m)),
-        },
-        inverter: InverterSettings {
-            vdc: i.dc_link_v,
-            dead_time_us: i.dead_time_s * 1e6,
-            propagation_us: i.propagation_us,
-            residual_v: i.residual_v,
-            switched: i.switched,
-            ..InverterSettings::default()
-        },
-        measurement: MeasurementSettings {
-            noise_a: s.noise_a.unwrap_or(reference.noise_a * relative_range),
-            range_a: s.range_a,
-            lsb_a: s.lsb_a.unwrap_or(reference.lsb_a * relative_range),
-            filter_hz: s.filter_hz,
-            gain_error_a: s.gain_error_a,
-            gain_error_b: s.gain_error_b,
-            offset_a: s.offset_a,
-            offset_b: s.offset_b,
-            dc_link_v: s.dc_link_range_v.map_or(
-                reference.dc_link_v
-                    * (i.dc_link_v / reference_drive.inverter.dc_link_v as f64).max(1.0),
-                |range| range / f64::from(CONVERTER_CODES),
-            ),
-            heat_sink_code: config.drive.scales.ntc.code(s.heat_sink_c as f32),
-        },
-        mechanics: MechanicsSettings {
-            inertia: m.inertia,
-            friction: m.friction,
-            load: match config.load.mode {
-                config::LoadMode::Locked => Load::Locked,
-                config::LoadMode::Free => Load::Free { torque: config.load.torque_nm },
-                config::LoadMode::Speed => {
-                    Load::Speed { speed: config.load.speed_rpm * TAU / 60.0 }
-                }
-            },
-        },
-        ..PlantSettings::default()
-    }
 }

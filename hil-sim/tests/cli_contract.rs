@@ -61,6 +61,72 @@ fn json_is_one_object_and_nothing_else() {
 }
 
 #[test]
+fn a_group_is_one_json_object_too() {
+    let folder = folder("group");
+    let arguments = ["run", "identify", "--json", "--set", "runs=2"];
+    let output = hil_sim(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let experiments = object["experiments"].as_array().expect("a list");
+    assert_eq!(experiments.len(), hil_sim::experiments::named("identify").len());
+    assert!(
+        experiments.iter().all(|one| one["settings"]["runs"] == 2 && one["version"].is_string())
+    );
+}
+
+#[test]
+fn csv_has_a_file_for_every_figure_and_table() {
+    let folder = folder("csv");
+    let output = hil_sim(&folder, &["run", "torque-steps", "--seconds", "1", "--csv", "data"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let printed = text(&output.stdout);
+    assert!(printed.contains("Metrics") && printed.contains("angle_error_rms_deg"), "{printed}");
+    let read = |name: &str| std::fs::read_to_string(folder.join("data").join(name)).expect(name);
+    assert!(read("torque-steps-levels.csv").starts_with("iq_ref_a,iq_a,torque_nm,"));
+    let figure = read("torque-steps-steps.csv");
+    let mut lines = figure.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().expect("heads");
+    assert!(heads.contains(&"time_s") && heads.contains(&"torque_motor_nm"), "{heads:?}");
+    assert!(lines.all(|row| row.len() == heads.len()));
+    assert_eq!(figure.lines().count(), 601, "a mean every carrier period of 1/600 s");
+}
+
+#[test]
+fn a_page_names_itself_its_origin_and_its_settings() {
+    let folder = folder("origin");
+    let arguments = ["run", "adc-calibration", "--seed", "5", "--set", "motor.r_s=6"];
+    assert_eq!(hil_sim(&folder, &arguments).status.code(), Some(0));
+    let page = std::fs::read_to_string(folder.join("out/adc-calibration.html")).unwrap();
+    let version = format!("hil-sim {}", env!("CARGO_PKG_VERSION"));
+    for part in ["<title>adc-calibration – ", &version, "UTC with seed 5", "motor.r_s = 6"] {
+        assert!(page.contains(part), "{part}");
+    }
+}
+
+/// A rotor a twentieth as heavy as the speed loop is made for runs away with the load.
+#[test]
+fn a_lost_run_names_its_fault_and_prints_no_nan() {
+    let folder = folder("lost");
+    let set = ["--set", "motor.inertia=0.0005", "--set", "load.torque_nm=0.6"];
+    let run =
+        |more: &[&str]| hil_sim(&folder, &[&["run", "speed-profile"], &set[..], more].concat());
+    let output = run(&[]);
+    let printed = text(&output.stdout);
+    assert!(printed.contains("\nLost: fault ") && !printed.contains("NaN"), "{printed}");
+    let page = std::fs::read_to_string(folder.join("out/speed-profile.html")).unwrap();
+    assert!(page.contains("<p class=\"lost\">Lost: fault ") && !page.contains("NaN"));
+    let output = run(&["--json"]);
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let fault = object["faults"][0].as_str().expect("a fault");
+    assert!(printed.contains(fault), "{fault}");
+    let events = object["events"]["profile"].as_array().expect("events");
+    assert_eq!(events.last().expect("an event")[1], fault, "{events:?}");
+    // It comes with the load, at 3 s, not at the end of the part of the profile, at 5 s.
+    let stop = events.last().and_then(|event| event[0].as_f64()).expect("a time");
+    assert!((3.0..3.5).contains(&stop), "{events:?}");
+}
+
+#[test]
 fn user_errors_say_what_is_allowed_and_write_nothing() {
     let folder = folder("errors");
     std::fs::write(folder.join("bad.toml"), "[motor]\nrs = \"5.4\"\n").unwrap();

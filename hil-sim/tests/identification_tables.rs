@@ -3,7 +3,7 @@
 use hil_sim::identification::Parameters;
 use hil_sim::identification::study::{Errors, all};
 use hil_sim::identification::trial::Noise;
-use hil_sim::outcome::Entry;
+use hil_sim::outcome::{Entry, Origin};
 use hil_sim::{Config, Outcome, experiments};
 
 const TRIALS: u64 = 60;
@@ -128,7 +128,9 @@ fn outcome(name: &str, seed: u64) -> Outcome {
 
 #[test]
 fn the_json_table_has_one_row_for_every_number() {
-    let text = outcome("identify-continuous", 1).to_json("identify-continuous", 1).expect("JSON");
+    let text = outcome("identify-continuous", 1)
+        .to_json("identify-continuous", &Origin::new(1, &[]))
+        .expect("JSON");
     let object: serde_json::Value = serde_json::from_str(&text).expect("one object");
     let rows = object["table"].as_array().expect("rows");
     // Twelve columns, four models, five parameters; 90 of them printed.

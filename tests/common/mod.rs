@@ -2,14 +2,15 @@
 #![allow(dead_code)] // every procedure uses its own part of it
 
 use drive_core::{Command, Mode, Settings};
+pub use hil_sim::config::plant_settings;
 use hil_sim::plant::PlantSettings;
-pub use hil_sim::rig::{Rig, plant_settings};
+pub use hil_sim::rig::Rig;
 use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.
 pub fn config(changes: &[&str]) -> Config {
     let changes: Vec<String> = changes.iter().map(|&c| c.to_owned()).collect();
-    Config::load(None, &changes).unwrap()
+    Config::load(None, None, &changes).unwrap()
 }
 
 /// No noise, a converter of 16 bits, no analog filter, an ideal inverter.

@@ -95,6 +95,12 @@ pub fn ensure_c_compiler() -> Result<()> {
     provide("cmake, make, pkg-config or a C compiler", there, "", packages)
 }
 
+/// Finds or gets Chromium, for pictures of pages.
+pub fn ensure_chromium() -> Result<()> {
+    let there = || run::succeeds(run::command("chromium").arg("--version"));
+    provide("chromium", there, "", "chromium")
+}
+
 /// Installs something that is not there, by a command of rustup or as packages of Debian.
 fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -> Result<()> {
     if there() {

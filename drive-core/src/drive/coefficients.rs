@@ -169,7 +169,7 @@ impl Settings {
         let m = &self.motor;
         let motor_plant = tuning::motor_plant(&m.circuit(), f64::from(PERIOD_S))?;
         let (d, q) = match self.current_plant.source {
-            PlantSource::Identified => (self.current_plant.d.into(), self.current_plant.q.into()),
+            PlantSource::Identified => (self.identified_d(), self.identified_q()),
             PlantSource::Motor => (motor_plant, motor_plant),
         };
         let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));

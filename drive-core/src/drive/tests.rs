@@ -295,7 +295,7 @@ fn settings_out_of_range_are_refused_by_name() {
         ),
         (|s| s.inverter.dead_time_s = 1e-3, "inverter.dead_time_s = 0.001"),
         (
-            |s| s.current_plant.d = IdentifiedPlant { k: 0.003, p: 1.5 },
+            |s| s.current_plant.d = IdentifiedPlant { k: None, p: Some(1.5) },
             "current_plant.d.p = 1.5: allowed is 0 to",
         ),
     ];

@@ -232,7 +232,7 @@ macro_rules! number {
 }
 
 macro_rules! auto {
-    ($name:literal, $($path:ident).+, $effective:path, $unit:literal, $help:literal) => {
+    ($name:literal, $($path:ident).+, $effective:expr, $unit:literal, $help:literal) => {
         Entry::new($name, $unit, Access::Auto {
             get: |s: &Settings| s.$($path).+,
             set: |s, value| s.$($path).+ = value,

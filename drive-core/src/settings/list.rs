@@ -49,10 +49,10 @@ pub static SETTINGS: &[Entry<Settings>] = &[
 
     word!("angle_source", angle_source: AngleSource, "source of the flux angle"),
     word!("current_plant", current_plant.source: PlantSource, "plant that the current controllers are designed for"),
-    number!("current_plant.d.k", current_plant.d.k, "A/V", "identified plant k/(z - p) of the direct axis").from_to(1e-6, 10.0),
-    number!("current_plant.d.p", current_plant.d.p, "", "its pole").from_to(0.0, 0.999_99),
-    number!("current_plant.q.k", current_plant.q.k, "A/V", "identified plant k/(z - p) of the quadrature axis").from_to(1e-6, 10.0),
-    number!("current_plant.q.p", current_plant.q.p, "", "its pole").from_to(0.0, 0.999_99),
+    auto!("current_plant.d.k", current_plant.d.k, |s| s.identified_d().k as f32, "A/V", "identified plant k/(z - p) of the direct axis").from_to(1e-6, 10.0),
+    auto!("current_plant.d.p", current_plant.d.p, |s| s.identified_d().p as f32, "", "its pole").from_to(0.0, 0.999_99),
+    auto!("current_plant.q.k", current_plant.q.k, |s| s.identified_q().k as f32, "A/V", "identified plant k/(z - p) of the quadrature axis").from_to(1e-6, 10.0),
+    auto!("current_plant.q.p", current_plant.q.p, |s| s.identified_q().p as f32, "", "its pole").from_to(0.0, 0.999_99),
     word!("ignore_delays", ignore_delays: bool, "whether known delays are left uncompensated, as in the dissertation").learned(),
     word!("track_rotor", track_rotor: bool, "whether the rotor time constant is tracked while running"),
 

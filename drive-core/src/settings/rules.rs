@@ -19,6 +19,7 @@
 //! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
 //! | `speed.limit_rpm`, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
+//! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
 //! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
 
@@ -26,7 +27,9 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use super::Settings;
 use super::table::{CarrierTable, ReferenceTable};
+use super::{IdentifiedPlant, Motor};
 use crate::io::{CONVERTER_CODES, PERIOD_S};
+use crate::tuning::{FirstOrder, motor_plant};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 const RATED_A: f32 = 2.56 * SQRT_2;
@@ -127,19 +130,43 @@ impl Settings {
     /// Peak of the injected voltage, V, from the reactance X = ω σL_s of the leakage at the carrier.
     ///
     /// The angle error is noise over saliency and carrier current, so the rule asks for a current, 0.26 A of the
-    /// dissertation's motor. The remainder of the dead time sets a floor in volts: 50 V at 311 V, where 0.35 A of that
-    /// motor reach it; with more, phases b and c would cross zero at a start, where the drop of the inverter is uncertain.
-    /// The voltage is between 20 and 110 V at 311 V.
+    /// dissertation's motor. The remainder of the dead time asks for a voltage, 50 V at 311 V. The larger of both is
+    /// taken, but not more than the voltage that drives half the direct current: beyond, phases b and c would cross zero
+    /// at a start, where the drop of the inverter is uncertain. The voltage is between 20 and 110 V at 311 V.
     pub fn carrier_v(&self) -> f32 {
         let rule = || {
             let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
-            let wanted = self.share_of_rated(0.257_65) * reactance;
-            let floor =
-                f32::min(self.share_of_dc_link(50.0), self.share_of_rated(0.35) * reactance);
-            let (low, high) = (self.share_of_dc_link(20.0), self.share_of_dc_link(110.0));
-            f32::min(f32::max(f32::max(wanted, floor), low), high)
+            let by_noise = self.share_of_rated(0.257_65) * reactance;
+            let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
+            let most = 0.5 * self.i_d() * reactance;
+            f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
         };
         or_rule(self.injection.amplitude_v, rule)
+    }
+
+    /// Plant of the direct axis for the design of its current controller. The rule is the plant that was identified on the
+    /// dissertation's motor (Eq. 3.41), its gain and its distance from 1 in proportion to those of the plants computed
+    /// from the parameters.
+    pub fn identified_d(&self) -> FirstOrder {
+        self.identified(&self.current_plant.d, FirstOrder { k: 0.002_837, p: 0.9511 })
+    }
+
+    /// The same of the quadrature axis (Eq. 3.42).
+    pub fn identified_q(&self) -> FirstOrder {
+        self.identified(&self.current_plant.q, FirstOrder { k: 0.003_721, p: 0.9503 })
+    }
+
+    fn identified(&self, set: &IdentifiedPlant, on_reference: FirstOrder) -> FirstOrder {
+        let computed = |motor: &Motor| motor_plant(&motor.circuit(), f64::from(PERIOD_S));
+        let rule = match (computed(&self.motor), computed(&Motor::default())) {
+            (Ok(own), Ok(reference)) => FirstOrder {
+                k: on_reference.k * (own.k / reference.k),
+                p: 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p)),
+            },
+            // The parameters are out of their ranges, which is reported of them.
+            _ => on_reference,
+        };
+        FirstOrder { k: set.k.map_or(rule.k, f64::from), p: set.p.map_or(rule.p, f64::from) }
     }
 
     /// Torque current from which on the constant reference of the current difference is full, A peak.

@@ -40,7 +40,10 @@ impl Key {
             bench.map(Self::Bench).into_iter().chain(drive.map(Self::Drive)).collect();
         if keys.is_empty() {
             let known = Self::all().map(Self::name);
-            return Err(Error::UnknownKey { key: name.to_owned(), nearest: nearest(name, known) });
+            return Err(Error::UnknownKey {
+                key: name.to_owned(),
+                nearest: nearest(name, known).map(str::to_owned),
+            });
         }
         Ok(keys)
     }

@@ -149,8 +149,8 @@ keys! {
         /// Time from the command to the first switch (section 3.9).
         propagation_us: f64 = 2.2, [0 .. 10], "us";
         /// Further voltage per phase that goes with the sign of the current and that no compensation
-        /// knows of; 40 % of the dead time's (assumed).
-        residual_v: f64 = 1.64, [0 .. 20], "V";
+        /// knows of; unset: 1.64 V at 311 V, 40 % of the dead time's (assumed), in proportion to the dc link.
+        residual_v: Option<f64> = None, [0 .. 20], "V";
         /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
         switched: bool = false, [switch], "";
     }
@@ -183,8 +183,8 @@ keys! {
         mode: LoadMode = LoadMode::Locked, [LoadMode], "";
         /// Speed that the dynamometer holds, with load.mode = speed.
         speed_rpm: f64 = 0.0, [-24000 .. 24000], "rpm";
-        /// Torque of the load, with load.mode = free.
-        torque_nm: f64 = 0.0, [-1000 .. 1000], "Nm";
+        /// Torque of the load, with load.mode = free; unset: none, or the experiment's own.
+        torque_nm: Option<f64> = None, [-10000 .. 10000], "Nm";
     }
     /// References, for experiments that do not bring their own.
     "reference." reference: ReferenceConfig {
@@ -201,6 +201,8 @@ keys! {
     "spread." spread: SpreadConfig {
         /// Largest relative error of each parameter that the drive believes of its motor.
         motor: f64 = 0.0, [0 .. 0.5], "";
+        /// In machines: factor by which each parameter of the motor is larger or smaller at most; 1 for the motor itself.
+        machine: f64 = 1.0, [1 .. 4], "";
         /// Largest relative change of the sensors' noise.
         noise: f64 = 0.0, [0 .. 1], "";
         /// Largest relative error of the gain of each current channel.

@@ -29,7 +29,7 @@ fn every_default_is_allowed_and_every_key_round_trips() {
             || found.parse::<f64>().unwrap() as f32 == text.parse::<f64>().unwrap() as f32;
         assert!(same, "{name}: {found}, not {text}");
         // The changes make the same configuration again.
-        let again = Config::load(None, &config.changes());
+        let again = Config::load(None, None, &config.changes());
         assert_eq!(again.expect(name), config, "{name}");
     }
 }
@@ -55,8 +55,9 @@ fn just_outside_the_range_is_refused() {
 
 #[test]
 fn errors_name_the_key_the_value_and_the_range() {
-    let text =
-        |assignment: &str| Config::load(None, &[assignment.to_owned()]).unwrap_err().to_string();
+    let text = |assignment: &str| {
+        Config::load(None, None, &[assignment.to_owned()]).unwrap_err().to_string()
+    };
     assert_eq!(text("motor.r_s=-1"), "motor.r_s = -1: out of range; allowed: 0.001 to 1000 ohm");
     assert_eq!(
         text("motor.r_s=nan"),
@@ -96,7 +97,7 @@ fn toml_and_assignments_say_the_same() {
     from_toml.set_table(&table.parse().unwrap()).unwrap();
     let changes = from_toml.changes();
     assert_eq!(changes, ["motor.r_s=6", "load.mode=speed", "runs=3", "drive.motor.r_r=1.3"]);
-    assert_eq!(Config::load(None, &changes).unwrap(), from_toml);
+    assert_eq!(Config::load(None, None, &changes).unwrap(), from_toml);
     // The drive knows its motor, but for what it is told.
     assert_eq!((from_toml.drive.motor.r_s, from_toml.drive.motor.r_r), (6.0, 1.3));
     assert_eq!((from_toml.motor.r_s, from_toml.motor.r_r), (6.0, 1.1));
@@ -140,7 +141,7 @@ fn old_names_are_accepted() {
         "sequence.i_d=0.9",
         "prepare.learn=yes",
     ];
-    let load = |all: [&str; 12]| Config::load(None, &all.map(str::to_owned)).unwrap();
+    let load = |all: [&str; 12]| Config::load(None, None, &all.map(str::to_owned)).unwrap();
     assert_eq!(load(old), load(today));
     assert_eq!(load(old).drive.motor.r_s, 5.0);
 }

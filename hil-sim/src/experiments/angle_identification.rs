@@ -8,9 +8,10 @@ use super::bode::{Bode, frequencies, largest_pole};
 use super::torque::assumptions;
 use super::{Context, Experiment};
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::{RATE_HZ, plant_settings};
+use crate::rig::RATE_HZ;
 use drive_core::carrier::DemodulatorKind;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, PRINTED_PII, Pii, TABLE_6};
@@ -43,7 +44,9 @@ struct Demodulation {
 const DEMODULATIONS: [Demodulation; 3] = [
     Demodulation { name: "literal", demodulator: DemodulatorKind::Literal, unit: "mA" },
     Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, unit: "mA" },
-    Demodulation { name: "synchronous", demodulator: DemodulatorKind::Synchronous, unit: "10^-3" },
+    Demodulation {
+        name: "synchronous", demodulator: DemodulatorKind::Synchronous, unit: "10⁻³"
+    },
 ];
 
 /// Identification at one torque current.
@@ -139,7 +142,7 @@ fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table 
         let printed = Model::printed(row);
         table.record([
             ("iq (A)", Cell::fixed(TABLE_6[row].0, 1)),
-            ("k_phi x 10^5", Cell::fixed(model.k * 1e5, 3)),
+            ("k_φ × 10⁵", Cell::fixed(model.k * 1e5, 3)),
             ("printed", Cell::fixed(printed.k * 1e5, 3)),
             ("ratio", Cell::fixed(model.k / printed.k, 2)),
             ("poles", Cell::from(poles_text(model))),
@@ -160,20 +163,20 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
     let title = format!("Two plants: {}", demodulation.name);
     let mut table = Table::new(title, &[]).note(match demodulation.demodulator {
             DemodulatorKind::Literal => {
-                "Predicted: the leak of the fundamental, -sqrt2 0.01 0.944 |i| sin(x + gamma) with x the \
-                 axis seen from the current's frame: slope sqrt2 0.00944 iq while the current is held; \
+                "Predicted: the leak of the fundamental, −√2 0.01 0.944 |i| sin(x + γ) with x the \
+                 axis seen from the current's frame: slope √2 0.00944 iq while the current is held; \
                  none when the current turns with the axis. The loop is closed around the second: it \
                  has no gain."
             }
             DemodulatorKind::Synchronous => {
-                "Predicted: q = -Im(s e^(-2j theta)) with s = a e^(2j phi2) + b |i| e^(2j arg i): slope \
-                 2(|a| - b |i| cos 2 gamma) while the current is held, 2|a| once it has turned with the \
+                "Predicted: q = −Im(s e^(−2jθ)) with s = a e^(2jφ̂₂) + b |i| e^(2j arg i): slope \
+                 2(|a| − b |i| cos 2γ) while the current is held, 2|a| once it has turned with the \
                  axis. The first is what a fast error meets and what section 3.11 identifies; the second \
                  is what a slow error meets."
             }
             _ => {
-                "Predicted: the slopes of the saliency (see synchronous) times sqrt2 |I_hf| and the gain \
-                 of the chain, 0.945 2/pi 0.944. "
+                "Predicted: the slopes of the saliency (see synchronous) times √2 |I_hf| and the gain \
+                 of the chain, 0.945 2/π 0.944."
             }
         });
     let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
@@ -213,7 +216,7 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
 /// The controllers on the identified plants.
 fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedPoint])>) -> Table {
     let mut table = Table::new("Closed loop of Eq. 3.44 and the identified plants", &[]).note(
-        "Largest magnitude of the poles of (z-1)^2 (z-p1)(z-p2) + k_s k_phi (z - z_s); above 1 the loop \
+        "Largest magnitude of the poles of (z − 1)² (z − p₁)(z − p₂) + k_s k_φ (z − z_s); above 1 the loop \
          is unstable. Design: the fastest with its zero at a quarter of the crossover and a sensitivity peak of 2 at \
          most, on the plant at 1.5 A, as in the source; the printed k_s is in rad/A and says nothing for the synchronous signal.",
     );
@@ -347,7 +350,7 @@ fn remarks() -> Vec<String> {
     vec![
         "Two plants. With the encoder the current stays where it is when the injection axis is turned, so \
          the part of the saliency that belongs to the current is seen to turn, together with that of \
-         the flux: slope 2(|a| + b |i| |cos 2 gamma|), growing with iq. This is what section 3.11 \
+         the flux: slope 2(|a| + b |i| |cos 2γ|), growing with iq. This is what section 3.11 \
          identifies (Table 6). Without the encoder the current is put on the estimated angle: it turns \
          with the axis, its part of the saliency stands still in the estimated frame, and slow errors \
          meet 2|a| alone, whatever iq. Errors faster than the current loop meet the first. A controller \

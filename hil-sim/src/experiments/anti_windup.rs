@@ -144,7 +144,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks.push(format!(
         "Eq. B.1 and B.3 print u[k+1] on the left. Accepted literally that is one more delay, and the \
          example is unstable without any limit (largest pole {delayed:.4}). The immediate form, \
-         u[k] = u[k-1] + Kc (e[k] - zc e[k-1]), gives what Figure 40 is said to show; the drive \
+         u[k] = u[k − 1] + K_c (e[k] − z_c e[k − 1]), gives what Figure 40 is said to show; the drive \
          uses that."
     ));
     Ok(outcome)

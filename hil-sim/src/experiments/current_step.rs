@@ -51,9 +51,9 @@ fn settling(response: &[f64]) -> usize {
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Unit step, C(z) = 52.48 (z - 0.94786)/(z - 1)", &[]);
+    let mut table = Table::new("Unit step, C(z) = 52.48 (z − 0.94786)/(z − 1)", &[]);
     let larger = FirstOrder { p: 1.03 * PLANT.p, ..PLANT };
-    let plants = [("Eq. 3.34", "nominal", PLANT), ("pole x 1.03", "larger_pole", larger)];
+    let plants = [("Eq. 3.34", "nominal", PLANT), ("pole × 1.03", "larger_pole", larger)];
     let mut figure = Figure::new(
         "step",
         "Current after a unit step: plant of Eq. 3.34 (top) and with its pole 3 % larger (bottom)",

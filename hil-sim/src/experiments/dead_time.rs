@@ -72,8 +72,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .push(Figure::new("dead_time", title, "Figures 28, 29").panel(voltage).panel(current));
     outcome.remarks.push(format!(
         "Per phase the dead time takes V_dc t_d / T = {lost:.2} V with the sign of the current. The \
-         source writes 2 ms and 4 ms where its figure shows 2 us and 4 us, and 2.64 % of the period \
-         for both delays together: 2.2 us until the first switch acts, 2.2 us of dead time."
+         source writes 2 ms and 4 ms where its figure shows 2 µs and 4 µs, and 2.64 % of the period \
+         for both delays together: 2.2 µs until the first switch acts, 2.2 µs of dead time."
     ));
     Ok(outcome)
 }
@@ -84,12 +84,12 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.inverter.switched = true;
     config.drive.inverter.compensate = compensate;
     // No compensation knows the residual drop; this experiment is about the dead time alone.
-    config.inverter.residual_v = 0.0;
+    config.inverter.residual_v = Some(0.0);
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = SPEED_RPM;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(IQ_A as f32))?;
+    rig.command(&Command::Torque(config.amperes(IQ_A) as f32))?;
     rig.run(0.5, |_| {});
 
     const BINS: usize = 120;

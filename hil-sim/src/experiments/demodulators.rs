@@ -195,7 +195,7 @@ fn summary<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResu
 fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>) -> Table {
     let mut table = Table::new("What each sees at the right angle", &[]).note(
         "Oriented by the encoder, shaft locked. Slope: the injection axis is turned by ±4° and the \
-         current stays. Without saliency: the same drive on a motor with a_psi = b1 = 0, where nothing \
+         current stays. Without saliency: the same drive on a motor with `saliency.a_psi` = `saliency.b1` = 0, where nothing \
          should be seen; as angle: what that would shift the angle by.",
     );
     for (demodulation, f) in all {
@@ -267,7 +267,7 @@ fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
         let y = format!("{of} ({})", demodulation.unit());
         IQ_A.iter()
             .zip(family)
-            .fold(Panel::new("phi2 - theta (° electrical)", y), |panel, (iq, curve)| {
+            .fold(Panel::new("φ̂₂ − θ (° electrical)", y), |panel, (iq, curve)| {
                 panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
             })
     };
@@ -312,9 +312,9 @@ fn remarks() -> Vec<String> {
          600 Hz and 1200 Hz, and an average over one carrier period takes them out."
             .into(),
         "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
-         filters (injection.rms_samples). Their impedance difference is shown as the current \
-         difference that it stands for, I^2/(sqrt2 V) amperes an ohm (0.94 mA/ohm with 50 V on the \
-         motor of Table 5), and theta is counted from 90° ahead of the flux, so that the maps compare."
+         filters (`injection.rms_samples`). Their impedance difference is shown as the current \
+         difference that it stands for, I²/(√2 V) amperes an ohm (0.94 mA/Ω with 50 V on the \
+         motor of Table 5), and θ is counted from 90° ahead of the flux, so that the maps compare."
             .into(),
     ]
 }

@@ -47,14 +47,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("within_factor_2_printed_noise", printed);
     outcome.entries = all.iter().map(|(entry, _)| *entry).collect();
     outcome.remarks.extend([
-        "omega_m in Tables 2 and 3 (0.20 to 0.69 %) cannot be reproduced: Eq. 42 itself is 1.19, \
+        "ω_m in Tables 2 and 3 (0.20 to 0.69 %) cannot be reproduced: Eq. 42 itself is 1.19, \
          2.38 and 4.73 % low at 50, 100 and 200 µs on this machine without any noise, and the \
          error of f_1b printed in Table 1 is up to twelve times larger than that of the speed that \
          is proportional to it. Tables 2 and 3 are not of the same runs, or not by Eq. 42."
             .to_owned(),
         "r_s in Table 3 and in the S_s columns of Table 5 (4 to 20 %) is not reproduced: with \
          this signal it comes out three to seven times better at 50 and 100 µs. So is, two to \
-         nine times, tau_r in the S_s columns of Table 5. tau_r by Model C at 375 rad/s and \
+         nine times, τ_r in the S_s columns of Table 5. τ_r by Model C at 375 rad/s and \
          200 µs comes out two to six times worse."
             .to_owned(),
         "The speeds of B and C agree to four digits in all six printed pairs: the columns B were \
@@ -66,7 +66,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 /// Means over the twelve columns.
 fn means(all: &[(Entry, f64)], metrics: &mut crate::outcome::Metrics) -> Table {
-    let heads = ["model", "r_s (%)", "tau_r (%)", "sigma_l_s (%)", "l_s (%)", "omega_m (%)"];
+    let heads = ["model", "r_s (%)", "τ_r (%)", "σ l_s (%)", "l_s (%)", "ω_m (%)"];
     let mut table = Table::new("Mean of both signals, speeds and all periods", &heads);
     for model in MODELS {
         let mean = |parameter: &str| {

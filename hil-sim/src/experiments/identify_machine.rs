@@ -37,12 +37,12 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("rbv_largest_factor", rbv.exp());
     outcome.tables.push(table.note(
         "h_0b / h_1b: both have the same absolute error, so their relative errors in Tables 1 and 4 \
-         have the inverse ratio of their values. (1 - f_11)/2: what separates sigma_l_s by Models B \
-         and C in Tables 2 and 3. The error of tau_r by Model B is almost all bias.",
+         have the inverse ratio of their values. (1 - f_11)/2: what separates σ l_s by Models B \
+         and C in Tables 2 and 3. The error of τ_r by Model B is almost all bias.",
     ));
     let mut machines = Table::new(
         "Machines",
-        &["machine", "r_s (ohm)", "tau_r (s)", "sigma_l_s (H)", "l_s (H)", "r_s/sigma_l_s (1/s)"],
+        &["machine", "r_s (Ω)", "τ_r (s)", "σ l_s (H)", "l_s (H)", "r_s/(σ l_s) (1/s)"],
     );
     for (name, machine) in [("PX", Parameters::PX), ("rbv", Parameters::RBV)] {
         let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
@@ -59,7 +59,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks.push(
         "The simulated tables were not made with the machine of Table 6 (rbv). PX is inferred from \
          the tables; the paper does not name it. Errors in % do not depend on the level of voltage \
-         or impedance, so only r_s/sigma_l_s, tau_r and l_s/sigma_l_s can be inferred at all."
+         or impedance, so only r_s/(σ l_s), τ_r and l_s/(σ l_s) can be inferred at all."
             .to_owned(),
     );
     Ok(outcome)

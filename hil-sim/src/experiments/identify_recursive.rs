@@ -51,7 +51,8 @@ fn estimate(trial: &Trial, level: Noise, seconds: f64, seed: u64) -> Result<Run,
         corner: (corner * H) as f32,
         ..RlsSettings::paper(VOLTAGE as f32, CURRENT as f32)
     };
-    let mut single = Rls::new(settings).map_err(|e| Error::Internal(format!("{e:?}")))?;
+    let mut single = Rls::new(settings)
+        .map_err(|_| Error::Internal("a setting of the least squares is out of range".into()))?;
     let mut double = Reference::new(f64::from(settings.lambda), f64::from(settings.p0));
     let filter = Filter::new(corner, H);
     let (mut on_v, mut on_i) = (filter, filter);
@@ -93,7 +94,7 @@ fn convergence(estimates: &[[Value; 5]], k: usize) -> f64 {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let seconds = context.seconds.unwrap_or(2.0).clamp(0.2, 60.0);
     let mut outcome = Outcome::default();
-    let mut table = Table::new("Recursive least squares, lambda 0.999, P0 = 1000 I", &[]);
+    let mut table = Table::new("Recursive least squares, λ = 0.999, P₀ = 1000 I", &[]);
     let bar = context.progress.bar("identification", 2 * CASES.len() as u64);
     for (index, (source, signal, speed, paper)) in CASES.into_iter().enumerate() {
         let machine = Parameters::PX.at(speed);
@@ -108,12 +109,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("signal", Cell::from(signal.name())),
             ("speed (rad/s)", Cell::fixed(speed, 1)),
             ("r_s converges (s)", Cell::fixed(times[0], 3)),
-            ("tau_r converges (s)", Cell::fixed(times[1], 3)),
+            ("τ_r converges (s)", Cell::fixed(times[1], 3)),
             (
                 "paper, worst (s)",
                 paper.map_or_else(|| Cell::from("-"), |paper| Cell::fixed(paper, 1)),
             ),
-            ("speed, f32 - f64 (rad/s rms)", Cell::significant(noisy.speed_rms, 2)),
+            ("speed, f32 − f64 (rad/s rms)", Cell::significant(noisy.speed_rms, 2)),
         ]);
         let key = format!("figure_{}", index + 2);
         outcome.metrics.set(format!("{key}_r_s_converges_s"), times[0]);
@@ -142,7 +143,7 @@ fn figure(
     estimates: &[[Value; 5]],
 ) -> Figure {
     let title = format!("Model C with {} at {} rad/s", signal.name(), machine.omega_m);
-    let labels = ["r_s (ohm)", "tau_r (s)", "sigma l_s (H)", "l_s (H)", "speed (electrical rad/s)"];
+    let labels = ["r_s (Ω)", "τ_r (s)", "σ l_s (H)", "l_s (H)", "speed (electrical rad/s)"];
     let end = estimates.len() as f64 * H;
     let mut figure = Figure::new(name, title, source);
     for (k, label) in labels.into_iter().enumerate() {

@@ -82,12 +82,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.metrics.set("tau_r_error_of_rbv_sg_printed_noise_pct", sg);
     outcome.metrics.set("tau_r_error_of_rbv_ss_printed_noise_pct", ss);
     outcome.remarks.push(format!(
-        "The paper does not discuss that tau_r by Model C (0.0114 s at 60 Hz, 0.021 s at 10 Hz) is \
+        "The paper does not discuss that τ_r by Model C (0.0114 s at 60 Hz, 0.021 s at 10 Hz) is \
          73 and 50 % below the 0.0427 s of the locked-rotor and no-load tests, nor that it doubles \
          at the lower frequency. The bias of Model C on the machine rbv is 0.3 % at 50 µs. All the \
          noise of section 5, said to be far above that of the measurements, makes a mean error of \
          {sg:.0} % with S_g and of {ss:.0} % with S_s at 375 rad/s; both signals gave the same \
-         tau_r. The gap stays unexplained."
+         τ_r. The gap stays unexplained."
     ));
     Ok(outcome)
 }
@@ -113,7 +113,7 @@ fn figure_5(machine: &Parameters, estimated: &Parameters, outcome: &mut Outcome)
             (0..measured.len()).map(|n| (n as f64 * H, of(n))).collect()
         };
         figure = figure.panel(
-            Panel::new("time (s)", format!("i_d (A), {name}"))
+            Panel::new("time (s)", format!("i_d, {name} (A)"))
                 .with(Series::reference("machine", points(&|n| measured[n].re)))
                 .with(Series::line("simulated", points(&|n| simulated[n].re)))
                 .with(Series::line("error", points(&|n| measured[n].re - simulated[n].re))),

@@ -104,7 +104,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
-        let mut panel = Panel::new("phi2 - theta (° electrical)", "delta_i (mA)");
+        let mut panel = Panel::new("φ̂₂ − θ (° electrical)", "Δi (mA)");
         for (iq, curve) in IQ_A.iter().zip(family) {
             panel = panel.with(Series::line(format!("iq = {iq} A"), curve.clone()));
         }
@@ -187,7 +187,7 @@ fn zero(curve: &Curve) -> f64 {
 /// chain on the motor with saliency.
 fn table(curves: &[Curve], id: f64) -> Table {
     let mut table = Table::new("What Figure 19 shows", &[]).note(
-        "The leak predicts delta_i = -sqrt2 * 0.01 * 0.944 * |i| * sin(phi2 - theta + gamma), gamma \
+        "The leak predicts Δi = −√2 · 0.01 · 0.944 · |i| · sin(φ̂₂ − θ + γ), γ \
          = atan(iq/id), without any free parameter: 0.01 and 0.944 are the dc gains of BPF and PP. \
          (In the source the 0.944 of the low-pass, which makes the real currents larger than \
          commanded, cancels that of PP: 9.9 mA.)",

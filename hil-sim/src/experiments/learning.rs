@@ -1,8 +1,8 @@
 //! A drive that learns its tracking reference on a simulated motor with the shaft locked.
 
+use drive_core::Command;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::table::{Grid, ReferenceTable};
-use drive_core::{Command, Mode, State};
 
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -10,37 +10,15 @@ use crate::rig::Rig;
 use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
 
-/// Longest learning run, s: 30 points of 31 s at most, and the start.
-const LONGEST_S: u32 = 1000;
-
-/// Lets the drive of a rig learn; the shaft must be locked. The drive is off afterwards and uses the
-/// learned values.
-///
-/// # Errors
-/// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
-pub fn learn(rig: &mut Rig) -> Result<Learned, Error> {
-    rig.command(&Command::Start(Mode::Learning))?;
-    for _ in 0..LONGEST_S {
-        rig.run(1.0, |_| {});
-        match (rig.drive.state(), rig.drive.learned()) {
-            (State::Off, Some(learned)) => return Ok(*learned),
-            (State::Fault(fault), _) => {
-                return Err(Error::Refused(format!("the drive does not learn: {fault}")));
-            }
-            _ => {}
-        }
-    }
-    Err(Error::Refused(format!("the drive does not learn: it is {}", rig.drive.state())))
-}
-
 /// The values that the drive of the configuration learns.
 ///
 /// # Errors
-/// As [`Rig::from_config`] and [`learn`].
+/// As [`Rig::from_config`] and [`Rig::learn`].
 pub fn learned(config: &Config, seed: u64) -> Result<Learned, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
-    learn(&mut Rig::from_config(&config, seed)?)
+    config.prepare.learn = false;
+    Rig::from_config(&config, seed)?.learn()
 }
 
 /// Distance of the points of [`reference_of`], A.

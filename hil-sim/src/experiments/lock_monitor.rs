@@ -161,7 +161,7 @@ impl Trials<'_> {
             for r in alarms {
                 table.row([
                     Cell::from(r.case.seed.to_string()),
-                    Cell::from(format!("{:?}", r.kind)),
+                    Cell::from(r.kind.name()),
                     Cell::fixed(r.case.iq, 3),
                     Cell::fixed(r.case.rpm, 1),
                     Cell::from(r.fault.map(|f| f.to_string()).unwrap_or_default()),
@@ -173,7 +173,7 @@ impl Trials<'_> {
         for kind in KINDS {
             let of_kind = runs.iter().filter(|r| r.kind == kind);
             let points = of_kind.map(|r| (r.case.iq, r.largest_loss)).collect();
-            panel = panel.with(Series::points(format!("{kind:?}"), points));
+            panel = panel.with(Series::points(kind.name(), points));
         }
         outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
         Ok(())
@@ -193,7 +193,7 @@ impl Trials<'_> {
         let heads =
             ["limit (rpm)", "trials", "off before the limit", "latest after it (s)", "not in time"];
         let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &heads)
-            .note("The drive goes by its estimate, injection.tracked_rpm, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
+            .note("The drive goes by its estimate, `injection.tracked_rpm`, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
         table.row([
             Cell::fixed(limit, 0),
             Cell::fixed(trials.len() as f64, 0),

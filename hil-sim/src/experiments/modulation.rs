@@ -132,7 +132,7 @@ fn vectors(inverter: &Inverter) -> Figure {
             .collect()
     };
     let inner = inverter.vdc / 3.0_f64.sqrt();
-    let panel = Panel::new("alpha (V)", "beta (V)")
+    let panel = Panel::new("α (V)", "β (V)")
         .equal_axes()
         .with(Series::reference("hexagon of U_0 to U_300", (0..=6).map(corner).collect()))
         .with(Series::points("vectors of Table 2", (0..6).map(corner).collect()))

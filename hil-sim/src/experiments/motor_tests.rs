@@ -1,10 +1,10 @@
 //! The tests that gave Table 5, on the simulated motor.
 
 use super::{Context, Experiment};
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
 use crate::outcome::{Cell, Outcome, Table};
-use crate::rig::plant_settings;
 
 /// Section 3.6, Table 5.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -36,11 +36,11 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         format!(
             "The locked-rotor test as section 3.6.2 reads it leaves out the magnetising branch, which \
              at 15 Hz takes part of the current: it gives r_r (L_m/L_r)² and less leakage, here {bias:.2} \
-             of r_r. If the printed readings are right, the motor of the source has r_r = {:.2} ohm and \
+             of r_r. If the printed readings are right, the motor of the source has r_r = {:.2} Ω and \
              not 1.1 (last column).",
             Readings::PRINTED.exact().r_r
         ),
-        "Table 5 truncates: 27.9 V / 2.60 A / 2 is 5.365 ohm (5.4 printed from the rounded 10.8), \
+        "Table 5 truncates: 27.9 V / 2.60 A / 2 is 5.365 Ω (5.4 printed from the rounded 10.8), \
          r_r 1.15 (1.19 with 5.365) and not 1.1, L_s 204.75 mH, L_m 177.15 mH. What 3.6.3 calls \
          L_m + L_s is L_m + L_l1."
             .to_owned(),
@@ -68,10 +68,10 @@ fn readings_table(ours: &Readings) -> Table {
         ("locked rotor, 15 Hz", "voltage (V rms)", printed.locked.1, ours.locked.1),
         ("", "current (A rms)", printed.locked.2, ours.locked.2),
         ("", "angle (rad)", printed.locked.3, ours.locked.3),
-        ("", "|z| (ohm)", printed.locked_impedance().norm(), ours.locked_impedance().norm()),
+        ("", "|z| (Ω)", printed.locked_impedance().norm(), ours.locked_impedance().norm()),
         ("no load, 60 Hz", "voltage (V rms)", printed.no_load.1, ours.no_load.1),
         ("", "current (A rms)", printed.no_load.2, ours.no_load.2),
-        ("", "|z| (ohm)", printed.no_load_impedance(), ours.no_load_impedance()),
+        ("", "|z| (Ω)", printed.no_load_impedance(), ours.no_load_impedance()),
     ];
     for (test, reading, printed, ours) in rows {
         table.row([
@@ -91,7 +91,7 @@ fn circuit_table(readings: &Readings, motor: &Circuit) -> Table {
     let (printed, classical) = (Readings::PRINTED.as_printed(), readings.as_printed());
     let (exact, theirs) = (readings.exact(), Readings::PRINTED.exact());
     for (k, name) in Circuit::NAMES.iter().enumerate() {
-        let (scale, unit, digits) = if k < 2 { (1.0, "ohm", 4) } else { (1000.0, "mH", 4) };
+        let (scale, unit, digits) = if k < 2 { (1.0, "Ω", 4) } else { (1000.0, "mH", 4) };
         let value = |circuit: &Circuit| Cell::significant(scale * circuit.array()[k], digits);
         table.record([
             ("parameter", Cell::from(format!("{name} ({unit})"))),

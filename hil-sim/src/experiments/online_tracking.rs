@@ -101,7 +101,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;
         let mut config = context.config.clone();
         config.drive.angle_source = source;
-        config.inverter.residual_v = residual(&config, share);
+        config.inverter.residual_v = Some(residual(&config, share));
         let seconds = SECONDS;
         let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
         simulate(&config, &case, context.seed)
@@ -124,7 +124,7 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
 }
 
 fn with_encoder(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Table {
-    let mut table = Table::new("With the encoder: tau_r of the warm rotor, used by the drive", &[]);
+    let mut table = Table::new("With the encoder: τ_r of the warm rotor, used by the drive", &[]);
     let (mut worst, mut angle, mut untracked) = ([0.0f64; 3], 0.0f64, 0.0f64);
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
         for (worst, ending) in worst.iter_mut().zip(row) {
@@ -169,7 +169,7 @@ fn without(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Tab
                 ("speed (rpm)", Cell::fixed(point.0, 0)),
                 ("i_q (A)", Cell::fixed(point.1, 1)),
                 ("dead time left (%)", left),
-                ("tau_r error (%)", number(ending.tau_r, 1)),
+                ("τ_r error (%)", number(ending.tau_r, 1)),
                 ("speed error (rad/s)", number(ending.speed, 2)),
                 ("there was an estimate (% of the time)", Cell::fixed(ending.valid, 0)),
                 ("Model D's speed error (rad/s)", number(ending.inverse_speed, 1)),
@@ -224,8 +224,8 @@ fn remarks(config: &Config) -> Vec<String> {
         format!(
             "The voltage is the one the drive put out, reconstructed from its own compare values. Of \
              the dead time ({:.1} V) what is not compensated acts like a resistance, and the stator \
-             resistance is estimated beside tau_r to take it up; held fixed, 20 % of the dead time \
-             left puts 10 % on tau_r at 2 A (measured on a motor without saliency).",
+             resistance is estimated beside τ_r to take it up; held fixed, 20 % of the dead time \
+             left puts 10 % on τ_r at 2 A (measured on a motor without saliency).",
             residual(config, 1.0)
         ),
         "Model D, the inverse of all four complex coefficients, is of no use here: two or three \

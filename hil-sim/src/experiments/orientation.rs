@@ -21,7 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, 150.0, 300.0, 700.0, 1200.0, 1440.0];
 const IQ_A: f64 = 2.0;
 
-/// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) psi i_q.
+/// Mean flux angle error, degrees, and torque as a share of 3/2 P (Lm/Lr) ψ i_q.
 type Orientation = (f64, f64);
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -34,8 +34,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let mut table = Table::new("Field orientation over speed", &[]).note(format!(
-        "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m^2/L_r belongs; \
-         the torque is compared with 3/2 P (L_m/L_r) psi i_q."
+        "iq = {} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
+         the torque is compared with 3/2 P (L_m/L_r) ψ i_q.",
+        context.config.amperes(IQ_A)
     ));
     let mut lines = [Vec::new(), Vec::new()];
     for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {
@@ -79,12 +80,13 @@ fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orie
     config.load.speed_rpm = rpm;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(IQ_A as f32))?;
+    let iq = config.amperes(IQ_A);
+    rig.command(&Command::Torque(iq as f32))?;
     rig.run(1.0, |_| {});
     let (mut error, mut share) = (Stats::default(), Stats::default());
     rig.run(context.seconds.unwrap_or(0.3), |p| {
         error.push(p.angle_error_deg);
-        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * IQ_A));
+        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * iq));
     });
     Ok((error.mean(), share.mean()))
 }

@@ -13,7 +13,7 @@ use num_complex::Complex64;
 use super::bode::{Bode, RATE, fictitious, frequencies, omega_t};
 use super::{Context, Experiment};
 use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Style, Table};
 
 /// Figures 23 to 25, section 3.8.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -107,8 +107,8 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
     let bode = Bode { hz: &grid, label: "fictitious frequency v (Hz)", shown: fictitious };
     let (gain, phase) = bode.panels(&[
         ("G (Fig. 23)", &g),
-        ("G/(z-1) (Fig. 24)", &integrated),
-        ("G(z-zc)/(z-1) (Fig. 25)", &with_zero),
+        ("G/(z − 1) (Fig. 24)", &integrated),
+        ("G (z − zc)/(z − 1) (Fig. 25)", &with_zero),
     ]);
     let at = |low, high| {
         Series::limit("crossover by the rule", vec![(hz(rule.v), low), (hz(rule.v), high)])
@@ -193,7 +193,11 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         format!("by the rule, kc = {:.1}", design.rule_k_c),
         format!("used, kc = {:.1}", design.k_c),
     ];
-    let (gain, phase) = bode.panels(&[(&names[0], &rule), (&names[1], &used)]);
+    let (mut gain, mut phase) = bode.panels(&[(&names[0], &rule), (&names[1], &used)]);
+    // The phases are the same: dashed, the rule does not hide behind the other.
+    for panel in [&mut gain, &mut phase] {
+        panel.series[0].style = Style::Reference;
+    }
     let sensitivity = |l: &dyn Fn(f64) -> Complex64| {
         grid.iter().map(|&hz| (hz, 1.0 / (Complex64::ONE + l(omega_t(hz))).norm())).collect()
     };
@@ -201,7 +205,7 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
     let sensitivity = Panel::new("frequency (Hz)", "|1/(1 + L)|")
         .log_x()
         .y_range(0.0, 3.0)
-        .with(Series::line(&*names[0], sensitivity(&rule)))
+        .with(Series::reference(&*names[0], sensitivity(&rule)))
         .with(Series::line(&*names[1], sensitivity(&used)))
         .with(Series::limit("largest allowed, 2.2", ends(2.2)));
     Figure::new(

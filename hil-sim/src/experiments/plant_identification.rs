@@ -192,7 +192,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let motor = physical(context.config)?;
     let mut outcome = Outcome::default();
     let mut plants = Table::new(
-        "Plants (b1 + b2 z^-1) z^-d / (z - p), k = b1 + b2, by least squares (appendix A)",
+        "Plants (b₁ + b₂ z⁻¹) z⁻ᵈ / (z − p), k = b₁ + b₂, by least squares (appendix A)",
         &[],
     );
     let mut designs = Table::new("Controllers by the rule of section 3.8", &[]);

@@ -120,7 +120,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          designed as if one of its integrators were not there. Here a PI controller of the speed, \
          designed for 60° of phase margin, stands inside a P controller of the position; the speed \
          it may ask for follows a braking curve and a ramp instead of the filter of Eq. 4.3. Inertia \
-         (0.012 kg m2) and friction are assumed: the source gives none."
+         (0.012 kg m²) and friction are assumed: the source gives none."
             .into(),
     );
     Ok(outcome)

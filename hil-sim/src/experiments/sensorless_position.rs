@@ -8,11 +8,12 @@ use drive_core::{Mode, State};
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
 use super::{Context, Experiment, learning};
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, means_over, plant_settings};
+use crate::rig::{Point, Rig, means_over};
 use crate::stats::{Stats, StraightLine};
 use drive_core::settings::AngleSource;
 
@@ -71,7 +72,7 @@ fn hold(
     let mut config = config.clone();
     config.drive.angle_source = AngleSource::Injection;
     config.load.mode = LoadMode::Free;
-    config.load.torque_nm = 0.0;
+    config.load.torque_nm = None;
     config.motor.r_r = f64::from(config.drive.motor.r_r) * belief.0;
     let mut drive = config.drive;
     if belief.1 {
@@ -113,8 +114,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let without = step(config, AngleSource::Injection, seed, step_s)?;
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
+    let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
     let cases: Vec<(f64, (f64, bool))> =
-        BELIEFS.iter().flat_map(|&b| LOADS_NM.iter().map(move |&l| (l, b))).collect();
+        BELIEFS.iter().flat_map(|&b| loads.iter().map(move |&l| (l, b))).collect();
     let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
         hold(config, seed.wrapping_add(number), load, belief, hold_s)
     })?;
@@ -175,7 +177,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.remarks = assumptions(config);
     outcome.remarks.push(
         "The position is the flux angle less the integral of the slip. The injection observes the \
-         flux; nothing observes the rotor inside it, so an error of the slip, i_q/(tau_r i_d), is an \
+         flux; nothing observes the rotor inside it, so an error of the slip, i_q/(τ_r i_d), is an \
          error of the speed: at 1 A, 1 % of rotor resistance is 2.2 mechanical degrees per second, \
          whatever the estimator. What is not of the resistance comes from the angle error: by one \
          degree at 1 A the slip is 16 electrical degrees per second off."
@@ -201,9 +203,7 @@ fn step_figure(without: &[Point], with: &[Point]) -> Figure {
     };
     Figure::new("step", "Position step without and with the encoder", "Figure 37")
         .panel(panel("position (° mechanical)", |p| p.turns * 360.0))
-        .panel(panel("position seen minus true (° mechanical)", |p| {
-            (p.turns_estimate - p.turns) * 360.0
-        }))
+        .panel(panel("seen − true (° mechanical)", |p| (p.turns_estimate - p.turns) * 360.0))
         .panel(panel("speed (rpm)", |p| p.speed_rpm))
         .panel(panel("quadrature current (A)", |p| p.iq))
         .panel(panel("flux angle error (° electrical)", |p| p.angle_error_deg))
@@ -214,8 +214,8 @@ fn drift_figure(held: &[HeldPosition]) -> Figure {
     let mut figure = Figure::new("drift", title, "");
     for belief in BELIEFS {
         let pct = (belief.0 - 1.0) * 100.0;
-        let learned = if belief.1 { ", learned so" } else { "" };
-        let label = format!("position (°), r_r +{pct:.0} %{learned}");
+        let learned = if belief.1 { ", learned" } else { "" };
+        let label = format!("position, r_r +{pct:.0} %{learned} (°)");
         let mut panel = Panel::new("time (s)", label);
         for h in held.iter().filter(|h| h.belief == belief) {
             panel = panel.with(Series::line(format!("{} Nm", h.load_nm), h.track.clone()));

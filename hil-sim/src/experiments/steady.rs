@@ -4,12 +4,11 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode, Settings, State};
 
-use super::learning;
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::plant::Load;
-use crate::rig::{Rig, plant_settings};
+use crate::rig::Rig;
 use crate::stats::Stats;
 
 /// Operating point and seed of a run.
@@ -49,22 +48,33 @@ pub fn at_speed(config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
 
 /// The same before it is given its torque; it may have stopped itself on the way.
 fn without_torque(drive: &Settings, config: &Config, case: OperatingPoint) -> Result<Rig, Error> {
-    let mut config = config.clone();
+    let mut rig = prepared(drive, config, case.seed)?;
+    bring_up(&mut rig, case.rpm)?;
+    Ok(rig)
+}
+
+/// A drive that is off, coupled to a dynamometer at rest.
+///
+/// # Errors
+/// As [`Rig::from_config`].
+pub fn prepared(drive: &Settings, config: &Config, seed: u64) -> Result<Rig, Error> {
+    let mut config = Config { drive: *drive, ..config.clone() };
     config.load.mode = LoadMode::Speed;
     config.load.speed_rpm = 0.0;
-    let mut rig = Rig::new(&plant_settings(&config), drive, case.seed)?;
-    if config.prepare.learn {
-        learning::learn(&mut rig)?;
-    }
+    Rig::from_config(&config, seed)
+}
+
+/// Starts a drive and brings it up to speed without torque; it may have stopped itself on the way.
+fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     rig.start(Mode::Torque)?;
-    let steps = (case.rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
+    let steps = (rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
     for n in 1..=steps {
-        let speed = case.rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
+        let speed = rpm * TAU / 60.0 * f64::from(n) / f64::from(steps);
         rig.set_load(Load::Speed { speed })?;
         rig.run(0.01, |_| {});
     }
     rig.run(0.3, |_| {});
-    Ok(rig)
+    Ok(())
 }
 
 /// At speed and torque, one second to settle, then `seconds` of judging.
@@ -85,7 +95,15 @@ pub fn steady_run_of(
     case: OperatingPoint,
     seconds: f64,
 ) -> Result<SteadyRun, Error> {
-    let mut rig = without_torque(drive, config, case)?;
+    judged(prepared(drive, config, case.seed)?, case, seconds)
+}
+
+/// The same with a drive that is off.
+///
+/// # Errors
+/// When the drive does not start.
+pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
+    bring_up(&mut rig, case.rpm)?;
     let (mut error, mut torque) = (Stats::default(), Stats::default());
     if matches!(rig.drive.state(), State::Fault(_)) {
         return Ok(SteadyRun { error, torque: 0.0, lost: true });

@@ -5,10 +5,11 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode, State};
 
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::experiments::{Context, Experiment};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
-use crate::rig::{Point, RATE_HZ, Rig, means_over, plant_settings};
+use crate::rig::{Point, RATE_HZ, Rig, means_over};
 use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
 
@@ -16,7 +17,7 @@ use drive_core::carrier::DemodulatorKind;
 pub const STEPS: Experiment = Experiment {
     name: "torque-steps",
     stands_for: "Figure 38, Eq. 4.4",
-    about: "Torque steps with a locked shaft and no position sensor: 1 A to 2 A in steps of 0.25 A.",
+    about: "Torque steps with a locked shaft and no position sensor: five levels, 1 to 2 times `reference.iq_a`.",
     run: steps,
 };
 
@@ -24,7 +25,7 @@ pub const STEPS: Experiment = Experiment {
 pub const RAMP: Experiment = Experiment {
     name: "torque-ramp",
     stands_for: "Figure 39, Eq. 4.4",
-    about: "Torque ramp with a locked shaft and no position sensor: 1 A to 2 A and back.",
+    about: "Torque ramp with a locked shaft and no position sensor: `reference.iq_a` to twice that and back.",
     run: ramp,
 };
 
@@ -52,6 +53,15 @@ fn steps(context: &Context<'_>) -> Result<Outcome, Error> {
         .map(|n| run.level(iq * LEVELS[n], (n as f64 + 0.5) * level_s, (n + 1) as f64 * level_s))
         .collect();
     outcome.steps = Some(steps);
+    let end = run.points.last().map_or(0.0, |p| p.t);
+    let levels = LEVELS.iter().enumerate().skip(1);
+    let events = levels
+        .map(|(n, level)| (n as f64 * level_s, format!("{:.2} A", iq * level)))
+        .filter(|event| event.0 < end);
+    if let Some(figure) = outcome.figures.first_mut() {
+        // Before a fault, which ends the run.
+        figure.events.splice(0..0, events);
+    }
     Ok(outcome)
 }
 
@@ -149,9 +159,12 @@ impl Run {
 
         if let Some(fault) = &self.fault {
             outcome.remarks.push(format!("The drive stopped itself with {fault}."));
+            outcome.faults.push(fault.clone());
         }
         outcome.remarks.extend(self.notes.iter().cloned());
-        outcome.figures.push(self.figure(name, title, source));
+        let mut figure = self.figure(name, title, source);
+        figure.events.extend(self.fault.iter().map(|fault| (end, fault.clone())));
+        outcome.figures.push(figure);
         outcome
     }
 
@@ -167,7 +180,10 @@ impl Run {
             )
             .panel(
                 Panel::new(x, "torque (Nm)").with(Series::line("motor", line(|p| p.torque))).with(
-                    Series::line("by Eq. 4.4 from flux, current and angle error", line(eq_4_4)),
+                    Series::reference(
+                        "by Eq. 4.4 from flux, current and angle error",
+                        line(eq_4_4),
+                    ),
                 ),
             )
             .panel(
@@ -177,10 +193,10 @@ impl Run {
                 )),
             )
             .panel(match self.demodulator {
-                DemodulatorKind::Synchronous => Panel::new(x, "saliency (10^-3)")
+                DemodulatorKind::Synchronous => Panel::new(x, "saliency (10⁻³)")
                     .with(Series::line("q, as demodulated", line(|p| p.saliency * 1e3))),
                 _ => Panel::new(x, "current difference (mA)")
-                    .with(Series::line("delta_i", line(|p| p.delta_i * 1e3))),
+                    .with(Series::line("Δi", line(|p| p.delta_i * 1e3))),
             })
     }
 }

@@ -1,5 +1,7 @@
 //! Figures, without any word about how they are drawn.
 
+use super::name;
+
 /// A figure: panels above each other.
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
@@ -11,6 +13,18 @@ pub struct Figure {
     pub source: String,
     /// Panels from top to bottom; those with the same x label share the x axis.
     pub panels: Vec<Panel>,
+    /// Events, each at its x and with a short text; shown where all panels share the x axis.
+    pub events: Vec<(f64, String)>,
+}
+
+/// A series of a figure and its name for programs.
+pub struct Curve<'a> {
+    /// Unique in the figure, `snake_case` with the unit at the end: `torque_motor_nm`.
+    pub name: String,
+    /// The panel that it belongs to.
+    pub panel: &'a Panel,
+    /// Its points.
+    pub series: &'a Series,
 }
 
 impl Figure {
@@ -21,13 +35,32 @@ impl Figure {
         source: impl Into<String>,
     ) -> Self {
         let (name, title, source) = (name.into(), title.into(), source.into());
-        Self { name, title, source, panels: Vec::new() }
+        Self { name, title, source, ..Self::default() }
     }
 
     /// With one more panel below.
     pub fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
+    }
+
+    /// With more events.
+    pub fn events(mut self, events: impl IntoIterator<Item = (f64, String)>) -> Self {
+        self.events.extend(events);
+        self
+    }
+
+    /// All series of all panels, with their names.
+    pub fn curves(&self) -> Vec<Curve<'_>> {
+        let mut taken = Vec::new();
+        let mut curves = Vec::new();
+        for panel in &self.panels {
+            for series in &panel.series {
+                let name = name::of_curve(&panel.y_label, &series.name);
+                curves.push(Curve { name: name::unique(name, &mut taken), panel, series });
+            }
+        }
+        curves
     }
 }
 
@@ -46,6 +79,8 @@ pub struct Panel {
     pub y_range: Option<(f64, f64)>,
     /// One unit is as long on either axis.
     pub equal_axes: bool,
+    /// The values are 0 for off and 1 for on.
+    pub switch: bool,
 }
 
 impl Panel {
@@ -72,6 +107,12 @@ impl Panel {
         self
     }
 
+    /// With 0 for off and 1 for on, and no other labels.
+    pub fn switch(mut self) -> Self {
+        self.switch = true;
+        self.y_range(-0.1, 1.1)
+    }
+
     /// With a unit as long on either axis.
     pub fn equal_axes(mut self) -> Self {
         self.equal_axes = true;
@@ -85,7 +126,7 @@ pub enum Style {
     /// A line in a colour of its own.
     #[default]
     Line,
-    /// A dashed dark line: a reference value.
+    /// A thin dashed line in the colour of the text, above the others: a reference value or a prediction.
     Reference,
     /// A thin dashed grey line: a limit or a level to compare with.
     Limit,

@@ -51,13 +51,18 @@ impl Table {
         for step in steps {
             table.row([
                 Cell::fixed(step.iq_ref_a, 3),
-                Cell::fixed(step.iq_a, 3),
-                Cell::fixed(step.torque_nm, 3),
-                Cell::fixed(step.angle_error_mean_deg, 2),
+                of_level(step.iq_a, 3),
+                of_level(step.torque_nm, 3),
+                of_level(step.angle_error_mean_deg, 2),
             ]);
         }
         table
     }
+}
+
+/// The mean over a level, which a lost run does not reach.
+fn of_level(value: f64, decimals: usize) -> Cell {
+    if value.is_nan() { Cell::from("lost") } else { Cell::fixed(value, decimals) }
 }
 
 /// One cell of a table.
@@ -77,22 +82,31 @@ pub enum Cell {
 impl Cell {
     /// A number with this many decimals.
     pub fn fixed(value: f64, decimals: usize) -> Self {
-        Self::Number { value, text: plain_minus(format!("{value:.decimals$}")) }
+        Self::number(value, format!("{value:.decimals$}"))
     }
 
     /// A number with this many significant digits; powers of ten for the very small and the very
     /// large.
     pub fn significant(value: f64, digits: usize) -> Self {
         let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
-        let text = if !value.is_finite() {
-            value.to_string()
-        } else if (-4..6).contains(&exponent) {
+        let text = if (-4..6).contains(&exponent) {
             let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
             format!("{value:.decimals$}")
         } else {
             format!("{value:.*e}", digits.saturating_sub(1))
         };
-        Self::Number { value, text: plain_minus(text) }
+        Self::number(value, text)
+    }
+
+    /// A number with its rounded text; words for what is not finite.
+    fn number(value: f64, rounded: String) -> Self {
+        let text = match value {
+            nan if nan.is_nan() => "none".to_owned(),
+            f64::INFINITY => "∞".to_owned(),
+            f64::NEG_INFINITY => "-∞".to_owned(),
+            _ => plain_minus(rounded),
+        };
+        Self::Number { value, text }
     }
 
     /// How it is shown.

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::outcome::{Cell, Outcome, Table};
+use crate::outcome::{Cell, Metrics, Outcome, Table};
 
-/// The levels, tables and remarks of an outcome; the metrics where there is no table.
+/// The levels, tables, metrics and remarks of an outcome, and whether the drive was lost.
 pub fn text(outcome: &Outcome) -> String {
     let mut text = String::new();
     if let Some(steps) = &outcome.steps {
@@ -13,17 +13,38 @@ pub fn text(outcome: &Outcome) -> String {
     for table in &outcome.tables {
         write_table(&mut text, table);
     }
-    if outcome.tables.is_empty() || outcome.steps.is_some() {
-        let mut metrics = Table::new("Metrics", &["name", "value"]);
-        for (name, value) in outcome.metrics.iter() {
-            metrics.row([Cell::from(name), Cell::significant(value, 5)]);
-        }
-        write_table(&mut text, &metrics);
+    if let Some(lost) = outcome.lost() {
+        let _ = writeln!(text, "{}\n", wrap(&lost, "", ""));
     }
+    write_metrics(&mut text, &outcome.metrics);
     for remark in &outcome.remarks {
         let _ = writeln!(text, "{}", wrap(remark, "* ", "  "));
     }
     text
+}
+
+/// Names, which end in their unit, and values, in as many columns as fit.
+fn write_metrics(text: &mut String, metrics: &Metrics) {
+    let cells: Vec<_> =
+        metrics.iter().map(|(name, value)| (name, Metrics::cell(name, value))).collect();
+    let longest = |length: fn(&(&str, Cell)) -> usize| cells.iter().map(length).max().unwrap_or(0);
+    let name_width = longest(|(name, _)| name.chars().count());
+    let value_width = longest(|(_, cell)| cell.text().chars().count());
+    let columns = ((WIDTH + 4) / (name_width + value_width + 6)).max(1);
+    let rows = cells.len().div_ceil(columns);
+    if rows > 0 {
+        text.push_str("Metrics\n");
+    }
+    for row in 0..rows {
+        let line =
+            cells.iter().skip(row).step_by(rows).map(|(name, value)| {
+                format!("{name:<name_width$}  {:>value_width$}", value.text())
+            });
+        let _ = writeln!(text, "{}", line.collect::<Vec<_>>().join("    "));
+    }
+    if rows > 0 {
+        text.push('\n');
+    }
 }
 
 /// A table with aligned columns.
@@ -73,6 +94,9 @@ fn write_table(text: &mut String, table: &Table) {
     text.push('\n');
 }
 
+/// Longest line of a paragraph, characters.
+const WIDTH: usize = 100;
+
 /// A paragraph in lines of at most 100 characters, indented by `indent` columns.
 pub fn paragraph(text: &str, indent: usize) -> String {
     let indent = " ".repeat(indent);
@@ -86,7 +110,7 @@ fn wrap(paragraph: &str, first: &str, others: &str) -> String {
     let mut fresh = true;
     for word in paragraph.split_whitespace() {
         let width = word.chars().count();
-        if !fresh && used + 1 + width > 100 {
+        if !fresh && used + 1 + width > WIDTH {
             text.push('\n');
             text.push_str(others);
             used = others.chars().count();
@@ -101,4 +125,25 @@ fn wrap(paragraph: &str, first: &str, others: &str) -> String {
         fresh = false;
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metrics_are_printed_beside_tables_and_without_any_nan() {
+        let mut outcome = Outcome::default();
+        let mut table = Table::new("Levels", &["error (°)"]);
+        table.row([Cell::fixed(f64::NAN, 1)]);
+        outcome.tables.push(table);
+        outcome.metrics.set("angle_error_rms_deg", 1.63447);
+        outcome.metrics.set("largest_loss", f64::NAN);
+        outcome.metrics.set("lost", 1.0);
+        let text = text(&outcome);
+        let words: Vec<_> = text.split_whitespace().collect();
+        assert!(words.windows(2).any(|pair| pair == ["angle_error_rms_deg", "1.634"]), "{text}");
+        assert!(words.windows(2).any(|pair| pair == ["largest_loss", "none"]), "{text}");
+        assert!(text.contains("Lost: ") && !text.contains("NaN"), "{text}");
+    }
 }

@@ -1,5 +1,8 @@
 //! Figures as SVG, drawn by plotters.
 
+mod above;
+mod colours;
+
 use std::ops::Range;
 
 use plotters::coord::Shift;
@@ -8,8 +11,12 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 use super::envelope::envelope;
+use super::prose::signs;
 use crate::error::Error;
-use crate::outcome::{Figure, Panel, Series, Style};
+use crate::outcome::{Figure, Panel, Style};
+use above::{Entry, Label, draw_labels, draw_legend, labels, labels_height, legend, legend_height};
+pub use colours::style;
+use colours::{GREY, GRID, INK, MARKER, dash, pen, pen_of};
 
 /// Drawing units per pixel of the page. plotters draws in whole units: finer ones keep curves smooth.
 const SCALE: i32 = 4;
@@ -21,80 +28,133 @@ const HEIGHT: i32 = 190 * SCALE;
 const LEFT: i32 = 72 * SCALE;
 const RIGHT: i32 = 20 * SCALE;
 /// Space below a plot area: with the labels of the horizontal axis, and without.
-const LABELS: i32 = 46 * SCALE;
+const LABELS: i32 = 43 * SCALE;
 const GAP: i32 = 6 * SCALE;
-/// Space above a plot area, and the height of a row of the legend above it.
+/// Size of texts.
+const TEXT_PX: f64 = 12.0;
+/// Space above a plot area.
 const ABOVE: i32 = 8 * SCALE;
-const LEGEND_ROW: i32 = 20 * SCALE;
-
-/// Colours that can be told apart with any colour vision (Okabe and Ito).
-const PALETTE: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
-const INK: RGBColor = RGBColor(51, 51, 51);
-const GREY: RGBColor = RGBColor(120, 120, 120);
-const GRID: RGBColor = RGBColor(230, 230, 230);
 
 type Failure = Box<dyn std::error::Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The figure as one `<svg>` element, which grows and shrinks with the page.
+/// The figure as one `<svg>` element, a file of its own: white, and dark where the reader prefers that.
 ///
 /// # Errors
 /// [`Error::Internal`] with the figure's name when plotters fails.
 pub fn svg(figure: &Figure) -> Result<String, Error> {
+    let mut text = String::new();
+    let mut height = 0;
+    for part in parts(figure)? {
+        text.push_str(&format!("<g transform=\"translate(0 {height})\">\n{}</g>\n", part.text));
+        height += part.height;
+    }
+    let style = format!("<style>\n{}</style>\n", style());
+    Ok(Part { text: style + &text, height }.element())
+}
+
+/// The panels of the figure as `<svg>` elements that belong below each other, so that a printed page can end
+/// between them. [`style`] belongs into the style of the page.
+///
+/// # Errors
+/// As [`svg`].
+pub fn panels(figure: &Figure) -> Result<Vec<String>, Error> {
+    Ok(parts(figure)?.iter().map(Part::element).collect())
+}
+
+/// Content of an `<svg>` element.
+struct Part {
+    text: String,
+    height: i32,
+}
+
+impl Part {
+    /// The page decides how large the element is; the view box keeps its shape.
+    fn element(&self) -> String {
+        let Self { text, height } = self;
+        format!(
+            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {height}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
+             {text}</svg>\n"
+        )
+    }
+}
+
+fn parts(figure: &Figure) -> Result<Vec<Part>, Error> {
     draw(figure).map_err(|e| Error::Internal(format!("figure `{}`: {e}", figure.name)))
 }
 
-fn draw(figure: &Figure) -> Result<String, Failure> {
+fn draw(figure: &Figure) -> Result<Vec<Part>, Failure> {
     let panels: Vec<&Panel> = figure.panels.iter().collect();
     let alike = |a: &Panel, b: &Panel| {
         (&a.x_label, a.log_x) == (&b.x_label, b.log_x) && !a.equal_axes && !b.equal_axes
     };
     let shared = panels.windows(2).all(|pair| alike(pair[0], pair[1]));
-    let labelled = |k: usize| !shared || k + 1 == panels.len();
-    // A legend is not repeated below one that says the same.
-    let legend = |k: usize| match legend(panels[k]) {
-        same if shared && k > 0 && same == self::legend(panels[k - 1]) => Vec::new(),
-        entries => entries,
-    };
-    let parts: Vec<[i32; 2]> = (0..panels.len())
-        .map(|k| {
-            let plot = if panels[k].equal_axes { 2 * HEIGHT } else { HEIGHT };
-            let below = if labelled(k) { LABELS } else { GAP };
-            [legend_height(&legend(k)), ABOVE + plot + below]
-        })
-        .collect();
-    let height: i32 = parts.iter().flatten().sum();
+    let has_events = shared && panels.iter().all(|panel| !panel.log_x);
+    let events = if has_events { figure.events.as_slice() } else { &[] };
+    let mut parts = Vec::new();
+    for (k, panel) in panels.iter().enumerate() {
+        let (x, y) = ranges(panel, if shared { &panels[..] } else { &panels[k..=k] });
+        let frame = Frame {
+            // A legend is not repeated below one that says the same.
+            legend: match legend(panel) {
+                same if shared && k > 0 && same == legend(panels[k - 1]) => Vec::new(),
+                entries => entries,
+            },
+            labels: if k == 0 { labels(events, &x) } else { Vec::new() },
+            events: events.iter().map(|event| event.0).filter(|at| x.contains(at)).collect(),
+            has_x_labels: !shared || k + 1 == panels.len(),
+        };
+        parts.push(draw_part(panel, &frame, x, y)?);
+    }
+    Ok(parts)
+}
+
+/// The surroundings of a plot.
+struct Frame<'a> {
+    legend: Vec<Entry<'a>>,
+    labels: Vec<Label<'a>>,
+    events: Vec<f64>,
+    has_x_labels: bool,
+}
+
+/// A panel with its legend and the names of the events.
+fn draw_part(
+    panel: &Panel,
+    frame: &Frame<'_>,
+    x: Range<f64>,
+    y: Range<f64>,
+) -> Result<Part, Failure> {
+    let plot = if panel.equal_axes { 2 * HEIGHT } else { HEIGHT };
+    let below = if frame.has_x_labels { LABELS } else { GAP };
+    let (legend, labels) = (legend_height(&frame.legend), labels_height(&frame.labels));
+    // The lines of the events go on to the plot.
+    let above = if frame.labels.is_empty() { ABOVE } else { 0 };
+    let height = legend + labels + above + plot + below;
     let mut text = String::new();
     {
         let size = (WIDTH as u32, height as u32);
-        let mut rest = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        for (k, [above, below]) in parts.into_iter().enumerate() {
-            let (area, remaining) = rest.split_vertically(above);
-            draw_legend(&area, &legend(k))?;
-            let (area, remaining) = remaining.split_vertically(below);
-            rest = remaining;
-            let sharing = if shared { &panels[..] } else { &panels[k..=k] };
-            let (x, y) = ranges(panels[k], sharing);
-            if panels[k].log_x {
-                draw_panel(&area, panels[k], x.log_scale(), y, labelled(k))?;
-            } else {
-                draw_panel(&area, panels[k], x, y, labelled(k))?;
-            }
+        let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        let (top, rest) = area.split_vertically(legend);
+        draw_legend(&top, &frame.legend)?;
+        let (top, rest) = rest.split_vertically(labels);
+        draw_labels(&top, &frame.labels)?;
+        let mut chart = ChartBuilder::on(&rest);
+        chart
+            .margin_top(above)
+            .margin_left(GAP)
+            .margin_right(RIGHT)
+            .set_label_area_size(LabelAreaPosition::Left, LEFT - GAP)
+            .set_label_area_size(LabelAreaPosition::Bottom, below);
+        if panel.log_x {
+            draw_plot(&mut chart, panel, frame, x.log_scale(), y)?;
+        } else {
+            draw_plot(&mut chart, panel, frame, x, y)?;
         }
-        rest.present()?;
+        area.present()?;
     }
-    // The page decides how large the figure is; the view box keeps its shape. White behind it, so
-    // that the file can be shown alone on a dark page.
-    let size = format!("width=\"{WIDTH}\" height=\"{height}\" ");
-    Ok(text.replacen(&size, "style=\"background:#fff\" ", 1))
+    // Only what is inside of plotters' element.
+    let inside = text.split_once(">\n").and_then(|(_, text)| text.rsplit_once("</svg>"));
+    Ok(Part { text: inside.map_or("", |(text, _)| text).to_owned(), height })
 }
 
 /// The ranges of the two axes of a panel; that of the horizontal one covers all panels that share it.
@@ -135,39 +195,48 @@ fn is_drawn(panel: &Panel, point: (f64, f64)) -> bool {
     is_on_axes(panel, point) && inside
 }
 
-/// The axes of a panel and its series.
-fn draw_panel<X>(
-    area: &Area<'_>,
+/// The axes of a panel, the events and the series.
+fn draw_plot<X>(
+    chart: &mut ChartBuilder<'_, '_, SVGBackend<'_>>,
     panel: &Panel,
+    frame: &Frame<'_>,
     x: X,
     y: Range<f64>,
-    labelled: bool,
 ) -> Result<(), Failure>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
-    let mut chart = ChartBuilder::on(area)
-        .margin_top(ABOVE)
-        .margin_left(GAP)
-        .margin_right(RIGHT)
-        .set_label_area_size(LabelAreaPosition::Left, LEFT - GAP)
-        .set_label_area_size(LabelAreaPosition::Bottom, if labelled { LABELS } else { GAP })
-        .build_cartesian_2d(x, y)?;
+    let mut chart = chart.build_cartesian_2d(x, y.clone())?;
     let unlabelled = |_: &f64| String::new();
     let mut mesh = chart.configure_mesh();
-    mesh.label_style(font(12)).axis_desc_style(font(13)).axis_style(pen(GREY, SCALE));
+    mesh.label_style(font(TEXT_PX)).axis_style(pen(GREY, SCALE));
     mesh.bold_line_style(pen(GRID, SCALE)).light_line_style(TRANSPARENT);
-    mesh.x_labels(10).y_labels(7).y_desc(&panel.y_label).y_label_formatter(&number);
+    mesh.x_labels(10).y_labels(if panel.switch { 2 } else { 7 });
+    mesh.y_desc(signs(&panel.y_label)).y_label_formatter(&number);
+    mesh.axis_desc_style(font_beside(&panel.y_label));
     mesh.set_all_tick_mark_size(3 * SCALE);
-    if labelled {
-        mesh.x_desc(&panel.x_label).x_label_formatter(&number);
+    if frame.has_x_labels {
+        mesh.x_desc(signs(&panel.x_label)).x_label_formatter(&number);
     } else {
         mesh.x_label_formatter(&unlabelled);
     }
     mesh.draw()?;
-    for (place, series) in places(panel) {
-        let pen = pen_of(series.style, place);
+    let area = chart.plotting_area();
+    let dashed = |line, dash, pen| DashedPathElement::new(line, dash, dash, pen);
+    for &x in &frame.events {
+        area.draw(&dashed(vec![(x, y.start), (x, y.end)], 2 * SCALE, pen(GREY, SCALE)))?;
+    }
+    // References and limits lie above the curves.
+    let (above, below): (Vec<_>, Vec<_>) =
+        above::places(panel).partition(|(_, series)| dash(series.style).is_some());
+    let has_reference = above.iter().any(|(_, series)| series.style == Style::Reference);
+    for (place, series) in below.into_iter().chain(above) {
+        let mut pen = pen_of(series.style, place);
+        if has_reference && series.style == Style::Line {
+            // The reference shows on it.
+            pen.color = pen.color.mix(0.6);
+        }
         for part in series.points.split(|p| !is_drawn(panel, *p)) {
             if series.style == Style::Points {
                 chart.draw_series(part.iter().map(|p| Circle::new(*p, MARKER, pen)))?;
@@ -176,12 +245,7 @@ where
             let line = envelope(part, (WIDTH / SCALE) as usize);
             match dash(series.style) {
                 None => chart.plotting_area().draw(&PathElement::new(line, pen))?,
-                Some(dash) => chart.plotting_area().draw(&DashedPathElement::new(
-                    line,
-                    dash,
-                    4 * SCALE,
-                    pen,
-                ))?,
+                Some(dash) => chart.plotting_area().draw(&dashed(line, dash, pen))?,
             }
         }
     }
@@ -190,87 +254,29 @@ where
 
 /// A label of an axis, with at most six decimals.
 fn number(value: &f64) -> String {
-    let text = format!("{:.6}", value + 0.0);
-    text.trim_end_matches('0').trim_end_matches('.').replace('-', "\u{2212}")
-}
-
-fn font(size: i32) -> TextStyle<'static> {
-    ("sans-serif", size * SCALE).into_font().color(&INK)
-}
-
-fn pen(colour: RGBColor, width: i32) -> ShapeStyle {
-    colour.stroke_width(width as u32)
-}
-
-fn pen_of(style: Style, place: usize) -> ShapeStyle {
-    match style {
-        Style::Line | Style::Points => pen(PALETTE[place % PALETTE.len()], 2 * SCALE),
-        Style::Reference => pen(INK, SCALE),
-        Style::Limit => pen(GREY, SCALE),
+    let text = format!("{value:.6}");
+    match text.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_owned(),
+        number => signs(number),
     }
 }
 
-/// Length of the dashes of a dashed line.
-fn dash(style: Style) -> Option<i32> {
-    match style {
-        Style::Line | Style::Points => None,
-        Style::Reference => Some(7 * SCALE),
-        Style::Limit => Some(3 * SCALE),
-    }
+/// A font of this size in pixels; plotters writes its sizes divided by 1.24.
+fn font(size: f64) -> TextStyle<'static> {
+    ("sans-serif", 1.24 * size * f64::from(SCALE)).into_font().color(&INK)
 }
 
-/// Radius of a marker.
-const MARKER: i32 = 7 * SCALE / 2;
-
-/// The series with their places in the palette.
-fn places(panel: &Panel) -> impl Iterator<Item = (usize, &Series)> {
-    let mut next = 0;
-    panel.series.iter().map(move |series| {
-        let coloured = matches!(series.style, Style::Line | Style::Points);
-        next += usize::from(coloured && !series.like_previous);
-        (usize::saturating_sub(next, 1), series)
-    })
-}
-
-/// The named series: name, style and place in the palette.
-fn legend(panel: &Panel) -> Vec<(&str, Style, usize)> {
-    let named = places(panel).filter(|(_, series)| !series.name.is_empty());
-    named.map(|(place, series)| (series.name.as_str(), series.style, place)).collect()
-}
-
-/// Columns of a legend; generous, because the reader's fonts are not known.
-fn legend_columns(entries: &[(&str, Style, usize)]) -> usize {
-    let longest = entries.iter().map(|entry| entry.0.chars().count()).max().unwrap_or(0) as i32;
-    ((WIDTH - LEFT - RIGHT) / ((50 + 7 * longest) * SCALE)).max(1) as usize
-}
-
-fn legend_height(entries: &[(&str, Style, usize)]) -> i32 {
-    LEGEND_ROW * entries.len().div_ceil(legend_columns(entries)) as i32
-}
-
-/// The legend in rows above its plot, where it hides nothing; plotters' own lies in the plot.
-fn draw_legend(area: &Area<'_>, entries: &[(&str, Style, usize)]) -> Result<(), Failure> {
-    let columns = legend_columns(entries);
-    let cells =
-        area.margin(0, 0, LEFT, RIGHT).split_evenly((entries.len().div_ceil(columns), columns));
-    for (cell, &(name, style, place)) in cells.iter().zip(entries) {
-        let (pen, middle) = (pen_of(style, place), LEGEND_ROW / 2);
-        let sample = vec![(0, middle), (26 * SCALE, middle)];
-        match (style, dash(style)) {
-            (Style::Points, _) => cell.draw(&Circle::new((13 * SCALE, middle), MARKER, pen))?,
-            (_, None) => cell.draw(&PathElement::new(sample, pen))?,
-            (_, Some(dash)) => {
-                cell.draw(&DashedPathElement::new(sample, dash, 4 * SCALE, pen))?;
-            }
-        }
-        cell.draw(&Text::new(name.to_owned(), (32 * SCALE, middle - 6 * SCALE), font(12)))?;
-    }
-    Ok(())
+/// The font of a label beside a plot: smaller than others where a long text has no room otherwise.
+fn font_beside(text: &str) -> TextStyle<'static> {
+    const ROOM_PX: f64 = 204.0;
+    const WIDTH_OF_LETTER: f64 = 0.6;
+    font((ROOM_PX / (WIDTH_OF_LETTER * text.chars().count() as f64)).min(TEXT_PX))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::outcome::Series;
 
     fn svg_of(panels: impl IntoIterator<Item = Panel>) -> String {
         let figure = Figure { panels: panels.into_iter().collect(), ..Figure::new("f", "", "") };
@@ -328,5 +334,39 @@ mod tests {
         let line = vec![(0.0, 0.1), (1.0, 0.2), (2.0, 5.0), (3.0, 0.2), (4.0, 0.1)];
         let line = Panel::new("x", "y").y_range(0.0, 1.0).with(Series::line("", line));
         assert_eq!(svg_of([line]).matches("stroke-width=\"8\"").count(), 2);
+    }
+
+    #[test]
+    fn events_are_named_once_and_marked_in_every_panel() {
+        let line = || Series::line("", vec![(0.0, 0.0), (10.0, 1.0)]);
+        let panel = || Panel::new("time (s)", "y").with(line());
+        let mut figure = Figure::new("f", "", "").panel(panel()).panel(panel());
+        let dashes = |figure: &Figure| {
+            let parts = panels(figure).unwrap();
+            parts.iter().map(|part| part.matches("stroke=\"#787878\"").count()).collect::<Vec<_>>()
+        };
+        let without = dashes(&figure);
+        let events = [(2.0, "start"), (2.1, "load on"), (99.0, "outside")];
+        figure = figure.events(events.map(|(x, text)| (x, text.into())));
+        let svg = svg(&figure).unwrap();
+        let texts = texts(&svg);
+        assert_eq!(texts.iter().filter(|text| **text == "start").count(), 1);
+        assert!(!texts.contains(&"outside"));
+        assert!(dashes(&figure).iter().zip(without).all(|(with, without)| *with > without + 10));
+        // Names that would hide each other are in different rows.
+        let found = labels(&figure.events, &(0.0..10.0));
+        assert!(labels_height(&found) > labels_height(&found[..1]));
+    }
+
+    #[test]
+    fn references_lie_above_the_curves_and_every_colour_has_one_for_the_dark() {
+        let points = vec![(0.0, 0.0), (1.0, 1.0)];
+        let panel = Panel::new("x", "y").with(Series::reference("", points.clone()));
+        let svg = svg_of([panel.with(Series::line("", points))]);
+        let curve = svg.find("stroke=\"#0072B2\" stroke-width").unwrap();
+        assert!(svg.rfind("stroke=\"#333333\"").unwrap() > curve);
+        for part in svg.split("=\"#").skip(1).filter(|part| part.is_char_boundary(6)) {
+            assert!(style().contains(&format!("stroke=\"#{}\"", &part[..6])), "{}", &part[..6]);
+        }
     }
 }

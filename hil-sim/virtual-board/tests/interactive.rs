@@ -163,20 +163,20 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     }
 
     let report = Report::open(&folder);
-    let torque = report.series("torque (Nm)/motor");
-    let outputs = report.series("outputs on/on");
-    let reference = report.series("quadrature current (A)/reference");
+    let torque = report.series("torque_nm");
+    let outputs = report.series("outputs_on");
+    let reference = report.series("quadrature_current_reference_a");
     // From half a second after the reference is there: settled.
     let level: Vec<f64> = reference.iter().filter(|p| p.1 > 0.95).map(|p| p.0).collect();
     let (from, to) = (level[0] + 0.5, level[level.len() - 1]);
     assert!(to - from > 1.0, "{from} {to}");
-    let error = report.series("angle error (° electrical)/true minus estimated flux angle");
+    let error = report.series("angle_error_true_minus_estimated_flux_angle_electrical_deg");
     assert!(error.iter().filter(|p| p.0 > from && p.0 < to).all(|p| p.1.abs() < 15.0));
     // 3/2 P L_m/L_r psi i_q (Eq. 4.4 for a true angle); 15 degrees of error are 4 % of it and some
     // of the direct current besides.
     let config = Config::default();
     let m = &config.motor;
-    let flux = mean_within(&report.series("rotor flux (Wb)/motor"), from, to);
+    let flux = mean_within(&report.series("rotor_flux_wb"), from, to);
     let expected = 1.5 * f64::from(m.pole_pairs) * m.l_m / (m.l_m + m.l_lr) * flux * 1.0;
     let seen = mean_within(&torque, from, to);
     println!("torque {seen:.3} Nm, by the equation {expected:.3} Nm, flux {flux:.3} Wb");
@@ -212,8 +212,8 @@ fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
     });
     assert!(runs[0].0 == runs[1].0, "two runs with one seed differ");
 
-    let torque = runs[0].series("torque (Nm)/motor");
-    let speed = runs[0].series("speed (rpm)/rotor");
+    let torque = runs[0].series("torque_nm");
+    let speed = runs[0].series("speed_rotor_rpm");
     let config = Config::default();
     let (inertia, friction) = (config.motor.inertia, config.motor.friction);
     let mut expected = 0.0;
@@ -237,8 +237,8 @@ fn an_interrupt_still_writes_the_page() {
     assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     assert!(talk.ended().contains("# end: interrupted"));
     let report = Report::open(&folder);
-    assert!(report.series("speed (rpm)/rotor").iter().all(|p| (p.1 + 150.0).abs() < 1e-6));
-    assert!(report.series("outputs on/on").iter().all(|p| p.1 == 0.0));
+    assert!(report.series("speed_rotor_rpm").iter().all(|p| (p.1 + 150.0).abs() < 1e-6));
+    assert!(report.series("outputs_on").iter().all(|p| p.1 == 0.0));
     assert!(folder.join("board.html").exists() && folder.join("board-session.svg").exists());
 }
 

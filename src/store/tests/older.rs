@@ -16,9 +16,8 @@ fn board_of_1abee12(record: &[u8]) -> Fake {
 fn records_saved_by_commit_1abee12_are_read() {
     let defaults = include_bytes!("defaults-1abee12.bin");
     let mut expected = board();
-    // That firmware had no rules, and another default of the plant: these values stood in its settings.
+    // That firmware had no rules: these numbers stood in its settings.
     for (name, value) in [
-        ("current_plant", "identified"),
         ("inverter.full_compensation_a", "0.03"),
         ("injection.amplitude_v", "50"),
         ("injection.full_reference_iq_a", "1"),

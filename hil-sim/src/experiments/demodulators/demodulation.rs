@@ -81,7 +81,7 @@ impl Demodulation {
 
     /// Unit of its signal times 1000.
     pub fn unit(&self) -> &'static str {
-        if self.demodulator == DemodulatorKind::Synchronous { "10^-3" } else { "mA" }
+        if self.demodulator == DemodulatorKind::Synchronous { "10⁻³" } else { "mA" }
     }
 
     /// The reference that it learns on this motor.

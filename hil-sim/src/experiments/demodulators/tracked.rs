@@ -7,7 +7,7 @@ use super::super::steady::{OperatingPoint, SteadyRun, steady_run_of};
 use super::super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
-use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::rig::{RATE_HZ, Rig};
 use crate::stats::Stats;
 
 /// Levels of Figure 38, A, and the time at each, s.
@@ -34,11 +34,12 @@ pub struct StepsRun {
 pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::new(&plant_settings(&config), drive, seed)?;
+    let config = Config { drive: *drive, ..config };
+    let mut rig = Rig::from_config(&config, seed)?;
     rig.start(Mode::Torque)?;
     let start = rig.time();
     let (mut error, mut stats) = (Vec::new(), Stats::default());
-    for iq in LEVELS_A {
+    for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
         if matches!(rig.drive.state(), State::Fault(_)) {
             break;
         }

@@ -107,6 +107,18 @@ pub enum HealthyKind {
     LoadStep,
 }
 
+impl HealthyKind {
+    /// Name in legends and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Slow => "within 150 rpm",
+            Self::Fast => "within 300 rpm",
+            Self::Reversal => "torque reversed, within 150 rpm",
+            Self::LoadStep => "free shaft, load step of 0.6 Nm",
+        }
+    }
+}
+
 /// All of them.
 pub const KINDS: [HealthyKind; 4] =
     [HealthyKind::Slow, HealthyKind::Fast, HealthyKind::Reversal, HealthyKind::LoadStep];
@@ -175,7 +187,7 @@ fn load_step(
             break;
         }
         if n == 600 {
-            rig.set_load(Load::Free { torque: LOAD_NM * case.iq.signum() })?;
+            rig.set_load(Load::Free { torque: config.newton_metres(LOAD_NM) * case.iq.signum() })?;
         }
         let error = (case.rpm - estimate) * TAU / 60.0;
         integral += k_p * SPEED_LOOP / 4.0 * error * pace;

@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, channel};
 use anyhow::{Context, Result, anyhow};
 use clap::Parser;
 use hil_sim::board::Options;
+use hil_sim::outcome::Origin;
 use hil_sim::report::{self, Section};
 use hil_sim::{Config, Error};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -109,13 +110,14 @@ fn write(options: &Options, config: &Config, session: &Session) -> Result<PathBu
         command: options.command(config),
         outcome: &outcome,
     };
+    let origin = Origin::new(options.input.seed, &config.changes());
     let path = options.out.join(format!("{}.html", page::NAME));
-    report::write_whole(&path, &report::page("Induction drive", &[section])?)?;
+    report::write_whole(&path, &report::page("Induction drive", &origin, &[section])?)?;
     for figure in &outcome.figures {
         let file = options.out.join(format!("{}-{}.svg", page::NAME, figure.name));
         report::write_whole(&file, &report::svg(figure)?)?;
     }
-    let json = outcome.to_json(page::NAME, options.input.seed).map_err(|e| anyhow!("{e}"))?;
+    let json = outcome.to_json(page::NAME, &origin).map_err(|e| anyhow!("{e}"))?;
     report::write_whole(&options.out.join(format!("{}.json", page::NAME)), &json)?;
     Ok(path)
 }

@@ -4,7 +4,7 @@ use hil_sim::outcome::{Figure, Panel, Series};
 use hil_sim::{Config, Outcome};
 
 use super::record::{Quantity, Record};
-use super::transcript::{Line, Source};
+use super::transcript::{Line, Source, events, faults};
 
 /// Name of the page's files.
 pub const NAME: &str = "board";
@@ -29,7 +29,8 @@ pub fn outcome(
     m.set("angle_error_max_deg", record.largest_error_deg);
     m.set("phase_current_peak_a", record.peak_current);
     m.set("worst_interrupt_cycles", f64::from(record.worst_cycles));
-    outcome.figures.push(figure(record));
+    outcome.faults = faults(lines);
+    outcome.figures.push(figure(record).events(events(lines)));
     let text = |wanted: fn(Source) -> bool| {
         let lines = lines.iter().filter(|line| wanted(line.source));
         lines.map(|line| format!("{line}\n")).collect::<String>()
@@ -63,8 +64,8 @@ fn figure(record: &Record) -> Figure {
                 .with(line("measured", Quantity::CurrentQ))
                 .with(Series::reference("reference", record.curve(Quantity::ReferenceQ))),
         )
-        .panel(Panel::new(x, "torque (Nm)").with(line("motor", Quantity::Torque)))
-        .panel(Panel::new(x, "rotor flux (Wb)").with(line("motor", Quantity::Flux)))
+        .panel(Panel::new(x, "torque (Nm)").with(line("", Quantity::Torque)))
+        .panel(Panel::new(x, "rotor flux (Wb)").with(line("", Quantity::Flux)))
         .panel(
             Panel::new(x, "speed (rpm)")
                 .with(line("rotor", Quantity::Speed))
@@ -75,5 +76,5 @@ fn figure(record: &Record) -> Figure {
                 .with(line("inverter", Quantity::DcLink))
                 .with(Series::reference("as measured", record.curve(Quantity::DcLinkSeen))),
         )
-        .panel(Panel::new(x, "outputs on").with(line("on", Quantity::Outputs)).y_range(-0.1, 1.1))
+        .panel(Panel::new(x, "outputs on").with(line("", Quantity::Outputs)).switch())
 }

@@ -38,6 +38,62 @@ impl fmt::Display for Line {
     }
 }
 
+/// Commands that change what the drive does; those with a reference can be many in a session.
+const CHANGES: [&str; 5] = ["start", "stop", "learn", "clear", "reboot"];
+const REFERENCES: [&str; 3] = ["torque", "speed", "position"];
+/// Events that a figure can name and still be read.
+const MOST_EVENTS: usize = 24;
+
+impl Line {
+    /// The text of a line that changes what the drive does, or reports a fault or a reset.
+    fn event(&self, references: bool) -> Option<&str> {
+        let text = self.text.trim();
+        let first = text.split_whitespace().next()?;
+        match self.source {
+            Source::Typed if CHANGES.contains(&first) => Some(text),
+            Source::Typed if references && REFERENCES.contains(&first) => Some(text),
+            Source::Board if text.starts_with("reset") => Some(text),
+            Source::Log => text.strip_prefix("ERROR ").filter(|text| is_fault(text)),
+            Source::Said if is_fault(text) => Some(text),
+            _ => None,
+        }
+    }
+}
+
+/// Whether a text is the report of a fault: `fault NUMBER: MEANING`.
+fn is_fault(text: &str) -> bool {
+    let number = text.strip_prefix("fault ").and_then(|rest| rest.split_once(':'));
+    number.is_some_and(|(number, _)| number.parse::<u8>().is_ok())
+}
+
+/// The events of a session: commands that change what the drive does, faults and resets, each at its time, s. A
+/// fault counts once until something else happens. Where there are too many, references are left out.
+pub fn events(lines: &[Line]) -> Vec<(f64, String)> {
+    let all = |references: bool| {
+        let mut events: Vec<(f64, String)> = Vec::new();
+        for line in lines {
+            if let Some(text) = line.event(references)
+                && !(is_fault(text) && events.last().is_some_and(|last| last.1 == text))
+            {
+                events.push((line.time, text.to_owned()));
+            }
+        }
+        events
+    };
+    Some(all(true)).filter(|events| events.len() <= MOST_EVENTS).unwrap_or_else(|| all(false))
+}
+
+/// Texts of the faults that console or log have reported, each once.
+pub fn faults(lines: &[Line]) -> Vec<String> {
+    let mut faults: Vec<String> = Vec::new();
+    for text in lines.iter().filter_map(|line| line.event(false)).filter(|text| is_fault(text)) {
+        if !faults.iter().any(|known| known == text) {
+            faults.push(text.to_owned());
+        }
+    }
+    faults
+}
+
 /// Bytes of one direction, as they become lines.
 #[derive(Debug, Default)]
 pub struct Assembler {
@@ -76,4 +132,29 @@ fn readable(bytes: &[u8]) -> String {
         other => format!("\\x{other:02x}"),
     };
     bytes.iter().map(shown).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_faults_and_resets_are_events_and_a_fault_counts_once() {
+        let line = |time, source, text: &str| Line { time, source, text: text.to_owned() };
+        let mut lines = vec![
+            line(1.0, Source::Typed, "status"),
+            line(2.0, Source::Typed, "start"),
+            line(2.5, Source::Log, "INFO magnetising"),
+            line(3.0, Source::Log, "ERROR fault 4: dc link above its limit"),
+            line(3.1, Source::Log, "ERROR fault 4: dc link above its limit"),
+            line(4.0, Source::Board, "reset: watchdog"),
+            line(5.0, Source::Typed, "torque 1"),
+        ];
+        let texts = |lines: &[Line]| events(lines).into_iter().map(|e| e.1).collect::<Vec<_>>();
+        let fault = "fault 4: dc link above its limit";
+        assert_eq!(texts(&lines), ["start", fault, "reset: watchdog", "torque 1"]);
+        assert_eq!(faults(&lines), [fault]);
+        lines.extend((0..40).map(|k| line(6.0 + f64::from(k), Source::Typed, "torque 2")));
+        assert_eq!(texts(&lines), ["start", fault, "reset: watchdog"]);
+    }
 }

@@ -1,0 +1,176 @@
+//! The motors that come with the program: one file a motor in the folder `motors`, every number with its source.
+//!
+//! A file holds settings under the names of the keys ([`super`]), a title, a text, and sources. See the page
+//! "Motors" of the documentation.
+
+use std::path::Path;
+
+use include_dir::{Dir, include_dir};
+use serde::Deserialize;
+
+use super::{Config, Key, Value, flattened};
+use crate::error::{Error, nearest};
+
+static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
+
+/// Where numbers of a motor come from.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// The keys whose values come from here.
+    pub keys: Vec<String>,
+    /// Publication, file and line, and how the values were converted.
+    pub from: String,
+    /// The values are recalled: nobody has looked them up.
+    #[serde(default)]
+    pub unverified: bool,
+}
+
+/// A motor with the inverter and the sensors that suit it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Motor {
+    /// Name on the command line: that of the file.
+    #[serde(skip)]
+    pub name: String,
+    /// Rated data in a line.
+    pub title: String,
+    /// The motor, and what is special about it.
+    pub about: String,
+    /// Where the numbers come from.
+    pub source: Vec<Source>,
+    /// The settings, in groups.
+    #[serde(flatten)]
+    settings: toml::Table,
+}
+
+impl Motor {
+    /// All motors that come with the program, by name.
+    pub fn all() -> Vec<Self> {
+        let mut all: Vec<Self> = FILES.files().filter_map(|file| embedded(file.path())).collect();
+        all.sort_by(|a, b| a.name.cmp(&b.name));
+        all
+    }
+
+    /// The motor with this name, or of this file when the name ends in `.toml`.
+    ///
+    /// # Errors
+    /// [`Error::UnknownMotor`] with the most similar name; [`Error::ConfigFile`].
+    pub fn find(name: &str) -> Result<Self, Error> {
+        if name.ends_with(".toml") {
+            let path = Path::new(name);
+            let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
+            let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+            return parse(name, &text).map_err(|e| failed(e.to_string()));
+        }
+        let all = Self::all();
+        let names: Vec<String> = all.iter().map(|motor| motor.name.clone()).collect();
+        let found = all.into_iter().find(|motor| motor.name == name);
+        found.ok_or_else(|| Error::UnknownMotor {
+            name: name.to_owned(),
+            nearest: nearest(name, names.iter().map(String::as_str)).map(str::to_owned),
+        })
+    }
+
+    /// The keys that the file sets, with their values.
+    pub fn settings(&self) -> Vec<(String, Value)> {
+        flattened(&self.settings)
+    }
+
+    /// The source of a key.
+    pub fn source_of(&self, key: &str) -> Option<&Source> {
+        self.source.iter().find(|source| source.keys.iter().any(|known| known == key))
+    }
+
+    /// Sets the keys of the file.
+    ///
+    /// # Errors
+    /// As [`Config::set`]; [`Error::Refused`] when a number has no source, or two.
+    pub fn apply(&self, config: &mut Config) -> Result<(), Error> {
+        for (key, value) in self.settings() {
+            let sources = self.source.iter().flat_map(|source| &source.keys);
+            let count = sources.filter(|known| **known == key).count();
+            if count != 1 {
+                let name = &self.name;
+                return Err(Error::Refused(format!(
+                    "motor {name}: {key} has {count} sources; one [[source]] must name it"
+                )));
+            }
+            config.set(&key, &value)?;
+        }
+        Ok(())
+    }
+
+    /// The lines that set the drive to this motor at the console.
+    pub fn console_lines(&self) -> Vec<String> {
+        let mut config = Config::default();
+        if self.apply(&mut config).is_err() {
+            return Vec::new();
+        }
+        let default = Config::default();
+        // The scales belong to the board, not to the motor.
+        Key::all()
+            .filter(|key| matches!(key, Key::Drive(entry) if !entry.name.starts_with("scales.")))
+            .filter(|key| key.get(&config) != key.get(&default))
+            .map(|key| format!("set {} {}", key.name(), key.get(&config)))
+            .collect()
+    }
+}
+
+fn embedded(path: &Path) -> Option<Motor> {
+    let name = path.file_stem()?.to_str()?;
+    // Every file is parsed by a test.
+    parse(name, FILES.get_file(path)?.contents_utf8()?).ok()
+}
+
+fn parse(name: &str, text: &str) -> Result<Motor, toml::de::Error> {
+    Ok(Motor { name: name.to_owned(), ..toml::from_str(text)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_is_a_motor_whose_numbers_all_have_one_source() {
+        let all = Motor::all();
+        assert_eq!(all.len(), FILES.files().count());
+        assert!(all.len() >= 9);
+        for motor in all {
+            let mut config = Config::default();
+            motor.apply(&mut config).unwrap();
+            let named: Vec<&String> = motor.source.iter().flat_map(|source| &source.keys).collect();
+            assert_eq!(named.len(), motor.settings().len(), "{}", motor.name);
+            assert!(config.drive.check().is_ok(), "{}: {:?}", motor.name, config.drive.check());
+            assert!(config.drive.build().is_ok(), "{}", motor.name);
+            assert!(!motor.about.trim().is_empty() && motor.console_lines().len() < 20);
+        }
+    }
+
+    #[test]
+    fn the_default_is_the_dissertations() {
+        let mut config = Config::default();
+        Motor::find("dissertation").unwrap().apply(&mut config).unwrap();
+        // The direct current is that of the rule.
+        config.drive.sequence.i_d = None;
+        assert_eq!(config.changes(), [""; 0]);
+    }
+
+    #[test]
+    fn errors_name_motor_key_and_file() {
+        let error = Motor::find("motulator").unwrap_err().to_string();
+        assert!(error.contains("did you mean `motulator-2kw2`"), "{error}");
+        let error = Motor::find("missing.toml").unwrap_err().to_string();
+        assert!(error.starts_with("missing.toml: "), "{error}");
+        let text = "title = \"x\"\nabout = \"y\"\nsource = []\n[motor]\nr_s = 1\n";
+        let error = parse("mine", text).unwrap().apply(&mut Config::default()).unwrap_err();
+        assert!(error.to_string().contains("motor mine: motor.r_s has 0 sources"), "{error}");
+    }
+
+    #[test]
+    fn the_console_is_set_to_the_motor() {
+        let lines = Motor::find("motulator-2kw2").unwrap().console_lines();
+        for line in ["set motor.r_s 3.7", "set nameplate.current_a 5", "set sequence.i_d 2"] {
+            assert!(lines.iter().any(|found| found == line), "{line} in {lines:?}");
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! A drive that has learned its motor, at sixteen operating points: for the motor of the configuration, or for machines
+//! drawn around it.
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
+use super::torque::assumptions;
+use super::{Context, Experiment};
+use crate::config::Config;
+use crate::config::plant_settings;
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+
+/// Not a figure of the source: whether the drive suits other motors.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "machines",
+    stands_for: "beyond the dissertation",
+    about: "A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
+            the motor.",
+    run,
+};
+
+/// Torque currents of the operating points, A on the dissertation's motor; both signs.
+const IQ_A: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
+/// Speeds, rpm on four poles.
+const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
+/// Time of each run, s, after the settling.
+const RUN_S: f64 = 2.0;
+/// Angle error of a good machine in every run, degrees: rms, largest.
+const GOOD_DEG: (f64, f64) = (4.0, 14.0);
+/// Machines in the table, the worst first.
+const LISTED: usize = 20;
+
+/// A machine and its runs, or why there are none.
+struct Machine {
+    config: Config,
+    runs: Result<Vec<SteadyRun>, String>,
+}
+
+impl Machine {
+    fn new(config: Config, seed: u64, seconds: f64) -> Result<Self, Error> {
+        let runs = match runs(&config, seed, seconds) {
+            Ok(runs) => Ok(runs),
+            // A refusal of the drive belongs to the result; other errors do not.
+            Err(Error::Refused(why)) => Err(why),
+            Err(other) => return Err(other),
+        };
+        Ok(Self { config, runs })
+    }
+
+    fn worst(&self, of: impl Fn(&SteadyRun) -> f64) -> f64 {
+        self.runs.iter().flatten().map(of).fold(0.0, f64::max)
+    }
+
+    fn rms(&self) -> f64 {
+        self.worst(|run| run.error.rms())
+    }
+
+    fn largest(&self) -> f64 {
+        self.worst(|run| run.error.largest())
+    }
+
+    fn lost(&self) -> usize {
+        self.runs.iter().flatten().filter(|run| run.lost).count()
+    }
+
+    fn is_good(&self) -> bool {
+        let within = self.rms() <= GOOD_DEG.0 && self.largest() <= GOOD_DEG.1;
+        self.runs.is_ok() && self.lost() == 0 && within
+    }
+
+    /// The outcome in words.
+    fn verdict(&self) -> String {
+        match (&self.runs, self.lost()) {
+            (Err(why), _) => why.clone(),
+            (Ok(_), 0) if self.is_good() => "good".into(),
+            (Ok(_), 0) => "angle error too large".into(),
+            (Ok(_), lost) => format!("{lost} runs lost"),
+        }
+    }
+}
+
+/// Learns once, then starts anew for each operating point.
+fn runs(config: &Config, seed: u64, seconds: f64) -> Result<Vec<SteadyRun>, Error> {
+    let learned = prepared(&config.drive, config, seed)?;
+    let mut runs = Vec::new();
+    for speed in SPEEDS_RPM {
+        for iq in IQ_A {
+            for sign in [1.0, -1.0] {
+                let iq = sign * config.amperes(iq);
+                let case = OperatingPoint { rpm: config.rpm(speed), iq, seed };
+                runs.push(judged(learned.clone(), case, seconds)?);
+            }
+        }
+    }
+    Ok(runs)
+}
+
+/// A machine whose resistances, inductances and saliencies are each multiplied by a factor of its own, and whose drive
+/// knows the circuit.
+fn drawn(config: &Config, seed: u64) -> Config {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let most = config.spread.machine.ln();
+    let mut factor = || random.random_range(-most..=most).exp();
+    let mut drawn = config.clone();
+    let saliency = plant_settings(config).saliency;
+    let (m, leakage) = (&mut drawn.motor, factor());
+    m.r_s *= factor();
+    m.r_r *= factor();
+    m.l_m *= factor();
+    m.l_ls *= leakage;
+    m.l_lr *= leakage;
+    drawn.saliency.a_psi = saliency.a_psi * factor();
+    drawn.saliency.b1 = Some(saliency.b1 * factor());
+    let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
+    (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);
+    (drive.l_ls, drive.l_lr, drive.l_m) = (m.l_ls as f32, m.l_lr as f32, m.l_m as f32);
+    drawn
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let mut config = context.config.clone();
+    config.prepare.learn = true;
+    let draws = config.spread.machine > 1.0;
+    let count = if draws { config.extent.runs.unwrap_or(100) } else { 1 };
+    let jobs: Vec<(Config, u64)> = (0..u64::from(count))
+        .map(|number| {
+            let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
+            (if draws { drawn(&config, seed) } else { config.clone() }, seed)
+        })
+        .collect();
+    let seconds = context.seconds.unwrap_or(RUN_S);
+    let mut machines = context.in_parallel("machines", &jobs, |_, (config, seed)| {
+        Machine::new(config.clone(), *seed, seconds)
+    })?;
+    machines.sort_by(|a, b| {
+        let key = |m: &Machine| (m.runs.is_err(), m.lost());
+        key(b).cmp(&key(a)).then(b.rms().total_cmp(&a.rms()))
+    });
+
+    let mut outcome = Outcome::default();
+    let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
+    let good = machines.iter().filter(|machine| machine.is_good()).count();
+    let mut rms: Vec<f64> = machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();
+    rms.sort_by(f64::total_cmp);
+    let m = &mut outcome.metrics;
+    m.set("machines", machines.len() as f64);
+    m.set("learned", learned as f64);
+    m.set("good", good as f64);
+    m.set("good_share", good as f64 / machines.len() as f64);
+    m.set("lost_runs", machines.iter().map(Machine::lost).sum::<usize>() as f64);
+    if let Some(worst) = rms.last() {
+        m.set("worst_rms_median_deg", rms[rms.len() / 2]);
+        m.set("worst_rms_deg", *worst);
+        m.set("largest_deg", machines.iter().map(Machine::largest).fold(0.0, f64::max));
+    }
+    let heads = [
+        "r_s (ohm)",
+        "r_r (ohm)",
+        "σL_s (mH)",
+        "L_m (mH)",
+        "a (%)",
+        "b (%/A)",
+        "carrier (V)",
+        "worst rms (°)",
+        "largest (°)",
+        "verdict",
+    ];
+    let title = if draws { "Machines, the worst first" } else { "The motor" };
+    let mut table = Table::new(title, &heads).note(format!(
+        "Good: every run within {}° rms and {}° at most, none lost.",
+        GOOD_DEG.0, GOOD_DEG.1
+    ));
+    for machine in machines.iter().take(LISTED) {
+        let (motor, drive) = (&machine.config.motor, &machine.config.drive);
+        let saliency = plant_settings(&machine.config).saliency;
+        table.row([
+            Cell::fixed(motor.r_s, 3),
+            Cell::fixed(motor.r_r, 3),
+            Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2),
+            Cell::fixed(1e3 * motor.l_m, 1),
+            Cell::fixed(100.0 * saliency.a_psi, 2),
+            Cell::fixed(100.0 * saliency.b1, 2),
+            Cell::fixed(drive.carrier_v().into(), 1),
+            Cell::fixed(machine.rms(), 2),
+            Cell::fixed(machine.largest(), 2),
+            Cell::from(machine.verdict()),
+        ]);
+    }
+    outcome.tables.push(table);
+    let points = |of: &dyn Fn(&Machine) -> f64| -> Vec<(f64, f64)> {
+        let sound = machines.iter().filter(|m| m.runs.is_ok());
+        sound.map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
+    };
+    outcome.figures.push(
+        Figure::new("machines", "Worst of 16 runs over the saliency of the machine", "").panel(
+            Panel::new("saliency fixed to the flux (%)", "angle error (°)")
+                .with(Series::points("largest", points(&|m| m.largest())))
+                .with(Series::points("rms", points(&|m| m.rms()))),
+        ),
+    );
+    outcome.remarks = assumptions(context.config);
+    Ok(outcome)
+}

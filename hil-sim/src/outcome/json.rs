@@ -1,0 +1,182 @@
+//! The JSON form of an outcome.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::{Entry, Figure, Metrics, Origin, Outcome, Step, Table};
+
+/// Version of the form: it grows when a name changes its meaning or goes away.
+pub const SCHEMA_VERSION: u32 = 2;
+
+/// The one JSON object of an experiment.
+#[derive(serde::Serialize)]
+struct Json<'a> {
+    schema_version: u32,
+    version: &'a str,
+    experiment: &'a str,
+    seed: u64,
+    settings: Settings<'a>,
+    metrics: &'a Metrics,
+    series: AllSeries<'a>,
+    #[serde(skip_serializing_if = "AllEvents::is_empty")]
+    events: AllEvents<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    steps: &'a Option<Vec<Step>>,
+    #[serde(skip_serializing_if = "Rows::is_empty")]
+    table: Rows<'a>,
+    remarks: &'a [String],
+    faults: &'a [String],
+}
+
+/// Names and values; a value that is a number or a switch is one in JSON too.
+struct Settings<'a>(&'a [(String, String)]);
+
+impl Serialize for Settings<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let typed = |text: &str| match serde_json::from_str(text) {
+            Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
+            _ => serde_json::Value::from(text),
+        };
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, typed(value))))
+    }
+}
+
+/// Content of `table` in JSON.
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+enum Rows<'a> {
+    Tables(&'a [Table]),
+    Entries(&'a [Entry]),
+}
+
+impl Rows<'_> {
+    fn is_empty(&self) -> bool {
+        matches!(self, Self::Tables([]) | Self::Entries([]))
+    }
+}
+
+struct AllSeries<'a>(&'a [Figure]);
+
+impl Serialize for AllSeries<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(serde::Serialize)]
+        struct Points<'a> {
+            x_label: &'a str,
+            y_label: &'a str,
+            x: Vec<f64>,
+            y: Vec<f64>,
+        }
+        let mut map = serializer.serialize_map(None)?;
+        for figure in self.0 {
+            for curve in figure.curves() {
+                let key = format!("{}/{}", figure.name, curve.name);
+                let (x, y) = curve.series.points.iter().copied().unzip();
+                let (x_label, y_label) = (&curve.panel.x_label, &curve.panel.y_label);
+                map.serialize_entry(&key, &Points { x_label, y_label, x, y })?;
+            }
+        }
+        map.end()
+    }
+}
+
+/// Events of the figures that have any.
+struct AllEvents<'a>(&'a [Figure]);
+
+impl AllEvents<'_> {
+    fn is_empty(&self) -> bool {
+        self.0.iter().all(|figure| figure.events.is_empty())
+    }
+}
+
+impl Serialize for AllEvents<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let with = self.0.iter().filter(|figure| !figure.events.is_empty());
+        serializer.collect_map(with.map(|figure| (&figure.name, &figure.events)))
+    }
+}
+
+impl Outcome {
+    /// The one JSON object: `schema_version`, `version` of the program, `experiment`, `seed`, `settings` (those
+    /// that were changed), `metrics`, `series` (`FIGURE/CURVE`), `remarks`, `faults`, and where there are any
+    /// `events`, `steps` and `table`. A number that is not finite becomes `null`.
+    ///
+    /// # Errors
+    /// As [`serde_json::to_string`].
+    pub fn to_json(&self, experiment: &str, origin: &Origin) -> serde_json::Result<String> {
+        serde_json::to_string(&Json {
+            schema_version: SCHEMA_VERSION,
+            version: env!("CARGO_PKG_VERSION"),
+            experiment,
+            seed: origin.seed,
+            settings: Settings(&origin.settings),
+            metrics: &self.metrics,
+            series: AllSeries(&self.figures),
+            events: AllEvents(&self.figures),
+            steps: &self.steps,
+            table: match self.entries.as_slice() {
+                [] => Rows::Tables(&self.tables),
+                entries => Rows::Entries(entries),
+            },
+            remarks: &self.remarks,
+            faults: &self.faults,
+        })
+    }
+}
+
+/// One JSON object with the objects of several experiments, in the list `experiments`.
+pub fn group(objects: &[String]) -> String {
+    format!(r#"{{"schema_version":{SCHEMA_VERSION},"experiments":[{}]}}"#, objects.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Cell, Panel, Series};
+    use super::*;
+
+    #[test]
+    fn json_is_one_object_with_the_agreed_names() {
+        let mut outcome = Outcome::default();
+        outcome.metrics.set("speed_rpm", 12.5);
+        outcome.metrics.set("lost", f64::NAN);
+        let step = Step { iq_ref_a: 1.0, iq_a: 0.9, torque_nm: 0.3, angle_error_mean_deg: 5.0 };
+        outcome.steps = Some(vec![step]);
+        let mut table = Table::new("Levels", &["name", "value"]);
+        table.row([Cell::from("a"), Cell::fixed(1.23456, 2)]);
+        outcome.tables.push(table);
+        let panel = Panel::new("time (s)", "current (A)");
+        let panel = panel.with(Series::line("actual", vec![(0.0, 1.0), (1.0, 2.0)]));
+        let figure =
+            Figure::new("step", "A step", "Figure 38").panel(panel).events([(0.5, "stop".into())]);
+        outcome.figures.push(figure);
+        outcome.faults.push("fault 4: dc link above its limit".into());
+        let changes = ["motor.rs=6", "load.mode=free", "drive.learn=true"].map(String::from);
+        let text = outcome.to_json("torque-steps", &Origin::new(7, &changes)).unwrap();
+        let object: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(object["schema_version"], SCHEMA_VERSION);
+        assert_eq!(object["version"], env!("CARGO_PKG_VERSION"));
+        assert_eq!(object["experiment"], "torque-steps");
+        assert_eq!(object["seed"], 7);
+        assert_eq!(object["settings"]["motor.rs"], 6);
+        assert_eq!(object["settings"]["load.mode"], "free");
+        assert_eq!(object["settings"]["drive.learn"], true);
+        assert_eq!(object["metrics"]["speed_rpm"], 12.5);
+        assert!(object["metrics"]["lost"].is_null());
+        assert_eq!(object["steps"][0]["torque_nm"], 0.3);
+        assert_eq!(object["table"][0]["rows"][0][1], 1.23456);
+        assert_eq!(object["series"]["step/current_actual_a"]["y"][1], 2.0);
+        assert_eq!(object["events"]["step"][0][1], "stop");
+        assert_eq!(object["faults"][0], "fault 4: dc link above its limit");
+        assert!(!text.contains('\n'));
+    }
+
+    #[test]
+    fn absent_parts_are_left_out() {
+        let text = Outcome::default().to_json("filters", &Origin::new(1, &[])).unwrap();
+        let version = env!("CARGO_PKG_VERSION");
+        let expected = format!(
+            r#"{{"schema_version":2,"version":"{version}","experiment":"filters","seed":1,"settings":{{}},"metrics":{{}},"series":{{}},"remarks":[],"faults":[]}}"#
+        );
+        assert_eq!(text, expected);
+        let both: serde_json::Value = serde_json::from_str(&group(&[text.clone(), text])).unwrap();
+        assert_eq!(both["experiments"][1]["experiment"], "filters");
+    }
+}

@@ -1,0 +1,117 @@
+//! Names for programs, made of labels for people.
+//!
+//! Own code: the crates that change the case of identifiers split `mA` and `dB`, and know no units.
+
+/// A label in `snake_case`: `turn of the axis (°)` becomes `turn_of_the_axis_deg`. A unit in brackets at the
+/// end stays at the end; signs and Greek letters are spelled out.
+pub fn snake(label: &str) -> String {
+    let (quantity, unit) = split(label);
+    joined(&[quantity, unit])
+}
+
+/// The name of a curve: that of its panel and its own, with the unit of the panel at the end.
+pub fn of_curve(panel: &str, series: &str) -> String {
+    let (quantity, unit) = split(panel);
+    joined(&[quantity, series, unit])
+}
+
+/// A name that `taken` does not have yet: with a number behind it where needed.
+pub fn unique(name: String, taken: &mut Vec<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    let mut candidates = std::iter::once(name.clone()).chain(numbered);
+    let free = candidates.find(|name| !taken.contains(name)).unwrap_or(name);
+    taken.push(free.clone());
+    free
+}
+
+/// Quantity and unit of a label.
+fn split(label: &str) -> (&str, &str) {
+    let inside = label.strip_suffix(')').and_then(|label| label.rsplit_once(" ("));
+    inside.unwrap_or((label, ""))
+}
+
+fn joined(parts: &[&str]) -> String {
+    let words: Vec<_> =
+        parts.iter().map(|part| plain(part)).filter(|part| !part.is_empty()).collect();
+    words.join("_")
+}
+
+fn plain(text: &str) -> String {
+    // As in the names of metrics: the kind of an angle stands before its unit.
+    let text = match text.strip_prefix("° ") {
+        Some(kind) => format!("{kind} °"),
+        None => text.replace("10⁻³", "milli"),
+    };
+    let mut name = String::new();
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let is_sign = matches!(letter, '-' | '−')
+            && !before.is_alphanumeric()
+            && letters.peek().is_some_and(char::is_ascii_digit);
+        before = letter;
+        match spelled(letter) {
+            _ if is_sign => name.push_str(" minus "),
+            Some(word) => name.push_str(&format!(" {word} ")),
+            None if letter == 'µ' => name.push('u'),
+            None if letter.is_ascii_alphanumeric() => name.push(letter.to_ascii_lowercase()),
+            None if letter == '\u{302}' => {}
+            None => name.push(' '),
+        }
+    }
+    name.split_whitespace().collect::<Vec<_>>().join("_")
+}
+
+fn spelled(letter: char) -> Option<&'static str> {
+    const WORDS: [(char, &str); 16] = [
+        ('°', "deg"),
+        ('%', "pct"),
+        ('Ω', "ohm"),
+        ('Δ', "delta"),
+        ('γ', "gamma"),
+        ('θ', "theta"),
+        ('λ', "lambda"),
+        ('σ', "sigma"),
+        ('τ', "tau"),
+        ('φ', "phi"),
+        ('ψ', "psi"),
+        ('ω', "omega"),
+        ('±', "plus_minus"),
+        ('₁', "1"),
+        ('₂', "2"),
+        ('²', "2"),
+    ];
+    WORDS.iter().find(|(known, _)| *known == letter).map(|(_, word)| *word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_end_in_their_unit() {
+        for (label, name) in [
+            ("quadrature current (A)", "quadrature_current_a"),
+            ("angle error (° electrical)", "angle_error_electrical_deg"),
+            ("φ̂₂ − θ (° electrical)", "phi_2_theta_electrical_deg"),
+            ("saliency (10⁻³)", "saliency_milli"),
+            ("Δi (mA)", "delta_i_ma"),
+            ("speed (electrical rad/s)", "speed_electrical_rad_s"),
+            ("−0.6 dB at (Hz)", "minus_0_6_db_at_hz"),
+            ("h (µs)", "h_us"),
+            ("leg high (1) or low (0), offset", "leg_high_1_or_low_0_offset"),
+            ("outputs on", "outputs_on"),
+        ] {
+            assert_eq!(snake(label), name);
+        }
+        assert_eq!(of_curve("gain (dB)", "LPF, f32"), "gain_lpf_f32_db");
+        assert_eq!(of_curve("torque (Nm)", ""), "torque_nm");
+    }
+
+    #[test]
+    fn equal_names_get_numbers() {
+        let mut taken = Vec::new();
+        let names = ["a", "b", "a", "a"].map(|name| unique(name.to_owned(), &mut taken));
+        assert_eq!(names, ["a", "b", "a_2", "a_3"]);
+    }
+}
