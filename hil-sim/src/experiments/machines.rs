@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -18,6 +18,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "beyond the dissertation",
     about: "A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
             the motor.",
+    uses: &[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 

@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -16,6 +16,20 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "monte-carlo",
     stands_for: "the claim behind Figures 38 and 39",
     about: "Random torque current (0.5 A to 3 A, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
+    uses: &[
+        BENCH,
+        DRIVE,
+        &[
+            "load.speed_rpm",
+            "prepare.learn",
+            "spread.motor",
+            "spread.noise",
+            "spread.gain",
+            "runs",
+            "seconds",
+        ],
+    ],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 

@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Table 5, section 3.6, Eq. 3.17 to 3.19",
     about: "Direct-current, locked-rotor and no-load test of the simulated motor, and the equivalent \
             circuit from them, by the source's formulas and without what these neglect.",
+    uses: &[&["motor."]],
+    not: &[],
     run,
 };
 

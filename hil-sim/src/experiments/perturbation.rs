@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -20,6 +20,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "perturbation",
     stands_for: "section 5.2",
     about: "Angle error after load and current steps, measured and by the linear model.",
+    uses: &[BENCH, DRIVE, &["prepare.learn"]],
+    not: &[&["angle_source"]],
     run,
 };
 

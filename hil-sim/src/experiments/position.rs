@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode};
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
@@ -17,6 +17,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "position-step",
     stands_for: "Figure 37, Eq. 4.1 to 4.3",
     about: "A position step of five turns with the encoder and a free shaft.",
+    uses: &[BENCH, DRIVE, &["load.", "seconds"]],
+    not: &[&["angle_source"]],
     run,
 };
 

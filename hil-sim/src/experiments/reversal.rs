@@ -4,7 +4,7 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State};
 
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{Point, Rig, means_over};
@@ -15,6 +15,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "torque-reversal",
     stands_for: "section 5.2",
     about: "Sudden steps of the torque current up to full reversal, without a position sensor.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run,
 };
 

@@ -7,7 +7,7 @@ use drive_core::{Mode, State};
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
-use super::{Context, Experiment, learning};
+use super::{BENCH, Context, DRIVE, Experiment, learning};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -21,6 +21,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "sensorless-position",
     stands_for: "section 4.1 without its encoder, section 5.2",
     about: "A position step of five turns without an encoder, beside the one with it, and the drift.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
+    not: &[&["angle_source"]],
     run,
 };
 

@@ -4,7 +4,7 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Command, Mode, State};
 
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
@@ -17,6 +17,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "speed-profile",
     stands_for: "section 5.2",
     about: "Speed steps with a reversal through standstill and a load, with the angle source as set.",
+    uses: &[BENCH, DRIVE, &["load.torque_nm", "prepare.learn", "seconds"]],
+    not: &[],
     run,
 };
 

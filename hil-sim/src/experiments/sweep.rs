@@ -2,7 +2,7 @@
 
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -11,6 +11,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "speed-torque-sweep",
     stands_for: "the range behind Figures 38 and 39",
     about: "Angle error over torque current and speed, a dynamometer holding the speed.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 

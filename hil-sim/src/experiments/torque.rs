@@ -6,7 +6,7 @@ use drive_core::{Accepted, Command, Mode, State};
 
 use crate::config::Config;
 use crate::error::Error;
-use crate::experiments::{Context, Experiment};
+use crate::experiments::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
 use crate::rig::{Point, RATE_HZ, Rig, means_over, plant_settings};
 use crate::stats::Stats;
@@ -17,6 +17,8 @@ pub const STEPS: Experiment = Experiment {
     name: "torque-steps",
     stands_for: "Figure 38, Eq. 4.4",
     about: "Torque steps with a locked shaft and no position sensor: five levels, 1 to 2 times `reference.iq_a`.",
+    uses: &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run: steps,
 };
 
@@ -25,6 +27,8 @@ pub const RAMP: Experiment = Experiment {
     name: "torque-ramp",
     stands_for: "Figure 39, Eq. 4.4",
     about: "Torque ramp with a locked shaft and no position sensor: `reference.iq_a` to twice that and back.",
+    uses: &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run: ramp,
 };
 

@@ -2,7 +2,7 @@
 
 use super::steady::{OperatingPoint, at_speed};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::Stats;
@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "torque-drift",
     stands_for: "Eq. 4.4 over a minute",
     about: "Torque and angle at standstill over a minute, against the current and the first ten seconds.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 
