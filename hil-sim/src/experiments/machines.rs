@@ -142,6 +142,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     });
 
     let mut outcome = Outcome::default();
+    for machine in &machines {
+        match &machine.runs {
+            Ok(runs) => outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text)),
+            Err(why) => outcome.faults.push(why.clone()),
+        }
+    }
     let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
     let good = machines.iter().filter(|machine| machine.is_good()).count();
     let mut rms: Vec<f64> = machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();

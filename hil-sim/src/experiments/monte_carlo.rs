@@ -61,6 +61,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(results.iter().filter_map(SteadyRun::lost_text));
     let kept: Vec<(&OperatingPoint, &SteadyRun)> =
         cases.iter().map(|(case, _)| case).zip(&results).filter(|(_, r)| !r.lost).collect();
     let mut largest: Vec<f64> = kept.iter().map(|(_, r)| r.error.largest()).collect();

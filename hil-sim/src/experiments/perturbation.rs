@@ -178,6 +178,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
 
     let mut outcome = Outcome::default();
+    for m in results.iter().filter(|m| m.lost > 0) {
+        outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
+    }
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
     let mut table = Table::new(title, &[]).note(
         "The mean before the step is taken away, but not from the largest single error, which has \

@@ -1,7 +1,7 @@
 //! The speed loop without a position sensor: a profile with a reversal and a load step.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};
 use super::{BENCH, Context, DRIVE, Experiment};
@@ -54,7 +54,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (mut steady, mut seen) = (Stats::default(), Stats::default());
     for (speed, load, seconds) in PROFILE {
         let (rpm, torque) = (speed * largest_rpm, load * load_nm);
-        if matches!(rig.drive.state(), State::Fault(_)) {
+        if rig.fault().is_some() {
             break;
         }
         rig.command(&Command::Speed(rpm as f32))?;
@@ -80,10 +80,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
-    let stopped = match rig.drive.state() {
-        State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
-        _ => None,
-    };
+    let stopped = rig.fault();
     let m = &mut outcome.metrics;
     m.set("angle_error_rms_deg", error.rms());
     m.set("angle_error_max_deg", error.largest());

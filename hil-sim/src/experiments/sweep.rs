@@ -28,6 +28,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text));
     let kept = || runs.iter().filter(|r| !r.lost);
     let largest = |of: fn(&SteadyRun) -> f64| kept().map(of).fold(0.0, f64::max);
     let pooled =

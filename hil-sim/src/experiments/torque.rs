@@ -2,7 +2,7 @@
 //! the quadrature axis, shaft locked, without a position sensor.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Accepted, Command, Mode, State};
+use drive_core::{Accepted, Command, Mode};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -109,7 +109,7 @@ impl Run {
         // References change at the pace of a host, not of the control.
         for n in 0..periods.div_ceil(CARRIER_SAMPLES) {
             let reference = profile((n * CARRIER_SAMPLES) as f64 / RATE_HZ) as f32;
-            if matches!(rig.drive.state(), State::Fault(_)) {
+            if rig.fault().is_some() {
                 break;
             }
             if let Accepted::Limited(a) = rig.command(&Command::Torque(reference))? {
@@ -124,11 +124,8 @@ impl Run {
         if let Some(a) = limited {
             notes.insert(0, format!("The drive limited the torque reference to {a:.3} A."));
         }
-        let fault = match rig.drive.state() {
-            State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
-            _ => None,
-        };
-        Ok(Self { points, demodulator: context.config.drive.injection.demodulator, fault, notes })
+        let (demodulator, fault) = (context.config.drive.injection.demodulator, rig.fault());
+        Ok(Self { points, demodulator, fault, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {

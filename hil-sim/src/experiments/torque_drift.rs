@@ -28,6 +28,8 @@ struct HeldTorque {
     angle_deg: Vec<f64>,
     /// Torque of that current at the right angle and nominal flux, Nm.
     ideal: f64,
+    /// Current and fault of a drive that has stopped itself.
+    fault: Option<String>,
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -69,6 +71,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     let mut outcome = Outcome::default();
+    outcome.faults.extend(held.iter().filter_map(|h| h.fault.clone()));
     let m = &mut outcome.metrics;
     m.set("torque_error_to_2a_pct", linear_2a);
     m.set("torque_error_to_3a_pct", linear_3a);
@@ -91,7 +94,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<HeldTorque, Error> {
     let mut rig = at_speed(context.config, case)?;
     rig.run(1.0, |_| {});
-    let mut held = HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0 };
+    let mut held =
+        HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0, fault: None };
     let (id, lm) = (f64::from(context.config.drive.i_d()), context.config.motor.l_m);
     for _ in 0..MEANS {
         let (mut torque, mut angle) = (Stats::default(), Stats::default());
@@ -103,5 +107,6 @@ fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<Held
         held.torque.push(torque.mean());
         held.angle_deg.push(angle.mean());
     }
+    held.fault = rig.fault().map(|fault| format!("{} A: {fault}", case.iq));
     Ok(held)
 }

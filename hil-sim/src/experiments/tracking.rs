@@ -52,6 +52,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             whole.figures.push(figure);
         }
         whole.steps = whole.steps.or(part.steps);
+        whole.faults.extend(part.faults.iter().map(|fault| format!("{}: {fault}", title(prefix))));
         for remark in part.remarks {
             if !whole.remarks.contains(&remark) {
                 whole.remarks.push(remark);
