@@ -177,6 +177,9 @@ pub const SPEED_LOOP: &[&str] =
     &["speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.phase_margin_deg", "drive.motor.inertia"];
 /// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
 pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction"];
+/// Keys of the tracking of the saliency, which a drive with an encoder does not use.
+pub const TRACKING: &[&str] =
+    &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
 /// Keys that do nothing while the shaft is locked.
 pub const TURNING: &[&str] =
     &["motor.inertia", "motor.friction", "motor.pole_pairs", "drive.motor.pole_pairs"];

@@ -35,6 +35,15 @@ pub struct Trace {
     /// Another name of a column in the file; can be given many times
     #[arg(long = "column", value_name = "OURS=THEIRS")]
     columns: Vec<String>,
+    /// Rows by which a voltage acts after the currents of its row; 0 for measured voltages [default: 1 and the delay of
+    /// the current filter, as the drive records it]
+    #[arg(long, value_name = "ROWS", value_parser = delay, allow_negative_numbers = true)]
+    delay: Option<f64>,
+}
+
+fn delay(text: &str) -> Result<f64, String> {
+    let rows = text.parse().ok().filter(|rows| (0.0..=10.0).contains(rows));
+    rows.ok_or_else(|| "allowed: 0 to 10 rows".to_owned())
 }
 
 /// A run, as the functions that write its results need it.
@@ -134,8 +143,12 @@ pub fn run(name: &str, file: Option<&Path>, input: &Input, output: &Output) -> R
 /// As [`trace::identify`], [`Input::config`]; [`Error::Write`].
 pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(), Error> {
     let config = input.config()?;
-    let outcome = trace::identify(&given.file, &given.columns, &config)?;
+    let outcome = trace::identify(&given.file, &given.columns, given.delay, &config)?;
+    used::check(trace::EXPERIMENT.name, &[&trace::EXPERIMENT], input)?;
     let mut command = format!("identify-trace --input {}", given.file.display());
+    if let Some(delay) = given.delay {
+        command.push_str(&format!(" --delay {delay}"));
+    }
     for column in &given.columns {
         command.push_str(&format!(" --column {column}"));
     }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode, State};
 
-use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
 use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -21,6 +21,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     not: &[
         FREE_SHAFT,
         SPEED_LOOP,
+        TRACKING,
         &["angle_source", "inverter.residual_v", "inverter.switched", "inverter.compensate"],
     ],
     run,

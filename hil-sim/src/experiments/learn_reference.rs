@@ -13,7 +13,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "section 3.3, section 5.2",
     about: "The drive learns reference, sensor mismatch and saliency with the shaft locked.",
     uses: &[BENCH, DRIVE],
-    not: &[TURNING, SPEED_LOOP],
+    not: &[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]],
     run,
 };
 

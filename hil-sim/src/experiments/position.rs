@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode};
 
-use super::{BENCH, Context, DRIVE, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, TRACKING};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
@@ -18,7 +18,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figure 37, Eq. 4.1 to 4.3",
     about: "A position step of five turns with the encoder and a free shaft.",
     uses: &[BENCH, DRIVE, &["load.", "seconds"]],
-    not: &[&["angle_source"]],
+    not: &[TRACKING, &["angle_source"]],
     run,
 };
 
