@@ -62,7 +62,7 @@ const CASES: [(&str, &[&str]); 54] = [
     ("run torque-steps --set inverter.switched=maybe", &["inverter.switched = maybe", "yes, no"]),
     ("run torque-steps --set injection.demodulator=x", &["injection.demodulator = x", "synchronous"]),
     ("run torque-steps --set limits.trip_a=lots", &["limits.trip_a = lots", "number"]),
-    ("run torque-steps --set measurement.lsb_a=2", &["bits"]),
+    ("run torque-steps --set measurement.lsb_a=2", &["measurement.lsb_a = 2", "0.0559089175 A"]),
     ("run monte-carlo --set runs=0", &["runs = 0", "1 to 1000000"]),
     ("run speed-profile --set runs=5", &["speed-profile does not use `runs`", "it uses: ", "load.torque_nm"]),
     ("run anti-windup --set motor.r_s=5", &["anti-windup does not use `motor.r_s`", "no key"]),

@@ -31,12 +31,12 @@ pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(
         }
     }
     let Some(path) = &input.config else { return Ok(()) };
-    let base = Config::of_motor(input.motor.as_deref())?;
+    let mut config = Config::of_motor(input.motor.as_deref())?;
     let mut unused = Vec::new();
     for assignment in file::read(path)? {
-        let mut changed = base.clone();
-        changed.set(&assignment.name, &assignment.value)?;
-        if changed != base && !is_used(&assignment.name)? {
+        let before = config.clone();
+        config.set(&assignment.name, &assignment.value)?;
+        if config != before && !is_used(&assignment.name)? {
             unused.push(assignment.name);
         }
     }
