@@ -29,7 +29,7 @@ impl Running<'_> {
         }
     }
 
-    fn run(&self, experiment: &'static Experiment, context: &Context<'_>) -> Outcome {
+    fn run(&self, experiment: &Experiment, context: &Context<'_>) -> Outcome {
         self.change(|names| names.push(experiment.name));
         let outcome = (experiment.run)(context).unwrap_or_else(|error| Outcome::refused(&error));
         self.change(|names| names.retain(|name| *name != experiment.name));
@@ -43,8 +43,12 @@ impl Running<'_> {
 /// # Errors
 /// As [`Input::config`] and [`used::check`]; [`Error::Write`]; [`Error::Incomplete`] after the page is written.
 pub fn report(input: &Input, out: &Path) -> Result<(), Error> {
+    report_of(EXPERIMENTS, input, out)
+}
+
+fn report_of(experiments: &[Experiment], input: &Input, out: &Path) -> Result<(), Error> {
     let config = input.config()?;
-    used::check("report", &EXPERIMENTS.iter().collect::<Vec<_>>(), input)?;
+    used::check("report", &experiments.iter().collect::<Vec<_>>(), input)?;
     let context = Context {
         config: &config,
         seed: input.seed,
@@ -52,19 +56,18 @@ pub fn report(input: &Input, out: &Path) -> Result<(), Error> {
         progress: input.progress(),
         file: None,
     };
-    let bar = context.progress.bar("report", EXPERIMENTS.len() as u64);
+    let bar = context.progress.bar("report", experiments.len() as u64);
     let running = Running { bar: &bar, names: Mutex::default() };
     let outcomes: Vec<Outcome> =
-        EXPERIMENTS.par_iter().map(|experiment| running.run(experiment, &context)).collect();
+        experiments.par_iter().map(|experiment| running.run(experiment, &context)).collect();
     drop(bar);
 
-    let run = |experiment: &'static Experiment| Run {
-        experiment,
-        input,
-        config: &config,
-        command: format!("run {}", experiment.name),
-    };
-    let runs: Vec<_> = EXPERIMENTS.iter().map(run).collect();
+    let run = |experiment: &'_ Experiment| format!("run {}", experiment.name);
+    let runs: Vec<_> = experiments
+        .iter()
+        .map(|experiment| Run { experiment, input, config: &config, command: run(experiment) })
+        .collect();
+
     let sections: Vec<_> =
         runs.iter().zip(&outcomes).map(|(run, outcome)| run.section(outcome)).collect();
     let origin = Origin::new(input.seed, &config.changes());
@@ -74,7 +77,7 @@ pub fn report(input: &Input, out: &Path) -> Result<(), Error> {
     say(&format!("Report: {}\n", path.display()))?;
 
     let mut names = Vec::new();
-    for (experiment, outcome) in EXPERIMENTS.iter().zip(&outcomes) {
+    for (experiment, outcome) in experiments.iter().zip(&outcomes) {
         if let Some(reason) = outcome.lost() {
             eprintln!("{}: {reason}", experiment.name);
             names.push(experiment.name.to_owned());
@@ -82,6 +85,43 @@ pub fn report(input: &Input, out: &Path) -> Result<(), Error> {
     }
     match names.len() {
         0 => Ok(()),
-        failed => Err(Error::Incomplete { failed, all: EXPERIMENTS.len(), names }),
+        failed => Err(Error::Incomplete { failed, all: experiments.len(), names }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn experiment(
+        name: &'static str,
+        run: fn(&Context<'_>) -> Result<Outcome, Error>,
+    ) -> Experiment {
+        Experiment { name, stands_for: "a test", about: "A test.", uses: &[], not: &[], run }
+    }
+
+    #[test]
+    fn a_report_goes_on_when_experiments_are_refused_or_lost() {
+        let experiments = [
+            experiment("refused", |_| Err(Error::Refused("dc link too low".into()))),
+            experiment("sound", |_| {
+                let mut outcome = Outcome::default();
+                outcome.metrics.set("torque_nm", 0.625);
+                Ok(outcome)
+            }),
+            experiment("lost", |_| {
+                let faults = vec!["fault 12: the flux angle is lost".to_owned()];
+                Ok(Outcome { faults, ..Outcome::default() })
+            }),
+        ];
+        let folder = std::env::temp_dir().join(format!("hil-sim-report-{}", std::process::id()));
+        let error = report_of(&experiments, &Input::default(), &folder).unwrap_err();
+        assert_eq!(error.to_string(), "2 of 3 experiments failed: refused, lost");
+        assert_eq!(error.exit_code(), 1);
+        let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+        for part in ["Refused: dc link too low.", "0.625", "fault 12: the flux angle is lost"] {
+            assert!(page.contains(part), "{part}");
+        }
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -295,7 +295,7 @@ fn steps_figure<'a>(
             }
         }
     }
-    let title = "Torque steps, 1 A to 2 A, without a position sensor";
+    let title = "Torque steps without a position sensor";
     panels.into_iter().fold(Figure::new("steps", title, "Figure 38"), Figure::panel)
 }
 

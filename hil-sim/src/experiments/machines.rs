@@ -19,7 +19,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
             the motor.",
     uses: &[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]],
-    not: &[FREE_SHAFT, SPEED_LOOP],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
     run,
 };
 

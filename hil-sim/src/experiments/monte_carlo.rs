@@ -15,7 +15,7 @@ use crate::rig::plant_settings;
 pub const EXPERIMENT: Experiment = Experiment {
     name: "monte-carlo",
     stands_for: "the claim behind Figures 38 and 39",
-    about: "Random torque current (0.5 A to 3 A, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
+    about: "Random torque current of both signs and random speed, and what `spread.*` adds; `--set runs=N`.",
     uses: &[
         BENCH,
         DRIVE,
