@@ -121,7 +121,8 @@ impl fmt::Display for Report {
 mod tests {
     use drive_core::{Command, Mode};
     use hil_sim::Config;
-    use hil_sim::rig::{Rig, plant_settings};
+    use hil_sim::config::plant_settings;
+    use hil_sim::rig::Rig;
 
     use super::*;
     use heapless::spsc::Queue;

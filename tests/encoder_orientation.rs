@@ -4,7 +4,7 @@
 mod common;
 
 use common::{IDEAL, ISOTROPIC, all, config, regulating_with};
-use hil_sim::rig::plant_settings;
+use hil_sim::config::plant_settings;
 use hil_sim::stats::Stats;
 
 /// Largest flux angle error (degrees) and largest relative torque error at one speed.

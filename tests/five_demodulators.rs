@@ -7,10 +7,11 @@ use common::{ISOTROPIC, all, beside_encoder, config, regulating_with};
 use drive_core::carrier::DemodulatorKind;
 use drive_core::settings::SettingsError;
 use drive_core::{Command, Settings};
+use hil_sim::config::plant_settings;
 use hil_sim::config::{Config, LoadMode};
 use hil_sim::experiments::learning;
 use hil_sim::plant::Load;
-use hil_sim::rig::{RATE_HZ, Rig, plant_settings};
+use hil_sim::rig::{RATE_HZ, Rig};
 
 /// Name, and how large its signal is beside that of the rectified chain, by the gains of the filters
 /// and of the detector.

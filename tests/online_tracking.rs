@@ -9,9 +9,10 @@ use common::config;
 use drive_core::flux::indirect::TAU_R_LIMITS;
 use drive_core::identify::online::{NoEstimate, Online, SpeedInput};
 use drive_core::{Accepted, AlphaBeta, Command, Dq, Mode, Refused, Settings};
+use hil_sim::config::plant_settings;
 use hil_sim::experiments::warming_rotor::{WarmingCase, WarmingMoment, run};
 use hil_sim::plant::Load;
-use hil_sim::rig::{RATE_HZ, Rig, plant_settings};
+use hil_sim::rig::{RATE_HZ, Rig};
 
 /// r_r grows by 30 % between 3 and 6 s.
 const CASE: WarmingCase = WarmingCase {

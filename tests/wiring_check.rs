@@ -5,8 +5,8 @@ mod common;
 
 use common::config;
 use drive_core::{Command, Compare, Drive, Fault, Mode, Sample, State};
+use hil_sim::config::plant_settings;
 use hil_sim::plant::{Channel, CurrentFault, Plant};
-use hil_sim::rig::plant_settings;
 
 /// What is wrong between the drive and the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,6 +9,8 @@ mod alias;
 pub mod file;
 mod key;
 mod keys;
+pub mod motors;
+mod plant;
 mod value;
 
 use std::path::Path;
@@ -18,11 +20,11 @@ use drive_core::settings::{Line, Settings};
 use file::FileAssignment;
 pub use key::Key;
 pub use keys::*;
+pub use plant::plant_settings;
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
-use crate::motors::Motor;
-use crate::rig::plant_settings;
+use motors::Motor;
 
 /// Prefix of the keys that set the drive alone.
 const DRIVE: &str = "drive.";
@@ -109,24 +111,30 @@ impl Config {
 
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
     pub fn amperes(&self, on_reference: f64) -> f64 {
-        f64::from(self.drive.share_of_rated(on_reference as f32))
+        let relative = f64::from(self.drive.rated_a()) / f64::from(Settings::default().rated_a());
+        on_reference * relative
     }
 
-    /// A torque that is `on_reference`, Nm, on the dissertation's motor, in proportion to the torque of the current limit.
+    /// A load torque that is `on_reference`, Nm, on the dissertation's motor. A step of it accelerates the shaft as there,
+    /// electrically, because the tracking of the angle follows a limited acceleration; and it is not a larger share of
+    /// the torque at the current limit.
     pub fn newton_metres(&self, on_reference: f64) -> f64 {
-        let largest = |drive: &Settings| {
-            f64::from(drive.motor.torque_per_ampere(drive.i_d()) * drive.current_limit_a())
+        let relative = |of: fn(&Settings) -> f32| {
+            f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
         };
-        on_reference * largest(&self.drive) / largest(&Settings::default())
+        let torque = relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
+        let inertia = relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
+        on_reference * torque.min(inertia)
     }
 
     /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
     pub fn rpm(&self, on_reference: f64) -> f64 {
-        on_reference * 2.0 / f64::from(self.motor.pole_pairs)
+        on_reference * (2.0 / f64::from(self.motor.pole_pairs))
     }
 
-    /// Sets the scales of the drive to those of the sensors, without their errors.
-    pub(super) fn calibrate(&mut self) {
+    /// Sets the scales of the drive to those of the sensors, without their errors; after a direct change of
+    /// `measurement` or of the dc link.
+    pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
         let [a, b] = sensors
             .calibration()

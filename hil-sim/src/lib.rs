@@ -8,7 +8,6 @@ pub mod error;
 pub mod experiments;
 pub mod identification;
 pub mod input;
-pub mod motors;
 pub mod outcome;
 pub mod progress;
 pub mod report;

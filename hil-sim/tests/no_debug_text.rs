@@ -22,7 +22,6 @@ fn texts_for_people_are_made_without_debug_formatting() {
         "experiments.rs",
         "experiments",
         "input.rs",
-        "motors.rs",
         "outcome.rs",
         "outcome",
         "report",

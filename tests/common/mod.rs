@@ -2,8 +2,9 @@
 #![allow(dead_code)] // every procedure uses its own part of it
 
 use drive_core::{Command, Mode, Settings};
+pub use hil_sim::config::plant_settings;
 use hil_sim::plant::PlantSettings;
-pub use hil_sim::rig::{Rig, plant_settings};
+pub use hil_sim::rig::Rig;
 use hil_sim::{Config, Outcome, experiments};
 
 /// The configuration with these changes, `key=value`.

@@ -3,6 +3,7 @@
 mod board;
 mod budget;
 mod control;
+mod documents;
 mod elf;
 mod fuzz;
 mod image;
@@ -79,6 +80,8 @@ enum Task {
     /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
     /// the text of a plot is too small
     Pages,
+    /// Runs every command that a document shows, except those of a list with reasons
+    Documents,
     /// Long proofs in shards, which a later call continues. Lists them, or does one
     Prove {
         /// Name of the proof
@@ -119,6 +122,7 @@ fn run(task: Task) -> Result<()> {
         Task::Mutants { shard } => tools::mutants(&shard),
         Task::Book => tools::book(),
         Task::Pages => pages::pages(),
+        Task::Documents => documents::check(),
         Task::Prove { name: None, .. } => prove::list(),
         Task::Prove { name: Some(name), part } => prove::prove(&name, &part),
     }
@@ -136,6 +140,7 @@ fn test() -> Result<()> {
     run::step("host tests", &mut run::cargo("test --workspace --exclude virtual-board"))?;
     let mut documentation = run::cargo("doc --workspace --no-deps");
     run::step("documentation", documentation.env("RUSTDOCFLAGS", "-D warnings"))?;
+    run::timed("commands of the documents", documents::check)?;
 
     let target = toolchain::for_target()?;
     let core = ["--package", "drive-core"];

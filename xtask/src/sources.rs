@@ -1,4 +1,4 @@
-//! The Rust source files of the repository.
+//! The Rust source files and the documents of the repository.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,17 @@ const BUILT: [&str; 2] = ["target", "out"];
 
 /// All Rust files below the root, sorted, as paths relative to it.
 pub fn rust_files() -> Result<Vec<PathBuf>> {
+    files("rs")
+}
+
+/// All documents for readers of today; the change log speaks of the past.
+pub fn documents() -> Result<Vec<PathBuf>> {
+    let mut documents = files("md")?;
+    documents.retain(|path| !path.ends_with("CHANGELOG.md"));
+    Ok(documents)
+}
+
+fn files(extension: &str) -> Result<Vec<PathBuf>> {
     let kept = |name: &str| !name.starts_with('.') && !BUILT.contains(&name);
     let entries = WalkDir::new(run::root())
         .sort_by_file_name()
@@ -21,7 +32,7 @@ pub fn rust_files() -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in entries {
         let path = entry?.into_path();
-        if path.extension().is_some_and(|extension| extension == "rs") {
+        if path.extension().is_some_and(|found| found == extension) {
             files.push(path.strip_prefix(run::root())?.to_owned());
         }
     }

@@ -1,7 +1,5 @@
 //! Selection of the demodulator.
 
-use crate::settings::value::words;
-
 /// Demodulator of the carrier current; it also selects the angle-tracking loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DemodulatorKind {
@@ -18,11 +16,3 @@ pub enum DemodulatorKind {
     #[default]
     Synchronous,
 }
-
-words!(DemodulatorKind {
-    Self::Literal => DemodulatorKind::Literal, "literal";
-    Self::Rectified => DemodulatorKind::Rectified, "rectified";
-    Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
-    Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
-    Self::Envelope => DemodulatorKind::Envelope, "envelope";
-});

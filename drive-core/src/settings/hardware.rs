@@ -46,6 +46,21 @@ impl Line {
     #[allow(clippy::excessive_precision)]
     pub const CHANNEL_B: Self = Self { gain: 0.002_231_4, offset: -4.496_623_8 };
 
+    /// The line of a sensor that gives `zero_v` at zero and `v_per_unit` more per ampere or volt, behind a converter with
+    /// the reference `reference_v` and `codes` codes (4096 with 12 bits).
+    ///
+    /// ```
+    /// use drive_core::settings::Line;
+    ///
+    /// // A shunt of 10 mohm, amplified 20 times around 1.65 V: 0.2 V/A.
+    /// let line = Line::of_sensor(0.010 * 20.0, 1.65, 3.3, 4096);
+    /// assert!(line.at(2048).abs() < 0.001 && (line.at(4095) - 8.25).abs() < 0.01);
+    /// ```
+    pub fn of_sensor(v_per_unit: f32, zero_v: f32, reference_v: f32, codes: u16) -> Self {
+        let per_volt = 1.0 / v_per_unit;
+        Self { gain: per_volt * reference_v / f32::from(codes), offset: -per_volt * zero_v }
+    }
+
     /// The line multiplied by a factor.
     pub fn scaled(self, factor: f32) -> Self {
         Self { gain: factor * self.gain, offset: factor * self.offset }

@@ -1,5 +1,6 @@
 //! The injection and the tracking of the angle.
 
+use super::value::words;
 use crate::carrier::DemodulatorKind;
 use crate::settings::table::{CarrierTable, ReferenceTable};
 
@@ -108,3 +109,11 @@ impl Default for InjectionSettings {
         }
     }
 }
+
+words!(DemodulatorKind {
+    Self::Literal => DemodulatorKind::Literal, "literal";
+    Self::Rectified => DemodulatorKind::Rectified, "rectified";
+    Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
+    Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
+    Self::Envelope => DemodulatorKind::Envelope, "envelope";
+});

@@ -2,11 +2,11 @@
 
 use serde_json::json;
 
+use crate::config::motors::Motor;
 use crate::config::{Config, Key, Value, file};
 use crate::error::{Error, nearest};
 use crate::experiments::{EXPERIMENTS, Experiment, WITH_INPUT};
 use crate::input::Input;
-use crate::motors::Motor;
 use crate::outcome::{Cell, Table};
 use crate::report;
 

@@ -96,7 +96,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
     config.load.speed_rpm = SPEED_RPM;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(IQ_A as f32))?;
+    rig.command(&Command::Torque(config.amperes(IQ_A) as f32))?;
     rig.run(0.5, |_| {});
 
     const BINS: usize = 120;

@@ -8,9 +8,9 @@ use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::plant_settings;
 
 /// Not a figure of the source: whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -176,7 +176,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "verdict",
     ];
     let title = if draws { "Machines, the worst first" } else { "The motor" };
-    let mut table = Table::new(title, &heads).note(&format!(
+    let mut table = Table::new(title, &heads).note(format!(
         "Good: every run within {}° rms and {}° at most, none lost.",
         GOOD_DEG.0, GOOD_DEG.1
     ));

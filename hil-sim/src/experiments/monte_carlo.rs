@@ -7,15 +7,15 @@ use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
-use crate::rig::plant_settings;
 
 /// Not a figure of the source: the claim behind Figures 38 and 39, over many runs.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "monte-carlo",
     stands_for: "the claim behind Figures 38 and 39",
-    about: "Random torque current of both signs and random speed, and what `spread.*` adds; `--set runs=N`.",
+    about: "Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
     uses: &[
         BENCH,
         DRIVE,
@@ -36,22 +36,23 @@ pub const EXPERIMENT: Experiment = Experiment {
 const RUNS: u32 = 200;
 /// How many of the worst runs are listed.
 const WORST: usize = 10;
-/// Torque currents, A.
+/// Torque currents on the dissertation's motor, A.
 const IQ_A: (f64, f64) = (0.5, 3.0);
-/// Speeds up to here, rpm, unless `load.speed_rpm` says otherwise.
+/// Speeds up to here on four poles, rpm, unless `load.speed_rpm` says otherwise.
 const SPEED_RPM: f64 = 150.0;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let runs = context.config.extent.runs.unwrap_or(RUNS);
     let bound = context.config.load.speed_rpm.abs();
-    let bound = if bound > 0.0 { bound } else { SPEED_RPM };
+    let bound = if bound > 0.0 { bound } else { context.config.rpm(SPEED_RPM) };
+    let (least, most) = (context.config.amperes(IQ_A.0), context.config.amperes(IQ_A.1));
     let cases: Vec<(OperatingPoint, Config)> = (0..u64::from(runs))
         .map(|number| {
             // A generator of its own for every run: each can be repeated alone by its seed.
             let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
             let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
             let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-            let iq = sign * random.random_range(IQ_A.0..=IQ_A.1);
+            let iq = sign * random.random_range(least..=most);
             let case = OperatingPoint { rpm: random.random_range(-bound..=bound), iq, seed };
             (case, spread(context.config, &mut random))
         })

@@ -1,10 +1,10 @@
 //! The tests that gave Table 5, on the simulated motor.
 
 use super::{Context, Experiment, TURNING};
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
 use crate::outcome::{Cell, Outcome, Table};
-use crate::rig::plant_settings;
 
 /// Section 3.6, Table 5.
 pub const EXPERIMENT: Experiment = Experiment {

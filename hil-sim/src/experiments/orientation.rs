@@ -36,8 +36,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let mut table = Table::new("Field orientation over speed", &[]).note(format!(
-        "iq = {IQ_A} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
-         the torque is compared with 3/2 P (L_m/L_r) ψ i_q."
+        "iq = {} A, a dynamometer holding the speed. Eq. 2.7 prints L_m where L_m²/L_r belongs; \
+         the torque is compared with 3/2 P (L_m/L_r) ψ i_q.",
+        context.config.amperes(IQ_A)
     ));
     let mut lines = [Vec::new(), Vec::new()];
     for ((&rpm, a), b) in SPEEDS_RPM.iter().zip(with).zip(without) {
@@ -81,12 +82,13 @@ fn orientation(context: &Context<'_>, compensate: bool, rpm: f64) -> Result<Orie
     config.load.speed_rpm = rpm;
     let mut rig = Rig::from_config(&config, context.seed)?;
     rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(IQ_A as f32))?;
+    let iq = config.amperes(IQ_A);
+    rig.command(&Command::Torque(iq as f32))?;
     rig.run(1.0, |_| {});
     let (mut error, mut share) = (Stats::default(), Stats::default());
     rig.run(context.seconds.unwrap_or(0.3), |p| {
         error.push(p.angle_error_deg);
-        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * IQ_A));
+        share.push(p.torque / (p.torque_per_flux_ampere * p.flux * iq));
     });
     Ok((error.mean(), share.mean()))
 }

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
 use super::{BENCH, Context, DRIVE, Experiment};
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::rig::{RATE_HZ, Rig};
 use crate::stats::Stats;
 use drive_core::settings::AngleSource;
 
@@ -40,6 +41,21 @@ struct StepCase {
     from: f64,
     /// True rotor resistance over the one the drive believes.
     warmer: f64,
+}
+
+impl StepCase {
+    /// The case in proportion to the motor and the pole pairs of a configuration.
+    fn scaled(self, config: &Config) -> Self {
+        let (disturbance, from) = match self.disturbance {
+            Disturbance::Load(nm) => {
+                (Disturbance::Load(config.newton_metres(nm)), config.rpm(self.from))
+            }
+            Disturbance::TorqueCurrent(by) => {
+                (Disturbance::TorqueCurrent(config.amperes(by)), config.amperes(self.from))
+            }
+        };
+        Self { disturbance, from, ..self }
+    }
 }
 
 const fn load(name: &'static str, rpm: f64, nm: f64) -> StepCase {
@@ -173,6 +189,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let bar = context.progress.bar("perturbation", CASES.len() as u64);
     let mut results = Vec::with_capacity(CASES.len());
     for case in CASES {
+        let case = case.scaled(context.config);
         results.push(measure(context.config, case, context.seed)?);
         bar.advance(1);
     }
@@ -183,7 +200,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
     let mut table = Table::new(title, &[]).note(
-        "The mean before the step is taken away, but not from the largest single error, which has \
+        "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \
+         taken away, but not from the largest single error, which has \
          noise and bias in it.",
     );
     let is_load = |m: &&StepResponse| matches!(m.case.disturbance, Disturbance::Load(_));

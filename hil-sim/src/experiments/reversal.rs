@@ -20,7 +20,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Torque currents one after another, A.
+/// Torque currents one after another on the dissertation's motor, A.
 const LEVELS: [f64; 9] = [0.5, 1.0, 2.0, 3.0, 0.5, 2.0, -2.0, 3.0, -3.0];
 /// Time at each, s.
 const LEVEL_S: f64 = 1.0;
@@ -34,7 +34,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let heads = ["from (A)", "to (A)", "largest error (°)", "mean error, second half (°)"];
     let mut table = Table::new("Angle error after each step", &heads);
     let (mut largest, mut before) = (0.0_f64, 0.0);
-    for iq in LEVELS {
+    for iq in LEVELS.map(|iq| context.config.amperes(iq)) {
         if rig.fault().is_some() {
             break;
         }

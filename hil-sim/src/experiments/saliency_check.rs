@@ -58,6 +58,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn accepts(config: &Config, seed: u64) -> Result<bool, Error> {
     let mut config = config.clone();
     config.drive.angle_source = AngleSource::Injection;
+    // A start is checked, not a learning.
+    config.prepare.learn = false;
     config.drive.injection.demodulator = DemodulatorKind::Synchronous;
     let mut rig = Rig::from_config(&config, seed)?;
     rig.command(&Command::Start(Mode::Torque))?;

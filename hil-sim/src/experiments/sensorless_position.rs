@@ -8,11 +8,12 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, learning};
+use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Load;
-use crate::rig::{Point, Rig, means_over, plant_settings};
+use crate::rig::{Point, Rig, means_over};
 use crate::stats::{Stats, StraightLine};
 use drive_core::settings::AngleSource;
 
@@ -115,8 +116,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (without, fault_without) = step(config, AngleSource::Injection, seed, step_s)?;
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
+    let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
     let cases: Vec<(f64, (f64, bool))> =
-        BELIEFS.iter().flat_map(|&b| LOADS_NM.iter().map(move |&l| (l, b))).collect();
+        BELIEFS.iter().flat_map(|&b| loads.iter().map(move |&l| (l, b))).collect();
     let held = context.in_parallel("sensorless-position", &cases, |number, &(load, belief)| {
         hold(config, seed.wrapping_add(number), load, belief, hold_s)
     })?;

@@ -100,7 +100,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(
         Figure::new(
             "profile",
-            &format!("Speed profile with a reversal and a load of {load_nm:.2} Nm"),
+            format!("Speed profile with a reversal and a load of {load_nm:.2} Nm"),
             "section 5.2",
         )
         .events(events)

@@ -16,12 +16,16 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
+/// Torque currents on the dissertation's motor, A.
 const IQ_A: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 3.0, -1.0, -2.0];
+/// Speeds on four poles, rpm.
 const SPEEDS_RPM: [f64; 7] = [0.0, 30.0, -30.0, 150.0, -150.0, 300.0, 600.0];
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let currents = IQ_A.map(|iq| context.config.amperes(iq));
+    let speeds = SPEEDS_RPM.map(|rpm| context.config.rpm(rpm));
     let grid: Vec<(f64, f64)> =
-        SPEEDS_RPM.iter().flat_map(|&n| IQ_A.iter().map(move |&iq| (n, iq))).collect();
+        speeds.iter().flat_map(|&n| currents.iter().map(move |&iq| (n, iq))).collect();
     let runs = context.in_parallel("speed-torque-sweep", &grid, |number, &(rpm, iq)| {
         let case = OperatingPoint { rpm, iq, seed: context.seed.wrapping_add(number) };
         steady_run(context.config, case, context.seconds.unwrap_or(2.0))
@@ -43,7 +47,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut table = Table::new("Angle error, mean ± rms about it (°)", &[]).note(
         "Two seconds each, one second after the speed is reached. lost: beyond 45°, or stopped.",
     );
-    for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
+    for (rpm, row) in speeds.iter().zip(runs.chunks(IQ_A.len())) {
         let cell = |r: &SteadyRun| {
             if r.lost {
                 Cell::from("lost")
@@ -51,17 +55,21 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 Cell::from(format!("{:.1} ± {:.1}", r.error.mean(), r.error.deviation()))
             }
         };
-        let cells = IQ_A.iter().zip(row).map(|(iq, run)| (format!("iq = {iq} A"), cell(run)));
+        let cells = currents.iter().zip(row).map(|(iq, run)| (format!("iq = {iq} A"), cell(run)));
         table.record([("speed (rpm)".to_owned(), Cell::fixed(*rpm, 0))].into_iter().chain(cells));
     }
     outcome.tables.push(table);
 
     let mut error = Panel::new("quadrature current (A)", "mean angle error (°)");
     let mut torque = Panel::new("quadrature current (A)", "mean torque (Nm)");
-    for (rpm, row) in SPEEDS_RPM.iter().zip(runs.chunks(IQ_A.len())) {
+    for (rpm, row) in speeds.iter().zip(runs.chunks(IQ_A.len())) {
         let line = |of: fn(&SteadyRun) -> f64| {
-            let mut points: Vec<_> =
-                IQ_A.iter().zip(row).filter(|(_, r)| !r.lost).map(|(&iq, r)| (iq, of(r))).collect();
+            let mut points: Vec<_> = currents
+                .iter()
+                .zip(row)
+                .filter(|(_, r)| !r.lost)
+                .map(|(&iq, r)| (iq, of(r)))
+                .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             points
         };

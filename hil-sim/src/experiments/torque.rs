@@ -5,10 +5,11 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::{Accepted, Command, Mode};
 
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
 use crate::experiments::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
-use crate::rig::{Point, RATE_HZ, Rig, means_over, plant_settings};
+use crate::rig::{Point, RATE_HZ, Rig, means_over};
 use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
 

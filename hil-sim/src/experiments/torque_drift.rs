@@ -33,8 +33,9 @@ struct HeldTorque {
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let currents = IQ_A.map(|iq| context.config.amperes(iq));
     let mean_s = context.seconds.map_or(MEAN_S, |s| s / MEANS as f64);
-    let held = context.in_parallel("torque-drift", &IQ_A, |number, &iq| {
+    let held = context.in_parallel("torque-drift", &currents, |number, &iq| {
         hold(
             context,
             OperatingPoint { rpm: 0.0, iq, seed: context.seed.wrapping_add(number) },
@@ -49,13 +50,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     .note("Means of ten seconds; the drift is the farthest of them from the first.");
     let (mut linear_2a, mut linear_3a) = (0.0_f64, 0.0_f64);
     let (mut torque_drift, mut angle_drift) = (0.0_f64, 0.0_f64);
-    for (&iq, h) in IQ_A.iter().zip(&held) {
+    for (&iq, h) in currents.iter().zip(&held) {
         let off =
             |means: &[f64]| means.iter().map(|mean| (mean - means[0]).abs()).fold(0.0, f64::max);
         let torque = Stats::of(h.torque.iter().copied()).mean();
         let linear = 100.0 * (torque / h.ideal - 1.0).abs();
         linear_3a = linear_3a.max(linear);
-        if iq.abs() <= 2.0 {
+        if iq.abs() <= context.config.amperes(2.0) {
             linear_2a = linear_2a.max(linear);
         }
         let percent = 100.0 * off(&h.torque) / h.torque[0].abs();
@@ -79,7 +80,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("angle_drift_deg", angle_drift);
     outcome.tables.push(table);
     let mut panel = Panel::new("time (s)", "torque over that of the first mean");
-    for (iq, h) in IQ_A.iter().zip(&held) {
+    for (iq, h) in currents.iter().zip(&held) {
         let line = h.torque.iter().enumerate();
         let line = line.map(|(n, t)| ((n as f64 + 0.5) * mean_s, t / h.torque[0])).collect();
         panel = panel.with(Series::line(format!("{iq} A"), line));

@@ -5,12 +5,13 @@ use std::f64::consts::TAU;
 use drive_core::identify::online::{NoEstimate, Online, RotorEstimate, SAMPLE_S, SpeedInput};
 use drive_core::{Command, Mode};
 
-use crate::config::Config;
+use crate::config::plant_settings;
+use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::identification::models::model_d;
 use crate::identification::{Complex, Delta, Estimate};
-use crate::plant::{Load, PlantSettings};
-use crate::rig::{RATE_HZ, Rig, plant_settings};
+use crate::plant::Load;
+use crate::rig::{RATE_HZ, Rig};
 use drive_core::settings::AngleSource;
 
 /// Calls of `refine` per second.
@@ -60,20 +61,18 @@ pub struct WarmingMoment {
 pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<WarmingMoment>, Error> {
     let settings = drive_core::Settings { track_rotor: case.used, ..config.drive };
     let plant = plant_settings(config);
-    let start = PlantSettings {
-        mechanics: crate::plant::MechanicsSettings { load: Load::Locked, ..plant.mechanics },
-        ..plant
-    };
-    let mut rig = Rig::new(&start, &settings, seed)?;
+    let mut start = Config { drive: settings, ..config.clone() };
+    start.load.mode = LoadMode::Locked;
+    let mut rig = Rig::from_config(&start, seed)?;
     let mut online = Online::new(&settings).map_err(|_| {
         Error::Refused("the settings do not suit the estimation of the rotor time constant".into())
     })?;
     rig.start(Mode::Torque)?;
-    rig.command(&Command::Torque(case.iq_a as f32))?;
+    rig.command(&Command::Torque(config.amperes(case.iq_a) as f32))?;
     let steps = 1 + (100.0 * case.speed_rpm.abs() / RAMP_RPM_PER_S) as u32;
     for n in 1..=steps {
         let rpm = case.speed_rpm * f64::from(n) / f64::from(steps);
-        rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 })?;
+        rig.set_load(Load::Speed { speed: config.rpm(rpm) * TAU / 60.0 })?;
         rig.run(0.01, |_| {});
     }
     rig.run(1.0, |_| {});
@@ -94,7 +93,7 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         for k in 0..block {
             if case.excitation.0 > 0.0 && k.is_multiple_of(block / 10) {
                 let t = t + k as f64 / RATE_HZ;
-                let more = case.excitation.0 * (TAU * case.excitation.1 * t).sin();
+                let more = config.amperes(case.excitation.0) * (TAU * case.excitation.1 * t).sin();
                 rig.command(&Command::Magnetising((i_d + more) as f32))?;
             }
             rig.run(1.0 / RATE_HZ, |p| angle_error += p.angle_error_deg / block as f64);

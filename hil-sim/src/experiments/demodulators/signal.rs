@@ -4,8 +4,9 @@ use drive_core::Command;
 
 use super::demodulation::Demodulation;
 use crate::config::Config;
+use crate::config::plant_settings;
 use crate::error::Error;
-use crate::rig::{Rig, plant_settings};
+use crate::rig::Rig;
 use crate::stats::Stats;
 
 /// Half of the turn over which the slope is taken, degrees.
@@ -87,7 +88,9 @@ pub fn delay(
 ) -> Result<f64, Error> {
     let mut config = config.clone();
     config.measurement.noise_a = Some(0.0);
-    config.measurement.lsb_a = Some(0.000_14);
+    // 16 bits.
+    config.measurement.lsb_a = Some(0.000_14 / 4.472_713_4 * config.measurement.range_a);
+    config.calibrate();
     let mut rig = oriented(demodulation, &config, iq, seed)?;
     let plant = plant_settings(&config);
     let mut response = [0.0; AFTER];

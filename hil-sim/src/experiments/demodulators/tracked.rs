@@ -34,11 +34,12 @@ pub struct StepsRun {
 pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, Error> {
     let mut config = config.clone();
     config.load.mode = LoadMode::Locked;
-    let mut rig = Rig::from_config(&Config { drive: *drive, ..config }, seed)?;
+    let config = Config { drive: *drive, ..config };
+    let mut rig = Rig::from_config(&config, seed)?;
     rig.start(Mode::Torque)?;
     let start = rig.time();
     let (mut error, mut stats) = (Vec::new(), Stats::default());
-    for iq in LEVELS_A {
+    for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
         if matches!(rig.drive.state(), State::Fault(_)) {
             break;
         }

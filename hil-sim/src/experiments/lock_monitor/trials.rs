@@ -187,7 +187,7 @@ fn load_step(
             break;
         }
         if n == 600 {
-            rig.set_load(Load::Free { torque: LOAD_NM * case.iq.signum() })?;
+            rig.set_load(Load::Free { torque: config.newton_metres(LOAD_NM) * case.iq.signum() })?;
         }
         let error = (case.rpm - estimate) * TAU / 60.0;
         integral += k_p * SPEED_LOOP / 4.0 * error * pace;

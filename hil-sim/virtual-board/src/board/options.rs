@@ -23,7 +23,7 @@ pub struct Options {
 impl Options {
     /// The plant that a configuration describes, with the sensors and the dead time of this board.
     pub fn plant(config: &Config) -> PlantSettings {
-        let mut plant = hil_sim::rig::plant_settings(config);
+        let mut plant = hil_sim::config::plant_settings(config);
         // The converters have another reference than the source's.
         let gain =
             f64::from(firmware_board::CURRENT_A.gain / drive_core::settings::Line::CHANNEL_A.gain);

@@ -1,6 +1,6 @@
 //! The motors that come with the program: one file a motor in the folder `motors`, every number with its source.
 //!
-//! A file holds settings under the names of the keys ([`crate::config`]), a title, a text, and sources. See the page
+//! A file holds settings under the names of the keys ([`super`]), a title, a text, and sources. See the page
 //! "Motors" of the documentation.
 
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::path::Path;
 use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
-use crate::config::{Config, Key, Value};
+use super::{Config, Key, Value, flattened};
 use crate::error::{Error, nearest};
 
 static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
@@ -73,7 +73,7 @@ impl Motor {
 
     /// The keys that the file sets, with their values.
     pub fn settings(&self) -> Vec<(String, Value)> {
-        crate::config::flattened(&self.settings)
+        flattened(&self.settings)
     }
 
     /// The source of a key.

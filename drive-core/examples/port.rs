@@ -1,0 +1,144 @@
+//! The drive on another chip.
+//!
+//! A port brings four things: a board (what the timer, the converters and the encoder do), settings with the scales of
+//! its sensors, an interrupt that calls [`Drive::step`] 6000 times a second, and a task that gives commands. Here the
+//! board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
+//! one producer and one consumer, such as `heapless::spsc::Queue`.
+//!
+//! `cargo run -p drive-core --example port`
+
+use std::error::Error;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use drive_core::identify::learning::Learned;
+use drive_core::settings::{Line, Ntc, Scales, Settings};
+use drive_core::{Accepted, Command, Compare, Drive, Hardware, Mode, Refused, Sample, State};
+
+/// What the interrupt needs of the hardware.
+trait Board {
+    /// The readings of this period. The currents were sampled in the middle of the low sides' on-time.
+    fn sample(&mut self) -> Sample;
+    /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.
+    fn output(&mut self, compare: &Compare);
+}
+
+/// The board of this example: no current flows, 48 V, 25 °C.
+struct Idle;
+
+impl Board for Idle {
+    fn sample(&mut self) -> Sample {
+        let zero = 2048;
+        Sample {
+            current_a: zero,
+            current_b: zero,
+            dc_link: 1820,
+            heat_sink: 1309,
+            encoder: 0,
+            hardware: Hardware::empty(),
+        }
+    }
+
+    fn output(&mut self, _: &Compare) {}
+}
+
+/// Converter codes: 12 bits.
+const CODES: u16 = 4096;
+/// Reference of the converters, V.
+const REFERENCE_V: f32 = 3.3;
+
+/// The settings: motor, nameplate and sensors of one's own. All else follows from them by rules; a design that cannot be
+/// made is an error that names its reason.
+fn settings() -> Settings {
+    let mut settings = Settings::default();
+    // A motor with a winding for 48 V, from its data sheet: T-equivalent circuit per phase, star.
+    let motor = &mut settings.motor;
+    (motor.r_s, motor.r_r) = (0.22, 0.13);
+    (motor.l_ls, motor.l_lr, motor.l_m) = (0.8e-3, 0.8e-3, 9.0e-3);
+    let nameplate = &mut settings.nameplate;
+    (nameplate.power_w, nameplate.voltage_v, nameplate.current_a) = (250.0, 32.0, 8.0);
+    (nameplate.frequency_hz, nameplate.speed_rpm) = (50.0, 1400.0);
+    settings.inverter.dc_link_v = 48.0;
+    // Counts up and down once a period: clock / 12 kHz.
+    settings.inverter.top = 14_167;
+    // Shunts of 5 mohm, amplified 20 times around half of the reference.
+    let current = Line::of_sensor(0.005 * 20.0, 0.5 * REFERENCE_V, REFERENCE_V, CODES);
+    settings.scales = Scales {
+        current_a: current,
+        current_b: current,
+        // 22 kohm over 680 ohm.
+        dc_link: Line::of_sensor(0.68 / 22.68, 0.0, REFERENCE_V, CODES),
+        ntc: Ntc { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm: 4700.0, to_ground: false },
+        current_delay_s: 2e-6,
+        ..Scales::default()
+    };
+    settings
+}
+
+/// The control interrupt owns the drive. The task reaches it through two queues only, so that a command is never taken
+/// while a step runs.
+struct Interrupt<B> {
+    board: B,
+    drive: Drive,
+    commands: Receiver<Command>,
+    answers: SyncSender<Result<Accepted, Refused>>,
+}
+
+impl<B: Board> Interrupt<B> {
+    /// Called once a PWM period, at the highest priority.
+    fn on_period(&mut self) {
+        let compare = self.drive.step(&self.board.sample());
+        self.board.output(&compare);
+        // The compare values are out; what is left of the period belongs to commands.
+        if let Ok(command) = self.commands.try_recv() {
+            let _ = self.answers.try_send(self.drive.command(&command));
+        }
+    }
+}
+
+/// The result of the last learning with these settings, from the flash. This example has none.
+fn read_learned() -> Option<Learned> {
+    None
+}
+
+/// Writes the result of a learning to the flash, beside the settings it belongs to.
+fn write_learned(learned: &Learned) {
+    println!("learned {} points", learned.points);
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let settings = settings();
+    // Takes a second on a chip: with the outputs off.
+    let mut coefficients = settings.build()?;
+    if let Some(learned) = read_learned() {
+        coefficients.take(&learned);
+    }
+
+    let (order, commands) = sync_channel(1);
+    let (answers, answer) = sync_channel(1);
+    let drive = Drive::new(coefficients);
+    let mut interrupt = Interrupt { board: Idle, drive, commands, answers };
+
+    // The task: one command, one answer.
+    order.send(Command::Start(Mode::Torque))?;
+    interrupt.on_period();
+    match answer.recv()? {
+        Ok(Accepted::AsGiven) => println!("start: accepted"),
+        Ok(Accepted::Limited(value)) => println!("start: limited to {value}"),
+        Err(why) => println!("start: {why}"),
+    }
+
+    // A second of the interrupt. Without a motor the drive finds that no current flows.
+    for _ in 0..6000 {
+        interrupt.on_period();
+    }
+    match interrupt.drive.state() {
+        State::Fault(fault) => println!("fault {}: {fault}", fault.code()),
+        state => println!("{state}"),
+    }
+
+    // Whenever a learning has ended.
+    if let Some(learned) = interrupt.drive.learned().filter(|learned| learned.accepted) {
+        write_learned(learned);
+    }
+    Ok(())
+}

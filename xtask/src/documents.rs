@@ -1,0 +1,132 @@
+//! `cargo xtask documents`: runs every command that a document shows, or names the reason why it is not run here.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{run, sources};
+
+/// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
+const ELSEWHERE: [(&str, &str); 24] = [
+    ("cargo xtask test", "runs this"),
+    ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
+    ("cargo xtask flash", "needs a board"),
+    ("cargo xtask campaign", "`cargo xtask test` injects a twentieth"),
+    ("cargo firmware", "`cargo xtask test` builds it"),
+    ("cargo install probe-rs-tools", "needs a board"),
+    ("cargo bench", "measures; minutes"),
+    ("cargo test", "`cargo xtask test` runs all tests"),
+    ("cargo clippy", "`cargo xtask test` runs it"),
+    ("cargo fmt", "`cargo xtask test` checks the format"),
+    ("cargo run -p drive-core --example", "compiled by `cargo xtask test`; run by a person"),
+    ("cargo run --release -p hil-sim --example", "compiled by `cargo xtask test`; run by a person"),
+    ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
+    ("cargo sim console", "needs a port; its protocol is tested"),
+    ("cargo sim completion", "prints a script"),
+    ("cargo sim report", "every experiment runs in the tests; minutes"),
+    ("cargo sim run NAME", "a placeholder"),
+    ("cargo sim run GROUP", "a placeholder"),
+    ("cargo sim run lock-monitor --set runs", "long proof"),
+    ("cargo sim run saliency-check --set runs=1000", "long proof"),
+    ("cargo sim run monte-carlo --set runs=1000", "long proof"),
+    ("cargo sim run machines --set", "long proof"),
+    ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
+    ("cargo flash", "named to be avoided"),
+];
+
+/// Reads the documents and runs their commands in a folder of their own.
+pub fn check() -> Result<()> {
+    let mut commands: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for path in sources::documents()? {
+        for command in commands_of(&sources::read(&path)?) {
+            commands.entry(command).or_insert_with(|| path.clone());
+        }
+    }
+    let binary = built_simulator()?;
+    let folder = run::target_dir()?.join("documents");
+    std::fs::create_dir_all(&folder)?;
+    let (mut ran, mut left) = (0, 0);
+    for (command, document) in &commands {
+        if elsewhere(command).is_some() {
+            left += 1;
+            continue;
+        }
+        let Some(arguments) = command.strip_prefix("cargo sim") else {
+            bail!("{}: `{command}` neither runs here nor stands in a list", document.display());
+        };
+        let output = Command::new(&binary)
+            .args(arguments.split_whitespace())
+            .current_dir(&folder)
+            .stdin(Stdio::null())
+            .output()
+            .with_context(|| format!("cannot run {}", binary.display()))?;
+        if !output.status.success() {
+            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            bail!("{}: `{command}` fails: {error}", document.display());
+        }
+        ran += 1;
+    }
+    println!("commands of the documents: {ran} ran, {left} stand in the list with a reason");
+    Ok(())
+}
+
+/// The simulator as `cargo sim` runs it.
+fn built_simulator() -> Result<PathBuf> {
+    run::step("simulator", &mut run::cargo("build --release --quiet -p hil-sim"))?;
+    Ok(run::target_dir()?.join("release").join(format!("hil-sim{}", std::env::consts::EXE_SUFFIX)))
+}
+
+fn elsewhere(command: &str) -> Option<&'static (&'static str, &'static str)> {
+    let fits = |begin: &str| {
+        command
+            .strip_prefix(begin)
+            .is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric()))
+    };
+    ELSEWHERE.iter().filter(|(begin, _)| fits(begin)).max_by_key(|(begin, _)| begin.len())
+}
+
+/// The commands of a document: lines of code blocks and inline code that begin with `cargo`.
+fn commands_of(text: &str) -> Vec<String> {
+    let mut commands = Vec::new();
+    let mut in_block = false;
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            in_block = !in_block;
+        } else if in_block {
+            let line = line.trim().trim_start_matches("$ ");
+            commands.push(line.split(" #").next().unwrap_or_default().trim().to_owned());
+        } else {
+            commands.extend(line.split('`').skip(1).step_by(2).map(|code| code.trim().to_owned()));
+        }
+    }
+    commands.retain(|command| command.starts_with("cargo "));
+    commands
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_found_in_blocks_and_in_lines() {
+        let text = "Type `cargo sim list` or:\n\n```\n$ cargo sim   # the drive\nokay\n```\nand `cargo sim` too.\n";
+        assert_eq!(commands_of(text), ["cargo sim list", "cargo sim", "cargo sim"]);
+    }
+
+    #[test]
+    fn the_longest_beginning_counts() {
+        assert_eq!(elsewhere("cargo xtask flash").unwrap().1, "needs a board");
+        assert_eq!(elsewhere("cargo sim boards"), None);
+        assert_eq!(elsewhere("cargo sim list"), None);
+    }
+
+    #[test]
+    fn every_entry_of_the_list_is_a_beginning_of_its_own() {
+        for (n, (begin, reason)) in ELSEWHERE.iter().enumerate() {
+            assert!(ELSEWHERE[..n].iter().all(|(other, _)| other != begin), "{begin}");
+            assert!(!reason.is_empty());
+        }
+    }
+}
