@@ -89,13 +89,14 @@ fn a_page_names_itself_its_origin_and_its_settings() {
 #[test]
 fn a_lost_run_names_its_fault_and_prints_no_nan() {
     let folder = folder("lost");
-    let set = "motor.inertia=0.0005";
-    let output = hil_sim(&folder, &["run", "speed-profile", "--set", set]);
+    let set = ["--set", "motor.inertia=0.0005", "--set", "load.torque_nm=0.6"];
+    let output = hil_sim(&folder, &[&["run", "speed-profile"][..], &set].concat());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let printed = text(&output.stdout);
     assert!(printed.contains("\nLost: fault ") && !printed.contains("NaN"), "{printed}");
     let page = std::fs::read_to_string(folder.join("out/speed-profile.html")).unwrap();
     assert!(page.contains("<p class=\"lost\">Lost: fault ") && !page.contains("NaN"));
-    let output = hil_sim(&folder, &["run", "speed-profile", "--json", "--set", set]);
+    let output = hil_sim(&folder, &[&["run", "speed-profile", "--json"][..], &set].concat());
     let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
     let fault = object["faults"][0].as_str().expect("a fault");
     assert!(printed.contains(fault), "{fault}");

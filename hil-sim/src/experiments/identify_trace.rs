@@ -167,7 +167,7 @@ fn outcome(
         ("transient inductance σL_s", "sigma_l_s", "mH", p.sigma_l_s, expected.sigma_l_s, 1e3),
         ("stator inductance L_s", "l_s", "mH", p.l_s, expected.l_s, 1e3),
     ];
-    let mut table = Table::new("Identified motor", &[]).note(&format!(
+    let mut table = Table::new("Identified motor", &[]).note(format!(
         "{} rows of {:.1} µs. ±: standard deviation, for a white residual; a false voltage or current scale is not in it. \
          Settings: {}.",
         record.i.len(),
