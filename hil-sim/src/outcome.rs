@@ -158,7 +158,7 @@ impl Outcome {
     /// a run that ended as it should.
     pub fn lost(&self) -> Option<String> {
         if let Some(reason) = &self.refusal {
-            return Some(format!("Refused: {reason}."));
+            return Some(format!("Refused: {reason}"));
         }
         let lost = self.metrics.get("lost");
         let whether = if lost.is_some() { "Lost" } else { "The drive stopped itself" };

@@ -119,7 +119,7 @@ mod tests {
         assert_eq!(error.to_string(), "2 of 3 experiments failed: refused, lost");
         assert_eq!(error.exit_code(), 1);
         let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
-        for part in ["Refused: dc link too low.", "0.625", "fault 12: the flux angle is lost"] {
+        for part in ["Refused: dc link too low", "0.625", "fault 12: the flux angle is lost"] {
             assert!(page.contains(part), "{part}");
         }
         std::fs::remove_dir_all(folder).unwrap();
