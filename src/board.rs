@@ -176,24 +176,16 @@ const fn on_this_board(line: Line) -> Line {
     Line { gain: line.gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), ..line }
 }
 
-/// Phase current beyond which the analog watchdogs trip, A: above the software's limit (4.3 A), below
-/// the end of the sensors' range (4.47 A).
-pub const ANALOG_TRIP_A: f32 = 4.4;
-/// Lowest and highest code of current a that do not trip, both polarities.
-pub const ANALOG_WINDOW_A: (u16, u16) = window(CURRENT_A);
-/// The same of current b.
-pub const ANALOG_WINDOW_B: (u16, u16) = window(CURRENT_B);
-const _: () = {
-    // The converters can represent currents beyond the limits.
-    assert!(ANALOG_WINDOW_A.0 > 0 && ANALOG_WINDOW_B.0 > 0);
-    assert!(ANALOG_WINDOW_A.1 < ADC_FULL_SCALE && ANALOG_WINDOW_B.1 < ADC_FULL_SCALE);
-};
+/// The analog watchdogs trip at this multiple of the software's limit, which acts first at slow currents.
+const ANALOG_TRIP_SHARE: f32 = 1.02;
 
-const fn window(line: Line) -> (u16, u16) {
-    (
-        ((-ANALOG_TRIP_A - line.offset) / line.gain) as u16,
-        ((ANALOG_TRIP_A - line.offset) / line.gain) as u16,
-    )
+/// Lowest and highest code that do not trip an analog watchdog, for currents up to `trip_a` in both directions, A. Codes
+/// at the ends of the range always trip.
+fn window(line: Line, trip_a: f32) -> (u16, u16) {
+    // The casts saturate.
+    let code =
+        |amperes: f32| (((amperes - line.offset) / line.gain) as u16).clamp(1, ADC_FULL_SCALE - 1);
+    (code(-trip_a), code(trip_a))
 }
 
 // Reaction times --------------------------------------------------------------------------------
@@ -225,13 +217,36 @@ const _: () = {
 
 // Over-voltage ----------------------------------------------------------------------------------
 
-/// Dc link at which the comparator pulls the break, V: above the drive's own limit (400 V), which acts
-/// first, and below the end of the converter's range.
-pub const OVER_VOLTAGE_V: f32 = 430.0;
-/// The same as a converter code. The DAC that makes the level has the reference and the 12 bits of the ADC that
-/// measures the dc link.
-pub const OVER_VOLTAGE_CODE: u16 = ((OVER_VOLTAGE_V - DC_LINK.offset) / DC_LINK.gain) as u16;
-const _: () = assert!(OVER_VOLTAGE_CODE < ADC_FULL_SCALE);
+/// The comparator of the dc link pulls the break at this multiple of the software's limit, which acts first.
+const OVER_VOLTAGE_SHARE: f32 = 1.075;
+
+/// The protection that works without the control step. It is set up at start from the settings in force then, and holds
+/// until the next reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Protection {
+    /// Lowest and highest code of current a that do not trip its analog watchdog.
+    pub window_a: (u16, u16),
+    /// The same of current b.
+    pub window_b: (u16, u16),
+    /// Code of the dc link at which the comparator trips. The DAC that makes the level has the reference and the 12 bits
+    /// of the ADC that measures the dc link.
+    pub over_voltage: u16,
+}
+
+/// The protection for these settings: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
+/// `limits.dc_over_v`, both within the range of the converters.
+pub fn protection(settings: &Settings) -> Protection {
+    let Scales { current_a, current_b, dc_link, .. } = settings.scales;
+    let trip_a = ANALOG_TRIP_SHARE * settings.trip_a();
+    let over_v = OVER_VOLTAGE_SHARE * settings.dc_over_v();
+    let over_voltage = ((over_v - dc_link.offset) / dc_link.gain) as u16;
+    Protection {
+        window_a: window(current_a, trip_a),
+        window_b: window(current_b, trip_a),
+        over_voltage: over_voltage.clamp(1, ADC_FULL_SCALE - 1),
+    }
+}
+
 /// The INMSEL field of COMP1_CSR: DAC3, channel 1 (RM0440, comparator inverting inputs).
 pub const COMP1_INVERTING_DAC3: u8 = 0b100;
 /// The HYST field: 10 mV, which is 1.4 V of the dc link.

@@ -1,77 +1,68 @@
 //! The console: one line in, one line out, for people and for scripts.
 //!
-//! Replies begin with `ok` or `error:`, except for requests of data. `help`, `get`, `learned` and
-//! `trace` answer with many lines and end with `ok`; the next line that comes in cuts them short.
-//! An invalid line changes nothing.
+//! Replies begin with `ok` or `error:`, except for requests of data. Some requests answer with many lines and end with
+//! `ok`; the next line that comes in cuts them short. An invalid line changes nothing. Faults, changes of state, and the
+//! progress of a learning are announced unasked, between lines; see [`announce::ANNOUNCEMENTS`].
 
+pub mod announce;
+mod answer;
 pub mod grammar;
 pub mod handle;
+pub mod help;
 pub mod line;
+mod list;
+mod number;
 mod reply;
+mod restore;
+mod suggest;
+#[cfg(test)]
+mod tests;
 
 use core::fmt;
 
 use drive_core::identify::learning::Learned;
-use drive_core::{Accepted, Command, Mode, State};
+use drive_core::{Command, State};
 
-use crate::link::trace::SignalChoice;
+use crate::link::trace::Plan;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys;
-use grammar::{HELP, Request};
-use handle::{CommandError, DriveHandle, Port};
+use crate::settings::staging::Staging;
+use announce::Announcer;
+use answer::Task;
+use grammar::ParseError;
+use handle::{DriveHandle, Port};
 use line::{LineError, LineReader, OutputLine};
+use list::List;
+use restore::Restore;
 
 /// Longest time from the first character of a line to its end, ms: a slow typist.
 pub const LINE_MS: u32 = 30_000;
 
-/// A reply of many lines, with the number of the next line.
-#[derive(Clone, Copy)]
-struct List {
-    kind: ListKind,
-    next: u16,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum ListKind {
-    Help,
-    Settings,
-    Trace,
-    Learned,
-}
-
-/// A line that waits for room in the transmit queue.
-struct Pending(Option<OutputLine>);
-
-impl Pending {
-    fn line(&mut self, text: fmt::Arguments<'_>) {
-        self.0 = Some(OutputLine::new(text));
-    }
-
-    fn ok(&mut self) {
-        self.line(format_args!("ok"));
-    }
-
-    fn error(&mut self, why: &dyn fmt::Display) {
-        self.line(format_args!("error: {why}"));
-    }
-}
-
 /// The console.
 pub struct Console {
-    settings: FirmwareSettings,
+    settings: Staging,
+    /// Whether settings in force were changed since they were saved.
+    unsaved: bool,
     reader: LineReader,
-    out: Pending,
+    /// Text that waits for room in the transmit queue.
+    out: OutputLine,
     list: Option<List>,
+    task: Option<Task>,
+    announcer: Announcer,
     /// Start of the incoming line.
     began_ms: Option<u32>,
-    /// Time of the last valid line.
-    heard_ms: u32,
+    /// Time of the last valid line; `None` to begin anew.
+    heard_ms: Option<u32>,
     /// While the wiring is being checked: the periods of the status at its start.
     checking: Option<u32>,
-    /// Signals of the last trace.
-    traced: SignalChoice,
+    /// The last trace.
+    traced: Option<Plan>,
+    /// Whether it waits for its trigger.
+    armed: bool,
     /// Result of the last learning, if it is not believable.
     unbelievable: Option<Learned>,
+    /// Whether a learning has ended that is not announced yet.
+    ended: bool,
+    restore: Restore,
 }
 
 /// Most bytes read in one poll: a flood must not hold up the main loop.
@@ -81,15 +72,21 @@ impl Console {
     /// A console; the drive has these settings.
     pub const fn new(settings: FirmwareSettings) -> Self {
         Self {
-            settings,
+            settings: Staging::new(settings),
+            unsaved: false,
             reader: LineReader::new(),
-            out: Pending(None),
+            out: OutputLine::new(),
             list: None,
+            task: None,
+            announcer: Announcer::new(),
             began_ms: None,
-            heard_ms: 0,
+            heard_ms: None,
             checking: None,
-            traced: SignalChoice::none(),
+            traced: None,
+            armed: false,
             unbelievable: None,
+            ended: false,
+            restore: Restore::new(),
         }
     }
 
@@ -105,14 +102,24 @@ impl Console {
         self.watch_silence(drive, now_ms);
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
-            self.settings.learn(result);
+            self.settings.note(|settings| settings.learn(result));
+            self.unsaved |= result.accepted;
             self.unbelievable = Some(*result).filter(|result| !result.accepted);
+            self.ended = true;
         });
         if port.take_damage() {
             self.reader.spoil(LineError::Lost);
         }
+        if self.flushed(port) {
+            self.announce(drive, now_ms);
+        }
+        if self.flushed(port)
+            && let Some(task) = self.task
+        {
+            self.perform(task, drive, now_ms);
+        }
         for _ in 0..BYTES_AT_ONCE {
-            if !self.flushed(port) {
+            if !self.flushed(port) || self.task.is_some() {
                 return;
             }
             let Some(byte) = port.read() else { break };
@@ -123,38 +130,73 @@ impl Console {
             Some(began) if now_ms.wrapping_sub(began) > LINE_MS => {
                 self.reader.forget();
                 self.began_ms = None;
-                self.out.error(&LineError::Unfinished);
+                self.error(&LineError::Unfinished);
             }
             None if self.reader.begun() => self.began_ms = Some(now_ms),
             _ => {}
         }
-        while self.flushed(port) && self.list.is_some() {
-            if !self.next_of_list(drive) {
-                break;
-            }
+        // One line: what it costs to compute must not hold up the main loop.
+        if self.flushed(port) {
+            self.next_of_list(drive);
+            self.flushed(port);
         }
     }
 
-    /// Sends the waiting line; whether none waits any more.
+    fn ok(&mut self) {
+        self.out.line(format_args!("ok"));
+    }
+
+    fn error(&mut self, why: &dyn fmt::Display) {
+        self.out.line(format_args!("error: {why}"));
+    }
+
+    /// Sends the waiting text; whether none waits any more.
     fn flushed(&mut self, port: &mut impl Port) -> bool {
-        match &self.out.0 {
-            Some(text) if !port.write(text.as_str()) => false,
-            _ => {
-                self.out.0 = None;
-                true
+        let text = self.out.as_str();
+        let sent = text.is_empty() || port.write(text);
+        if sent {
+            self.out.clear();
+        }
+        sent
+    }
+
+    /// Writes the next announcement, if there is one, on a line of its own.
+    fn announce(&mut self, drive: &impl DriveHandle, now_ms: u32) {
+        let Some(status) = drive.status() else { return };
+        let typed = self.settings.in_force().command.echo && self.reader.begun();
+        if typed {
+            self.out.raw("\r\n");
+        }
+        let empty = self.out.as_str().len();
+        if core::mem::take(&mut self.ended) {
+            let learned = self.settings.in_force().learned.as_ref();
+            if let Some(result) = self.unbelievable.as_ref().or(learned) {
+                self.out.line(format_args!("{}", announce::outcome(result)));
             }
+        } else if let Some(news) = self.announcer.next(&status, now_ms) {
+            self.out.line(format_args!("{news}"));
+        } else if self.armed && !drive.tracing() {
+            self.armed = false;
+            self.out.line(format_args!("trace: recorded; `trace` prints it"));
+        }
+        if self.out.as_str().len() == empty {
+            self.out.clear();
+        } else if typed {
+            self.out.raw(self.reader.text());
         }
     }
 
     /// Stops the drive when no valid line came for too long.
     fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        let limit = self.settings.command.timeout_s;
-        let silence = now_ms.wrapping_sub(self.heard_ms) as f32 * 1e-3;
-        if limit > 0.0 && silence > limit && self.out.0.is_none() && !drive.is_off() {
-            self.heard_ms = now_ms;
+        let limit = self.settings.in_force().command.timeout_s;
+        let heard_ms = *self.heard_ms.get_or_insert(now_ms);
+        let silence = now_ms.wrapping_sub(heard_ms) as f32 * 1e-3;
+        if limit > 0.0 && silence > limit && self.out.as_str().is_empty() && !drive.is_off() {
+            self.heard_ms = Some(now_ms);
+            self.announcer.stopping();
             match drive.command(Command::Stop) {
                 Ok(_) => self.out.line(format_args!("stopped: no command for {limit} s")),
-                Err(why) => self.out.error(&format_args!("not stopped: {why}")),
+                Err(why) => self.error(&format_args!("not stopped: {why}")),
             }
         }
     }
@@ -168,28 +210,16 @@ impl Console {
         );
         // A report from before the start does not count.
         if past && status.periods != began {
-            self.settings.command.wiring_checked = true;
+            self.settings.note(|settings| settings.command.wiring_checked = true);
+            self.unsaved = true;
             self.checking = None;
         }
     }
 
-    /// Starts the drive; the first time since the defaults were set with a check of the wiring.
-    fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) {
-        if self.settings.command.wiring_checked {
-            return self.give(Command::Start(mode), drive);
-        }
-        let began = drive.status().map(|status| status.periods);
-        match drive.command(Command::CheckWiring).and_then(|_| drive.command(Command::Start(mode)))
-        {
-            Ok(_) => {
-                self.checking = began;
-                self.out.line(format_args!("ok: the wiring is checked first"));
-            }
-            Err(why) => self.out.error(&why),
-        }
-    }
-
     fn take(&mut self, byte: u8, drive: &mut impl DriveHandle, now_ms: u32) {
+        if self.settings.in_force().command.echo {
+            self.reader.echo(byte, &mut self.out);
+        }
         let line = match self.reader.push(byte) {
             Ok(None) => return,
             Ok(Some(line)) => Ok(line),
@@ -197,177 +227,30 @@ impl Console {
         };
         // The next line has its own time.
         (self.list, self.began_ms) = (None, None);
-        match line.map(|line| grammar::parse(&line)) {
-            Ok(Ok(request)) => {
-                self.heard_ms = now_ms;
+        let mut line = match line {
+            Ok(line) => line,
+            Err(why) => return self.error(&why),
+        };
+        line.make_ascii_lowercase();
+        match grammar::parse(&line) {
+            Ok(request) => {
+                self.heard_ms = Some(now_ms);
                 self.answer(request, drive);
             }
-            Ok(Err(why)) => self.out.error(&why),
-            Err(why) => self.out.error(&why),
+            Err(why) => self.refuse(&why),
         }
     }
 
-    fn answer(&mut self, request: Request, drive: &mut impl DriveHandle) {
-        match request {
-            Request::Help => self.begin(ListKind::Help),
-            Request::Status => match drive.status() {
-                Some(status) => {
-                    let (scales, stack) = (&self.settings.drive.scales, drive.stack());
-                    let tracking = drive.tracking().filter(|_| status.state.regulates());
-                    let line = fmt::from_fn(|f| {
-                        reply::status(f, &status, scales, stack)?;
-                        tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
-                    });
-                    self.out.line(format_args!("{line}"));
-                }
-                None => self.out.error(&CommandError::NoAnswer),
-            },
-            Request::Start(mode) => self.start(mode, drive),
-            Request::Stop => self.give(Command::Stop, drive),
-            Request::Relock => self.give(Command::Relock, drive),
-            Request::Torque(i_q) => self.give(Command::Torque(i_q), drive),
-            Request::Speed(rpm) => self.give(Command::Speed(rpm), drive),
-            Request::Position(turns) => self.give(Command::Position(turns), drive),
-            Request::Clear => self.give(Command::Clear, drive),
-            Request::Set(key, value) => {
-                let mut settings = self.settings;
-                key.set(&mut settings, value);
-                self.configure(settings, drive);
+    /// Answers an invalid line; for a value with the allowed range.
+    fn refuse(&mut self, why: &ParseError<'_>) {
+        let range = match why {
+            ParseError::Value { key, .. } => {
+                key.range(self.settings.latest()).zip(Some(key.unit()))
             }
-            Request::Defaults => self.configure(FirmwareSettings::of_the_board(), drive),
-            Request::Get(Some(key)) => {
-                let setting = reply::Setting::new(key, &self.settings);
-                self.out.line(format_args!("{setting}"));
-            }
-            Request::Get(None) => self.begin(ListKind::Settings),
-            Request::Learned => {
-                if self.unbelievable.is_some() || self.settings.learned.is_some() {
-                    self.begin(ListKind::Learned);
-                } else {
-                    self.out.line(format_args!("ok: nothing learned with these settings"));
-                }
-            }
-            Request::Save => {
-                if !drive.is_off() {
-                    return self.out.error(&MUST_BE_OFF);
-                }
-                match drive.save(&self.settings) {
-                    Ok(()) => self.out.ok(),
-                    Err(why) => self.out.error(&why),
-                }
-            }
-            Request::Faults => {
-                let last_run = fmt::from_fn(|f| drive.last_run(f));
-                match drive.status().map(|status| status.state) {
-                    Some(State::Fault(fault)) => self.out.line(format_args!(
-                        "latched: fault {}, {fault}; last run: {last_run}",
-                        fault.code()
-                    )),
-                    _ => self.out.line(format_args!("none latched; last run: {last_run}")),
-                }
-            }
-            Request::Trace { records, divider, choice } => {
-                if drive.begin_trace(records, divider, &choice) {
-                    self.traced = choice;
-                    self.begin(ListKind::Trace);
-                } else {
-                    self.out.error(&"a trace is being recorded");
-                }
-            }
-            Request::Log(level) => {
-                drive.set_log_level(level);
-                self.out.ok();
-            }
-            Request::Version => {
-                let version = fmt::from_fn(|f| drive.version(f));
-                self.out.line(format_args!("{version}"));
-            }
-        }
-    }
-
-    fn begin(&mut self, kind: ListKind) {
-        self.list = Some(List { kind, next: 0 });
-    }
-
-    fn give(&mut self, command: Command, drive: &mut impl DriveHandle) {
-        match drive.command(command) {
-            Ok(Accepted::AsGiven) => self.out.ok(),
-            Ok(Accepted::Limited(value)) => self.out.line(format_args!("ok: limited to {value}")),
-            Err(why) => self.out.error(&why),
-        }
-    }
-
-    /// Applies other settings, if the drive is off and the design rules allow them. A result learned with other
-    /// settings is dropped.
-    fn configure(&mut self, mut settings: FirmwareSettings, drive: &mut impl DriveHandle) {
-        if !drive.is_off() {
-            return self.out.error(&MUST_BE_OFF);
-        }
-        settings.forget_unless_as(&self.settings);
-        match drive.build(&settings) {
-            Err(why) => self.out.error(&why),
-            Ok(coefficients) => match drive.command(Command::Configure(coefficients)) {
-                Err(why) => self.out.error(&why),
-                Ok(_) => {
-                    let waits = settings.drive.inverter.dead_time_s
-                        != self.settings.drive.inverter.dead_time_s;
-                    let forgotten = self.settings.learned.is_some() && settings.learned.is_none();
-                    self.settings = settings;
-                    drive.configured(&settings);
-                    self.out.line(format_args!(
-                        "ok{}{}",
-                        if waits { FROM_RESET } else { "" },
-                        if forgotten { FORGOTTEN } else { "" },
-                    ));
-                }
-            },
-        }
-    }
-
-    /// Writes the next line of the list, or `ok` behind the last; `false` if the list has to wait for it.
-    fn next_of_list(&mut self, drive: &impl DriveHandle) -> bool {
-        let Some(List { kind, next }) = self.list else { return false };
-        let index = usize::from(next);
-        let out = &mut self.out;
-        let written = match kind {
-            ListKind::Help => HELP.get(index).map(|line| out.line(format_args!("{line}"))),
-            ListKind::Settings => keys::number(index).map(|key| {
-                let setting = reply::Setting::new(key, &self.settings);
-                out.line(format_args!("{setting}"));
-            }),
-            ListKind::Trace if drive.tracing() => return false,
-            ListKind::Trace if next == 0 => {
-                let names =
-                    fmt::from_fn(|f| self.traced.names().try_for_each(|name| write!(f, ",{name}")));
-                out.line(format_args!("record{names}"));
-                Some(())
-            }
-            ListKind::Trace => drive.traced(next - 1).map(|record| {
-                let values = record.iter().take(self.traced.count());
-                let values =
-                    fmt::from_fn(|f| values.clone().try_for_each(|x| write!(f, ",{x:.4}")));
-                out.line(format_args!("{}{values}", next - 1));
-            }),
-            ListKind::Learned => {
-                // The last result if it is not believable, else the one in use.
-                let result = self.unbelievable.as_ref().or(self.settings.learned.as_ref());
-                let believable = self.unbelievable.is_none();
-                let line = result.and_then(|result| reply::learned(result, believable, next));
-                line.map(|line| out.line(format_args!("{line}")))
-            }
+            _ => None,
         };
-        self.list = written.map(|()| List { kind, next: next + 1 });
-        if written.is_none() {
-            self.out.ok();
-        }
-        true
+        let Some(((min, max), unit)) = range else { return self.error(why) };
+        let space = if unit.is_empty() { "" } else { " " };
+        self.error(&format_args!("{why}; allowed is {min} to {max}{space}{unit}"));
     }
 }
-
-/// The timer locks its dead time until a reset.
-const FROM_RESET: &str = ": the dead time holds from the next reset on, if saved";
-const FORGOTTEN: &str = ": what was learned belonged to other settings and is forgotten";
-const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
-
-#[cfg(test)]
-mod tests;

@@ -28,4 +28,6 @@ pub struct Status {
     pub worst_latency: u32,
     /// Events of [`Hardware`] since the last status.
     pub hardware: Hardware,
+    /// While the drive learns: the point that is being measured, from 1 on, and the number of points.
+    pub learning: Option<(usize, usize)>,
 }

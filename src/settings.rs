@@ -2,6 +2,9 @@
 //! motor. [`keys`] lists them by name.
 
 pub mod keys;
+#[cfg(test)]
+mod manual;
+pub mod staging;
 
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;

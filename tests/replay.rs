@@ -52,8 +52,8 @@ fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
         Some(Request::Stop) => drive.command(&Command::Stop),
         Some(Request::Torque(i_q)) => drive.command(&Command::Torque(i_q)),
         Some(Request::Position(turns)) => drive.command(&Command::Position(turns)),
-        Some(Request::Set(key, value)) => {
-            key.set(settings, value);
+        Some(Request::Set(values)) => {
+            values.iter().for_each(|(key, value)| key.set(settings, *value));
             drive.command(&Command::Configure(settings.build().unwrap()))
         }
         Some(other) => panic!("{other:?} is no order to the drive"),

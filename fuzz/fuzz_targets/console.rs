@@ -7,7 +7,8 @@ use std::sync::{LazyLock, OnceLock};
 use drive_core::identify::learning::Learned;
 use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
-use induction_drive::console::grammar::{HELP, LEVELS};
+use induction_drive::console::announce::ANNOUNCEMENTS;
+use induction_drive::console::grammar::{COMMANDS, LEVELS};
 use induction_drive::link::trace::SIGNALS;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::settings::keys;
@@ -27,14 +28,17 @@ fuzz_target!(|bytes: &[u8]| {
     let mut port = FakePort::default();
     let mut now_ms = 0_u32;
     // Bytes above 0xf0 are not sent: they are what was learned, pauses, room, damage, and samples for the
-    // drive. Those from 0x80 on stand for words, which the fuzzer does not find letter by letter.
+    // drive. The byte behind 0xf7 stands for a word, which the fuzzer does not find letter by letter.
     static WORDS: LazyLock<Vec<&str>> = LazyLock::new(words);
-    for &byte in bytes {
-        if let Some(word) = byte.checked_sub(0x80).and_then(|n| WORDS.get(usize::from(n))) {
+    let mut bytes = bytes.iter().copied();
+    while let Some(byte) = bytes.next() {
+        if byte == 0xf7 {
+            let word = bytes.next().and_then(|n| WORDS.get(usize::from(n))).unwrap_or(&"");
             port.sent.extend(word.bytes().chain([b' ']));
             continue;
         }
         match byte {
+            0xf6 => drive.triggered = true,
             0xf8 => drive.found = Some(doubtful()),
             0xf9 => drive.found = Some(found()),
             0xfa => port.damaged = true,
@@ -48,33 +52,40 @@ fuzz_target!(|bytes: &[u8]| {
             _ => port.sent.push_back(byte),
         }
     }
-    // Whatever came: from here on it answers, and stops the drive.
+    // Whatever came: from here on it answers, and stops the drive. What it says unasked comes behind that.
     port.room = usize::MAX;
     port.sent.extend(b"\nstop\n");
-    while !port.sent.is_empty() {
+    // A design or a reset that was asked for comes first, and takes its time.
+    let mut polls = 0;
+    while !port.sent.is_empty() || polls < 200 {
+        polls = if port.sent.is_empty() { polls + 1 } else { 0 };
+        now_ms = now_ms.wrapping_add(1);
         console.poll(&mut port, &mut drive, now_ms);
     }
-    console.poll(&mut port, &mut drive, now_ms);
-    assert!(port.received.ends_with("ok\r\n"), "{:?}", port.received);
+    let mut lines = port.received.lines().filter(|line| {
+        !ANNOUNCEMENTS.iter().any(|first| line.starts_with(first))
+    });
+    assert!(lines.next_back().is_some_and(|line| line.ends_with("ok")), "{:?}", port.received);
     let running = !matches!(drive.drive.state(), State::Off | State::Stopping | State::Fault(_));
     assert!(!running, "{}", drive.drive.state());
 });
 
-/// What the console knows: commands, settings, and the words that follow them.
+/// The words of the console: commands, settings, and the words that follow them.
 fn words() -> Vec<&'static str> {
-    let commands = HELP.iter().filter_map(|line| line.split_whitespace().next());
     let settings = keys::all().map(|key| key.name());
     let levels = LEVELS.iter().map(|(name, _)| *name);
-    let others =
-        ["encoder", "injection", "learning", "yes", "no", "synchronous", "rectified", "motor"];
+    let signals = SIGNALS.iter().map(|signal| signal.name);
+    let others = [
+        "encoder", "injection", "learning", "yes", "no", "synchronous", "rectified", "motor", "auto", "on",
+        "above", "fault", "now", "check", "00000000",
+    ];
     let words: Vec<_> =
-        commands.chain(settings).chain(levels).chain(others).chain(SIGNALS).collect();
-    // Or they would hide the bytes that are not sent.
-    assert!(words.len() <= 0xf0 - 0x80, "{} words", words.len());
+        COMMANDS.into_iter().chain(settings).chain(levels).chain(others).chain(signals).collect();
+    assert!(words.len() <= 256, "{} words", words.len());
     words
 }
 
-/// What a learning finds that is not believable.
+/// A result that is not believable.
 fn doubtful() -> Learned {
     let mut found = found();
     found.carrier = None;

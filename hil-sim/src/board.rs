@@ -1,13 +1,14 @@
 //! `cargo sim board`: the flashed image on the virtual board, with a serial port.
 //!
 //! The virtual board is a separate program, because its emulator is GPL-2.0 and must not be linked here.
-//! This module parses the options, builds the image and replaces this process by that program.
+//! This module parses the options, builds image and program, and replaces this process by that program.
 
-use std::io::{BufRead as _, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+mod build;
 
-use clap::Args;
+use std::path::PathBuf;
+use std::process::Command;
+
+use clap::{Args, ValueEnum};
 
 use crate::config::{Config, Value};
 use crate::error::Error;
@@ -22,9 +23,20 @@ pub struct Options {
     /// Load on the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
     #[arg(long, value_names = ["LOAD", "RPM"], num_args = 1..=2, allow_negative_numbers = true)]
     pub load: Option<Vec<String>>,
-    /// Types the lines of a file: `at SECONDS: LINE`, `wait SECONDS: LINE`, `wait for TEXT`; ends after it
+    /// Types the lines of a file (`at SECONDS: LINE`, `wait SECONDS: LINE`) and checks the answers (`wait for TEXT`,
+    /// `expect [SECONDSs] TEXT`, `expect not [SECONDSs] TEXT`); ends after it. Exit code 1 for an answer `error:` that is
+    /// not expected, a text that does not come, or a fault at the end
     #[arg(long, value_name = "FILE")]
     pub script: Option<PathBuf>,
+    /// Unexpected errors and faults during a script are shown, and the exit code stays 0
+    #[arg(long, requires = "script")]
+    pub lenient: bool,
+    /// Keeps the contents of the flash in a file, so that `save` outlasts the session; created if missing
+    #[arg(long, value_name = "FILE")]
+    pub flash: Option<PathBuf>,
+    /// Least urgent lines of the log that are shown; `log LEVEL` at the console changes it
+    #[arg(long, value_name = "LEVEL", default_value = "warn")]
+    pub log: LogLevel,
     /// As fast as possible instead of in real time
     #[arg(long)]
     pub fast: bool,
@@ -34,6 +46,31 @@ pub struct Options {
     /// The firmware's ELF [default: the image that `cargo firmware` builds]
     #[arg(long, value_name = "FILE")]
     pub elf: Option<PathBuf>,
+    /// Shows the commands of the firmware's build
+    #[arg(long)]
+    pub verbose: bool,
+}
+
+/// Level of a line of the log, the most urgent first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum LogLevel {
+    /// No line has this level: nothing is shown.
+    Off,
+    /// Faults.
+    Error,
+    /// Events that need attention.
+    Warn,
+    /// Changes of state.
+    Info,
+    /// Everything.
+    Debug,
+}
+
+impl LogLevel {
+    /// The level of a name, in any case.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::from_str(name, true).ok()
+    }
 }
 
 impl Options {
@@ -67,6 +104,12 @@ impl Options {
         if let Some(script) = &self.script {
             command.push_str(&format!(" --script {}", script.display()));
         }
+        if self.lenient {
+            command.push_str(" --lenient");
+        }
+        if let Some(flash) = &self.flash {
+            command.push_str(&format!(" --flash {}", flash.display()));
+        }
         if self.fast {
             command.push_str(" --fast");
         }
@@ -78,16 +121,15 @@ impl Options {
 /// arguments behind `board`. Returns on failure only.
 ///
 /// # Errors
-/// As [`Options::config`]; [`Error::Internal`] when the image cannot be built or cargo does not run.
+/// As [`Options::config`]; [`Error::Internal`] when a build fails or cargo does not run.
 pub fn become_board(options: &Options) -> Result<(), Error> {
-    // Wrong options are reported before the build, which takes a minute.
+    // Wrong options are reported before the builds, which take minutes.
     options.config()?;
-    let mut command = cargo();
-    command.args(["run", "--quiet", "--release", "--package", "virtual-board", "--bin", "board"]);
-    command.arg("--manifest-path").arg(root().join("Cargo.toml")).arg("--");
+    let image = options.elf.is_none().then(|| build::image(options.verbose)).transpose()?;
+    let mut command = Command::new(build::virtual_board()?);
     command.args(std::env::args_os().skip_while(|argument| argument != "board").skip(1));
-    if options.elf.is_none() {
-        command.arg("--elf").arg(built_image()?);
+    if let Some(image) = image {
+        command.arg("--elf").arg(image);
     }
     Err(replaced_by(command))
 }
@@ -96,43 +138,10 @@ pub fn become_board(options: &Options) -> Result<(), Error> {
 #[cfg(unix)]
 fn replaced_by(mut command: Command) -> Error {
     let error = std::os::unix::process::CommandExt::exec(&mut command);
-    Error::Internal(format!("cannot run cargo: {error}"))
+    Error::Internal(format!("cannot run the virtual board: {error}"))
 }
 
 #[cfg(not(unix))]
 fn replaced_by(_: Command) -> Error {
     Error::Refused("the virtual board needs pseudo-terminals, which only Unix has".into())
-}
-
-/// Builds and checks the image as it is flashed; returns its path.
-fn built_image() -> Result<PathBuf, Error> {
-    let failed = |why: String| Error::Internal(format!("cargo xtask firmware: {why}"));
-    let mut child = cargo()
-        .args(["xtask", "firmware"])
-        .current_dir(root())
-        .stdout(Stdio::piped())
-        .spawn()
-        .map_err(|e| failed(e.to_string()))?;
-    let mut last = None;
-    for line in child.stdout.take().into_iter().flat_map(|out| BufReader::new(out).lines()) {
-        let line = line.map_err(|e| failed(e.to_string()))?;
-        // The last line is the path; the others are for people.
-        if let Some(before) = last.replace(line) {
-            eprintln!("{before}");
-        }
-    }
-    let status = child.wait().map_err(|e| failed(e.to_string()))?;
-    match last {
-        Some(path) if status.success() => Ok(path.into()),
-        _ => Err(failed(status.to_string())),
-    }
-}
-
-fn cargo() -> Command {
-    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-}
-
-fn root() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
 }

@@ -13,6 +13,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board;
+use crate::console;
 use crate::error::Error;
 use crate::experiments;
 use crate::input::{Input, OUT};
@@ -97,10 +98,15 @@ enum Command {
     },
     /// Run the image that is flashed on an emulated controller, with a serial port to talk to it
     ///
-    /// Builds the image, prints the path of a pseudo-terminal that is its console, and its log. `quit`,
-    /// Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
+    /// Builds the image, prints the path of a pseudo-terminal that is its console, and its log. `!help` lists the
+    /// commands of the board itself: reset button, power, end. The end, Ctrl-C or the end of the time write the page. Keys of the motor, inverter, measurement and load
     /// count; those of the drive do not, for the image has settings of its own: `set` at the console.
     Board(board::Options),
+    /// Talk to a drive at a serial port: line editor, backup and restore of settings, plots of traces
+    ///
+    /// For a board and for the pseudo-terminal of `cargo sim board` alike. `!help` lists the commands of this program;
+    /// other lines go to the drive. Exit code 1 when the drive refuses a line of --command or of standard input.
+    Console(console::Options),
 }
 
 /// Runs the command that the arguments of the process name. Exit codes: 0 done, 1 failed or lost, 2 the request
@@ -133,6 +139,7 @@ pub fn main() -> ExitCode {
             say(&String::from_utf8_lossy(&text))
         }
         Some(Command::Board(options)) => board::become_board(&options),
+        Some(Command::Console(options)) => console::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

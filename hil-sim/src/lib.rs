@@ -4,6 +4,7 @@ pub mod board;
 pub mod cli;
 pub mod columns;
 pub mod config;
+pub mod console;
 pub mod error;
 pub mod experiments;
 pub mod identification;

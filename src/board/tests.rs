@@ -17,8 +17,28 @@ fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
 
 #[test]
 fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
-    let trip = DC_LINK.at(OVER_VOLTAGE_CODE);
+    let trip = DC_LINK.at(protection(&settings()).over_voltage);
     assert!(trip > settings().dc_over_v() && trip < DC_LINK.at(ADC_FULL_SCALE));
+    assert!((trip - 430.0).abs() < 0.2, "{trip}");
+}
+
+/// A 48 V board with sensors to 100 A, and limits at the ends of the ranges.
+#[test]
+fn the_protection_follows_the_settings_and_stays_in_the_range_of_the_converters() {
+    let mut s = settings();
+    let current = Line { gain: 200.0 / 4095.0, offset: -100.0 };
+    (s.scales.current_a, s.scales.current_b) = (current, current);
+    s.scales.dc_link = Line { gain: 0.02, offset: 0.0 };
+    (s.limits.trip_a, s.limits.dc_over_v) = (Some(80.0), Some(60.0));
+    let Protection { window_a, window_b, over_voltage } = protection(&s);
+    assert_eq!(window_a, window_b);
+    assert!(
+        (current.at(window_a.1) - 81.6).abs() < 0.1 && (current.at(window_a.0) + 81.6).abs() < 0.1
+    );
+    assert!((s.scales.dc_link.at(over_voltage) - 64.5).abs() < 0.05);
+    (s.limits.trip_a, s.limits.dc_over_v) = (Some(s.sensor_range_a()), Some(s.dc_link_range_v()));
+    let ends = protection(&s);
+    assert_eq!((ends.window_a, ends.over_voltage), ((1, ADC_FULL_SCALE - 1), ADC_FULL_SCALE - 1));
 }
 
 #[test]
@@ -53,7 +73,8 @@ fn the_calibration_follows_the_reference() {
 
 #[test]
 fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
-    for (line, (low, high)) in [(CURRENT_A, ANALOG_WINDOW_A), (CURRENT_B, ANALOG_WINDOW_B)] {
+    let Protection { window_a, window_b, .. } = protection(&settings());
+    for (line, (low, high)) in [(CURRENT_A, window_a), (CURRENT_B, window_b)] {
         let software = settings().trip_a();
         assert!(line.at(high) > software && line.at(low) < -software);
         assert!(line.at(high + 1) < 4.47 && line.at(low - 1) > -4.47);

@@ -61,7 +61,7 @@ pub struct Adc {
 }
 
 impl Adc {
-    /// Sets both converters up; they wait for the trigger.
+    /// Sets both converters up, with the windows of their analog watchdogs; they wait for the trigger.
     ///
     /// # Errors
     /// A converter did not finish a step in time.
@@ -71,6 +71,7 @@ impl Adc {
         common: &pac::ADC12_COMMON,
         pins: Pins,
         rcc: &mut Rcc,
+        protection: &board::Protection,
     ) -> Result<Self, AdcTimeout> {
         pins.current_a.into_analog();
         pins.current_b.into_analog();
@@ -80,8 +81,8 @@ impl Adc {
         rcc.ahb2enr().modify(|_, w| w.adc12en().enabled());
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4());
-        prepare(&one, board::ADC1_CHANNELS, board::ANALOG_WINDOW_A)?;
-        prepare(&two, board::ADC2_CHANNELS, board::ANALOG_WINDOW_B)?;
+        prepare(&one, board::ADC1_CHANNELS, protection.window_a)?;
+        prepare(&two, board::ADC2_CHANNELS, protection.window_b)?;
         // Both sequences take the same time, so one interrupt at their end is enough. The analog watchdogs
         // interrupt earlier, when the current is converted.
         one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());

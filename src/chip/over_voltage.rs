@@ -10,8 +10,8 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use induction_drive::board;
 
-/// Starts the comparator and locks it until the next reset.
-pub fn watch(dac: &pac::DAC3, comparators: &pac::COMP, rcc: &mut Rcc) {
+/// Starts the comparator at the level of the converter code `level`, and locks it until the next reset.
+pub fn watch(dac: &pac::DAC3, comparators: &pac::COMP, rcc: &mut Rcc, level: u16) {
     rcc.ahb2enr().modify(|_, w| w.dac3en().set_bit());
     rcc.apb2enr().modify(|_, w| w.syscfgen().enabled());
     dac.mcr().write(|w| {
@@ -20,7 +20,7 @@ pub fn watch(dac: &pac::DAC3, comparators: &pac::COMP, rcc: &mut Rcc) {
         // SAFETY: two bits; 2 stands for bus clocks above 160 MHz.
         unsafe { w.hfsel().bits(2) }
     });
-    dac.dhr12r1().write(|w| w.daccdhr().set(board::OVER_VOLTAGE_CODE));
+    dac.dhr12r1().write(|w| w.daccdhr().set(level));
     dac.cr().modify(|_, w| w.en1().set_bit());
     asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
 

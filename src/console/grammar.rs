@@ -1,27 +1,40 @@
 //! The grammar: a line in, a [`Request`] or a [`ParseError`] out.
 
-use core::fmt;
+mod error;
+#[cfg(test)]
+mod tests;
 
-use drive_core::Mode;
-use drive_core::settings::value::{self, Value, ValueError};
+use core::str::SplitAsciiWhitespace;
 
+use drive_core::settings::value;
+use drive_core::{Fault, Mode};
+use heapless::Vec;
+
+use super::suggest::nearest;
 use crate::board;
-use crate::link::trace::{self, SignalChoice};
+use crate::link::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
 use crate::settings::keys::{self, Key};
+use crate::settings::staging::{Assignments, MOST};
+
+pub use error::ParseError;
 
 /// Most records of a trace.
 const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
 /// Largest divider of a trace.
 const LARGEST_DIVIDER: u16 = 1000;
+/// Words of a learned result in a line of `backup`.
+pub const WORDS_IN_LINE: usize = 8;
 
 /// A valid line.
+// Exists once at a time.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
     /// List all commands.
     Help,
     /// Show the state of the drive.
     Status,
-    /// Start in a mode.
+    /// Put the staged settings in force, then start in a mode.
     Start(Mode),
     /// Torque to zero, then off.
     Stop,
@@ -33,31 +46,46 @@ pub enum Request {
     Speed(f32),
     /// Set the position, mechanical turns from the start.
     Position(f32),
-    /// Show one setting, or all.
-    Get(Option<Key>),
-    /// Change a setting.
-    Set(Key, Value),
+    /// Show one setting.
+    Get(Key),
+    /// List the settings whose names begin so.
+    List(&'static str),
+    /// List them as JSON.
+    Describe(&'static str),
+    /// Stage settings.
+    Set(Assignments),
+    /// Put the staged settings in force.
+    Apply,
+    /// Drop the staged settings.
+    Revert,
+    /// Put the staged settings in force and save all, with what was learned.
+    Save,
+    /// Stage the settings of the image.
+    Defaults,
+    /// List the lines that restore settings and learned values.
+    Backup,
     /// List the result of the last learning.
     Learned,
-    /// Save the settings, and what was learned.
-    Save,
-    /// Restore the settings of the image.
-    Defaults,
-    /// Show the latched fault and the last reset.
-    Faults,
+    /// Words of a learned result, from this index on.
+    Restore(usize, Vec<u32, WORDS_IN_LINE>),
+    /// The checksum over all words of a learned result, which completes it.
+    Restored(u32),
+    /// Show the latched fault and the last reset, or the text of a fault.
+    Faults(Option<Fault>),
     /// Clear the latched fault.
     Clear,
     /// Record a trace.
-    Trace {
-        /// Number of records.
-        records: u16,
-        /// Periods from one record to the next.
-        divider: u16,
-        /// Recorded signals.
-        choice: SignalChoice,
-    },
+    Trace(Plan),
+    /// Print the last trace.
+    ShowTrace,
+    /// End the recording of a trace.
+    EndTrace,
     /// Set how much is logged.
     Log(Level),
+    /// Send typed characters back, or not.
+    Echo(bool),
+    /// Reset the controller; whether unsaved settings may be lost.
+    Reboot(bool),
     /// Show the version of the firmware.
     Version,
 }
@@ -71,280 +99,241 @@ pub enum Level {
     Error,
     /// Events that need attention as well.
     Warn,
-    /// State changes and ten status lines a second as well.
+    /// Changes of state as well.
     Info,
+    /// What the drive does, once a second, as well.
+    Debug,
 }
 
 /// Names of the levels, in order.
-pub const LEVELS: [(&str, Level); 4] =
-    [("off", Level::Off), ("error", Level::Error), ("warn", Level::Warn), ("info", Level::Info)];
+pub const LEVELS: [(&str, Level); 5] = [
+    ("off", Level::Off),
+    ("error", Level::Error),
+    ("warn", Level::Warn),
+    ("info", Level::Info),
+    ("debug", Level::Debug),
+];
 
-/// Reason why a line is invalid.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ParseError {
-    /// No such command.
-    Command,
-    /// This word is missing.
-    Missing(&'static str),
-    /// More words than the command takes.
-    TooMuch,
-    /// Not a finite number.
-    Number,
-    /// Not one of these words.
-    OneOf(&'static str),
-    /// Not a whole number in this range.
-    Whole {
-        /// Smallest.
-        min: u16,
-        /// Largest.
-        max: u16,
-    },
-    /// No such signal, or too many.
-    Signal,
-    /// No such setting.
-    Key,
-    /// Not a value of the setting.
-    Value(ValueError),
-}
+/// The commands.
+pub const COMMANDS: [&str; 27] = [
+    "help", "status", "start", "stop", "relock", "torque", "speed", "position", "angle", "get",
+    "describe", "set", "apply", "revert", "save", "defaults", "backup", "learned", "faults",
+    "clear", "trace", "log", "echo", "reboot", "version", "h", "?",
+];
 
-impl fmt::Display for ParseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Command => f.write_str("no such command; `help` lists them"),
-            Self::Missing(what) => write!(f, "{what} is missing"),
-            Self::TooMuch => f.write_str("too many words"),
-            Self::Number => f.write_str("not a number"),
-            Self::OneOf(words) => write!(f, "not one of: {words}"),
-            Self::Whole { min, max } => write!(f, "not a whole number from {min} to {max}"),
-            Self::Signal => {
-                write!(f, "unknown signal, or more than {}; there are:", trace::MOST)?;
-                trace::SIGNALS.iter().try_for_each(|name| write!(f, " {name}"))
-            }
-            Self::Key => f.write_str("no such setting; `get` lists them"),
-            Self::Value(why) => why.fmt(f),
-        }
+/// The words of a line.
+struct Words<'a>(SplitAsciiWhitespace<'a>);
+
+impl<'a> Words<'a> {
+    fn next(&mut self, what: &'static str) -> Result<&'a str, ParseError<'a>> {
+        self.0.next().ok_or(ParseError::Missing(what))
+    }
+
+    fn optional(&mut self) -> Option<&'a str> {
+        self.0.next()
+    }
+
+    /// One of these words.
+    fn one_of<T: Copy>(
+        &mut self,
+        what: &'static str,
+        all: &'static str,
+        words: &[(&str, T)],
+    ) -> Result<T, ParseError<'a>> {
+        let word = self.next(what)?;
+        let found = words.iter().find(|(known, _)| *known == word);
+        found.map(|(_, value)| *value).ok_or(ParseError::OneOf { what, word, all })
+    }
+
+    fn number(&mut self, what: &'static str) -> Result<f32, ParseError<'a>> {
+        let word = self.next(what)?;
+        value::number(word).ok_or(ParseError::Number { what, word })
     }
 }
 
-/// One line per command, for `help`.
-pub const HELP: [&str; 20] = [
-    "help                      this list",
-    "status                    what the drive is doing",
-    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position, or learn",
-    "stop                      torque to zero, then off",
-    "relock                    no torque, magnetise again, verify the lock, go on",
-    "torque A                  current on the quadrature axis, A peak",
-    "speed RPM                 speed, mechanical rpm",
-    "position TURNS            position, mechanical turns from where it started",
-    "angle encoder|injection   where the flux angle comes from",
-    "get [KEY]                 one setting with its range, or all",
-    "set KEY VALUE             change a setting; the drive must be off",
-    "learned                   what was learned on the motor with these settings",
-    "save                      keep the settings, and what was learned, over a reset",
-    "defaults                  back to the settings of the image; the drive must be off",
-    "faults                    the latched fault and what ended the last run",
-    "clear                     forget the latched fault",
-    "trace N [DIVIDER] [NAME]  record N periods, every DIVIDER-th, of the signals named; print as CSV",
-    "log off|error|warn|info   how much goes to the log",
-    "version                   which firmware this is",
-    "one line in, one line out; set command.timeout_s stops the drive when no line comes",
-];
-
-/// Parses one line.
+/// Parses one line, in lower case.
 ///
 /// # Errors
 /// The first invalid or missing word. A line is valid as a whole or not at all.
-pub fn parse(line: &str) -> Result<Request, ParseError> {
-    let mut words = line.split_ascii_whitespace();
-    let mut word = |what| words.next().ok_or(ParseError::Missing(what));
-    let request = match word("a command")? {
-        "help" => Request::Help,
+pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
+    let mut words = Words(line.split_ascii_whitespace());
+    let request = match words.next("a command")? {
+        "help" | "h" | "?" => Request::Help,
         "status" => Request::Status,
-        "start" => Request::Start(match word("") {
-            Err(_) | Ok("torque") => Mode::Torque,
-            Ok("speed") => Mode::Speed,
-            Ok("position") => Mode::Position,
-            Ok("learning") => Mode::Learning,
-            Ok(_) => return Err(ParseError::OneOf("torque speed position learning")),
+        "start" => Request::Start(match words.optional() {
+            None | Some("torque") => Mode::Torque,
+            Some("speed") => Mode::Speed,
+            Some("position") => Mode::Position,
+            Some("learning") => Mode::Learning,
+            Some(word) => {
+                let all = "torque speed position learning";
+                return Err(ParseError::OneOf { what: "the mode", word, all });
+            }
         }),
         "stop" => Request::Stop,
         "relock" => Request::Relock,
-        "torque" => Request::Torque(number(word("the current")?)?),
-        "speed" => Request::Speed(number(word("the speed")?)?),
-        "position" => Request::Position(number(word("the position")?)?),
+        "torque" => Request::Torque(words.number("the current, A")?),
+        "speed" => Request::Speed(words.number("the speed, rpm")?),
+        "position" => Request::Position(words.number("the position, turns")?),
         // An alias of `set angle_source`.
         "angle" => {
-            let key = keys::find("angle_source").ok_or(ParseError::Key)?;
-            let value = key.parse(word("encoder or injection")?);
-            Request::Set(key, value.map_err(|_| ParseError::OneOf("encoder injection"))?)
+            let key = setting("angle_source")?;
+            let word = words.next("encoder or injection")?;
+            let value = key.parse(word);
+            let value = value.map_err(|why| ParseError::Value { key, word, why })?;
+            Request::Set([(key, value)].into_iter().collect())
         }
-        "get" => Request::Get(match word("") {
-            Err(_) => None,
-            Ok(name) => Some(keys::find(name).ok_or(ParseError::Key)?),
-        }),
-        "set" => {
-            let key = keys::find(word("the setting")?).ok_or(ParseError::Key)?;
-            let value = key.parse(word("the value")?).map_err(ParseError::Value)?;
-            Request::Set(key, value)
-        }
-        "learned" => Request::Learned,
+        "get" => match words.optional() {
+            None => Request::List(""),
+            Some(name) => match keys::find(name) {
+                Some(key) => Request::Get(key),
+                None => Request::List(prefix(name)?),
+            },
+        },
+        "describe" => Request::Describe(words.optional().map_or(Ok(""), prefix)?),
+        "set" => Request::Set(assignments(&mut words)?),
+        "apply" => Request::Apply,
+        "revert" => Request::Revert,
         "save" => Request::Save,
         "defaults" => Request::Defaults,
-        "faults" => Request::Faults,
+        "backup" => Request::Backup,
+        "learned" => match words.optional() {
+            None => Request::Learned,
+            Some("check") => Request::Restored(hexadecimal(words.next("the checksum")?)?),
+            Some(index) => restore(index, &mut words)?,
+        },
+        "faults" => Request::Faults(words.optional().map(fault).transpose()?),
         "clear" => Request::Clear,
-        "trace" => {
-            let records = whole(word("the number of records")?, LONGEST_TRACE)?;
-            let mut next = word("").ok();
-            let mut divider = 1;
-            if let Some(text) = next
-                && text.starts_with(|c: char| c.is_ascii_digit() || c == '-')
-            {
-                divider = whole(text, LARGEST_DIVIDER)?;
-                next = word("").ok();
-            }
-            let mut choice =
-                if next.is_some() { SignalChoice::none() } else { SignalChoice::usual() };
-            while let Some(name) = next {
-                if !choice.add(name) {
-                    return Err(ParseError::Signal);
-                }
-                next = word("").ok();
-            }
-            Request::Trace { records, divider, choice }
+        "trace" => match words.optional() {
+            None => Request::ShowTrace,
+            Some("off") => Request::EndTrace,
+            Some(records) => Request::Trace(plan(records, &mut words)?),
+        },
+        "log" => Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?),
+        "echo" => {
+            Request::Echo(words.one_of("on or off", "on off", &[("on", true), ("off", false)])?)
         }
-        "log" => {
-            let name = word("the level")?;
-            let level = LEVELS.iter().find(|(known, _)| *known == name);
-            Request::Log(level.ok_or(ParseError::OneOf("off error warn info"))?.1)
-        }
+        "reboot" => match words.optional() {
+            None => Request::Reboot(false),
+            Some("now") => Request::Reboot(true),
+            Some(word) => return Err(ParseError::TooMuch(word)),
+        },
         "version" => Request::Version,
-        _ => return Err(ParseError::Command),
+        word => {
+            return Err(ParseError::Command { word, near: nearest(word, COMMANDS.into_iter()) });
+        }
     };
-    if words.next().is_some() { Err(ParseError::TooMuch) } else { Ok(request) }
+    words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))
 }
 
-fn number(text: &str) -> Result<f32, ParseError> {
-    value::number(text).ok_or(ParseError::Number)
+/// The setting with this name.
+fn setting(word: &str) -> Result<Key, ParseError<'_>> {
+    let near = || nearest(word, keys::all().map(Key::name));
+    keys::find(word).ok_or_else(|| ParseError::Key { word, near: near() })
 }
 
-fn whole(text: &str, max: u16) -> Result<u16, ParseError> {
-    let value = text.parse().ok().filter(|value| (1..=max).contains(value));
-    value.ok_or(ParseError::Whole { min: 1, max })
+/// The same beginning of a name in the table.
+fn prefix(word: &str) -> Result<&'static str, ParseError<'_>> {
+    let beginning = keys::all().find_map(|key| {
+        let name = key.name();
+        name.starts_with(word).then(|| name.get(..word.len())).flatten()
+    });
+    beginning.map_or_else(|| setting(word).map(Key::name), Ok)
 }
 
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    #[test]
-    fn every_line_of_the_help_but_the_last_is_a_command() {
-        for line in &HELP[..HELP.len() - 1] {
-            let command = line.split(' ').next().unwrap();
-            assert_ne!(parse(command), Err(ParseError::Command), "{command}");
+/// Settings and values by turns.
+fn assignments<'a>(words: &mut Words<'a>) -> Result<Assignments, ParseError<'a>> {
+    let mut all = Assignments::new();
+    let mut name = words.next("the setting")?;
+    loop {
+        let key = setting(name)?;
+        let word = words.next("the value")?;
+        let value = key.parse(word).map_err(|why| ParseError::Value { key, word, why })?;
+        all.push((key, value)).map_err(|_| ParseError::TooMany { what: "settings", most: MOST })?;
+        match words.optional() {
+            Some(next) => name = next,
+            None => return Ok(all),
         }
     }
+}
 
-    #[test]
-    fn commands_are_understood() {
-        let key = keys::find("motor.r_s").unwrap();
-        let source = keys::find("angle_source").unwrap();
-        let mut two = SignalChoice::none();
-        assert!(two.add("i_q") && two.add("turns"));
-        let table = [
-            ("help", Request::Help),
-            ("  status\t", Request::Status),
-            ("start", Request::Start(Mode::Torque)),
-            ("start position", Request::Start(Mode::Position)),
-            ("start learning", Request::Start(Mode::Learning)),
-            ("stop", Request::Stop),
-            ("relock", Request::Relock),
-            ("torque -1.5", Request::Torque(-1.5)),
-            ("start speed", Request::Start(Mode::Speed)),
-            ("speed -150", Request::Speed(-150.0)),
-            ("position 5e1", Request::Position(50.0)),
-            ("angle encoder", Request::Set(source, Value::Word("encoder"))),
-            ("set angle_source encoder", Request::Set(source, Value::Word("encoder"))),
-            ("get", Request::Get(None)),
-            ("get motor.r_s", Request::Get(Some(key))),
-            ("set motor.r_s 5.5", Request::Set(key, Value::Number(5.5))),
-            (
-                "trace 100",
-                Request::Trace { records: 100, divider: 1, choice: SignalChoice::usual() },
-            ),
-            (
-                "trace 1024 10",
-                Request::Trace { records: 1024, divider: 10, choice: SignalChoice::usual() },
-            ),
-            ("trace 5 i_q turns", Request::Trace { records: 5, divider: 1, choice: two.clone() }),
-            ("trace 5 2 i_q turns", Request::Trace { records: 5, divider: 2, choice: two }),
-            ("learned", Request::Learned),
-            ("log warn", Request::Log(Level::Warn)),
-            ("version", Request::Version),
-        ];
-        for (line, request) in table {
-            assert_eq!(parse(line), Ok(request), "{line}");
+/// The words of a learned result in a line of `backup`.
+fn restore<'a>(index: &'a str, words: &mut Words<'a>) -> Result<Request, ParseError<'a>> {
+    let largest = crate::store::learned::WORDS as u16 - 1;
+    let index = whole("the index", index, 0, largest)?;
+    let mut all = Vec::new();
+    while let Some(word) = words.optional() {
+        let most = WORDS_IN_LINE;
+        all.push(hexadecimal(word)?)
+            .map_err(|_| ParseError::TooMany { what: "words in a line", most })?;
+    }
+    if all.is_empty() {
+        return Err(ParseError::Missing("a word"));
+    }
+    Ok(Request::Restore(index.into(), all))
+}
+
+/// The fault with this number.
+fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
+    let last = Fault::ALL.last().map_or(0, |fault| fault.code());
+    let code = whole("the fault", word, 1, last.into())?;
+    let found = Fault::ALL.iter().find(|fault| u16::from(fault.code()) == code);
+    let max = last.into();
+    found.copied().ok_or(ParseError::Whole { what: "the fault", word, min: 1, max })
+}
+
+/// The trace with this number of records.
+fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, ParseError<'a>> {
+    let records = whole("the number of records", records, 1, LONGEST_TRACE)?;
+    let mut plan =
+        Plan { records, divider: 1, choice: SignalChoice::none(), trigger: Trigger::Now };
+    let mut next = words.optional();
+    if let Some(text) = next
+        && text.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+    {
+        plan.divider = whole("the divider", text, 1, LARGEST_DIVIDER)?;
+        next = words.optional();
+    }
+    while let Some(name) = next {
+        if name == "on" {
+            plan.trigger = trigger(words)?;
+            break;
+        }
+        if !plan.choice.add(signal(name)?) {
+            return Err(ParseError::TooMany { what: "signals", most: trace::MOST });
+        }
+        next = words.optional();
+    }
+    if plan.choice.signals().next().is_none() {
+        plan.choice = SignalChoice::usual();
+    }
+    Ok(plan)
+}
+
+fn signal(word: &str) -> Result<u8, ParseError<'_>> {
+    let near = || nearest(word, SIGNALS.iter().map(|signal| signal.name));
+    trace::find(word).ok_or_else(|| ParseError::Signal { word, near: near() })
+}
+
+fn trigger<'a>(words: &mut Words<'a>) -> Result<Trigger, ParseError<'a>> {
+    match words.next("fault, or a signal")? {
+        "fault" => Ok(Trigger::Fault),
+        name => {
+            let signal = signal(name)?;
+            let sides = [("above", true), ("below", false)];
+            let above = words.one_of("above or below", "above below", &sides)?;
+            Ok(Trigger::Level { signal, level: words.number("the level")?, above })
         }
     }
+}
 
-    #[test]
-    fn what_is_half_wrong_is_refused_whole() {
-        use ParseError::*;
-        let trace = Whole { min: 1, max: LONGEST_TRACE };
-        let table = [
-            ("", Missing("a command")),
-            ("Stop", Command),
-            ("stopp", Command),
-            ("stop now", TooMuch),
-            ("angle", Missing("encoder or injection")),
-            ("angle guess", OneOf("encoder injection")),
-            ("start backwards", OneOf("torque speed position learning")),
-            ("torque", Missing("the current")),
-            ("torque 1 2", TooMuch),
-            ("torque 1,5", Number),
-            ("torque 1A", Number),
-            ("torque nan", Number),
-            ("torque inf", Number),
-            ("torque 1e99", Number),
-            ("set motor.r_s", Missing("the value")),
-            ("set motor.r_x 1", Key),
-            ("trace 0", trace),
-            ("trace 1025", trace),
-            ("trace 5 0", Whole { min: 1, max: 1000 }),
-            ("trace -5", trace),
-            ("trace 5 i_x", Signal),
-            ("trace 5 2 3", Signal),
-            ("trace 5 i_d i_d i_d i_d i_d i_d i_d i_d i_d", Signal),
-            ("log loud", OneOf("off error warn info")),
-        ];
-        for (line, why) in table {
-            assert_eq!(parse(line), Err(why), "{line}");
-        }
-    }
+fn whole<'a>(what: &'static str, word: &'a str, min: u16, max: u16) -> Result<u16, ParseError<'a>> {
+    let value = word.parse().ok().filter(|value| (min..=max).contains(value));
+    value.ok_or(ParseError::Whole { what, word, min, max })
+}
 
-    proptest! {
-        #[test]
-        fn any_text_is_understood_or_refused(line in ".*") {
-            let _ = parse(&line);
-        }
-
-        #[test]
-        fn words_that_look_like_commands_are_understood_or_refused(
-            line in "(start|torque|speed|position|angle|get|set|trace|log|stop) ?[-+.0-9a-z_ ]{0,30}",
-        ) {
-            if let Ok(Request::Torque(x) | Request::Speed(x) | Request::Position(x)) = parse(&line) {
-                prop_assert!(x.is_finite());
-            }
-        }
-
-        #[test]
-        fn numbers_survive_the_way_through_text(
-            digits in -9_999_999..=9_999_999, power in -9_i32..=9,
-        ) {
-            let value = digits as f32 * 10_f32.powi(power);
-            prop_assert_eq!(parse(&format!("torque {value}")), Ok(Request::Torque(value)));
-            prop_assert_eq!(parse(&format!("torque {value:e}")), Ok(Request::Torque(value)));
-        }
-    }
+fn hexadecimal(word: &str) -> Result<u32, ParseError<'_>> {
+    let digits = word.len() == 8 && word.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let value = u32::from_str_radix(word, 16).ok().filter(|_| digits);
+    value.ok_or(ParseError::Hexadecimal(word))
 }

@@ -8,7 +8,7 @@ use drive_core::{Accepted, Coefficients, Command, Refused};
 
 use super::grammar::Level;
 use crate::link::Status;
-use crate::link::trace::{self, SignalChoice};
+use crate::link::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::store::FlashError;
@@ -57,11 +57,15 @@ pub trait DriveHandle {
     /// The flash failed.
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError>;
     /// Starts a trace; `false`, and nothing changed, while one is being recorded.
-    fn begin_trace(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool;
+    fn begin_trace(&mut self, plan: &Plan) -> bool;
+    /// Ends a recording without a result.
+    fn cancel_trace(&mut self);
     /// Whether a trace is being recorded.
     fn tracing(&self) -> bool;
-    /// Record number `i` of the last trace.
-    fn traced(&self, i: u16) -> Option<trace::Record>;
+    /// Record number `i` of the last trace, and its number from the record of the trigger.
+    fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
+    /// Resets the chip. Only while the outputs are off.
+    fn reboot(&mut self);
     /// Calls `show` with the result of a learning that ended since the last call, accepted or not.
     fn learned(&mut self, show: &mut dyn FnMut(&Learned));
     /// Sets how much is logged.

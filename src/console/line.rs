@@ -1,11 +1,19 @@
-//! Lines: bytes in, whole lines out; and a buffer for the line that goes out.
+//! Lines: bytes in, whole lines out; and a buffer for the text that goes out.
 
 use core::fmt;
 
 use heapless::String;
 
 /// Longest line that is taken, characters without its end.
-pub const LONGEST: usize = 80;
+pub const LONGEST: usize = 120;
+/// Room for text that goes out, bytes: the longest line, a line of `describe`, and what was typed so far.
+pub const OUTPUT: usize = 480;
+
+const CTRL_C: u8 = 0x03;
+const BACKSPACE: u8 = 0x08;
+const CTRL_U: u8 = 0x15;
+const ESCAPE: u8 = 0x1b;
+const DELETE: u8 = 0x7f;
 
 /// Reason why a line was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,44 +39,87 @@ impl fmt::Display for LineError {
     }
 }
 
+/// Place in an escape sequence of a terminal.
+#[derive(Clone, Copy, PartialEq)]
+enum Sequence {
+    Outside,
+    /// Behind the escape character.
+    Began,
+    /// Behind `ESC [` or `ESC O`; ends with a letter or `~`.
+    Inside,
+}
+
 /// Collects bytes to lines.
 pub struct LineReader {
     text: String<LONGEST>,
     /// First error in the line so far; the line is discarded at its end.
     error: Option<LineError>,
+    sequence: Sequence,
+    /// Whether the last byte was a carriage return: a line feed behind it belongs to the same end.
+    returned: bool,
 }
 
 impl LineReader {
     /// A reader without input so far.
     pub const fn new() -> Self {
-        Self { text: String::new(), error: None }
+        Self { text: String::new(), error: None, sequence: Sequence::Outside, returned: false }
     }
 
-    /// Takes one byte. Returns the line at its end (carriage return or line feed), unless it is empty.
+    /// Takes one byte. Returns the line at its end (carriage return or line feed), unless it is empty. Tab and the
+    /// sequences of cursor keys are ignored.
     ///
     /// # Errors
     /// The first error in the line, which is discarded.
     pub fn push(&mut self, byte: u8) -> Result<Option<String<LONGEST>>, LineError> {
-        match byte {
-            b'\r' | b'\n' => {
-                let line = core::mem::replace(self, Self::new());
+        let sequence = core::mem::replace(&mut self.sequence, Sequence::Outside);
+        match (sequence, byte) {
+            (_, b'\r' | b'\n') => {
+                let fresh = Self { returned: byte == b'\r', ..Self::new() };
+                let line = core::mem::replace(self, fresh);
                 return match line.error {
                     Some(error) => Err(error),
                     None => Ok(Some(line.text).filter(|text| !text.is_empty())),
                 };
             }
-            // Backspace and delete, for people.
-            0x08 | 0x7f => {
+            (Sequence::Began, b'[' | b'O') | (Sequence::Inside, b' '..=b'?') => {
+                self.sequence = Sequence::Inside;
+            }
+            (Sequence::Inside, b'@'..=b'~') | (Sequence::Outside, b'\t') => {}
+            (Sequence::Outside, ESCAPE) => self.sequence = Sequence::Began,
+            (Sequence::Outside, CTRL_C | CTRL_U) => self.forget(),
+            (Sequence::Outside, BACKSPACE | DELETE) => {
                 self.text.pop();
             }
-            b'\t' | b' '..=b'~' => {
+            (Sequence::Outside, b' '..=b'~') => {
                 if self.text.push(char::from(byte)).is_err() {
                     self.spoil(LineError::TooLong);
                 }
             }
             _ => self.spoil(LineError::NotText),
         }
+        self.returned = false;
         Ok(None)
+    }
+
+    /// Writes the text that a terminal is to show for the next byte, before it is [pushed](Self::push).
+    pub fn echo<const N: usize>(&self, byte: u8, to: &mut OutputLine<N>) {
+        match byte {
+            b'\n' if self.returned => {}
+            b'\r' | b'\n' => to.raw("\r\n"),
+            CTRL_C => to.raw("^C\r\n"),
+            // Erases the line of the terminal.
+            CTRL_U => to.raw("\r\x1b[K"),
+            BACKSPACE | DELETE if !self.text.is_empty() => to.raw("\x08 \x08"),
+            b' '..=b'~' if self.sequence == Sequence::Outside && self.text.len() < LONGEST => {
+                to.raw(char::from(byte).encode_utf8(&mut [0; 1]));
+            }
+            _ => {}
+        }
+    }
+
+    /// The line so far.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// Marks the incoming line as unusable.
@@ -87,26 +138,39 @@ impl LineReader {
     }
 }
 
-/// Room for a line that goes out, bytes. Text that does not fit is cut off, between characters.
-pub struct OutputLine<const N: usize = 240>(String<N>);
+/// Text that goes out. What does not fit is cut off, between characters.
+pub struct OutputLine<const N: usize = OUTPUT>(String<N>);
 
 impl<const N: usize> OutputLine<N> {
-    /// The line of this text.
-    pub fn new(text: fmt::Arguments<'_>) -> Self {
-        const END: &str = "\r\n";
-        let mut line = Self(String::new());
-        // Writing to it never fails.
-        let _ = fmt::Write::write_fmt(&mut line, text);
-        while line.0.len() + END.len() > N {
-            line.0.pop();
-        }
-        let _ = line.0.push_str(END);
-        line
+    /// No text.
+    pub const fn new() -> Self {
+        Self(String::new())
     }
 
-    /// The line with its end.
+    /// Adds a line.
+    pub fn line(&mut self, text: fmt::Arguments<'_>) {
+        const END: &str = "\r\n";
+        // Writing to it never fails.
+        let _ = fmt::Write::write_fmt(self, text);
+        while self.0.len() + END.len() > N {
+            self.0.pop();
+        }
+        let _ = self.0.push_str(END);
+    }
+
+    /// Adds text without the end of a line.
+    pub fn raw(&mut self, text: &str) {
+        let _ = fmt::Write::write_str(self, text);
+    }
+
+    /// The text.
     pub fn as_str(&self) -> &str {
         &self.0
+    }
+
+    /// Removes the text.
+    pub fn clear(&mut self) {
+        self.0.clear();
     }
 }
 
@@ -119,76 +183,4 @@ impl<const N: usize> fmt::Write for OutputLine<N> {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    type Line = Result<std::string::String, LineError>;
-
-    fn push(reader: &mut LineReader, byte: u8) -> Option<Line> {
-        reader.push(byte).map(|line| line.map(|text| text.to_string())).transpose()
-    }
-
-    fn read(bytes: &[u8]) -> Vec<Line> {
-        let mut reader = LineReader::new();
-        bytes.iter().filter_map(|byte| push(&mut reader, *byte)).collect()
-    }
-
-    #[test]
-    fn lines_end_with_either_character_or_both() {
-        let text = |t: &str| Ok(t.to_owned());
-        assert_eq!(read(b"a\nbb\r\n\n\rcc\rd"), [text("a"), text("bb"), text("cc")]);
-        assert_eq!(read(b"abx\x08c\n"), [text("abc")]);
-    }
-
-    #[test]
-    fn what_is_no_line_is_one_error_and_the_next_line_is_whole() {
-        let mut long = vec![b'x'; 1000];
-        long.extend(b"\nok\n");
-        assert_eq!(read(&long), [Err(LineError::TooLong), Ok("ok".to_owned())]);
-        assert_eq!(read(b"st\xffop\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
-        assert_eq!(read(b"st\0op\nok\n"), [Err(LineError::NotText), Ok("ok".to_owned())]);
-        // A backspace does not heal.
-        assert_eq!(read(b"\xff\x08stop\n"), [Err(LineError::NotText)]);
-    }
-
-    #[test]
-    fn a_lost_character_spoils_its_line_only() {
-        let mut reader = LineReader::new();
-        for byte in *b"tor" {
-            assert_eq!(push(&mut reader, byte), None);
-        }
-        reader.spoil(LineError::Lost);
-        assert!(reader.begun());
-        for byte in *b"e 3" {
-            assert_eq!(push(&mut reader, byte), None);
-        }
-        assert_eq!(push(&mut reader, b'\n'), Some(Err(LineError::Lost)));
-        assert!(!reader.begun());
-    }
-
-    #[test]
-    fn text_is_cut_between_characters() {
-        for (text, line) in
-            [("ab", "ab\r\n"), ("ab°", "ab\r\n"), ("ab°°", "ab\r\n"), ("a°cd", "a°\r\n")]
-        {
-            assert_eq!(OutputLine::<5>::new(format_args!("{text}")).as_str(), line);
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn whatever_comes_in_a_line_is_taken_as_it_is(line in "[ -~]{1,80}") {
-            prop_assert_eq!(read(format!("{line}\n").as_bytes()), [Ok(line)]);
-        }
-
-        #[test]
-        fn after_any_bytes_a_line_is_read_again(bytes: Vec<u8>) {
-            let mut all = bytes;
-            all.extend(b"\nstop\n");
-            let lines = read(&all);
-            prop_assert_eq!(lines.last(), Some(&Ok("stop".to_owned())));
-        }
-    }
-}
+mod tests;

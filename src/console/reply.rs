@@ -1,34 +1,48 @@
-//! Replies: the status line, settings, and the result of a learning.
+//! Replies: the status line, settings, the text of a fault, and the result of a learning.
 
+use core::f32::consts::TAU;
 use core::fmt;
 
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::io::PERIOD_S;
-use drive_core::settings::Scales;
+use drive_core::settings::entry::Change;
 use drive_core::settings::value::Value;
+use drive_core::{Fault, Settings, State};
 
 use crate::board::CYCLES_PER_US;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
+use crate::settings::staging::Staging;
 
-/// Writes the status line: `stack` is the most bytes used and the size.
+/// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with
+/// psi = L_m i_d; power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the carrier.
 ///
 /// # Errors
 /// Those of the formatter.
 pub fn status(
     f: &mut fmt::Formatter<'_>,
     s: &Status,
-    scales: &Scales,
+    settings: &Settings,
     (used, size): (usize, usize),
 ) -> fmt::Result {
-    let t = &s.telemetry;
-    let rpm = t.rotor_freq * (60.0 / PERIOD_S);
+    let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
+    write!(f, "{}; ", s.state)?;
+    // While the drive is off, its signals are those of the last run.
+    if s.state != State::Off {
+        let (i, reference) = (t.current, t.reference);
+        let rpm = t.rotor_freq * (60.0 / PERIOD_S) / f32::from(motor.pole_pairs);
+        let torque = motor.torque_per_ampere(i.d) * i.q;
+        let shaft_w = torque * rpm * (TAU / 60.0);
+        let electrical_w = 1.5 * (t.voltage.d * i.d + t.voltage.q * i.q);
+        write!(f, "i_d {:.2} A, i_q {:.2} of {:.2} A, ", i.d, i.q, reference.q)?;
+        write!(f, "torque {torque:.2} Nm, speed {rpm:.1} rpm, position {:.3} turns, ", t.turns)?;
+        write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
+    }
     // Dc link and heat sink from the sample: the drive's own values stand still while it is off.
     let dc_link = scales.dc_link.at(s.sample.dc_link);
     let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
-    write!(f, "{}; i_d {:.2} A, i_q {:.2} of ", s.state, t.current.d, t.current.q)?;
-    write!(f, "{:.2} A, rotor {rpm:.1} rpm electrical, dc link {dc_link:.0} V, ", t.reference.q)?;
+    write!(f, "dc link {dc_link:.0} V, ")?;
     write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
     write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
     write!(f, "stack {used} of {size}")
@@ -41,16 +55,20 @@ pub struct Setting {
     value: Value,
     number: Option<f32>,
     range: Option<(f32, f32)>,
+    /// The value in force, if another is staged.
+    in_force: Option<Value>,
 }
 
 impl Setting {
     /// The setting of this key.
-    pub fn new(key: Key, settings: &FirmwareSettings) -> Self {
+    pub fn new(key: Key, settings: &Staging) -> Self {
+        let latest = settings.latest();
         Self {
             key,
-            value: key.get(settings),
-            number: key.number(settings),
-            range: key.range(settings),
+            value: key.get(latest),
+            number: key.number(latest),
+            range: key.range(latest),
+            in_force: settings.differs(key).then(|| key.get(settings.in_force())),
         }
     }
 }
@@ -68,12 +86,78 @@ impl fmt::Display for Setting {
             (Value::Word(_), _) => {
                 f.write_str(" (one of:")?;
                 self.key.words().iter().try_for_each(|word| write!(f, " {word}"))?;
-                f.write_str(")")
+                f.write_str(")")?;
             }
-            (_, Some((min, max))) => write!(f, " ({min} to {max})"),
-            (_, None) => Ok(()),
+            (_, Some((min, max))) => write!(f, " ({min} to {max})")?,
+            (_, None) => {}
         }
+        self.in_force.map_or(Ok(()), |value| write!(f, "; staged, in force: {value}"))
     }
+}
+
+/// A setting as a JSON object.
+pub struct Description {
+    setting: Setting,
+    default: Value,
+}
+
+impl Description {
+    /// The setting of this key.
+    pub fn new(key: Key, settings: &Staging) -> Self {
+        let default = key.get(&FirmwareSettings::of_the_board());
+        Self { setting: Setting::new(key, settings), default }
+    }
+}
+
+/// A value in JSON.
+fn json(f: &mut fmt::Formatter<'_>, value: Value) -> fmt::Result {
+    match value {
+        Value::Number(_) | Value::Whole(_) => write!(f, "{value}"),
+        Value::Auto | Value::Word(_) => write!(f, "\"{value}\""),
+    }
+}
+
+impl fmt::Display for Description {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Setting { key, value, number, range, in_force } = &self.setting;
+        let kind = match self.default {
+            Value::Word(_) => "word",
+            Value::Whole(_) => "whole",
+            Value::Number(_) | Value::Auto => "number",
+        };
+        let change = match key.change() {
+            Change::WhileOff => "off",
+            Change::FromReset => "reset",
+            Change::Board => "board",
+        };
+        write!(f, "{{\"name\":\"{}\",\"unit\":\"{}\"", key.name(), key.unit())?;
+        write!(f, ",\"type\":\"{kind}\",\"auto\":{}", key.has_rule())?;
+        match range {
+            Some((min, max)) => write!(f, ",\"min\":{min},\"max\":{max}")?,
+            None => f.write_str(",\"min\":null,\"max\":null")?,
+        }
+        f.write_str(",\"words\":[")?;
+        for (i, word) in key.words().iter().enumerate() {
+            write!(f, "{}\"{word}\"", if i > 0 { "," } else { "" })?;
+        }
+        f.write_str("],\"value\":")?;
+        json(f, *value)?;
+        f.write_str(",\"effective\":")?;
+        json(f, number.map_or(*value, Value::Number))?;
+        f.write_str(",\"default\":")?;
+        json(f, self.default)?;
+        write!(f, ",\"change\":\"{change}\",\"learned\":{}", key.learned())?;
+        write!(f, ",\"staged\":{},\"help\":\"{}\"}}", in_force.is_some(), key.help())
+    }
+}
+
+/// Line number `i` of the text of a fault, behind its first: the causes, the likely ones first, and the cure.
+pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
+    let causes = fault.causes();
+    (i <= causes.len()).then_some(fmt::from_fn(move |f| match causes.get(i) {
+        Some(cause) => write!(f, "cause {}: {cause}", i + 1),
+        None => write!(f, "cure: {}", fault.cure()),
+    }))
 }
 
 /// Line number `i` of the result of a learning; `None` behind the last line. The fitted values come first, then a table

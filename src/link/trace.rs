@@ -1,94 +1,49 @@
 //! The trace: signals of the drive, period by period, recorded in RAM.
 //!
 //! The main loop requests it, the control interrupt writes it, the main loop reads it; `stage` says who owns the
-//! memory.
+//! memory. The records form a ring, so that a trace with a trigger holds what came before it.
+
+mod signals;
+#[cfg(test)]
+mod tests;
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
-use heapless::Vec;
 
-/// Signals that can be recorded: currents in A, voltages in V, steps in electrical turns per period.
-pub const SIGNALS: [&str; 13] = [
-    "phi_deg",
-    "flux_step",
-    "rotor_step",
-    "i_d_ref",
-    "i_q_ref",
-    "i_d",
-    "i_q",
-    "v_d",
-    "v_q",
-    "delta_i",
-    "saliency",
-    "dc_link",
-    "turns",
-];
+pub use signals::{MOST, Record, SIGNALS, Signal, SignalChoice, find};
 
-/// Most signals in one record.
-pub const MOST: usize = 8;
-
-/// The signals of a trace, in their order.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SignalChoice {
-    /// Indices into [`SIGNALS`].
-    signals: Vec<u8, MOST>,
+/// What starts the part of a trace that is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trigger {
+    /// The request.
+    Now,
+    /// A fault: all records are from before it, but the last.
+    Fault,
+    /// A signal that is above or below a level: a quarter of the records are from before that.
+    Level {
+        /// Index into [`SIGNALS`].
+        signal: u8,
+        /// The level, in the unit of the signal in a plan of the console, and as recorded in the recorder.
+        level: f32,
+        /// Whether the signal has to be above it.
+        above: bool,
+    },
 }
 
-impl SignalChoice {
-    /// No signal.
-    pub const fn none() -> Self {
-        Self { signals: Vec::new() }
-    }
-
-    /// The default: angle, currents and their reference, voltages, saliency, position.
-    pub fn usual() -> Self {
-        Self { signals: [0, 5, 6, 4, 7, 8, 9, 12].into_iter().collect() }
-    }
-
-    /// Adds the signal with this name; `false` if there is none, or no room for it.
-    pub fn add(&mut self, name: &str) -> bool {
-        let signal = SIGNALS.iter().position(|known| *known == name);
-        signal.is_some_and(|index| self.signals.push(index as u8).is_ok())
-    }
-
-    /// Names of the signals.
-    pub fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.signals.iter().filter_map(|signal| SIGNALS.get(usize::from(*signal)).copied())
-    }
-
-    /// Number of signals.
-    pub fn count(&self) -> usize {
-        self.signals.len()
-    }
-
-    /// Values of the signals.
-    fn values(&self, t: &Telemetry) -> Record {
-        let mut record = [0.0; MOST];
-        for (value, signal) in record.iter_mut().zip(&self.signals) {
-            *value = match signal {
-                0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
-                1 => t.flux_freq,
-                2 => t.rotor_freq,
-                3 => t.reference.d,
-                4 => t.reference.q,
-                5 => t.current.d,
-                6 => t.current.q,
-                7 => t.voltage.d,
-                8 => t.voltage.q,
-                9 => t.delta_i,
-                10 => t.saliency,
-                11 => t.dc_link,
-                _ => t.turns,
-            };
-        }
-        record
-    }
+/// A trace that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Number of records.
+    pub records: u16,
+    /// Periods from one record to the next.
+    pub divider: u16,
+    /// Recorded signals.
+    pub choice: SignalChoice,
+    /// Its start.
+    pub trigger: Trigger,
 }
-
-/// One record: the values of a [`SignalChoice`], in its order.
-pub type Record = [f32; MOST];
 
 /// Before the first request: the memory is the main loop's.
 const IDLE: u8 = 0;
@@ -99,11 +54,15 @@ const DONE: u8 = 2;
 
 struct Inner<const N: usize> {
     records: [Record; N],
-    wanted: usize,
-    divider: u16,
-    choice: SignalChoice,
-    /// Next record to write.
+    plan: Plan,
+    /// Place of the next record.
     next: usize,
+    /// Number of records that were written, at most the size of the ring.
+    written: usize,
+    /// Records still to be written; `None` before the trigger.
+    left: Option<usize>,
+    /// Records behind the one of the trigger.
+    behind: usize,
     /// Periods until the next record.
     wait: u16,
 }
@@ -131,10 +90,16 @@ impl<const N: usize> Trace<N> {
         // Zeros only: otherwise 32 KiB of the flash would hold the initial contents.
         let inner = Inner {
             records: [[0.0; MOST]; N],
-            wanted: 0,
-            divider: 0,
-            choice: SignalChoice::none(),
+            plan: Plan {
+                records: 0,
+                divider: 0,
+                choice: SignalChoice::none(),
+                trigger: Trigger::Now,
+            },
             next: 0,
+            written: 0,
+            left: None,
+            behind: 0,
             wait: 0,
         };
         Self {
@@ -151,126 +116,105 @@ impl<const N: usize> Trace<N> {
     }
 }
 
+impl<const N: usize> Inner<N> {
+    /// Size of the ring.
+    fn size(&self) -> usize {
+        usize::from(self.plan.records).min(N)
+    }
+
+    /// Number of records behind that of the trigger, if it has come with the record just written.
+    fn triggered(&self, t: &Telemetry, fault: bool) -> Option<usize> {
+        let size = self.size();
+        match self.plan.trigger {
+            Trigger::Now => Some(size.saturating_sub(1)),
+            Trigger::Fault => fault.then_some(0),
+            Trigger::Level { signal, level, above } => {
+                let value = signals::value(signal, t);
+                let beyond = if above { value > level } else { value < level };
+                let before = (size / 4).min(self.written.saturating_sub(1));
+                beyond.then_some(size.saturating_sub(before + 1))
+            }
+        }
+    }
+}
+
 impl<const N: usize> Recorder<'_, N> {
-    /// Records the present control period, if one is due.
-    pub fn step(&mut self, telemetry: impl FnOnce() -> Telemetry) {
+    /// Records the present control period, if one is due; `fault` says whether the drive is in a fault.
+    pub fn step(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) {
         if self.0.stage.load(Ordering::Acquire) == RECORDING {
-            self.record(telemetry);
+            self.record(fault, telemetry);
         }
     }
 
-    fn record(&mut self, telemetry: impl FnOnce() -> Telemetry) {
+    fn record(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
-        if inner.wait > 0 {
+        // A fault is recorded at once: what follows it stands still.
+        if inner.wait > 0 && !(fault && inner.plan.trigger == Trigger::Fault) {
             inner.wait -= 1;
             return;
         }
-        inner.wait = inner.divider.saturating_sub(1);
+        inner.wait = inner.plan.divider.saturating_sub(1);
+        let t = telemetry();
+        let size = inner.size();
         if let Some(place) = inner.records.get_mut(inner.next) {
-            *place = inner.choice.values(&telemetry());
-            inner.next += 1;
+            *place = inner.plan.choice.values(&t);
+            inner.next = if inner.next + 1 < size { inner.next + 1 } else { 0 };
+            inner.written = size.min(inner.written + 1);
         }
-        if inner.next >= inner.wanted {
+        match inner.left {
+            Some(left) => inner.left = Some(left.saturating_sub(1)),
+            None => {
+                inner.left = inner.triggered(&t, fault);
+                inner.behind = inner.left.unwrap_or(0);
+            }
+        }
+        if inner.left == Some(0) {
             self.0.stage.store(DONE, Ordering::Release);
         }
     }
 }
 
 impl<const N: usize> Reader<'_, N> {
-    /// Requests `records` records, one in `divider` periods; `false`, and nothing changed, while recording.
-    pub fn begin(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool {
-        if self.0.stage.load(Ordering::Acquire) == RECORDING {
+    /// Requests a trace; `false`, and nothing changed, while recording.
+    pub fn begin(&mut self, plan: &Plan) -> bool {
+        if self.recording() {
             return false;
         }
         // SAFETY: the memory is the main loop's while not recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
-        inner.wanted = usize::from(records).min(N);
-        inner.divider = divider;
-        inner.choice = choice.clone();
-        inner.next = 0;
-        inner.wait = 0;
+        inner.plan = plan.clone();
+        (inner.next, inner.written, inner.wait) = (0, 0, 0);
+        (inner.left, inner.behind) = (None, 0);
         self.0.stage.store(RECORDING, Ordering::Release);
         true
     }
 
-    /// Record number `i` of a finished recording.
-    pub fn get(&self, i: u16) -> Option<Record> {
+    /// Ends a recording without a result.
+    pub fn cancel(&mut self) {
+        // The interrupt cannot be in the midst of a record: it is never interrupted by the main loop.
+        self.0.stage.store(IDLE, Ordering::Release);
+    }
+
+    /// Record number `i` of a finished recording, from the oldest on, and its number from that of the trigger.
+    pub fn get(&self, i: u16) -> Option<(i16, Record)> {
         if self.0.stage.load(Ordering::Acquire) != DONE {
             return None;
         }
         // SAFETY: the memory is the main loop's when done.
         let inner = unsafe { &*self.0.inner.get() };
-        let i = usize::from(i);
-        inner.records.get(..inner.wanted)?.get(i).copied()
+        let (i, size) = (usize::from(i), inner.size());
+        if i >= inner.written {
+            return None;
+        }
+        let oldest = if inner.written < size { 0 } else { inner.next };
+        let place = if oldest + i < size { oldest + i } else { oldest + i - size };
+        let from_trigger = i as i16 - (inner.written as i16 - 1 - inner.behind as i16);
+        inner.records.get(place).map(|record| (from_trigger, *record))
     }
 
     /// Whether a recording is in progress.
     pub fn recording(&self) -> bool {
         self.0.stage.load(Ordering::Acquire) == RECORDING
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn records_every_nth_period_and_gives_them_back_when_done() {
-        let trace = Trace::<4>::new();
-        let (mut recorder, mut reader) = trace.take().unwrap();
-        assert_eq!(reader.get(0), None);
-        assert!(reader.begin(3, 2, &SignalChoice::usual()));
-        assert!(!reader.begin(1, 1, &SignalChoice::usual()));
-        for period in 0..5 {
-            assert!(reader.recording());
-            assert_eq!(reader.get(0), None);
-            recorder.step(|| Telemetry { turns: period as f32, ..Telemetry::default() });
-        }
-        recorder.step(Telemetry::default);
-        let turns = |i| reader.get(i).map(|record: Record| record[7]);
-        assert_eq!(
-            [turns(0), turns(1), turns(2), turns(3)],
-            [Some(0.0), Some(2.0), Some(4.0), None]
-        );
-    }
-
-    #[test]
-    fn asks_for_no_more_than_there_is_room() {
-        let trace = Trace::<4>::new();
-        let (mut recorder, mut reader) = trace.take().unwrap();
-        assert!(reader.begin(100, 1, &SignalChoice::usual()));
-        for _ in 0..4 {
-            recorder.step(Telemetry::default);
-        }
-        assert!(!reader.recording());
-        assert!(reader.get(3).is_some() && reader.get(4).is_none());
-    }
-
-    /// Every signal is its own, under its name.
-    #[test]
-    fn signals_are_recorded_as_they_were_chosen() {
-        let telemetry = Telemetry {
-            phi: drive_core::Angle::QUARTER,
-            flux_freq: 1.0,
-            rotor_freq: 2.0,
-            reference: drive_core::Dq::new(3.0, 4.0),
-            current: drive_core::Dq::new(5.0, 6.0),
-            voltage: drive_core::Dq::new(7.0, 8.0),
-            delta_i: 9.0,
-            saliency: 10.0,
-            dc_link: 11.0,
-            turns: 12.0,
-            ..Telemetry::default()
-        };
-        for (i, name) in SIGNALS.iter().enumerate() {
-            let mut choice = SignalChoice::none();
-            assert!(choice.add(name) && choice.add("turns"));
-            let expected = if i == 0 { 90.0 } else { i as f32 };
-            assert_eq!(choice.values(&telemetry)[..2], [expected, 12.0], "{name}");
-            assert_eq!(choice.names().collect::<std::vec::Vec<_>>(), [name, "turns"]);
-        }
-        let mut full = SignalChoice::usual();
-        assert!(!full.add("turns") && !SignalChoice::none().add("speed"));
     }
 }

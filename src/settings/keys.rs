@@ -161,6 +161,14 @@ impl Key {
         }
     }
 
+    /// Whether the setting follows a rule unless it is set.
+    pub fn has_rule(self) -> bool {
+        match self {
+            Self::Drive(entry) => entry.has_rule(),
+            Self::Own(entry) => entry.has_rule(),
+        }
+    }
+
     /// The value.
     pub fn get(self, settings: &FirmwareSettings) -> Value {
         with!(self, settings, |entry, s| entry.get(s))

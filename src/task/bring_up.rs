@@ -99,18 +99,21 @@ pub fn bring_up() -> Result<Board, StartError> {
         adc::Pins { current_a: a.pa0, current_b: c.pc1, dc_link: a.pa1, heat_sink: c.pc2 };
 
     // First, because the gates are driven low from here on.
-    over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc);
+    let over_voltage = board::protection(&start.settings.drive).over_voltage;
+    over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, over_voltage);
     let pwm =
         pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc)
         .ok_or(StartError::Twice)?;
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
-    let link = adc::Adc::new(chip.ADC1, chip.ADC2, &chip.ADC12_COMMON, adc_pins, &mut rcc)
-        .map_err(StartError::Converter)
-        .and_then(|adc| {
-            let pwm = pwm.map_err(StartError::Timer)?;
-            start_control(start.build(dead_time_s), pwm, adc, encoder, resets)
-        });
+    let link = pwm.map_err(StartError::Timer).and_then(|pwm| {
+        let coefficients = start.build(dead_time_s);
+        // After the design, which may have replaced refused settings by the defaults.
+        let protection = board::protection(&start.settings.drive);
+        let (one, two) = (chip.ADC1, chip.ADC2);
+        let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, adc_pins, &mut rcc, &protection);
+        start_control(coefficients, pwm, adc.map_err(StartError::Converter)?, encoder, resets)
+    });
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {}", error);
     }
@@ -120,7 +123,7 @@ pub fn bring_up() -> Result<Board, StartError> {
     let tracking = singleton!(: Option<Tracking> = None).ok_or(StartError::Twice)?;
     *tracking = Tracking::new(&settings.drive);
     let chip = Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s };
-    let supervisor = Supervisor::new(link.ok(), watchdog, chip, tracking);
+    let supervisor = Supervisor::new(link.ok(), watchdog, chip, tracking, &settings.drive);
     Ok(Board { settings, port, supervisor })
 }
 

@@ -217,7 +217,8 @@ impl Running {
             answers.send(answer);
         }
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
-        trace.step(|| drive.telemetry());
+        let fault = matches!(drive.state(), State::Fault(_));
+        trace.step(fault, || drive.telemetry());
         if drive.tracks_rotor() {
             // Without room the period is missing, which the main loop detects by its number.
             let _ = observations.enqueue(Observation::new(self.periods, &drive.telemetry()));
@@ -257,6 +258,7 @@ impl Running {
             report.last_cycles = cycles;
             report.worst_latency = self.worst_latency;
             report.hardware = self.unreported;
+            report.learning = drive.learning_progress();
         });
         if sent {
             self.unreported = Hardware::empty();

@@ -6,7 +6,8 @@ use core::sync::atomic::Ordering;
 use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 use drive_core::identify::learning::Learned;
-use drive_core::settings::SettingsError;
+use drive_core::io::PERIOD_S;
+use drive_core::settings::{Scales, Settings, SettingsError};
 use drive_core::{Accepted, Coefficients, Command, Hardware, State};
 use heapless::spsc::Consumer;
 
@@ -18,7 +19,7 @@ use induction_drive::board;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
-use induction_drive::link::trace::{self, SignalChoice};
+use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
 use induction_drive::monitor::record::{Reason, Record};
@@ -62,6 +63,8 @@ pub struct Supervisor {
     chip: Chip,
     /// Tracking of the rotor time constant, if the settings enable it. (Large, so not on the stack.)
     tracking: &'static mut Option<Tracking>,
+    /// Scales and pole pairs of the settings in force, for the log.
+    scales: (Scales, u8),
 }
 
 /// State of the chip at start, and the saved settings.
@@ -107,6 +110,7 @@ impl Supervisor {
         watchdog: Option<Watchdog>,
         chip: Chip,
         tracking: &'static mut Option<Tracking>,
+        settings: &Settings,
     ) -> Self {
         let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
@@ -117,7 +121,8 @@ impl Supervisor {
             MemoryCheck::new(CheckedMemory { code, source, constants, changes }, memory::word)
         });
         let (status, level, well) = (None, Level::Info, false);
-        Self { link, status, level, clock, guard, check, well, chip, tracking }
+        let scales = (settings.scales, settings.motor.pole_pairs);
+        Self { link, status, level, clock, guard, check, well, chip, tracking, scales }
     }
 
     /// Checks a slice of the control's memory. A flipped bit ends the run: start-up copies the code and computes the
@@ -178,16 +183,21 @@ impl Supervisor {
         }
     }
 
+    /// Logs changes of state, faults and events; once a second, at the level `debug`, what the drive does.
     fn log(&mut self, s: Status) {
-        let before = self.status.replace(s).map(|status| status.state);
-        if before != Some(s.state)
-            && let State::Fault(fault) = s.state
-        {
-            stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
-            if self.level >= Level::Error {
-                defmt::error!("fault {}: {}", fault.code(), fault.meaning());
+        let before = self.status.replace(s);
+        if before.map(|status| status.state) != Some(s.state) {
+            if let State::Fault(fault) = s.state {
+                stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
+                if self.level >= Level::Error {
+                    defmt::error!("fault {}: {}", fault.code(), fault.text());
+                }
+            } else if self.level >= Level::Info {
+                defmt::info!("state: {}", Display2Format(&s.state));
             }
         }
+        // An event that lasts is logged once.
+        let known = before.map_or(Hardware::empty(), |status| status.hardware);
         if self.level >= Level::Warn {
             for (event, text) in [
                 (Hardware::BREAK, "the power stage pulls the break input, or is not there"),
@@ -195,23 +205,24 @@ impl Supervisor {
                 (Hardware::DEADLINE_MISS, "a control period took too long"),
                 (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
             ] {
-                if s.hardware.intersects(event) {
+                if (s.hardware - known).intersects(event) {
                     defmt::warn!("{}", text);
                 }
             }
         }
-        if self.level >= Level::Info {
-            defmt::info!(
-                "{}: codes {} {}, dc link {}, heat sink {}, encoder {}; {} periods, {} cycles, late {}",
+        let second = |status: &Status| status.periods / board::PWM_HZ;
+        if self.level >= Level::Debug && before.is_none_or(|last| second(&last) != second(&s)) {
+            let (scales, pole_pairs) = &self.scales;
+            let rpm = s.telemetry.rotor_freq * (60.0 / PERIOD_S) / f32::from(*pole_pairs);
+            defmt::debug!(
+                "{}: i_d {} A, i_q {} A, speed {} rpm, dc link {} V, heat sink {} degC, {} cycles",
                 Display2Format(&s.state),
-                s.sample.current_a,
-                s.sample.current_b,
-                s.sample.dc_link,
-                s.sample.heat_sink,
-                s.sample.encoder,
-                s.periods,
+                s.telemetry.current.d,
+                s.telemetry.current.q,
+                rpm,
+                scales.dc_link.at(s.sample.dc_link),
+                scales.ntc.celsius(s.sample.heat_sink),
                 s.worst_cycles,
-                s.worst_latency,
             );
         }
     }
@@ -250,6 +261,7 @@ impl DriveHandle for Supervisor {
 
     fn configured(&mut self, settings: &FirmwareSettings) {
         *self.tracking = Tracking::new(&settings.drive);
+        self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
     }
 
     fn tracking(&self) -> Option<Report> {
@@ -262,15 +274,21 @@ impl DriveHandle for Supervisor {
         Ok(())
     }
 
-    fn begin_trace(&mut self, records: u16, divider: u16, choice: &SignalChoice) -> bool {
-        self.link.as_mut().is_some_and(|link| link.trace.begin(records, divider, choice))
+    fn begin_trace(&mut self, plan: &Plan) -> bool {
+        self.link.as_mut().is_some_and(|link| link.trace.begin(plan))
+    }
+
+    fn cancel_trace(&mut self) {
+        if let Some(link) = &mut self.link {
+            link.trace.cancel();
+        }
     }
 
     fn tracing(&self) -> bool {
         self.link.as_ref().is_some_and(|link| link.trace.recording())
     }
 
-    fn traced(&self, i: u16) -> Option<trace::Record> {
+    fn traced(&self, i: u16) -> Option<(i16, trace::Record)> {
         self.link.as_ref()?.trace.get(i)
     }
 
@@ -278,6 +296,11 @@ impl DriveHandle for Supervisor {
         if let Some(link) = &mut self.link {
             link.learned.take_with(|result| result.as_ref().map(show));
         }
+    }
+
+    fn reboot(&mut self) {
+        pwm::outputs_off();
+        cortex_m::peripheral::SCB::sys_reset();
     }
 
     fn set_log_level(&mut self, level: Level) {

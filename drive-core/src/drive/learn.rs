@@ -15,6 +15,12 @@ impl Drive {
         self.learned.as_ref()
     }
 
+    /// The point that is being measured, from 1 on, and the number of points; `None` unless the drive learns.
+    pub fn learning_progress(&self) -> Option<(usize, usize)> {
+        let learns = self.state == State::Learning;
+        learns.then(|| self.c.learning.progress(&self.control.learning))
+    }
+
     pub(super) fn can_learn(&self) -> bool {
         let literal = self.c.estimator.demodulator == DemodulatorKind::Literal;
         self.c.inject && self.c.demodulate && !literal

@@ -202,6 +202,11 @@ impl Learning {
         2 * self.points
     }
 
+    /// The point that is being measured, from 1 on, and the number of points.
+    pub fn progress(&self, state: &LearningState) -> (usize, usize) {
+        (self.points().min(state.point + 1), self.points())
+    }
+
     /// Torque current of a point, A.
     fn current(&self, point: usize) -> f32 {
         let i_q = self.grid.current(point / 2 + 1);

@@ -238,8 +238,8 @@ fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     let reset = board.resets.last().map(|reset| reset.1).context("no reset")?;
     board.run_periods(100)?;
     let log = board.take_log()?;
-    let cause = scene::cause(reset);
-    ensure!(log.iter().any(|line| line.contains(cause)), "no {cause:?} in the log {log:?}");
+    let cause = reset.to_string();
+    ensure!(log.iter().any(|line| line.contains(&cause)), "no {cause:?} in the log {log:?}");
     if whole_start {
         let greeting = judge::greeting(board)?;
         ensure!(!greeting.contains("not used"), "{greeting}");

@@ -2,6 +2,8 @@
 //! page with plots at the end.
 #![deny(clippy::use_debug)]
 
+pub mod flash_file;
+pub mod own;
 pub mod page;
 pub mod pty;
 pub mod readings;

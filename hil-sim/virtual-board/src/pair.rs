@@ -3,6 +3,7 @@
 
 use anyhow::{Result, bail};
 use drive_core::State;
+use induction_drive::console::announce::ANNOUNCEMENTS;
 
 use crate::board::{Board, Options, Period};
 use crate::image::Image;
@@ -10,6 +11,8 @@ use crate::shadow::Shadow;
 
 /// Longest that the firmware takes from reset to its greeting, or to an answer, periods.
 const LONGEST_ANSWER: u64 = 30_000;
+/// Longest that an announcement takes on the wire, periods.
+const QUIET: u64 = 120;
 /// Longest from a start to regulating, or from a stop to off, periods.
 const LONGEST_START: u64 = 60_000;
 
@@ -70,17 +73,25 @@ impl Pair {
         bail!("{what} did not come; the drive is {}; log {log:#?}", self.shadow.drive.state())
     }
 
-    /// Types a line and waits for its answer.
+    /// Types a line and waits for its answer: the first line that is no announcement, and what came behind it.
     ///
     /// # Errors
     /// As [`Pair::until`].
     pub fn say(&mut self, line: &str) -> Result<String> {
+        // What it was saying ends first.
+        self.run(QUIET, |_, _| {})?;
         self.board.take_console();
         self.board.type_line(line);
         self.shadow.type_line(line)?;
         let mut answer = String::new();
         self.until(&format!("an answer to {line:?}"), LONGEST_ANSWER, |pair, _| {
             answer += &pair.board.take_console();
+            let announced = |line: &&str| ANNOUNCEMENTS.iter().any(|first| line.starts_with(first));
+            while let Some((first, rest)) = answer.split_once('\n')
+                && announced(&first)
+            {
+                answer = rest.to_owned();
+            }
             answer.ends_with('\n')
         })?;
         Ok(answer.trim_end().to_owned())

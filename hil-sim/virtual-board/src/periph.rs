@@ -11,6 +11,8 @@ pub mod plain;
 pub mod rcc;
 pub mod tim1;
 
+use std::fmt;
+
 /// Time of an event that does not come, ticks.
 pub const NEVER: u64 = u64::MAX;
 
@@ -25,6 +27,18 @@ pub enum Reset {
     Software,
     /// The independent watchdog.
     Watchdog,
+}
+
+/// As the firmware's log names it.
+impl fmt::Display for Reset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Power => "reset by power-on",
+            Self::Pin => "reset by reset pin",
+            Self::Software => "reset by software",
+            Self::Watchdog => "reset by watchdog",
+        })
+    }
 }
 
 /// The effect of a write beyond its register.

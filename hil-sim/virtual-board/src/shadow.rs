@@ -10,12 +10,13 @@ use crate::board::Period;
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
+use induction_drive::settings::staging::Staging;
 
 /// A drive with the settings of the board.
 pub struct Shadow {
     /// The drive.
     pub drive: Drive,
-    settings: FirmwareSettings,
+    settings: Staging,
     /// Dead time that the timer makes since its start, s.
     dead_time_s: f32,
     orders: VecDeque<Command>,
@@ -36,12 +37,13 @@ impl Shadow {
         let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
+        let settings = Staging::new(settings);
         Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
     }
 
     /// Its settings, with the dead time that the timer makes.
     pub fn settings(&self) -> Settings {
-        let mut settings = self.settings.drive;
+        let mut settings = self.settings.in_force().drive;
         settings.inverter.dead_time_s = self.dead_time_s;
         settings
     }
@@ -53,7 +55,8 @@ impl Shadow {
     pub fn type_line(&mut self, line: &str) -> Result<()> {
         let order = match grammar::parse(line) {
             Ok(Request::Start(mode)) => {
-                if !self.settings.command.wiring_checked {
+                self.apply()?;
+                if !self.settings.in_force().command.wiring_checked {
                     self.orders.push_back(Command::CheckWiring);
                 }
                 Command::Start(mode)
@@ -64,10 +67,19 @@ impl Shadow {
             Ok(Request::Torque(i_q)) => Command::Torque(i_q),
             Ok(Request::Speed(rpm)) => Command::Speed(rpm),
             Ok(Request::Position(turns)) => Command::Position(turns),
-            Ok(Request::Set(key, value)) => self.configure(|settings| key.set(settings, value))?,
-            Ok(Request::Defaults) => {
-                self.configure(|settings| *settings = FirmwareSettings::of_the_board())?
+            Ok(Request::Set(values)) => {
+                self.settings.set(&values).map_err(|why| anyhow::anyhow!("{line}: {why}"))?;
+                return Ok(());
             }
+            Ok(Request::Defaults) => {
+                self.settings.set_defaults();
+                return Ok(());
+            }
+            Ok(Request::Revert) => {
+                self.settings.revert();
+                return Ok(());
+            }
+            Ok(Request::Apply | Request::Save) => return self.apply(),
             Ok(_) => return Ok(()), // no order to the drive
             Err(why) => bail!("{line}: {why}"),
         };
@@ -75,12 +87,16 @@ impl Shadow {
         Ok(())
     }
 
-    /// Changes settings, as the firmware's console does.
-    fn configure(&mut self, change: impl FnOnce(&mut FirmwareSettings)) -> Result<Command> {
-        let before = self.settings;
-        change(&mut self.settings);
-        self.settings.forget_unless_as(&before);
-        Ok(Command::Configure(self.settings.build_for(self.dead_time_s)?))
+    /// Puts the staged settings in force, as the firmware's console does.
+    fn apply(&mut self) -> Result<()> {
+        let designs = self.settings.needs_design();
+        if let Some(settings) = self.settings.prepare()
+            && designs
+        {
+            self.orders.push_back(Command::Configure(settings.build_for(self.dead_time_s)?));
+        }
+        self.settings.adopt();
+        Ok(())
     }
 
     /// The board was reset: it has these settings, which were saved, and starts anew.
@@ -88,7 +104,7 @@ impl Shadow {
     /// # Errors
     /// They make no drive.
     pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
-        self.settings = settings;
+        self.settings = Staging::new(settings);
         self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
         self.orders.clear();
         Ok(())
@@ -96,7 +112,7 @@ impl Shadow {
 
     /// All settings, with the learned table.
     pub fn firmware_settings(&self) -> &FirmwareSettings {
-        &self.settings
+        self.settings.in_force()
     }
 
     /// Follows a control interrupt of the board.
@@ -110,7 +126,7 @@ impl Shadow {
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()
         {
-            self.settings.learn(found);
+            self.settings.note(|settings| settings.learn(found));
         }
         if compare != period.compare {
             bail!(
@@ -123,7 +139,7 @@ impl Shadow {
         self.compared += 1;
         // As the firmware's console: a drive that is past the check need not check again.
         if self.drive.state() == State::Magnetising {
-            self.settings.command.wiring_checked = true;
+            self.settings.note(|settings| settings.command.wiring_checked = true);
         }
         if period.took_order {
             // The main loop looks after the tracking first; of a line, it may not have heard yet.
@@ -132,7 +148,7 @@ impl Shadow {
             let Some(order) = order else { bail!("an order that was not given") };
             let answer = self.drive.command(&order);
             if let (Ok(_), Command::Configure(_)) = (answer, order) {
-                self.tracking = Tracking::new(&self.settings.drive);
+                self.tracking = Tracking::new(&self.settings.in_force().drive);
             }
         }
         // As the firmware's main loop.

@@ -30,7 +30,7 @@ fn it_starts_says_who_it_is_and_stays_off() -> Result<()> {
     );
     let log = board.take_log()?;
     assert!(log.iter().any(|line| line.contains("reset by power-on")), "{log:#?}");
-    assert!(log.iter().any(|line| line.contains("off: codes")), "{log:#?}");
+    assert!(log.iter().any(|line| line.contains("state: off")), "{log:#?}");
     assert!(!log.iter().any(|line| line.starts_with("ERROR")), "{log:#?}");
     assert!(!board.chip().tim1.outputs_on());
     assert!(board.resets.is_empty());

@@ -9,8 +9,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use hil_sim::Config;
+use hil_sim::console::catalogue::Catalogue;
+use hil_sim::console::link::Link;
+use hil_sim::console::session::{Flow, Session};
 use serde_json::Value;
-use virtual_board::interactive::script::{Due, Script};
 
 /// Longest wait for an answer on a busy machine; an answer takes 20 ms of simulated time.
 const ANSWER: Duration = Duration::from_secs(20);
@@ -53,15 +55,20 @@ struct Talk {
     said: Receiver<String>,
 }
 
+/// Starts a board: the process, its output, and its port.
+fn begin(mut command: Command) -> (Child, BufReader<ChildStdout>, File) {
+    let mut board = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut shown = BufReader::new(board.stdout.take().unwrap());
+    let mut first = String::new();
+    shown.read_line(&mut first).unwrap();
+    let path = first.trim().strip_prefix("console: ").expect(&first);
+    let port = OpenOptions::new().read(true).write(true).open(path).expect(path);
+    (board, shown, port)
+}
+
 impl Talk {
-    fn new(mut command: Command) -> Self {
-        let mut board =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
-        let mut shown = BufReader::new(board.stdout.take().unwrap());
-        let mut first = String::new();
-        shown.read_line(&mut first).unwrap();
-        let path = first.trim().strip_prefix("console: ").expect(&first);
-        let port = OpenOptions::new().read(true).write(true).open(path).expect(path);
+    fn new(command: Command) -> Self {
+        let (board, shown, port) = begin(command);
         let said = lines(port.try_clone().unwrap());
         Self { board, shown, port, said }
     }
@@ -130,7 +137,7 @@ fn mean_within(series: &[(f64, f64)], from: f64, to: f64) -> f64 {
 #[test]
 fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
     let folder = folder("talk");
-    let mut talk = Talk::new(command(&folder, &["--seed", "5"]));
+    let mut talk = Talk::new(command(&folder, &["--seed", "5", "--log", "info"]));
     assert!(talk.next().contains("last run: reset by power-on"));
     let mut help = vec![talk.say("help")];
     while help.last().is_some_and(|line| line != "ok") {
@@ -263,11 +270,16 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&run(&["--load", "free", "3"]), 2, &["only speed takes a number"]);
     refused(&run(&["--seconds", "-1"]), 2, &["seconds = -1", "0.001 to 3600 s"]);
     refused(&run(&["--script", "none.txt"]), 2, &["none.txt"]);
+    std::fs::write(folder.join("none.bin"), "nothing").unwrap();
+    let flash = folder.join("none.bin").display().to_string();
+    refused(&run(&["--flash", &flash]), 2, &["none.bin", "7 bytes", "266256"]);
+    refused(&run(&["--lenient"]), 2, &["--script"]);
+    refused(&run(&["--log", "loud"]), 2, &["loud", "warn"]);
     let script = folder.join("bad.txt");
     std::fs::write(&script, "at 1: start\nat soon: stop\n").unwrap();
     let script = script.display().to_string();
     refused(&run(&["--script", &script]), 2, &["line 2", "at soon: stop", "0 to 3600 s"]);
-    assert!(std::fs::read_dir(&folder).unwrap().count() == 1, "no page is written");
+    assert!(std::fs::read_dir(&folder).unwrap().count() == 2, "no page is written");
 
     // Room for the ELF to be read, but not for both ends of a pseudo-terminal.
     let program = env!("CARGO_BIN_EXE_board");
@@ -275,30 +287,99 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&Command::new("sh").args(limited).output().unwrap(), 1, &["pseudo-terminal"]);
 }
 
+/// `cargo sim console` finds the commands and settings of the image, restores a file and plots a trace.
 #[test]
-fn scripts_keep_their_times_and_wait_for_texts() {
-    let mut script =
-        Script::parse("at 1: a b\n\n# c\nwait 0.5: d: e\nwait for ok\nat 1: f").unwrap();
-    let mut due = |now, heard: Option<&str>| {
-        heard.into_iter().for_each(|line| script.hear(line));
-        script.due(now)
-    };
-    assert_eq!(due(0.9, Some("ok")).unwrap(), Due::Nothing);
-    assert_eq!(due(1.0, None).unwrap(), Due::Type("a b".into()));
-    assert_eq!(due(1.4, None).unwrap(), Due::Nothing);
-    assert_eq!(due(1.5, None).unwrap(), Due::Type("d: e".into()));
-    assert_eq!(due(1.6, Some("error")).unwrap(), Due::Nothing);
-    assert_eq!(due(2.0, Some("well, ok")).unwrap(), Due::Nothing);
-    // Its time has passed.
-    assert_eq!(due(2.1, None).unwrap(), Due::Type("f".into()));
-    assert_eq!(due(2.2, None).unwrap(), Due::Nothing);
-    assert_eq!(due(3.0, None).unwrap(), Due::End);
-
-    let mut silent = Script::parse("wait for ok").unwrap();
-    assert_eq!(silent.due(29.0).unwrap(), Due::Nothing);
-    assert!(silent.due(31.0).unwrap_err().to_string().contains("`ok` within 30 s"));
-    for bad in ["stop", "at 1 stop", "at -1: stop", "at nan: stop", "after 1: stop", "wait: stop"] {
-        let why = Script::parse(bad).unwrap_err();
-        assert!(why.contains("line 1") && why.contains(bad), "{why}");
+fn the_console_program_understands_the_image() {
+    let folder = folder("console");
+    let (mut board, _shown, port) = begin(command(&folder, &[]));
+    let link = Link::new(port.try_clone().unwrap(), port, |_: &str| ());
+    let mut session = Session::new(link);
+    let catalogue = Catalogue::read(session.link()).unwrap();
+    assert!(catalogue.settings() > 50);
+    for (line, word) in [("rel", "relock"), ("set motor.r_", "motor.r_s"), ("log w", "warn")] {
+        assert!(catalogue.complete(line).1.iter().any(|found| found == word), "{line}");
     }
+    let file = folder.join("settings.txt").display().to_string();
+    let restore = format!("!restore {file}");
+    std::fs::write(&file, "set command.timeout_s 77\nset command.timeout_s soon\n").unwrap();
+    let why = session.enter(&restore, |_| ()).unwrap_err().to_string();
+    assert!(why.contains("settings.txt, line 2: `set command.timeout_s soon`: error:"), "{why}");
+    let mut said = Vec::new();
+    session.enter("get command.timeout_s", |line| said.push(line.to_owned())).unwrap();
+    assert!(said[0].starts_with("command.timeout_s = 77"), "{said:?}");
+    let plot = folder.join("trace.svg");
+    assert_eq!(session.enter("trace 20 2 i_q dc_link", |_| ()).unwrap(), Flow::Next);
+    session.enter(&format!("!plot {}", plot.display()), |line| said.push(line.to_owned())).unwrap();
+    assert!(said[1].starts_with("20 records in") && plot.exists(), "{said:?}");
+    board.kill().unwrap();
+    board.wait().unwrap();
+}
+
+/// A session with a script, as fast as it goes; exit code and all that it showed.
+fn play(folder: &Path, script: &str, arguments: &[&str]) -> (Option<i32>, String) {
+    let file = folder.join("script.txt");
+    std::fs::write(&file, script).unwrap();
+    let mut command = command(folder, &["--fast", "--script"]);
+    let output = command.arg(&file).args(arguments).stdin(Stdio::null()).output().unwrap();
+    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (output.status.code(), text.concat())
+}
+
+#[test]
+fn saved_settings_outlast_reset_power_and_session() {
+    let folder = folder("flash");
+    let flash = folder.join("flash.bin").display().to_string();
+    let first = "at 1: set command.timeout_s 1234\n\
+                 expect ok\n\
+                 at 3: !unplug\n\
+                 expect last run: reset by power-on\n\
+                 wait 1: get command.timeout_s\n\
+                 expect command.timeout_s = 0\n\
+                 wait 0.1: set command.timeout_s 1234\n\
+                 expect ok\n\
+                 wait 2: save\n\
+                 expect ok\n\
+                 wait 0.1: !reset\n\
+                 expect last run: reset by reset pin\n\
+                 wait 1: get command.timeout_s\n\
+                 expect command.timeout_s = 1234\n";
+    let (code, shown) = play(&folder, first, &["--flash", &flash]);
+    assert_eq!(code, Some(0), "{shown}");
+    assert!(!shown.contains("INFO"), "the log is calm: {shown}");
+    let later = "at 1: get command.timeout_s\nexpect 1s command.timeout_s = 1234\n";
+    let (code, shown) = play(&folder, later, &["--flash", &flash]);
+    assert_eq!(code, Some(0), "{shown}");
+    let (code, shown) = play(&folder, later, &[]);
+    assert_eq!(code, Some(1), "without the file: {shown}");
+}
+
+#[test]
+fn an_error_in_a_script_ends_it_with_its_line() {
+    let folder = folder("strict");
+    let script = "at 1: torqe 1\nwait 0.5: status\n";
+    let (code, shown) = play(&folder, script, &[]);
+    assert_eq!(code, Some(1), "{shown}");
+    assert!(shown.contains("line 1: `at 1: torqe 1`: answered `error:"), "{shown}");
+    assert!(!shown.contains("> status"), "it has ended: {shown}");
+    let (code, shown) = play(&folder, script, &["--lenient"]);
+    assert_eq!(code, Some(0), "{shown}");
+    assert!(shown.contains("> status"), "it goes on: {shown}");
+}
+
+#[test]
+fn a_motor_with_other_sensors_is_told_its_settings() {
+    let folder = folder("sensors");
+    let keys = ["--set", "measurement.range_a=12", "--set", "inverter.dc_link_v=540"];
+    let shown = play(&folder, "at 0.5: !help\n", &keys).1;
+    // 12 A over 4.4727 A times the image's 2.4332 mA a code; 450 V times 540 over 311.
+    for line in ["set inverter.dc_link_v 540", "set scales.current_a.offset -12", "!reset"] {
+        assert!(shown.contains(line), "{line}: {shown}");
+    }
+    let value = |name: &str| -> f64 {
+        let (_, rest) = shown.split_once(&format!("set {name} ")).expect(name);
+        rest.lines().next().unwrap().parse().unwrap()
+    };
+    assert!((value("scales.current_a.gain") / (2.4332e-3 * 12.0 / 4.4727134) - 1.0).abs() < 1e-4);
+    assert!((value("scales.dc_link.gain") / (0.11 * 540.0 / 311.0) - 1.0).abs() < 1e-4);
+    assert!(!play(&folder, "at 0.1: !help\n", &[]).1.contains("set scales"));
 }

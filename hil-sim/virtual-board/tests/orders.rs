@@ -44,7 +44,8 @@ fn cost(pair: &mut Pair, line: &str) -> Result<(u32, u32)> {
 #[test]
 fn an_order_leaves_most_of_the_period() -> Result<()> {
     let mut pair = common::pair(&Config::default(), 5)?;
-    for line in ["clear", "angle injection", "start"] {
+    pair.say("set motor.inertia 0.013")?;
+    for line in ["clear", "apply", "start"] {
         let (taken, _) = cost(&mut pair, line)?;
         assert!(taken < PERIOD / 2, "{line}: {taken} cycles");
     }

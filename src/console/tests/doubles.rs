@@ -11,7 +11,7 @@ use induction_drive::board;
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
 use induction_drive::link::Status;
-use induction_drive::link::trace::{self, SignalChoice};
+use induction_drive::link::trace::{self, Plan, Trigger};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
@@ -24,8 +24,12 @@ pub struct FakeDrive {
     pub running: bool,
     /// Last sample.
     pub sample: Sample,
-    /// Number of records of the trace.
-    pub records: u16,
+    /// The trace that was asked for last, and whether its trigger has come.
+    pub plan: Option<Plan>,
+    /// See `plan`.
+    pub triggered: bool,
+    /// Times that the chip was reset.
+    pub reboots: u32,
     /// Commands so far.
     pub commands: Vec<Command>,
     /// Settings saved last.
@@ -45,7 +49,9 @@ impl FakeDrive {
             drive,
             running: true,
             sample: Sample { heat_sink: 1309, ..Sample::default() },
-            records: 0,
+            plan: None,
+            triggered: false,
+            reboots: 0,
             commands: Vec::new(),
             saved: None,
             worn_out: false,
@@ -73,6 +79,7 @@ impl DriveHandle for FakeDrive {
             last_cycles: 800,
             worst_latency: u32::MAX,
             hardware: Hardware::empty(),
+            learning: self.drive.learning_progress(),
         })
     }
     fn is_off(&self) -> bool {
@@ -94,16 +101,28 @@ impl DriveHandle for FakeDrive {
         self.saved = Some(*settings);
         Ok(())
     }
-    fn begin_trace(&mut self, records: u16, _: u16, _: &SignalChoice) -> bool {
-        assert!(usize::from(records) <= board::TRACE_RECORDS);
-        self.records = records;
+    fn begin_trace(&mut self, plan: &Plan) -> bool {
+        assert!(usize::from(plan.records) <= board::TRACE_RECORDS);
+        if self.tracing() {
+            return false;
+        }
+        self.triggered = plan.trigger == Trigger::Now;
+        self.plan = Some(plan.clone());
         true
     }
-    fn tracing(&self) -> bool {
-        false
+    fn cancel_trace(&mut self) {
+        self.plan = None;
     }
-    fn traced(&self, i: u16) -> Option<trace::Record> {
-        (i < self.records).then_some([0.0; trace::MOST])
+    fn tracing(&self) -> bool {
+        self.plan.is_some() && !self.triggered
+    }
+    fn traced(&self, i: u16) -> Option<(i16, trace::Record)> {
+        let plan = self.plan.as_ref()?;
+        let from_trigger = if plan.trigger == Trigger::Now { i } else { i.wrapping_sub(2) };
+        (i < plan.records).then_some((from_trigger as i16, [1.0 / 3.0; trace::MOST]))
+    }
+    fn reboot(&mut self) {
+        self.reboots += 1;
     }
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
         if let Some(found) = self.found.take() {

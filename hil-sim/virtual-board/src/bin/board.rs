@@ -14,6 +14,7 @@ use hil_sim::outcome::Origin;
 use hil_sim::report::{self, Section};
 use hil_sim::{Config, Error};
 use signal_hook::consts::{SIGINT, SIGTERM};
+use virtual_board::interactive::flash_file::FlashFile;
 use virtual_board::interactive::page;
 use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::Script;
@@ -42,25 +43,37 @@ fn run(options: &Options) -> Result<()> {
     // Everything that can be refused, before the session begins.
     let config = options.config()?;
     let script = options.script.as_deref().map(Script::open).transpose()?;
+    let script = script.map(|script| if options.lenient { script } else { script.strict() });
     let image = image(options.elf.as_deref())?;
     let pty = Pty::open()?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
     }
-    let board = Board::new(image, virtual_board::Options::new(&config, options.input.seed))?;
+    let mut board = Board::new(image, virtual_board::Options::new(&config, options.input.seed))?;
+    let flash = options.flash.as_deref().map(|path| FlashFile::open(path, &mut board.chip().flash));
+    let flash = flash.transpose()?;
 
-    say(&format!("console: {}", pty.path().display()));
+    let port = pty.path().display();
+    say(&format!("console: {port}"));
     say(&format!(
-        "type `screen {} 115200` elsewhere, or commands here; quit ends",
-        pty.path().display()
+        "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
+    let set_lines = virtual_board::Options::set_lines(&config);
+    if !set_lines.is_empty() {
+        say(
+            "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",
+        );
+        set_lines.iter().for_each(|line| say(&format!("    {line}")));
+    }
     let inputs = Inputs {
         terminal: typed_lines(),
         stop,
         script,
         seconds: config.extent.seconds,
         paced: !options.fast,
+        flash,
+        log: options.log,
     };
     let mut session = Session::new(board, pty, inputs);
     let end = session.run(|line| say(&line.to_string()));

@@ -4,6 +4,7 @@ use anyhow::Result;
 
 use super::Board;
 use crate::chip::CONTROL_INTERRUPT;
+use crate::periph::Reset;
 
 impl Board {
     /// Puts a line, without its end, on the wire to the console.
@@ -38,6 +39,14 @@ impl Board {
         let lines = self.log.take(&mut self.cpu)?;
         self.lines.extend(lines);
         Ok(())
+    }
+
+    /// The supply of the controller goes and comes back at once: RAM is lost, and an operation of the flash that is in
+    /// progress leaves its words unreadable.
+    pub fn unplug(&mut self) {
+        let now = self.chip().now;
+        self.chip().flash.cut(now);
+        self.reset(Reset::Power);
     }
 
     /// Level of the break pin: low trips.

@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, bail, ensure};
 
-use super::scene::cause;
 use crate::board::Board;
 use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::periph::Reset;
@@ -95,11 +94,8 @@ pub fn reported(board: &mut Board, whole_start: bool) -> Result<()> {
         bail!("outputs off without a reason in the log: {:?}", board.take_log()?)
     };
     let log = board.take_log()?;
-    ensure!(
-        log.iter().any(|l| l.contains(cause(reset))),
-        "no {:?} in the log {log:?}",
-        cause(reset)
-    );
+    let cause = reset.to_string();
+    ensure!(log.iter().any(|line| line.contains(&cause)), "no {cause:?} in the log {log:?}");
     if reset == Reset::Software {
         ensure!(log.iter().any(|l| l.contains("the last run ended with")), "no reason: {log:?}");
     }

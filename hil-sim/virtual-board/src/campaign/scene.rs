@@ -14,7 +14,6 @@ use crate::chip::Chip;
 use crate::image::Image;
 use crate::memory::{BANK_2, Region};
 use crate::pair::Pair;
-use crate::periph::Reset;
 
 /// Current on the quadrature axis before the injection, A.
 const TORQUE: &str = "torque 1.5";
@@ -192,14 +191,4 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
         _ => None,
     }
     .context("no whole settings in the flash")
-}
-
-/// The name of a cause of reset in the log.
-pub const fn cause(reset: Reset) -> &'static str {
-    match reset {
-        Reset::Power => "reset by power-on",
-        Reset::Pin => "reset by reset pin",
-        Reset::Software => "reset by software",
-        Reset::Watchdog => "reset by watchdog",
-    }
 }

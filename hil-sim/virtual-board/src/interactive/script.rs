@@ -1,55 +1,80 @@
-//! Sessions without a person: lines that are typed at their time.
+//! Sessions without a person: lines that are typed at their time, and checks of the answers.
 //!
 //! ```text
 //! # comment
 //! at 3: start             types `start` 3 s after power-on, at once if that has passed
 //! wait for torque:        goes on when console or log have said a line with `torque:` since the last one
 //! wait 0.5: torque 1      types `torque 1` half a second after that
+//! expect ok               console or log have said a line with `ok` since the last typed line, or do within 8 s
+//! expect 2s ok            the same within 2 s
+//! expect not fault        they have said no line with `fault` since the last typed line, and do not for 1 s
+//! expect not 5s fault     the same for 5 s
+//! wait 1: !reset          presses the reset button; see [`super::own`]
 //! wait 1: quit            ends the session
 //! ```
+//!
+//! A strict script fails at the first answer `error:` that no following `expect` or `wait for` names, at the first text
+//! that does not come, and when a fault is latched at its end.
+
+mod step;
 
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow};
 use hil_sim::Error;
 
-/// One line of a script.
-#[derive(Clone, Debug, PartialEq)]
-enum Step {
-    /// Types a line at a time since power-on, s.
-    At(f64, String),
-    /// Types a line so long after the step before, s.
-    After(f64, String),
-    /// Goes on when a line with this text has come.
-    For(String),
-}
+use super::own::Own;
+use step::Step;
 
 /// Longest wait for a text, s.
 const PATIENCE_S: f64 = 30.0;
 /// From the last step to the end of the session, s: the last answer is still heard.
 const LAST_ANSWER_S: f64 = 0.5;
-/// Longest time in a script, s: an hour, as for `seconds`.
-const LONGEST_S: f64 = 3600.0;
+/// The line that asks for a latched fault, and the beginning of the answer if there is one.
+const FAULTS: (&str, &str) = ("faults", "latched");
 
 /// The next action of a script.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Due {
     /// Nothing.
     Nothing,
     /// Type this.
     Type(String),
+    /// A check has failed and is only noted.
+    Note(String),
     /// It is at its end.
+    #[default]
     End,
+}
+
+/// A line of the file.
+#[derive(Clone, Debug)]
+struct Placed {
+    number: usize,
+    text: String,
+    step: Step,
 }
 
 /// A script and how far it has come.
 #[derive(Clone, Debug, Default)]
 pub struct Script {
-    steps: Vec<Step>,
+    steps: Vec<Placed>,
     next: usize,
     /// When the last step was done, s.
     since: f64,
+    /// The text of `wait for` has come.
     heard: bool,
+    /// The last step that typed a line.
+    typed: Option<usize>,
+    /// Lines that have come since.
+    answers: Vec<String>,
+    /// The first answer that is an error and not expected.
+    unexpected: Option<String>,
+    strict: bool,
+    /// The fault has been asked for.
+    at_end: bool,
+    /// `quit`, if the script says so.
+    end_with: Due,
 }
 
 impl Script {
@@ -70,67 +95,132 @@ impl Script {
     /// The number of the first line that is none of the forms, and why.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut steps = Vec::new();
-        for (number, line) in text.lines().enumerate() {
-            let line = line.trim();
+        for (index, line) in text.lines().enumerate() {
+            let (number, line) = (index + 1, line.trim());
             if !line.is_empty() && !line.starts_with('#') {
                 let step = Step::parse(line);
-                steps.push(step.map_err(|why| format!("line {}: `{line}`: {why}", number + 1))?);
+                let step = step.map_err(|why| format!("line {number}: `{line}`: {why}"))?;
+                steps.push(Placed { number, text: line.to_owned(), step });
             }
         }
         Ok(Self { steps, ..Self::default() })
     }
 
+    /// Fails at unexpected errors and at a fault at the end.
+    pub fn strict(self) -> Self {
+        Self { strict: true, ..self }
+    }
+
     /// A line that console or log have said.
     pub fn hear(&mut self, line: &str) {
-        if let Some(Step::For(text)) = self.steps.get(self.next) {
-            self.heard |= line.contains(text.as_str());
+        self.heard |= self.steps.get(self.next).is_some_and(|placed| placed.step.awaits(line));
+        if line.starts_with("error:") && !self.expects(line) && self.unexpected.is_none() {
+            self.unexpected = Some(self.failure(self.typed, &format!("answered `{line}`")));
         }
+        self.answers.push(line.to_owned());
+    }
+
+    /// Whether a step between the last typed line and the next one waits for this line.
+    fn expects(&self, line: &str) -> bool {
+        let behind = self.typed.map_or(0, |typed| typed + 1);
+        let steps = self.steps[behind..].iter().map(|placed| &placed.step);
+        steps.take_while(|step| !step.types()).any(|step| step.awaits(line))
+    }
+
+    /// A line with this text since the last typed one.
+    fn answer(&self, text: &str) -> Option<&str> {
+        self.answers.iter().map(String::as_str).find(|line| line.contains(text))
+    }
+
+    /// A failure at a step, in words.
+    fn failure(&self, step: Option<usize>, why: &str) -> String {
+        match step.and_then(|step| self.steps.get(step)) {
+            Some(Placed { number, text, .. }) => format!("script, line {number}: `{text}`: {why}"),
+            None => format!("script, before its first line: {why}"),
+        }
+    }
+
+    /// The time of the session is over: the failure of a strict script that has heard an unexpected error or is not at
+    /// its end.
+    pub fn cut_short(&mut self) -> Option<String> {
+        let over = (self.next < self.steps.len())
+            .then(|| self.failure(Some(self.next), "the time of the session is over"));
+        self.unexpected.take().or(over).filter(|_| self.strict)
     }
 
     /// The action due at this time, s since power-on.
     ///
     /// # Errors
-    /// A text that was waited for has not come.
+    /// A check has failed.
     pub fn due(&mut self, now: f64) -> Result<Due> {
-        let Some(step) = self.steps.get(self.next) else {
-            let over = now >= self.since + LAST_ANSWER_S;
-            return Ok(if over { Due::End } else { Due::Nothing });
-        };
+        if let Some(why) = self.unexpected.take().filter(|_| self.strict) {
+            return Err(anyhow!(why));
+        }
+        let Some(Placed { step, .. }) = self.steps.get(self.next) else { return self.end(now) };
+        let passed = now - self.since;
+        let mut failed = None;
         let due = match step {
             Step::At(at, line) if now >= *at => Due::Type(line.clone()),
-            Step::After(wait, line) if now >= self.since + wait => Due::Type(line.clone()),
+            Step::After(wait, line) if passed >= *wait => Due::Type(line.clone()),
             Step::For(_) if self.heard => Due::Nothing,
-            Step::For(text) if now > self.since + PATIENCE_S => {
-                bail!("script: nothing said `{text}` within {PATIENCE_S} s")
+            Step::For(text) if passed > PATIENCE_S => {
+                return Err(anyhow!(self.silence(text, PATIENCE_S)));
             }
+            Step::Expect(_, text) if self.answer(text).is_some() => Due::Nothing,
+            Step::Expect(within, text) if passed > *within => {
+                failed = Some(self.silence(text, *within));
+                Due::Nothing
+            }
+            Step::ExpectNot(during, text) => match self.answer(text) {
+                Some(line) => {
+                    failed = Some(self.failure(Some(self.next), &format!("said `{line}`")));
+                    Due::Nothing
+                }
+                None if passed > *during => Due::Nothing,
+                None => return Ok(Due::Nothing),
+            },
             _ => return Ok(Due::Nothing),
         };
+        if let Some(why) = failed.take_if(|_| self.strict) {
+            return Err(anyhow!(why));
+        }
+        if let Due::Type(line) = &due {
+            if self.strict && Own::parse(line) == Ok(Some(Own::Quit)) {
+                self.end_with = Due::Type(line.clone());
+                self.next = self.steps.len();
+                self.since = now;
+                return Ok(Due::Nothing);
+            }
+            self.typed = Some(self.next);
+            self.answers.clear();
+        }
         self.next += 1;
         self.since = now;
         self.heard = false;
-        Ok(due)
+        Ok(failed.map_or(due, Due::Note))
     }
-}
 
-impl Step {
-    fn parse(line: &str) -> Result<Self, String> {
-        if let Some(text) = line.strip_prefix("wait for ") {
-            return Ok(Self::For(text.trim().to_owned()));
+    /// Behind the last step: the last answer is heard, then a strict script asks for a latched fault.
+    fn end(&mut self, now: f64) -> Result<Due> {
+        if now < self.since + LAST_ANSWER_S {
+            return Ok(Due::Nothing);
         }
-        let forms = "write `at SECONDS: LINE`, `wait SECONDS: LINE` or `wait for TEXT`";
-        let (word, rest) = line.split_once(' ').ok_or(forms)?;
-        let (seconds, typed) = rest.split_once(':').ok_or(forms)?;
-        let typed = typed.trim().to_owned();
-        let seconds = match seconds.trim().parse() {
-            Ok(seconds) if (0.0..=LONGEST_S).contains(&seconds) => seconds,
-            _ => {
-                return Err(format!("`{}`: not a number from 0 to {LONGEST_S} s", seconds.trim()));
-            }
-        };
-        match word {
-            "at" => Ok(Self::At(seconds, typed)),
-            "wait" => Ok(Self::After(seconds, typed)),
-            _ => Err(forms.into()),
+        if !self.strict {
+            return Ok(Due::End);
         }
+        if !self.at_end {
+            self.at_end = true;
+            self.since = now;
+            self.answers.clear();
+            return Ok(Due::Type(FAULTS.0.to_owned()));
+        }
+        match self.answers.iter().find(|line| line.starts_with(FAULTS.1)) {
+            Some(fault) => Err(anyhow!(self.failure(self.typed, &format!("at the end: {fault}")))),
+            None => Ok(self.end_with.clone()),
+        }
+    }
+
+    fn silence(&self, text: &str, within: f64) -> String {
+        self.failure(Some(self.next), &format!("nothing said `{text}` within {within} s"))
     }
 }

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Result, bail};
+use hil_sim::board::LogLevel;
 
+use super::flash_file::FlashFile;
+use super::own::Own;
 use super::pty::Pty;
 use super::readings::Readings;
 use super::record::Record;
@@ -14,6 +17,7 @@ use super::script::{Due, Script};
 use super::transcript::{Assembler, Line, Source};
 use crate::board::{Board, Period};
 use crate::chip::{TICKS_PER_PERIOD as PERIOD, TICKS_PER_S};
+use crate::periph::Reset;
 
 /// Control periods between two exchanges with the inputs: 5 ms, which a person does not notice.
 const SLICE: u32 = 30;
@@ -22,6 +26,9 @@ const SLICE: u32 = 30;
 const BEFORE: u64 = PERIOD / 8;
 /// Later than this, time that was lost is not made up for: the board would race.
 const LATE: Duration = Duration::from_millis(100);
+
+/// A session without a person shows its time after this long without a line.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
 /// Why a session has ended.
 #[derive(Debug)]
@@ -50,6 +57,10 @@ pub struct Inputs {
     pub seconds: Option<f64>,
     /// Whether simulated time follows the clock.
     pub paced: bool,
+    /// The file that keeps the flash, if there is one.
+    pub flash: Option<FlashFile>,
+    /// Least urgent lines of the log that are kept and shown.
+    pub log: LogLevel,
 }
 
 /// A board that is talked to.
@@ -94,12 +105,21 @@ impl Session {
     /// Goes on until something ends it; every line is shown when it comes.
     pub fn run(&mut self, mut show: impl FnMut(&Line)) -> End {
         let (mut clock, mut since) = (Instant::now(), self.board.time());
+        let mut said = Instant::now();
+        let alone = self.inputs.script.is_some() || !self.inputs.paced;
         let end = loop {
             let shown = self.lines.len();
             let end = self.slice().unwrap_or_else(|error| Some(End::Failed(error)));
             self.lines[shown..].iter().for_each(&mut show);
             if let Some(end) = end {
                 break end;
+            }
+            if self.lines.len() > shown {
+                said = Instant::now();
+            } else if alone && said.elapsed() >= SIGN_OF_LIFE {
+                said = Instant::now();
+                let text = "simulating".to_owned();
+                show(&Line { time: self.board.time(), source: Source::Board, text });
             }
             if self.inputs.paced {
                 let due = Duration::from_secs_f64(self.board.time() - since);
@@ -111,6 +131,8 @@ impl Session {
                 std::thread::sleep(due.saturating_sub(passed));
             }
         };
+        // The flash may have changed in the last slice.
+        let end = self.keep_flash().err().map_or(end, End::Failed);
         let shown = self.lines.len();
         for (rest, source) in [(self.typed.rest(), Source::Typed), (self.said.rest(), Source::Said)]
         {
@@ -135,22 +157,27 @@ impl Session {
             return Ok(Some(End::Signal));
         }
         if self.inputs.seconds.is_some_and(|seconds| now >= seconds) {
+            if let Some(why) = self.inputs.script.as_mut().and_then(Script::cut_short) {
+                bail!(why);
+            }
             return Ok(Some(End::Time));
         }
         let typed = self.pty.read()?;
         self.send(&typed);
-        loop {
-            match self.inputs.terminal.try_recv() {
-                Ok(line) if is_quit(&line) => return Ok(Some(End::Quit)),
-                Ok(line) => self.send_line(&line),
-                // Without the terminal, script and pseudo-terminal go on.
-                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
+        // Without the terminal, script and pseudo-terminal go on.
+        while let Ok(line) = self.inputs.terminal.try_recv() {
+            if let Some(end) = self.enter(&line) {
+                return Ok(Some(end));
             }
         }
         if let Some(script) = &mut self.inputs.script {
             match script.due(now)? {
-                Due::Type(line) if is_quit(&line) => return Ok(Some(End::Quit)),
-                Due::Type(line) => self.send_line(&line),
+                Due::Type(line) => {
+                    if let Some(end) = self.enter(&line) {
+                        return Ok(Some(end));
+                    }
+                }
+                Due::Note(text) => self.add(Source::Board, text),
                 // An end given by the time is later.
                 Due::End if self.inputs.seconds.is_none() => return Ok(Some(End::Script)),
                 Due::End | Due::Nothing => {}
@@ -158,18 +185,46 @@ impl Session {
         }
         let went = (0..SLICE).try_for_each(|_| self.period());
         self.hear()?;
+        self.keep_flash()?;
         went.map(|()| None)
     }
 
-    fn send_line(&mut self, line: &str) {
-        self.send(line.as_bytes());
-        self.send(b"\n");
+    /// Does a command of the board, or sends the line to the console; the reason of the end, if the session ends.
+    fn enter(&mut self, line: &str) -> Option<End> {
+        let own = match Own::parse(line) {
+            Ok(Some(own)) => own,
+            Ok(None) => {
+                self.send(line.as_bytes());
+                self.send(b"\n");
+                return None;
+            }
+            Err(why) => {
+                self.add(Source::Board, format!("error: {why}"));
+                return None;
+            }
+        };
+        match own {
+            Own::Quit => return Some(End::Quit),
+            Own::Help => Own::help().for_each(|line| self.add(Source::Board, line)),
+            Own::Reset => self.board.reset(Reset::Pin),
+            Own::Unplug => self.board.unplug(),
+        }
+        None
+    }
+
+    fn keep_flash(&mut self) -> Result<()> {
+        let Some(file) = &mut self.inputs.flash else { return Ok(()) };
+        let chip = self.board.chip();
+        file.follow(&chip.flash, chip.now)
     }
 
     fn send(&mut self, bytes: &[u8]) {
         if !bytes.is_empty() {
             self.board.send(bytes);
             for line in self.typed.push(bytes) {
+                // The person who asks for more of the log sees it.
+                let level = line.trim().strip_prefix("log ").and_then(LogLevel::named);
+                self.inputs.log = level.unwrap_or(self.inputs.log);
                 self.add(Source::Typed, line);
             }
         }
@@ -199,7 +254,7 @@ impl Session {
         for n in self.resets..self.board.resets.len() {
             self.resets = n + 1;
             let cause = self.board.resets[n].1;
-            self.add(Source::Board, format!("reset: {cause:?}"));
+            self.add(Source::Board, cause.to_string());
         }
         let bytes = std::mem::take(&mut self.board.chip().lpuart.wire.from_chip);
         for line in self.said.push(&bytes) {
@@ -214,10 +269,15 @@ impl Session {
         {
             script.hear(&text);
         }
+        if source == Source::Log && log_level(&text) > self.inputs.log {
+            return;
+        }
         self.lines.push(Line { time: self.board.time(), source, text });
     }
 }
 
-fn is_quit(line: &str) -> bool {
-    line.trim() == "quit"
+/// The level that a line of the log begins with. A line without one, such as the message of a panic, is an error.
+fn log_level(line: &str) -> LogLevel {
+    let word = line.split_whitespace().next().unwrap_or_default();
+    LogLevel::named(word).unwrap_or(LogLevel::Error)
 }

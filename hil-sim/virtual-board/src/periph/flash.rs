@@ -4,6 +4,8 @@
 //! when the power went has a wrong check code: reading it raises the NMI. A page whose erasure was cut
 //! short holds such words too.
 
+use std::ops::Range;
+
 use super::{Effect, Plain, Store};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
 
@@ -59,6 +61,8 @@ pub struct Flash {
     bytes: Vec<u8>,
     /// Double words whose check code is wrong.
     torn: Vec<bool>,
+    /// Double words of the last operation.
+    changing: Range<usize>,
     /// Operations since the beginning: double words programmed, pages erased.
     pub operations: u64,
     /// The power goes in this operation, counted from 1; its double word or page is torn.
@@ -80,6 +84,7 @@ impl Flash {
             half: None,
             bytes: vec![0xff; size],
             torn: vec![false; size / 8],
+            changing: 0..0,
             operations: 0,
             power_loss_at: None,
             power_lost: false,
@@ -95,6 +100,29 @@ impl Flash {
     pub fn tear(&mut self, address: u32) {
         if let Some(torn) = self.torn.get_mut(((address - BANK_2) / 8) as usize) {
             *torn = true;
+        }
+    }
+
+    /// Contents of the second bank, and its double words whose check code is wrong.
+    pub fn contents(&self) -> (&[u8], &[bool]) {
+        (&self.bytes, &self.torn)
+    }
+
+    /// Replaces the contents by those of another flash of this size.
+    pub fn replace_contents(&mut self, bytes: &[u8], torn: &[bool]) {
+        self.bytes.copy_from_slice(bytes);
+        self.torn.copy_from_slice(torn);
+    }
+
+    /// Whether an operation is in progress.
+    pub fn is_busy(&self, now: u64) -> bool {
+        now < self.busy_until
+    }
+
+    /// The power goes: an operation in progress leaves its double words torn.
+    pub fn cut(&mut self, now: u64) {
+        if self.is_busy(now) {
+            self.torn[self.changing.clone()].fill(true);
         }
     }
 
@@ -125,7 +153,7 @@ impl Flash {
         if self.power_lost {
             return Some(Effect::None);
         }
-        if cr & (PG | LOCK) != PG || now < self.busy_until {
+        if cr & (PG | LOCK) != PG || self.is_busy(now) {
             self.status |= PGSERR;
             return Some(Effect::None);
         }
@@ -151,6 +179,7 @@ impl Flash {
         }
         place.copy_from_slice(&(old & new).to_le_bytes());
         self.torn[at / 8] = false;
+        self.changing = at / 8..at / 8 + 1;
         if self.power_goes() {
             self.torn[at / 8] = true;
         }
@@ -169,14 +198,15 @@ impl Flash {
         let lost = self.power_goes();
         let range = page * PAGE..(page + 1) * PAGE;
         self.bytes[range.clone()].fill(0xff);
-        self.torn[range.start / 8..range.end / 8].fill(lost);
+        self.changing = range.start / 8..range.end / 8;
+        self.torn[self.changing.clone()].fill(lost);
         self.status |= EOP;
     }
 
     /// Reads a register.
     pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
         Some(match offset {
-            SR => self.status | if now < self.busy_until { BSY } else { 0 },
+            SR => self.status | if self.is_busy(now) { BSY } else { 0 },
             ECCR => self.eccr,
             _ => return self.store.read(offset),
         })

@@ -1,0 +1,84 @@
+use super::*;
+
+/// The numbers are in logs and manuals: this list may grow, nothing in it may change.
+#[test]
+fn codes_never_change() {
+    let table = [
+        (1, Fault::OverCurrentA),
+        (2, Fault::OverCurrentB),
+        (3, Fault::OverCurrentC),
+        (4, Fault::DcLinkOverVoltage),
+        (5, Fault::DcLinkUnderVoltage),
+        (6, Fault::OverSpeed),
+        (7, Fault::SensorSaturatedA),
+        (8, Fault::SensorSaturatedB),
+        (9, Fault::CarrierMissingA),
+        (10, Fault::CarrierMissingB),
+        (11, Fault::CurrentNotAsPredicted),
+        (12, Fault::LostAngle),
+        (13, Fault::NonFiniteSettings),
+        (14, Fault::NonFiniteCommand),
+        (15, Fault::NonFiniteState),
+        (16, Fault::OffsetA),
+        (17, Fault::OffsetB),
+        (18, Fault::OverTemperature),
+        (19, Fault::Encoder),
+        (20, Fault::Break),
+        (21, Fault::AnalogWatchdog),
+        (22, Fault::DeadlineMiss),
+        (23, Fault::ConverterOverrun),
+        (24, Fault::ClockFailure),
+        (25, Fault::NoSaliency),
+        (26, Fault::LostLock),
+        (27, Fault::ShaftNotLocked),
+        (28, Fault::NothingLearned),
+        (29, Fault::CarrierWeak),
+        (30, Fault::WiringNoCurrent),
+        (31, Fault::WiringPolarityA),
+        (32, Fault::WiringPolarityB),
+        (33, Fault::WiringExchanged),
+        (34, Fault::WiringCurrent),
+        (35, Fault::CarrierNoRoom),
+        (36, Fault::SensorNoisyA),
+        (37, Fault::SensorNoisyB),
+    ];
+    for (code, fault) in table {
+        assert_eq!(fault.code(), code);
+    }
+    assert_eq!(table.len(), Fault::ALL.len());
+}
+
+/// Plain ASCII, and short enough for a line of the console together with the state of the drive.
+#[test]
+fn texts_fit_a_line_of_the_console() {
+    for fault in Fault::ALL {
+        for text in fault.causes().iter().chain([&fault.text(), &fault.cure()]) {
+            assert!(text.is_ascii() && text.len() <= 110, "{text}");
+            assert!(!text.ends_with('.') && !text.contains(['"', '\\']), "{text}");
+        }
+        assert!(fault.text().len() <= 80, "{fault}");
+    }
+}
+
+/// The page of the faults lists each with its text. The section that its row leads to has the causes in their order, and
+/// the cure.
+#[test]
+fn the_manual_says_the_same() {
+    let manual = include_str!("../../../docs/faults.md").replace('`', "");
+    for fault in Fault::ALL {
+        let row = format!("| {} | {fault} | [cure](#", fault.code());
+        let (_, rest) = manual.split_once(&row).unwrap_or_else(|| panic!("no row {row}"));
+        let (anchor, _) = rest.split_once(')').unwrap();
+        let section = manual.split("\n## ").find(|section| {
+            let heading = section.lines().next().unwrap_or_default().to_lowercase();
+            let kept = heading.chars().filter(|c| c.is_ascii_alphanumeric() || " -".contains(*c));
+            kept.collect::<String>().replace(' ', "-") == anchor
+        });
+        let section = section.unwrap_or_else(|| panic!("no section {anchor}"));
+        let causes: Vec<&str> =
+            section.lines().filter_map(|line| line.strip_prefix("* ")).collect();
+        assert_eq!(causes, fault.causes(), "{anchor}");
+        let cure = format!("\nCure: {}.\n", fault.cure());
+        assert!(section.contains(&cure), "{anchor} lacks {cure}");
+    }
+}

@@ -1,0 +1,184 @@
+//! The commands and settings of a drive, as it lists them itself; and the completion of a line from them.
+
+use serde_json::Value;
+
+use super::link::{Answer, Link, LinkError};
+use super::own;
+
+/// A command, or a setting behind `set`, with the words that can follow it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Known {
+    name: String,
+    words: Vec<String>,
+}
+
+/// Everything that can be completed.
+#[derive(Clone, Debug, Default)]
+pub struct Catalogue {
+    commands: Vec<Known>,
+    settings: Vec<Known>,
+}
+
+impl Catalogue {
+    /// Asks a drive. A firmware that does not know `describe` is asked with `get`.
+    ///
+    /// # Errors
+    /// The drive does not answer.
+    pub fn read(link: &mut Link) -> Result<Self, LinkError> {
+        let commands = commands(&link.ask("help", |_| ())?);
+        let described = link.ask("describe", |_| ())?;
+        let settings = match described.error() {
+            None => {
+                described.contents().iter().filter_map(|line| described_setting(line)).collect()
+            }
+            Some(_) => {
+                let listed = link.ask("get", |_| ())?;
+                listed.contents().iter().filter_map(|line| listed_setting(line)).collect()
+            }
+        };
+        Ok(Self { commands, settings })
+    }
+
+    /// Number of settings.
+    pub fn settings(&self) -> usize {
+        self.settings.len()
+    }
+
+    /// The words that can stand at the end of a line: where the last word begins, and its candidates.
+    pub fn complete(&self, line: &str) -> (usize, Vec<String>) {
+        let begin = line.rfind(char::is_whitespace).map_or(0, |at| at + 1);
+        let (before, word) = line.split_at(begin);
+        let before: Vec<&str> = before.split_whitespace().collect();
+        let names = |known: &[Known]| known.iter().map(|known| known.name.clone()).collect();
+        let words = |known: &[Known], name: &str| {
+            let found = known.iter().find(|known| known.name == name);
+            found.map_or_else(Vec::new, |known| known.words.clone())
+        };
+        let candidates: Vec<String> = match before[..] {
+            [] => {
+                let own = own::HELP.iter().filter_map(|(usage, _)| usage.split(' ').next());
+                let mut all: Vec<String> = names(&self.commands);
+                all.extend(own.map(str::to_owned));
+                all
+            }
+            ["get" | "describe"] => names(&self.settings),
+            // Names and values in turn.
+            ["set", .., name] if before.len().is_multiple_of(2) => words(&self.settings, name),
+            ["set", ..] => names(&self.settings),
+            [command] => words(&self.commands, command),
+            _ => Vec::new(),
+        };
+        (begin, candidates.into_iter().filter(|name| name.starts_with(word)).collect())
+    }
+}
+
+/// The commands of `help`: usage and, behind two spaces, the meaning. Words in lower case behind the name can be typed;
+/// others stand for something.
+fn commands(help: &Answer) -> Vec<Known> {
+    let mut commands: Vec<Known> = Vec::new();
+    let usages = help.contents().iter().filter_map(|line| Some(line.split_once("  ")?.0));
+    for usage in usages {
+        let mut parts = usage.split_whitespace();
+        let Some(name) = parts.next() else { continue };
+        let choices = parts.next().unwrap_or_default().trim_matches(['[', ']']).split('|');
+        let literal =
+            |word: &&str| !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase());
+        let words = choices.filter(literal).map(str::to_owned);
+        match commands.iter_mut().find(|known| known.name == name) {
+            Some(known) => known.words.extend(words),
+            None => commands.push(Known { name: name.to_owned(), words: words.collect() }),
+        }
+    }
+    commands
+}
+
+/// The setting of a line of `describe`, a JSON object.
+fn described_setting(line: &str) -> Option<Known> {
+    let object: Value = serde_json::from_str(line).ok()?;
+    let mut words: Vec<String> = match &object["words"] {
+        Value::Array(words) => words.iter().filter_map(Value::as_str).map(str::to_owned).collect(),
+        Value::String(words) => words.split_whitespace().map(str::to_owned).collect(),
+        _ => Vec::new(),
+    };
+    words.extend((object["auto"] == true).then(|| "auto".to_owned()));
+    Some(Known { name: object["name"].as_str()?.to_owned(), words })
+}
+
+/// The setting of a line of `get`: `NAME = VALUE UNIT (MIN to MAX)` or `NAME = WORD (one of: WORD WORD)`.
+fn listed_setting(line: &str) -> Option<Known> {
+    let (name, rest) = line.split_once(" = ")?;
+    let words = rest.split_once("(one of: ").map_or("", |(_, words)| words.trim_end_matches(')'));
+    let mut words: Vec<_> = words.split_whitespace().map(str::to_owned).collect();
+    words.extend(rest.starts_with("auto").then(|| "auto".to_owned()));
+    Some(Known { name: name.to_owned(), words })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn catalogue() -> Catalogue {
+        let help = [
+            "start [torque|speed]    begins",
+            "stop                    ends",
+            "log off|warn            how much goes to the log",
+            "set KEY VALUE           changes a setting",
+            "trace N [NAME]          records",
+            "trace [off]             ends it",
+            "one line in, one line out",
+            "ok",
+        ];
+        let described = [
+            r#"{"name":"motor.r_s","unit":"ohm","auto":false,"words":[],"value":5.4}"#,
+            r#"{"name":"sequence.i_d","auto":true,"value":null}"#,
+            r#"{"name":"angle_source","words":["encoder","injection"]}"#,
+            r#"{"name":"damaged"#,
+        ];
+        Catalogue {
+            commands: commands(&Answer { lines: help.map(str::to_owned).to_vec() }),
+            settings: described.iter().filter_map(|line| described_setting(line)).collect(),
+        }
+    }
+
+    #[test]
+    fn commands_settings_and_their_words_are_completed() {
+        let catalogue = catalogue();
+        for (line, begin, candidates) in [
+            ("st", 0, &["start", "stop"][..]),
+            ("one", 0, &[]),
+            ("!r", 0, &["!restore"]),
+            ("start s", 6, &["speed"]),
+            ("log ", 4, &["off", "warn"]),
+            ("tr", 0, &["trace"]),
+            ("trace ", 6, &["off"]),
+            ("describe mo", 9, &["motor.r_s"]),
+            ("get mo", 4, &["motor.r_s"]),
+            ("set ", 4, &["motor.r_s", "sequence.i_d", "angle_source"]),
+            ("set angle_source e", 17, &["encoder"]),
+            ("set sequence.i_d ", 17, &["auto"]),
+            ("set motor.r_s 5 an", 16, &["angle_source"]),
+            ("set motor.r_s 5 angle_source ", 29, &["encoder", "injection"]),
+            ("set motor.r_s ", 14, &[]),
+        ] {
+            let (at, found) = catalogue.complete(line);
+            assert_eq!(
+                (at, found),
+                (begin, candidates.iter().map(|c| c.to_string()).collect()),
+                "{line}"
+            );
+        }
+    }
+
+    #[test]
+    fn lines_of_get_name_settings_too() {
+        let source =
+            listed_setting("angle_source = injection (one of: encoder injection)").unwrap();
+        assert_eq!(source.words, ["encoder", "injection"]);
+        let current = listed_setting("sequence.i_d = auto: 0.7 A (0 to 3)").unwrap();
+        assert_eq!(
+            (current.name.as_str(), &current.words[..]),
+            ("sequence.i_d", &["auto".to_owned()][..])
+        );
+        assert_eq!(listed_setting("off; i_d 0.00 A"), None);
+    }
+}

@@ -1,0 +1,218 @@
+//! Moves lines between this program and the drive. A thread reads; its lines go to the command that awaits an answer, or
+//! are shown at once.
+
+use std::io::{ErrorKind, Read, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::answer::{Awaited, Meaning, is_error};
+use super::trace::{Collector, Trace};
+
+/// Longest silence within an answer: a setting is designed for seconds, on a virtual board at a fraction of real time.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// The same of a trace, which is recorded before anything is said.
+const PATIENCE_WITH_TRACE: Duration = Duration::from_secs(600);
+/// Longest line that is put together.
+const LONGEST: usize = 4096;
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The drive says nothing.
+    #[error("`{0}`: no answer within {1} s")]
+    Silence(String, u64),
+    /// The port is gone: unplugged, or the virtual board has ended.
+    #[error("the port is closed")]
+    Closed,
+}
+
+/// The answer to a command.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// Its lines, the last one included.
+    pub lines: Vec<String>,
+}
+
+impl Answer {
+    /// The line that refuses the command.
+    pub fn error(&self) -> Option<&str> {
+        self.lines.last().map(String::as_str).filter(|line| is_error(line))
+    }
+
+    /// The lines but an `ok` at the end.
+    pub fn contents(&self) -> &[String] {
+        match self.lines.split_last() {
+            Some((last, before)) if last == "ok" => before,
+            _ => &self.lines,
+        }
+    }
+}
+
+/// Where the lines of the drive go.
+struct Route {
+    /// To the command that awaits them.
+    asked: Option<Sender<String>>,
+    /// Or to the person.
+    show: Box<dyn FnMut(&str) + Send>,
+    traces: Collector,
+    closed: bool,
+}
+
+impl Route {
+    fn line(&mut self, line: String) {
+        self.traces.push(&line);
+        match &self.asked {
+            Some(asked) => drop(asked.send(line)),
+            None => (self.show)(&line),
+        }
+    }
+}
+
+/// A connection to a drive.
+pub struct Link {
+    port: Box<dyn Write + Send>,
+    route: Arc<Mutex<Route>>,
+}
+
+impl Link {
+    /// A connection over two directions of a port; `show` gets the lines that answer nothing.
+    pub fn new(
+        reader: impl Read + Send + 'static,
+        port: impl Write + Send + 'static,
+        show: impl FnMut(&str) + Send + 'static,
+    ) -> Self {
+        let traces = Collector::default();
+        let route = Route { asked: None, show: Box::new(show), traces, closed: false };
+        let route = Arc::new(Mutex::new(route));
+        let to = route.clone();
+        std::thread::spawn(move || read_lines(reader, &to));
+        Self { port: Box::new(port), route }
+    }
+
+    /// Ends a line that may have begun on the drive's side, and lets the answer go by.
+    pub fn begin(&mut self) {
+        // The port is found closed with the first command.
+        let _ = self.port.write_all(b"\n").and_then(|()| self.port.flush());
+        std::thread::sleep(Duration::from_millis(100));
+    }
+
+    /// Sends a command and hears its answer; every line of it is shown when it comes.
+    ///
+    /// # Errors
+    /// There is no whole answer.
+    pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
+        let (send, lines) = channel();
+        {
+            let mut route = locked(&self.route);
+            if route.closed {
+                return Err(LinkError::Closed);
+            }
+            route.asked = Some(send);
+        }
+        let sent = self.port.write_all(format!("{command}\n").as_bytes());
+        let answer = match sent.and_then(|()| self.port.flush()) {
+            Ok(()) => self.hear(command, &lines, &mut show),
+            Err(_) => Err(LinkError::Closed),
+        };
+        let mut route = locked(&self.route);
+        route.asked = None;
+        lines.try_iter().for_each(|line| (route.show)(&line));
+        answer
+    }
+
+    fn hear(
+        &self,
+        command: &str,
+        lines: &Receiver<String>,
+        show: &mut impl FnMut(&str),
+    ) -> Result<Answer, LinkError> {
+        let (mut awaited, mut answer) = (Awaited::new(command), Answer::default());
+        let patience = if awaited.is_slow() { PATIENCE_WITH_TRACE } else { PATIENCE };
+        loop {
+            let line = lines.recv_timeout(patience).map_err(|why| match why {
+                RecvTimeoutError::Timeout => {
+                    LinkError::Silence(command.to_owned(), patience.as_secs())
+                }
+                RecvTimeoutError::Disconnected => LinkError::Closed,
+            })?;
+            let meaning = awaited.take(&line);
+            match meaning {
+                Meaning::Echo => {}
+                Meaning::Unasked => (locked(&self.route).show)(&line),
+                Meaning::Answer | Meaning::Last => {
+                    show(&line);
+                    answer.lines.push(line);
+                }
+            }
+            if meaning == Meaning::Last {
+                return Ok(answer);
+            }
+        }
+    }
+
+    /// The last trace that the drive has printed.
+    pub fn last_trace(&self) -> Option<Trace> {
+        locked(&self.route).traces.last()
+    }
+}
+
+/// A thread that panicked while it showed a line leaves the route whole.
+fn locked(route: &Mutex<Route>) -> MutexGuard<'_, Route> {
+    route.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
+    let (mut buffer, mut line) = ([0; 1024], Vec::new());
+    loop {
+        match reader.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(read) => {
+                for byte in &buffer[..read] {
+                    if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST {
+                        line.push(*byte);
+                        continue;
+                    }
+                    let text = readable(&std::mem::take(&mut line));
+                    if !text.is_empty() {
+                        locked(route).line(text);
+                    }
+                }
+            }
+            Err(error) => match error.kind() {
+                ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted => {}
+                _ => break,
+            },
+        }
+    }
+    let mut route = locked(route);
+    route.closed = true;
+    route.asked = None;
+}
+
+/// The text of a line without the sequences that move the cursor of a terminal.
+fn readable(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let mut shown = String::new();
+    let mut rest = text.chars();
+    while let Some(c) = rest.next() {
+        match c {
+            // ESC [ parameters letter
+            '\x1b' => drop(rest.by_ref().find(|c| c.is_ascii_alphabetic())),
+            c if c.is_control() => {}
+            c => shown.push(c),
+        }
+    }
+    shown.trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sequences_of_a_terminal_are_no_text() {
+        assert_eq!(readable(b"\x1b[Kstatus \x07"), "status");
+        assert_eq!(readable("25 °C".as_bytes()), "25 °C");
+    }
+}

@@ -1,0 +1,212 @@
+//! `cargo sim console` against a pseudo-terminal, behind which a thread plays the firmware.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::{Arc, Mutex};
+
+use hil_sim::console::catalogue::Catalogue;
+use hil_sim::console::link::{Link, LinkError};
+use serialport::{SerialPort as _, TTYPort};
+
+/// A firmware with two settings.
+#[derive(Default)]
+struct Firmware {
+    /// Whether it knows `describe` and `backup`.
+    recent: bool,
+    echo: bool,
+    settings: BTreeMap<&'static str, f64>,
+    heard: Vec<String>,
+}
+
+type Shared = Arc<Mutex<Firmware>>;
+
+fn firmware(recent: bool, echo: bool) -> Shared {
+    let settings = BTreeMap::from([("motor.r_r", 1.1), ("motor.r_s", 5.4)]);
+    Arc::new(Mutex::new(Firmware { recent, echo, settings, heard: Vec::new() }))
+}
+
+impl Firmware {
+    fn answer(&mut self, line: &str) -> String {
+        self.heard.push(line.to_owned());
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let listed = |line: &dyn Fn((&&str, &f64)) -> String| {
+            let lines = self.settings.iter().map(|setting| line(setting) + "\r\n");
+            lines.collect::<String>() + "ok\r\n"
+        };
+        match words[..] {
+            ["help"] => "status   the state\r\nset KEY VALUE  sets\r\nok\r\n".into(),
+            ["status"] => "fault 4: dc link above its limit\r\noff; i_d 0.00 A\r\n".into(),
+            ["trace", ..] => "t_s,i_q_a,v_q_v\r\n0,1,20\r\n0.1,2,30\r\nok\r\n".into(),
+            ["get"] => listed(&|(name, value)| format!("{name} = {value} ohm (0.1 to 9)")),
+            ["backup"] if self.recent => listed(&|(name, value)| format!("set {name} {value}")),
+            ["describe"] if self.recent => {
+                listed(&|(name, value)| format!("{{\"name\":\"{name}\",\"value\":{value}}}"))
+            }
+            ["set", name, value] => match (self.settings.get_mut(name), value.parse::<f64>()) {
+                (Some(setting), Ok(value)) if (0.1..=9.0).contains(&value) => {
+                    *setting = value;
+                    "ok\r\n".into()
+                }
+                _ => format!("error: {name} {value}: allowed 0.1 to 9\r\n"),
+            },
+            [] => String::new(),
+            _ => "error: no such command\r\n".into(),
+        }
+    }
+}
+
+/// Answers at a port until it is closed.
+fn serve(mut port: impl Read + Write, firmware: &Shared) {
+    let (mut line, mut byte) = (Vec::new(), [0]);
+    loop {
+        match port.read(&mut byte) {
+            Ok(1) => {}
+            Err(error) if error.kind() == std::io::ErrorKind::TimedOut => continue,
+            _ => return,
+        }
+        if byte[0] != b'\n' {
+            line.push(byte[0]);
+            continue;
+        }
+        let text = String::from_utf8(std::mem::take(&mut line)).unwrap();
+        let mut firmware = firmware.lock().unwrap();
+        let echo = if firmware.echo { format!("{text}\r\n") } else { String::new() };
+        let answer = echo + &firmware.answer(&text);
+        if port.write_all(answer.as_bytes()).is_err() {
+            return;
+        }
+    }
+}
+
+/// A pseudo-terminal with a firmware behind it. The second end stays open, as that of the virtual board does.
+fn port(firmware: &Shared) -> (TTYPort, String) {
+    let (ours, theirs) = TTYPort::pair().expect("a pseudo-terminal");
+    let firmware = firmware.clone();
+    std::thread::spawn(move || serve(ours, &firmware));
+    let name = theirs.name().expect("a name");
+    (theirs, name)
+}
+
+fn console(port: &str, commands: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+    command.args(["console", "--port", port]);
+    command.args(commands.iter().flat_map(|line| ["--command", line]));
+    command.output().expect("the binary runs")
+}
+
+fn texts(output: &Output) -> (Option<i32>, String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[test]
+fn answers_are_printed_and_unasked_lines_kept_apart() {
+    for echo in [false, true] {
+        let firmware = firmware(true, echo);
+        let (_theirs, port) = port(&firmware);
+        let (code, out, err) = texts(&console(&port, &["status", "set motor.r_s 6", "help"]));
+        assert_eq!(code, Some(0), "{err}");
+        let help = "status   the state\nset KEY VALUE  sets\nok\n";
+        assert_eq!(out, format!("off; i_d 0.00 A\nok\n{help}"));
+        assert!(err.contains("fault 4: dc link above its limit"), "{err}");
+        assert_eq!(firmware.lock().unwrap().settings["motor.r_s"], 6.0);
+    }
+}
+
+#[test]
+fn the_first_error_ends_it_with_exit_code_1() {
+    let firmware = firmware(true, false);
+    let (_theirs, port) = port(&firmware);
+    let (code, out, err) = texts(&console(&port, &["set motor.r_s 99", "status"]));
+    assert_eq!((code, out.as_str()), (Some(1), "error: motor.r_s 99: allowed 0.1 to 9\n"));
+    assert!(err.contains("the drive refuses `set motor.r_s 99`: motor.r_s 99: allowed"), "{err}");
+    assert!(!firmware.lock().unwrap().heard.contains(&"status".to_owned()));
+    // A command of this program that does not exist never reaches the drive.
+    let (code, _, err) = texts(&console(&port, &["!backupp x"]));
+    assert_eq!(code, Some(2));
+    assert!(err.contains("`!backupp x`: no such command") && err.contains("!backup FILE"), "{err}");
+}
+
+#[test]
+fn settings_go_to_a_file_and_back() {
+    for recent in [true, false] {
+        let firmware = firmware(recent, false);
+        let (_theirs, port) = port(&firmware);
+        let file = folder("backup").join("drive.txt");
+        let [backup, restore] = ["backup", "restore"].map(|w| format!("!{w} {}", file.display()));
+        let (code, out, err) = texts(&console(&port, &[&backup, "set motor.r_s 2", &restore]));
+        assert_eq!(code, Some(0), "{out}{err}");
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert_eq!(text, "set motor.r_r 1.1\nset motor.r_s 5.4\n", "recent: {recent}");
+        assert_eq!(firmware.lock().unwrap().settings["motor.r_s"], 5.4);
+
+        std::fs::write(&file, "# mine\n\nset motor.r_r 2\nset motor.r_s 77\nset motor.r_r 3\n")
+            .unwrap();
+        let (code, _, err) = texts(&console(&port, &[&restore]));
+        assert_eq!(code, Some(1));
+        for said in ["drive.txt, line 4: `set motor.r_s 77`", "allowed 0.1 to 9", "1 lines before"]
+        {
+            assert!(err.contains(said), "{said} is not in {err}");
+        }
+        assert_eq!(firmware.lock().unwrap().settings["motor.r_r"], 2.0, "it stops at the error");
+    }
+}
+
+#[test]
+fn the_last_trace_is_plotted() {
+    let (_theirs, port) = port(&firmware(true, false));
+    let file = folder("plot").join("trace.svg");
+    let plot = format!("!plot {}", file.display());
+    let (code, _, err) = texts(&console(&port, &[&plot]));
+    assert_eq!(code, Some(2));
+    assert!(err.contains("no trace yet"), "{err}");
+    let (code, out, err) = texts(&console(&port, &["trace 2", &plot]));
+    assert_eq!(code, Some(0), "{err}");
+    assert!(out.contains("t_s,i_q_a,v_q_v") && out.contains("2 records in"), "{out}");
+    let svg = std::fs::read_to_string(file).unwrap();
+    assert!(svg.contains("i_q (A)") && svg.contains("v_q (V)") && svg.contains("t (s)"));
+}
+
+#[test]
+fn a_port_that_does_not_open_is_named() {
+    let (code, _, err) = texts(&console("/dev/no-such-port", &["status"]));
+    assert_eq!(code, Some(2));
+    assert!(err.contains("--port /dev/no-such-port"), "{err}");
+}
+
+#[test]
+fn the_drive_lists_what_can_be_completed() {
+    for recent in [true, false] {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let firmware = firmware(recent, false);
+        std::thread::spawn(move || serve(ours, &firmware));
+        let mut link = Link::new(theirs.try_clone().unwrap(), theirs, |_: &str| ());
+        let catalogue = Catalogue::read(&mut link).unwrap();
+        assert_eq!(catalogue.settings(), 2);
+        assert_eq!(catalogue.complete("set motor.r_s 1 mo").1, ["motor.r_r", "motor.r_s"]);
+        assert_eq!(catalogue.complete("sta").1, ["status"]);
+    }
+}
+
+#[test]
+fn a_closed_port_ends_the_wait() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let mut link = Link::new(theirs.try_clone().unwrap(), theirs, |_: &str| ());
+    std::thread::spawn(move || {
+        let mut ours = ours;
+        let _ = ours.read(&mut [0; 8]);
+    });
+    assert!(matches!(link.ask("status", |_| ()), Err(LinkError::Closed)));
+    assert!(matches!(link.ask("status", |_| ()), Err(LinkError::Closed)));
+}

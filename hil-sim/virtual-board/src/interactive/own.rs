@@ -1,0 +1,55 @@
+//! The commands of the board itself: lines that begin with `!`. All other lines go to the console of the firmware.
+
+/// A command of the board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Own {
+    /// Lists these commands.
+    Help,
+    /// Presses the reset button.
+    Reset,
+    /// Takes the supply of the controller away and gives it back.
+    Unplug,
+    /// Ends the session.
+    Quit,
+}
+
+/// Names and meanings.
+const COMMANDS: [(&str, Own, &str); 4] = [
+    ("!help", Own::Help, "lists the commands of the board; other lines go to the drive"),
+    ("!reset", Own::Reset, "presses the reset button: RAM and flash keep their contents"),
+    (
+        "!unplug",
+        Own::Unplug,
+        "unplugs the controller and plugs it in again: RAM is lost, flash stays",
+    ),
+    ("!quit", Own::Quit, "ends the session and writes the page; also quit"),
+];
+
+impl Own {
+    /// The command in a line; `None` for a line to the drive.
+    ///
+    /// # Errors
+    /// The line begins with `!`, and there is no such command.
+    pub fn parse(line: &str) -> Result<Option<Self>, String> {
+        let line = line.trim();
+        if line == "quit" {
+            return Ok(Some(Self::Quit));
+        }
+        if !line.starts_with('!') {
+            return Ok(None);
+        }
+        let known = COMMANDS.iter().find(|(name, ..)| *name == line);
+        match known {
+            Some((_, own, _)) => Ok(Some(*own)),
+            None => {
+                let names = COMMANDS.map(|(name, ..)| name).join(", ");
+                Err(format!("`{line}`: no such command of the board; there are {names}"))
+            }
+        }
+    }
+
+    /// A line about each command.
+    pub fn help() -> impl Iterator<Item = String> {
+        COMMANDS.iter().map(|(name, _, meaning)| format!("{name:<8} {meaning}"))
+    }
+}

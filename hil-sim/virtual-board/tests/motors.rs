@@ -1,0 +1,40 @@
+//! The lines that a session prints for another motor fit the image to it and to the sensors of the board.
+
+use drive_core::settings::find;
+use hil_sim::Config;
+use hil_sim::config::motors::Motor;
+use hil_sim::plant::Plant;
+use induction_drive::board;
+use virtual_board::Options;
+
+#[test]
+fn after_the_printed_lines_the_drive_reads_the_sensors_of_every_motor_right() {
+    assert_eq!(Options::set_lines(&Config::default()), Vec::<String>::new());
+    for motor in Motor::all() {
+        let name = motor.name.clone();
+        let config = Config::of_motor(Some(&name)).unwrap();
+        let mut settings = board::settings();
+        for line in Options::set_lines(&config) {
+            let words: Vec<&str> = line.split(' ').collect();
+            let ["set", key, value] = words[..] else { panic!("{line}") };
+            let entry = find(key).expect(key);
+            entry.set(&mut settings, entry.parse(value).unwrap());
+        }
+        let plant = Options::plant(&config);
+        let sample = Plant::new(&plant, 1).unwrap().sample();
+        let scales = &settings.scales;
+        let dc_link = f64::from(scales.dc_link.at(sample.dc_link));
+        assert!((dc_link / config.inverter.dc_link_v - 1.0).abs() < 2e-3, "{name}: {dc_link} V");
+        // No current flows: noise of the sensor, and a code.
+        let allowed = 6.0 * plant.measurement.noise_a + f64::from(scales.current_a.gain);
+        for (line, code) in
+            [(scales.current_a, sample.current_a), (scales.current_b, sample.current_b)]
+        {
+            assert!(f64::from(line.at(code)).abs() < allowed, "{name}: {} A", line.at(code));
+        }
+        // The converters reach as far as the sensors do.
+        let end = f64::from(scales.current_a.at(board::ADC_FULL_SCALE));
+        assert!(end >= config.measurement.range_a, "{name}: {end} A");
+        settings.check().unwrap_or_else(|why| panic!("{name}: {why}"));
+    }
+}

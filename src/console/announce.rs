@@ -1,0 +1,135 @@
+//! Announcements: changes of the drive's state that the console tells unasked.
+
+use core::fmt;
+
+use drive_core::identify::learning::Learned;
+use drive_core::{Fault, State};
+
+use crate::link::Status;
+
+/// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
+/// for an answer passes over them.
+pub const ANNOUNCEMENTS: [&str; 10] = [
+    "fault ",
+    "running: ",
+    "off: ",
+    "stopped: ",
+    "learning: ",
+    "learned: ",
+    "refused: ",
+    "trace: ",
+    "applied: ",
+    "designing...",
+];
+
+/// Longest silence while the drive learns, ms.
+const PROGRESS_MS: u32 = 5000;
+
+/// An announcement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum News {
+    /// The drive is in a fault.
+    Fault(Fault),
+    /// The drive regulates, in this state.
+    Running(State),
+    /// The outputs are off, for this reason.
+    Off(&'static str),
+    /// It learns: point, and number of points.
+    Learning(usize, usize),
+}
+
+/// Follows the state of the drive.
+pub struct Announcer {
+    /// The last state that was seen.
+    state: Option<State>,
+    /// The last one but for stopping.
+    active: State,
+    /// Whether the console has stopped the drive.
+    stopped: bool,
+    progress: Option<(usize, usize)>,
+    told_ms: u32,
+}
+
+impl Announcer {
+    /// One that has seen nothing yet.
+    pub const fn new() -> Self {
+        Self { state: None, active: State::Off, stopped: false, progress: None, told_ms: 0 }
+    }
+
+    /// Notes that the console stops the drive: off is no news then, unless it takes a while.
+    pub fn stopping(&mut self) {
+        self.stopped = true;
+    }
+
+    /// The news of a report, if there are any. `now_ms` wraps.
+    pub fn next(&mut self, status: &Status, now_ms: u32) -> Option<News> {
+        let state = status.state;
+        let before = self.state.replace(state);
+        if before == Some(state) {
+            return self.learning(status, now_ms);
+        }
+        let was = self.active;
+        if state != State::Stopping {
+            self.active = state;
+        }
+        match state {
+            State::Fault(fault) => Some(News::Fault(fault)),
+            State::Torque | State::Speed | State::Position => Some(News::Running(state)),
+            State::Off => {
+                let asked = core::mem::take(&mut self.stopped);
+                match (before?, was) {
+                    (State::Fault(_), _) => None,
+                    (State::Stopping, State::Learning) if !asked => {
+                        Some(News::Off("the learning has ended"))
+                    }
+                    (State::Stopping, _) => Some(News::Off("stopped")),
+                    // At once, and answered.
+                    _ if asked => None,
+                    _ => Some(News::Off("the start has ended")),
+                }
+            }
+            State::Learning => {
+                self.progress = None;
+                self.learning(status, now_ms)
+            }
+            _ => None,
+        }
+    }
+
+    fn learning(&mut self, status: &Status, now_ms: u32) -> Option<News> {
+        let (point, points) = status.learning?;
+        let late = now_ms.wrapping_sub(self.told_ms) >= PROGRESS_MS;
+        if self.progress == status.learning && !late {
+            return None;
+        }
+        (self.progress, self.told_ms) = (status.learning, now_ms);
+        Some(News::Learning(point, points))
+    }
+}
+
+impl fmt::Display for News {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(fault) => {
+                let likely = fault.causes().first().copied().unwrap_or_default();
+                write!(f, "fault {}: {fault}; likely: {likely}; type 'clear'", fault.code())
+            }
+            Self::Running(State::Speed) => f.write_str("running: speed"),
+            Self::Running(State::Position) => f.write_str("running: position"),
+            Self::Running(_) => f.write_str("running: torque"),
+            Self::Off(why) => write!(f, "off: {why}"),
+            Self::Learning(point, points) => write!(f, "learning: point {point} of {points}"),
+        }
+    }
+}
+
+/// The announcement of a learning's result.
+pub fn outcome(result: &Learned) -> impl fmt::Display {
+    fmt::from_fn(move |f| {
+        let Learned { asymmetry, gain_mismatch, current_saliency, .. } = result;
+        f.write_str(if result.accepted { "learned: " } else { "refused: not believable: " })?;
+        write!(f, "asymmetry {asymmetry:.5}, gain mismatch {:.5}", gain_mismatch.value)?;
+        write!(f, ", current saliency {:.5}", current_saliency.value)?;
+        f.write_str(if result.accepted { "; `save` keeps it" } else { "; nothing was changed" })
+    })
+}

@@ -1,0 +1,175 @@
+use drive_core::settings::value::{Value, ValueError};
+use proptest::prelude::*;
+
+use super::*;
+use crate::console::help::HELP;
+
+#[test]
+fn every_line_of_the_help_but_the_last_is_a_command_and_every_command_has_one() {
+    let mut told: std::vec::Vec<&str> =
+        HELP[..HELP.len() - 1].iter().map(|line| line.split(' ').next().unwrap()).collect();
+    told.dedup();
+    let commands = &COMMANDS[..COMMANDS.len() - 2];
+    assert_eq!(told.len(), commands.len());
+    for command in commands {
+        assert!(told.contains(command), "{command}");
+        assert!(!matches!(parse(command), Err(ParseError::Command { .. })), "{command}");
+    }
+}
+
+fn assigned(values: &[(&str, Value)]) -> Request {
+    Request::Set(values.iter().map(|(name, value)| (keys::find(name).unwrap(), *value)).collect())
+}
+
+fn traced(records: u16, divider: u16, names: &[&str], trigger: Trigger) -> Request {
+    let mut choice = SignalChoice::none();
+    assert!(names.iter().all(|name| choice.add(trace::find(name).unwrap())));
+    let choice = if names.is_empty() { SignalChoice::usual() } else { choice };
+    Request::Trace(Plan { records, divider, choice, trigger })
+}
+
+#[test]
+fn commands_are_understood() {
+    let speed = trace::find("speed_rpm").unwrap();
+    let two = ["i_q_a", "turns"];
+    let now = Trigger::Now;
+    let table = [
+        ("help", Request::Help),
+        ("?", Request::Help),
+        ("  status\t", Request::Status),
+        ("start", Request::Start(Mode::Torque)),
+        ("start position", Request::Start(Mode::Position)),
+        ("start learning", Request::Start(Mode::Learning)),
+        ("stop", Request::Stop),
+        ("relock", Request::Relock),
+        ("torque -1.5", Request::Torque(-1.5)),
+        ("start speed", Request::Start(Mode::Speed)),
+        ("speed -150", Request::Speed(-150.0)),
+        ("position 5e1", Request::Position(50.0)),
+        ("angle encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
+        ("set angle_source encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
+        ("get", Request::List("")),
+        ("get motor", Request::List("motor")),
+        ("get motor.r_s", Request::Get(keys::find("motor.r_s").unwrap())),
+        ("describe limits.", Request::Describe("limits.")),
+        ("set motor.r_s 5.5", assigned(&[("motor.r_s", Value::Number(5.5))])),
+        (
+            "set limits.trip_a auto motor.pole_pairs 3",
+            assigned(&[("limits.trip_a", Value::Auto), ("motor.pole_pairs", Value::Whole(3))]),
+        ),
+        ("trace 100", traced(100, 1, &[], now)),
+        ("trace 1024 10", traced(1024, 10, &[], now)),
+        ("trace 5 i_q turns", traced(5, 1, &two, now)),
+        ("trace 5 2 i_q_a turns", traced(5, 2, &two, now)),
+        ("trace 5 2 i_q turns on fault", traced(5, 2, &two, Trigger::Fault)),
+        (
+            "trace 5 on rotor_step below -20",
+            traced(5, 1, &[], Trigger::Level { signal: speed, level: -20.0, above: false }),
+        ),
+        ("trace", Request::ShowTrace),
+        ("trace off", Request::EndTrace),
+        ("learned", Request::Learned),
+        ("learned 8 0000000a ffffffff", Request::Restore(8, [10, u32::MAX].into_iter().collect())),
+        ("learned check 12345678", Request::Restored(0x1234_5678)),
+        ("faults", Request::Faults(None)),
+        ("faults 4", Request::Faults(Some(Fault::DcLinkOverVoltage))),
+        ("log warn", Request::Log(Level::Warn)),
+        ("log debug", Request::Log(Level::Debug)),
+        ("echo on", Request::Echo(true)),
+        ("reboot", Request::Reboot(false)),
+        ("reboot now", Request::Reboot(true)),
+        ("version", Request::Version),
+    ];
+    for (line, request) in table {
+        assert_eq!(parse(line), Ok(request), "{line}");
+    }
+}
+
+/// The answer names the thing, the word, and what is allowed or meant.
+#[test]
+fn what_is_half_wrong_is_refused_whole() {
+    let table = [
+        ("", "a command is missing"),
+        ("stopp", "no such command: stopp; did you mean `stop`? `help` lists them"),
+        ("rubbish", "no such command: rubbish; `help` lists them"),
+        ("stop now", "too many words, from `now` on"),
+        ("angle", "encoder or injection is missing"),
+        ("angle guess", "angle_source = guess: not one of: encoder injection"),
+        ("start backwards", "the mode = backwards: not one of: torque speed position learning"),
+        ("torque", "the current, A is missing"),
+        ("torque 1 2", "too many words, from `2` on"),
+        ("torque 1,5", "not a number: 1,5 (the current, A)"),
+        ("torque 1A", "not a number: 1A (the current, A)"),
+        ("torque nan", "not a number: nan (the current, A)"),
+        ("speed inf", "not a number: inf (the speed, rpm)"),
+        ("position 1e99", "not a number: 1e99 (the position, turns)"),
+        ("set", "the setting is missing"),
+        ("set motor.r_s", "the value is missing"),
+        ("set motor.r_s 1 motor.r_r", "the value is missing"),
+        ("set motor.rs 1", "no such setting: motor.rs; did you mean `motor.r_s`? `get` lists them"),
+        ("set motor.r_s 1 wheel 2", "no such setting: wheel; `get` lists them"),
+        ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number"),
+        ("set limits.trip_a off", "limits.trip_a = off: neither a number nor `auto`"),
+        ("get wheel", "no such setting: wheel; `get` lists them"),
+        ("describe wheel", "no such setting: wheel; `get` lists them"),
+        ("trace 0", "the number of records = 0: not a whole number from 1 to 1024"),
+        ("trace 1025", "the number of records = 1025: not a whole number from 1 to 1024"),
+        ("trace 5 0", "the divider = 0: not a whole number from 1 to 1000"),
+        ("trace -5", "the number of records = -5: not a whole number from 1 to 1024"),
+        ("trace 5 i_d i_d i_d i_d i_d i_d i_d i_d i_d", "more than 8 signals"),
+        ("trace 5 on", "fault, or a signal is missing"),
+        ("trace 5 on i_q_a", "above or below is missing"),
+        ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
+        ("trace 5 on i_q_a above x", "not a number: x (the level)"),
+        ("trace 5 on fault now", "too many words, from `now` on"),
+        ("faults 38", "the fault = 38: not a whole number from 1 to 37"),
+        ("learned 38 00000000", "the index = 38: not a whole number from 0 to 37"),
+        ("learned 0 12", "not eight hexadecimal digits: 12"),
+        ("learned 0 +1234567", "not eight hexadecimal digits: +1234567"),
+        ("learned 0", "a word is missing"),
+        ("learned check", "the checksum is missing"),
+        ("log loud", "the level = loud: not one of: off error warn info debug"),
+        ("echo loud", "on or off = loud: not one of: on off"),
+        ("reboot later", "too many words, from `later` on"),
+    ];
+    for (line, why) in table {
+        assert_eq!(parse(line).unwrap_err().to_string(), why, "{line}");
+    }
+    let signals = parse("trace 5 i_x").unwrap_err().to_string();
+    assert!(
+        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" turns"),
+        "{signals}"
+    );
+    let near = parse("trace 5 sped_rpm").unwrap_err().to_string();
+    assert!(near.contains("did you mean `speed_rpm`?"), "{near}");
+    let many = "set motor.r_s 1".to_owned() + &" motor.r_s 1".repeat(MOST);
+    assert_eq!(parse(&many), Err(ParseError::TooMany { what: "settings", most: MOST }));
+    let key = keys::find("motor.r_s").unwrap();
+    let why = ValueError::Number;
+    assert_eq!(parse("set motor.r_s x"), Err(ParseError::Value { key, word: "x", why }));
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_understood_or_refused(line in ".*") {
+        let _ = parse(&line);
+    }
+
+    #[test]
+    fn words_that_look_like_commands_are_understood_or_refused(
+        line in "(start|torque|speed|position|angle|get|set|trace|log|stop|learned|faults) ?[-+.0-9a-z_ ]{0,30}",
+    ) {
+        if let Ok(Request::Torque(x) | Request::Speed(x) | Request::Position(x)) = parse(&line) {
+            prop_assert!(x.is_finite());
+        }
+    }
+
+    #[test]
+    fn numbers_survive_the_way_through_text(
+        digits in -9_999_999..=9_999_999, power in -9_i32..=9,
+    ) {
+        let value = digits as f32 * 10_f32.powi(power);
+        prop_assert_eq!(parse(&format!("torque {value}")).ok(), Some(Request::Torque(value)));
+        prop_assert_eq!(parse(&format!("torque {value:e}")).ok(), Some(Request::Torque(value)));
+    }
+}

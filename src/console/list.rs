@@ -1,0 +1,159 @@
+//! Replies of many lines: one line at a time, and `ok` behind the last.
+
+use core::fmt;
+
+use drive_core::Fault;
+use drive_core::io::PERIOD_S;
+use drive_core::settings::entry::Change;
+use drive_core::settings::value::Value;
+
+use super::Console;
+use super::handle::DriveHandle;
+use super::help::HELP;
+use super::number::Significant;
+use super::reply::{self, Description, Setting};
+use super::restore;
+use crate::link::trace::Plan;
+use crate::settings::FirmwareSettings;
+use crate::settings::keys::{self, Key};
+
+/// A reply of many lines.
+#[derive(Clone, Copy)]
+pub(super) struct List {
+    pub kind: ListKind,
+    /// Number of the next line, or of the next setting to look at.
+    pub next: u16,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum ListKind {
+    Help,
+    /// The settings that begin so.
+    Settings(&'static str),
+    /// The same as JSON.
+    Describe(&'static str),
+    Backup,
+    Learned,
+    Fault(Fault),
+    Trace,
+}
+
+/// Significant digits of a trace.
+const TRACE_DIGITS: usize = 6;
+/// A setting that a backup leaves out: a restored drive checks its wiring.
+const NOT_IN_BACKUP: &str = "wiring_checked";
+
+impl Console {
+    pub(super) fn begin(&mut self, kind: ListKind) {
+        self.list = Some(List { kind, next: 0 });
+    }
+
+    /// Writes the next line of the list, or `ok` behind the last; nothing if the list has to wait.
+    pub(super) fn next_of_list(&mut self, drive: &impl DriveHandle) {
+        let Some(List { kind, next }) = self.list else { return };
+        let out = &mut self.out;
+        let line = usize::from(next);
+        let written = match kind {
+            ListKind::Help => HELP.get(line).map(|text| {
+                out.line(format_args!("{text}"));
+                next + 1
+            }),
+            ListKind::Settings(prefix) => setting_from(line, prefix).map(|(key, after)| {
+                let setting = Setting::new(key, &self.settings);
+                out.line(format_args!("{setting}"));
+                after
+            }),
+            ListKind::Describe(prefix) => setting_from(line, prefix).map(|(key, after)| {
+                let description = Description::new(key, &self.settings);
+                out.line(format_args!("{description}"));
+                after
+            }),
+            ListKind::Backup => self.backup(line),
+            ListKind::Fault(fault) => reply::fault(fault, line).map(|text| {
+                out.line(format_args!("{text}"));
+                next + 1
+            }),
+            ListKind::Learned => {
+                // The last result if it is not believable, else the one in use.
+                let result =
+                    self.unbelievable.as_ref().or(self.settings.in_force().learned.as_ref());
+                let believable = self.unbelievable.is_none();
+                let text = result.and_then(|result| reply::learned(result, believable, next));
+                text.map(|text| {
+                    out.line(format_args!("{text}"));
+                    next + 1
+                })
+            }
+            ListKind::Trace if drive.tracing() => return,
+            ListKind::Trace => self.trace_line(next, drive),
+        };
+        self.list = written.map(|next| List { kind, next });
+        if written.is_none() {
+            self.out.line(format_args!("ok"));
+        }
+    }
+
+    /// The header, then a line a record.
+    fn trace_line(&mut self, next: u16, drive: &impl DriveHandle) -> Option<u16> {
+        let Plan { choice, divider, .. } = self.traced.as_ref()?;
+        let Some(i) = next.checked_sub(1) else {
+            let names = fmt::from_fn(|f| {
+                choice.signals().try_for_each(|signal| write!(f, ",{}", signal.name))
+            });
+            self.out.line(format_args!("t_s{names}"));
+            return Some(1);
+        };
+        let (from_trigger, record) = drive.traced(i)?;
+        let seconds = f32::from(from_trigger) * f32::from(*divider) * PERIOD_S;
+        let pole_pairs = self.settings.in_force().drive.motor.pole_pairs;
+        let values = fmt::from_fn(|f| {
+            record.iter().zip(choice.signals()).try_for_each(|(value, signal)| {
+                write!(f, ",{}", Significant(value * signal.factor(pole_pairs), TRACE_DIGITS))
+            })
+        });
+        self.out.line(format_args!("{seconds:.6}{values}"));
+        Some(next + 1)
+    }
+
+    /// Writes the next line of a backup, from this place on: `defaults`; the words, since ranges depend on them, and then
+    /// the numbers that differ from the image; what was learned; `apply`.
+    fn backup(&mut self, place: usize) -> Option<u16> {
+        const NUMBERS: usize = 1 + keys::COUNT;
+        const LEARNED: usize = NUMBERS + keys::COUNT;
+        const LAST: usize = 1000;
+        let (settings, out) = (self.settings.in_force(), &mut self.out);
+        if place == 0 {
+            out.line(format_args!("defaults"));
+            return Some(1);
+        }
+        let image = FirmwareSettings::of_the_board();
+        for (place, key) in (1..).zip(keys::all().chain(keys::all())).skip(place - 1) {
+            let value = key.get(settings);
+            let in_turn = matches!(value, Value::Word(_)) == (place < NUMBERS);
+            let kept = key.change() == Change::Board || key.name() == NOT_IN_BACKUP;
+            if in_turn && !kept && value != key.get(&image) {
+                out.line(format_args!("set {} {value}", key.name()));
+                return Some(place as u16 + 1);
+            }
+        }
+        let line = place.saturating_sub(LEARNED);
+        let learned = settings.learned.as_ref().and_then(|learned| restore::line(learned, line));
+        match learned {
+            Some(text) => {
+                out.line(format_args!("{text}"));
+                Some((LEARNED + line) as u16 + 1)
+            }
+            None if place < LAST => {
+                out.line(format_args!("apply"));
+                Some(LAST as u16)
+            }
+            None => None,
+        }
+    }
+}
+
+/// The first setting from a number on whose name begins so, and the number behind it.
+fn setting_from(number: usize, prefix: &str) -> Option<(Key, u16)> {
+    let mut rest = (1..).zip(keys::all()).skip(number);
+    rest.find(|(_, key)| key.name().starts_with(prefix)).map(|(after, key)| (key, after))
+}

@@ -1,0 +1,101 @@
+//! Learned values as lines of text, which `backup` prints and a paste restores.
+//!
+//! `learned INDEX WORD ...` gives up to eight of the words of [`crate::store::learned`], from an index on, in
+//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them.
+
+use core::fmt;
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use drive_core::identify::learning::Learned;
+
+use super::grammar::WORDS_IN_LINE;
+use crate::store::learned::{self, WORDS};
+
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+const ALL: u64 = (1 << WORDS) - 1;
+
+/// Words that have come in so far.
+pub struct Restore {
+    words: [u32; WORDS],
+    /// A bit for each.
+    present: u64,
+}
+
+/// Reason why learned values were not restored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestoreError {
+    /// Words behind the last.
+    Behind,
+    /// The word with this index has not come.
+    Missing(usize),
+    /// The checksum of the words is another.
+    Checksum(u32),
+    /// No result that a learning accepts.
+    Unbelievable,
+}
+
+impl fmt::Display for RestoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Behind => write!(f, "learned: more than {WORDS} words"),
+            Self::Missing(index) => write!(f, "learned: word {index} is missing"),
+            Self::Checksum(right) => {
+                write!(f, "learned: the checksum of these words is {right:08x}")
+            }
+            Self::Unbelievable => f.write_str("learned: no result that a learning accepts"),
+        }
+    }
+}
+
+fn checksum(words: &[u32; WORDS]) -> u32 {
+    let mut digest = CRC.digest();
+    words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
+}
+
+impl Restore {
+    /// Nothing yet.
+    pub const fn new() -> Self {
+        Self { words: [0; WORDS], present: 0 }
+    }
+
+    /// Takes words, from an index on.
+    ///
+    /// # Errors
+    /// There are no so many; nothing is taken.
+    pub fn take(&mut self, index: usize, words: &[u32]) -> Result<(), RestoreError> {
+        let places = self.words.get_mut(index..index + words.len()).ok_or(RestoreError::Behind)?;
+        places.copy_from_slice(words);
+        self.present |= ((1 << words.len()) - 1) << index;
+        Ok(())
+    }
+
+    /// The result of the words that came in; the next begins anew.
+    ///
+    /// # Errors
+    /// Words are missing or damaged, or make no result.
+    pub fn finish(&mut self, check: u32) -> Result<Learned, RestoreError> {
+        let Self { words, present } = core::mem::replace(self, Self::new());
+        if present != ALL {
+            return Err(RestoreError::Missing(present.trailing_ones() as usize));
+        }
+        let right = checksum(&words);
+        if right != check {
+            return Err(RestoreError::Checksum(right));
+        }
+        learned::from_words(&words, present).ok_or(RestoreError::Unbelievable)
+    }
+}
+
+/// Line number `i` of a result; `None` behind the last.
+pub fn line(result: &Learned, i: usize) -> Option<impl fmt::Display> {
+    let words = learned::to_words(result);
+    let first = i * WORDS_IN_LINE;
+    (first < WORDS + WORDS_IN_LINE).then_some(fmt::from_fn(move |f| match words.get(first..) {
+        Some(rest) if !rest.is_empty() => {
+            write!(f, "learned {first}")?;
+            rest.iter().take(WORDS_IN_LINE).try_for_each(|word| write!(f, " {word:08x}"))
+        }
+        _ => write!(f, "learned check {:08x}", checksum(&words)),
+    }))
+}

@@ -1,0 +1,213 @@
+use std::rc::Rc;
+
+use drive_core::settings::AngleSource;
+use hil_sim::rig::Rig;
+
+use super::*;
+
+/// Bytes a second of the wire.
+const BYTES_PER_S: f64 = 11_520.0;
+/// Longest from a fault to its announcement, s.
+const LATEST_S: f64 = 0.2;
+
+/// A drive with its motor that is in a state.
+fn in_state(state: State) -> Rig {
+    let mut config = hil_sim::Config::default();
+    config.drive.angle_source =
+        if state == State::Verifying { AngleSource::Injection } else { AngleSource::Encoder };
+    config.drive.injection.beside_encoder = true;
+    let mut rig = Rig::from_config(&config, 1).unwrap();
+    let mode = match state {
+        State::Speed => Mode::Speed,
+        State::Position => Mode::Position,
+        State::Learning => Mode::Learning,
+        _ => Mode::Torque,
+    };
+    if state == State::CheckingWiring {
+        rig.command(&Command::CheckWiring).unwrap();
+    }
+    rig.drive.command(&Command::Start(mode)).unwrap();
+    if state == State::Stopping {
+        while rig.drive.state() != State::Torque {
+            rig.step();
+        }
+        rig.drive.command(&Command::Torque(2.0)).unwrap();
+        rig.run(0.1, |_| {});
+        rig.drive.command(&Command::Stop).unwrap();
+    }
+    for _ in 0..60_000 {
+        if rig.drive.state() == state {
+            return rig;
+        }
+        rig.step();
+    }
+    panic!("never {state}, but {}", rig.drive.state());
+}
+
+/// Polls the console as the wire lets it go on, ten times a millisecond, until a line begins so; the time and the line.
+fn until_line(talk: &mut Talk, begins: &str) -> (f64, String) {
+    const POLL_S: f64 = 1e-4;
+    let mut room = 0.0;
+    for poll in 0..20_000 {
+        talk.now_ms += u32::from(poll % 10 == 9);
+        room += BYTES_PER_S * POLL_S;
+        // What the transmit queue of 512 bytes has sent.
+        talk.port.room = (talk.port.room + room as usize).min(511);
+        room -= room.floor();
+        talk.poll();
+        if let Some(line) = talk.port.received.lines().find(|line| line.starts_with(begins)) {
+            // The queue is sent behind it.
+            let sent = (511 - talk.port.room) as f64 / BYTES_PER_S;
+            return (f64::from(poll) * POLL_S + sent, line.to_owned());
+        }
+    }
+    panic!("no line {begins}: {}", talk.port.received);
+}
+
+const STATES: [State; 10] = [
+    State::Calibrating,
+    State::Precharge,
+    State::CheckingWiring,
+    State::Magnetising,
+    State::Verifying,
+    State::Torque,
+    State::Speed,
+    State::Position,
+    State::Learning,
+    State::Stopping,
+];
+
+/// In every state, and while nothing, a list, or a trace is being printed.
+#[test]
+fn a_fault_in_any_state_is_told_in_words_within_a_fifth_of_a_second() {
+    for state in STATES {
+        let rig = Rc::new(in_state(state));
+        for printing in
+            ["", "get\n", "describe\n", "trace 1000\n", "trace 5 on fault\n", "rubbish\n", "tor"]
+        {
+            let mut talk = Talk::new();
+            talk.drive.drive = rig.drive.clone();
+            talk.say("");
+            // The wire is busy: the queue is full, and a line waits.
+            talk.port.room = 511;
+            talk.port.sent.extend(printing.bytes());
+            for _ in 0..40 {
+                talk.poll();
+            }
+            talk.port.received.clear();
+            talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+            assert_eq!(talk.drive.drive.state(), State::Fault(Fault::Break));
+            let (seconds, line) = until_line(&mut talk, "fault 20: ");
+            assert!(seconds < LATEST_S, "{state}, {printing:?}: {seconds} s");
+            assert_eq!(
+                line,
+                "fault 20: the power stage pulled the break input; likely: the power stage reports a fault of its \
+                 own; type 'clear'"
+            );
+        }
+    }
+}
+
+/// What was being printed goes on behind the announcement.
+#[test]
+fn an_announcement_comes_between_the_lines_of_a_list() {
+    let mut talk = Talk::new();
+    talk.ask("start");
+    talk.port.sent.extend(b"get\n");
+    for _ in 0..10 {
+        talk.poll();
+    }
+    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    let lines = talk.say("");
+    assert_eq!(lines.len(), keys::COUNT + 2);
+    let fault = lines.iter().position(|line| line.starts_with("fault ")).unwrap();
+    assert!((1..20).contains(&fault) && lines.last().unwrap() == "ok");
+    // Once.
+    talk.now_ms += 60_000;
+    assert!(talk.say("").is_empty());
+}
+
+#[test]
+fn every_fault_fits_a_line() {
+    for fault in Fault::ALL {
+        let text = announce::News::Fault(*fault).to_string();
+        assert!(
+            text.len() + 2 < line::OUTPUT - line::LONGEST && text.ends_with("type 'clear'"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn the_end_of_a_start_and_of_a_stop_is_told() {
+    let mut talk = Talk::new();
+    talk.drive.drive = in_state(State::Magnetising).drive;
+    assert!(talk.say("").is_empty());
+    for (state, line) in [
+        (State::Torque, "running: torque"),
+        (State::Speed, "running: speed"),
+        (State::Position, "running: position"),
+    ] {
+        talk.drive.drive = in_state(state).drive;
+        assert_eq!(talk.say(""), [line]);
+    }
+    assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.drive.drive.state(), State::Stopping);
+    let mut rig = in_state(State::Stopping);
+    while rig.drive.state() != State::Off {
+        rig.step();
+    }
+    talk.drive.drive = rig.drive;
+    assert_eq!(talk.say(""), ["off: stopped"]);
+    // A stop that is off at once is answered with ok.
+    talk.ask("start");
+    assert_eq!(talk.say("stop\n"), ["ok"]);
+}
+
+#[test]
+fn a_learning_tells_its_progress_and_its_end() {
+    let mut talk = Talk::new();
+    let mut rig = in_state(State::Learning);
+    talk.drive.drive = rig.drive.clone();
+    assert_eq!(talk.say(""), ["learning: point 1 of 26"]);
+    let mut told = 0;
+    // 80 ms at a time.
+    while rig.drive.state() == State::Learning {
+        rig.run(0.08, |_| {});
+        talk.drive.drive = rig.drive.clone();
+        talk.now_ms += 80;
+        let lines = talk.say("");
+        told = if lines.is_empty() { told + 80 } else { 0 };
+        assert!(told < 10_000, "silent for {told} ms");
+    }
+    assert!(talk.now_ms > 20_000, "{} ms", talk.now_ms);
+    talk.drive.found = rig.drive.learned().copied();
+    assert!(talk.say("")[0].starts_with("learned: asymmetry 0.00"));
+    while rig.drive.state() != State::Off {
+        rig.step();
+        talk.drive.drive = rig.drive.clone();
+        talk.poll();
+    }
+    assert_eq!(talk.say(""), ["off: the learning has ended"]);
+    // A result that is not believable.
+    talk.drive.found = Some(Learned { accepted: false, ..found() });
+    assert!(talk.say("")[0].starts_with("refused: not believable: asymmetry"));
+}
+
+#[test]
+fn every_announcement_begins_as_programs_expect() {
+    let words = |text: String| {
+        assert!(ANNOUNCEMENTS.iter().any(|first| text.starts_with(first)), "{text}");
+    };
+    for news in [
+        announce::News::Fault(Fault::Break),
+        announce::News::Running(State::Torque),
+        announce::News::Off("stopped"),
+        announce::News::Learning(1, 26),
+    ] {
+        words(news.to_string());
+    }
+    for accepted in [true, false] {
+        words(announce::outcome(&Learned { accepted, ..found() }).to_string());
+    }
+}

@@ -1,0 +1,239 @@
+use super::*;
+
+/// A console whose settings in force and staged are these, by name.
+fn shown(talk: &Talk, name: &str) -> (String, String) {
+    let (key, settings) = (keys::find(name).unwrap(), &talk.console.settings);
+    (key.get(settings.in_force()).to_string(), key.get(settings.latest()).to_string())
+}
+
+#[test]
+fn settings_out_of_range_are_refused_with_the_range() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set motor.r_s 0"), "error: motor.r_s = 0: allowed is 0.001 to 1000 ohm");
+    assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
+    assert!(talk.drive.commands.is_empty() && !talk.console.settings.is_staged());
+}
+
+#[test]
+fn a_value_that_is_none_is_refused_with_what_is_allowed() {
+    let mut talk = Talk::new();
+    for (line, answer) in [
+        ("set motor.r_s 5ohm", "motor.r_s = 5ohm: not a number; allowed is 0.001 to 1000 ohm"),
+        (
+            "set motor.pole_pairs 2.5",
+            "motor.pole_pairs = 2.5: not a whole number from 0 to 50; allowed is 1 to 50",
+        ),
+        ("set angle_source guess", "angle_source = guess: not one of: encoder injection"),
+        (
+            "set inverter.top 5000",
+            "inverter.top belongs to the board and is no setting of the console",
+        ),
+    ] {
+        assert_eq!(talk.ask(line), format!("error: {answer}"));
+    }
+    assert!(talk.drive.commands.is_empty() && !talk.console.settings.is_staged());
+}
+
+#[test]
+fn staged_values_are_marked_and_designed_for_once() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("apply"), "ok: nothing staged");
+    assert_eq!(talk.ask("set motor.r_s 5.5 motor.r_r 1.2"), "ok: staged");
+    assert_eq!(talk.ask("set motor.inertia 0.02"), "ok: staged");
+    assert!(talk.drive.commands.is_empty(), "nothing is given to the drive");
+    let get = "motor.r_s = 5.5 ohm (0.001 to 1000); staged, in force: 5.4";
+    assert_eq!(talk.ask("get motor.r_s"), in_force(get));
+    assert_eq!(talk.say("get motor.r_s\n").len(), 1);
+    assert!(talk.ask("status").ends_with("; 3 staged"));
+    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+    assert!(matches!(talk.drive.commands[..], [Command::Configure(_)]));
+    assert_eq!(shown(&talk, "motor.r_r"), ("1.2".into(), "1.2".into()));
+    // Back to the value in force: nothing is staged any more.
+    assert_eq!(talk.ask("set motor.r_s 5.6"), "ok: staged");
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: as in force");
+    assert_eq!(talk.ask("apply"), "ok: nothing staged");
+    // Settings of the firmware itself need no design.
+    assert_eq!(talk.ask("set command.timeout_s 3"), "ok: staged");
+    assert_eq!(talk.say("apply\n"), ["ok"]);
+}
+
+#[test]
+fn a_line_is_staged_whole_or_not_at_all() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    let refused = talk.ask("set motor.r_s 6 motor.r_r 1.3 motor.r_s 7 limits.trip_a 9");
+    assert!(refused.starts_with("error: limits.trip_a = 9: allowed is 0.05 to 4.47"), "{refused}");
+    assert_eq!(shown(&talk, "motor.r_s"), ("5.4".into(), "5.5".into()));
+    assert_eq!(shown(&talk, "motor.r_r").1, "1.1");
+    assert_eq!(talk.ask("revert"), "ok: 1 staged values dropped");
+    assert_eq!(shown(&talk, "motor.r_s").1, "5.4");
+    assert_eq!(talk.ask("revert"), "ok: 0 staged values dropped");
+}
+
+/// A range that depends on another setting is that beside the staged values.
+#[test]
+fn ranges_are_those_beside_the_staged_values() {
+    let mut talk = Talk::new();
+    assert!(talk.ask("set limits.trip_a 20").starts_with("error: limits.trip_a = 20: allowed is"));
+    let scales = "set scales.current_a.gain 0.05 scales.current_a.offset -100";
+    assert_eq!(talk.ask(scales), "ok: staged");
+    assert_eq!(talk.ask(&scales.replace("_a.", "_b.")), "ok: staged");
+    assert_eq!(talk.ask("set limits.trip_a 20 limits.current_a 15"), "ok: staged");
+    // What a later value makes wrong is found when all is put in force; the drive stays as it is.
+    assert_eq!(talk.ask("set limits.trip_a 10"), "ok: staged");
+    let refused =
+        "error: limits.current_a = 15: allowed is 0.01 to 10 A; not in force, still staged";
+    for line in ["apply", "save", "start"] {
+        assert_eq!(talk.say(format!("{line}\n")), ["designing...", refused]);
+    }
+    assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
+    assert_eq!(talk.ask("set limits.current_a 8"), "ok: staged");
+    assert!(talk.ask("apply").starts_with("ok: the limits hold in software"));
+}
+
+#[test]
+fn a_refused_design_names_the_reason_and_changes_nothing() {
+    let mut talk = Talk::new();
+    assert_eq!(
+        talk.ask("set current_plant identified current_plant.q.p 0 current_plant.d.k 1"),
+        "ok: staged"
+    );
+    let before = talk.console.settings.in_force().drive;
+    let replies = talk.say("start\n");
+    assert_eq!((replies.len(), replies[0].as_str()), (2, "designing..."));
+    assert!(
+        replies[1].starts_with("error: ") && replies[1].ends_with("; not in force, still staged"),
+        "{replies:?}"
+    );
+    assert!(talk.drive.commands.is_empty());
+    assert_eq!(talk.console.settings.in_force().drive, before);
+    let count = talk.console.settings.count();
+    assert!(count >= 2);
+    assert_eq!(talk.ask("revert"), format!("ok: {count} staged values dropped"));
+    assert_eq!(talk.ask("start"), "ok");
+}
+
+#[test]
+fn start_and_save_put_staged_values_in_force_first() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    assert_eq!(talk.say("start speed\n"), ["designing...", "ok"]);
+    assert!(matches!(
+        talk.drive.commands[..],
+        [Command::Configure(_), Command::Start(Mode::Speed)]
+    ));
+    assert_eq!(talk.ask("defaults"), "error: the drive must be off: `stop` first");
+    assert_eq!(talk.ask("apply"), "ok: nothing staged");
+    talk.ask("stop");
+    assert_eq!(
+        talk.ask("set motor.r_s 5.6 inverter.dead_time_s 3e-6"),
+        "ok: staged; inverter.dead_time_s takes effect at the next reset, if saved"
+    );
+    let said = talk.say("save\n");
+    assert_eq!(
+        said,
+        ["designing...", "applied: the dead time holds from the next reset on, if saved", "ok"]
+    );
+    assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.6);
+}
+
+/// The time of a design, seconds, is not silence of the user.
+#[test]
+fn a_start_after_a_design_is_not_stopped_for_silence() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("set command.timeout_s 1 motor.r_s 5.5"), "ok: staged");
+    talk.port.sent.extend(b"start\n");
+    talk.poll();
+    talk.now_ms += 2000;
+    talk.poll();
+    talk.now_ms += 500;
+    assert_eq!(talk.say(""), ["designing...", "ok"]);
+    assert_eq!(talk.drive.drive.state(), State::Calibrating);
+}
+
+#[test]
+fn a_backup_restores_settings_and_what_was_learned() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.say("backup\n"), ["defaults", "apply", "ok"]);
+    for line in [
+        "set scales.current_a.gain 0.001 scales.current_a.offset -2 limits.dc_over_v 371.3",
+        "set scales.current_b.gain 0.001 scales.current_b.offset -2",
+        "set injection.monitor no injection.amplitude_v 0 injection.demodulator rectified",
+        "set command.timeout_s 7.25 limits.trip_a auto",
+    ] {
+        assert_eq!(talk.ask(line), "ok: staged");
+    }
+    let refused = "error: there are staged values: `apply` or `revert` first";
+    assert_eq!(talk.ask("backup"), refused);
+    assert!(talk.ask("apply").starts_with("ok"));
+    talk.drive.found = Some(found());
+    talk.say("");
+    let backup = talk.say("backup\n");
+    let (end, lines) = backup.split_last().unwrap();
+    assert_eq!((end.as_str(), lines[0].as_str()), ("ok", "defaults"));
+    assert_eq!(lines.iter().filter(|line| line.starts_with("set ")).count(), 9);
+    assert!(lines.iter().all(|line| line.len() <= line::LONGEST));
+
+    let mut other = Talk::new();
+    assert_eq!(other.ask("set motor.r_s 9"), "ok: staged");
+    let replies = other.say(lines.join("\r\n") + "\r\n");
+    assert!(replies.iter().all(|reply| !reply.starts_with("error")), "{replies:#?}");
+    let mut expected = *talk.console.settings.in_force();
+    // Whoever restores checks the wiring.
+    expected.command.wiring_checked = false;
+    assert_eq!(*other.console.settings.in_force(), expected);
+    assert_eq!(other.console.settings.in_force().learned, Some(found()));
+    assert_eq!(other.say("backup\n"), backup);
+}
+
+#[test]
+fn damaged_learned_values_are_refused() {
+    let mut talk = Talk::new();
+    talk.drive.found = Some(found());
+    talk.say("");
+    let backup = talk.say("backup\n");
+    let words: Vec<&str> =
+        backup.iter().filter(|line| line.starts_with("learned ")).map(String::as_str).collect();
+    let mut other = Talk::new();
+    assert_eq!(other.ask(words[words.len() - 1]), "error: learned: word 0 is missing");
+    let mut say = |lines: &[String]| other.say(lines.join("\n") + "\n").pop().unwrap();
+    let mut lines: Vec<String> = words.iter().map(|line| (*line).to_owned()).collect();
+    let missing = say(&[&lines[..1], &lines[2..]].concat());
+    assert_eq!(missing, "error: learned: word 8 is missing");
+    let last = lines[0].pop().unwrap();
+    lines[0].push(if last == '0' { '1' } else { '0' });
+    assert!(say(&lines).starts_with("error: learned: the checksum of these words is "));
+    assert_eq!(
+        say(&["learned 37 00000000 00000000".to_owned()]),
+        "error: learned: more than 38 words"
+    );
+    assert!(!other.console.settings.is_staged());
+    // Whole, but then other settings.
+    assert_eq!(other.say(words.join("\n") + "\n").pop().unwrap(), "ok: staged");
+    let dropped = "ok: staged; what was restored belongs to other settings and is dropped";
+    assert_eq!(other.ask("set motor.r_s 5"), dropped);
+    assert_eq!(other.ask("apply"), "ok");
+    assert_eq!(other.console.settings.in_force().learned, None);
+}
+
+#[test]
+fn a_reboot_loses_nothing_silently_and_waits_for_its_answer() {
+    let mut talk = Talk::new();
+    let kept = "error: settings that were not saved would be lost: `save` first, or `reboot now`";
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    assert_eq!(talk.ask("reboot"), kept);
+    assert_eq!(talk.ask("apply"), "ok");
+    assert_eq!(talk.ask("reboot"), kept);
+    assert_eq!(talk.ask("save"), "ok");
+    assert_eq!(talk.ask("start"), "ok");
+    assert_eq!(talk.ask("reboot"), "error: the drive must be off: `stop` first");
+    assert_eq!(talk.ask("stop"), "ok");
+    assert_eq!(talk.ask("reboot"), "ok: rebooting");
+    assert_eq!(talk.drive.reboots, 0);
+    talk.now_ms += 101;
+    talk.poll();
+    assert_eq!(talk.drive.reboots, 1);
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("echo off"), "ok");
+    assert_eq!(talk.ask("reboot now"), "ok: rebooting");
+}

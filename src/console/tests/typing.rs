@@ -1,0 +1,44 @@
+use super::*;
+
+#[test]
+fn typed_characters_come_back_if_asked_for() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("echo on"), "ok");
+    talk.port.sent.extend(b"Stq\x08op\r\n");
+    while !talk.port.sent.is_empty() {
+        talk.poll();
+    }
+    talk.poll();
+    let said = std::mem::take(&mut talk.port.received);
+    assert_eq!(said, "Stq\x08 \x08op\r\nok\r\n");
+    // Byte by byte, as a person types, each at once.
+    for byte in *b"sta" {
+        talk.port.sent.push_back(byte);
+        talk.poll();
+        talk.poll();
+        let said = std::mem::take(&mut talk.port.received);
+        assert_eq!(said.as_bytes(), [byte]);
+    }
+    // An announcement comes on a line of its own, and what was typed so far behind it.
+    talk.drive.drive.command(&Command::Start(Mode::Torque)).unwrap();
+    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    talk.poll();
+    talk.poll();
+    let said = std::mem::take(&mut talk.port.received);
+    assert!(
+        said.starts_with("\r\nfault 20: ") && said.ends_with("type 'clear'\r\nsta"),
+        "{said:?}"
+    );
+    assert_eq!(talk.say("\x15echo off\n").last().unwrap(), "ok");
+    assert_eq!(talk.ask("version"), "version");
+}
+
+#[test]
+fn the_case_of_a_command_does_not_matter() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("Set Motor.R_s 5.5"), "ok: staged");
+    assert_eq!(talk.ask("REVERT"), "ok: 1 staged values dropped");
+    assert_eq!(talk.ask("\x1b[A\tVersion"), "version");
+    assert_eq!(talk.say("?\n"), talk.say("help\n"));
+    assert_eq!(talk.say("h\n").len(), HELP.len() + 1);
+}

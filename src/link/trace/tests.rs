@@ -1,0 +1,153 @@
+use super::*;
+
+fn plan(records: u16, divider: u16, trigger: Trigger) -> Plan {
+    Plan { records, divider, choice: SignalChoice::usual(), trigger }
+}
+
+fn at(turns: f32) -> Telemetry {
+    Telemetry { turns, ..Telemetry::default() }
+}
+
+/// Numbers from the trigger, and turns, of all records.
+fn all<const N: usize>(reader: &Reader<'_, N>) -> Vec<(i16, f32)> {
+    (0..).map_while(|i| reader.get(i)).map(|(n, record)| (n, record[7])).collect()
+}
+
+#[test]
+fn records_every_nth_period_and_gives_them_back_when_done() {
+    let trace = Trace::<4>::new();
+    let (mut recorder, mut reader) = trace.take().unwrap();
+    assert_eq!(reader.get(0), None);
+    assert!(reader.begin(&plan(3, 2, Trigger::Now)));
+    assert!(!reader.begin(&plan(1, 1, Trigger::Now)));
+    for period in 0..5 {
+        assert!(reader.recording());
+        assert_eq!(reader.get(0), None);
+        recorder.step(false, || at(period as f32));
+    }
+    recorder.step(false, Telemetry::default);
+    assert_eq!(all(&reader), [(0, 0.0), (1, 2.0), (2, 4.0)]);
+}
+
+#[test]
+fn asks_for_no_more_than_there_is_room() {
+    let trace = Trace::<4>::new();
+    let (mut recorder, mut reader) = trace.take().unwrap();
+    assert!(reader.begin(&plan(100, 1, Trigger::Now)));
+    for _ in 0..4 {
+        recorder.step(false, Telemetry::default);
+    }
+    assert!(!reader.recording());
+    assert!(reader.get(3).is_some() && reader.get(4).is_none());
+}
+
+#[test]
+fn a_trace_of_a_fault_ends_with_it() {
+    let trace = Trace::<8>::new();
+    let (mut recorder, mut reader) = trace.take().unwrap();
+    assert!(reader.begin(&plan(4, 2, Trigger::Fault)));
+    for period in 0..10 {
+        recorder.step(false, || at(period as f32));
+    }
+    assert!(reader.recording());
+    // In a period that would not be due.
+    recorder.step(false, || at(10.0));
+    recorder.step(true, || at(11.0));
+    assert_eq!(all(&reader), [(-3, 6.0), (-2, 8.0), (-1, 10.0), (0, 11.0)]);
+    // One that comes before the ring is full.
+    assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
+    recorder.step(false, || at(1.0));
+    recorder.step(true, || at(2.0));
+    assert_eq!(all(&reader), [(-1, 1.0), (0, 2.0)]);
+}
+
+#[test]
+fn a_level_keeps_a_quarter_from_before_it() {
+    let trace = Trace::<8>::new();
+    let (mut recorder, mut reader) = trace.take().unwrap();
+    let signal = find("turns").unwrap();
+    let record = |recorder: &mut Recorder<'_, 8>, reader: &mut Reader<'_, 8>, above, from: i32| {
+        assert!(reader.begin(&plan(8, 1, Trigger::Level { signal, level: 19.5, above })));
+        for n in from.. {
+            if !reader.recording() {
+                break;
+            }
+            let turns = if above { n } else { 40 - n };
+            recorder.step(false, || at(turns as f32));
+        }
+        all(reader)
+    };
+    let rising: Vec<(i16, f32)> = (-2..6).map(|n| (n, 20.0 + f32::from(n))).collect();
+    assert_eq!(record(&mut recorder, &mut reader, true, 0), rising);
+    // Fewer if it comes early.
+    let early: Vec<(i16, f32)> = (-1..7).map(|n| (n, 20.0 + f32::from(n))).collect();
+    assert_eq!(record(&mut recorder, &mut reader, true, 19), early);
+    let falling: Vec<(i16, f32)> = (-2..6).map(|n| (n, 19.0 - f32::from(n))).collect();
+    assert_eq!(record(&mut recorder, &mut reader, false, 0), falling);
+}
+
+#[test]
+fn a_trace_that_waits_for_its_trigger_can_be_ended() {
+    let trace = Trace::<4>::new();
+    let (mut recorder, mut reader) = trace.take().unwrap();
+    assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
+    recorder.step(false, Telemetry::default);
+    reader.cancel();
+    recorder.step(true, Telemetry::default);
+    assert!(!reader.recording() && reader.get(0).is_none());
+    assert!(reader.begin(&plan(1, 1, Trigger::Now)));
+}
+
+/// Every signal is its own, under its name and its old one.
+#[test]
+fn signals_are_recorded_as_they_were_chosen() {
+    let telemetry = Telemetry {
+        phi: drive_core::Angle::QUARTER,
+        flux_freq: 1.0,
+        rotor_freq: 2.0,
+        reference: drive_core::Dq::new(3.0, 4.0),
+        current: drive_core::Dq::new(5.0, 6.0),
+        voltage: drive_core::Dq::new(7.0, 8.0),
+        delta_i: 9.0,
+        saliency: 10.0,
+        dc_link: 11.0,
+        turns: 12.0,
+        ..Telemetry::default()
+    };
+    let old = [
+        "phi_deg",
+        "flux_step",
+        "rotor_step",
+        "i_d_ref",
+        "i_q_ref",
+        "i_d",
+        "i_q",
+        "v_d",
+        "v_q",
+        "delta_i",
+        "saliency",
+        "dc_link",
+        "turns",
+    ];
+    for (i, (signal, old)) in SIGNALS.iter().zip(old).enumerate() {
+        let mut choice = SignalChoice::none();
+        assert!(choice.add(find(signal.name).unwrap()) && choice.add(find("turns").unwrap()));
+        assert_eq!(find(old), find(signal.name), "{old}");
+        let expected = if i == 0 { 90.0 } else { i as f32 };
+        assert_eq!(choice.values(&telemetry)[..2], [expected, 12.0], "{}", signal.name);
+        let names: Vec<&str> = choice.signals().map(|signal| signal.name).collect();
+        assert_eq!(names, [signal.name, "turns"]);
+    }
+    let mut full = SignalChoice::usual();
+    assert!(!full.add(0) && find("speed").is_none() && find("").is_none());
+}
+
+/// 1/4 of a revolution of a four-pole shaft a second is 1/2 electrical turn a second, 15 rpm.
+#[test]
+fn speeds_are_shown_in_the_unit_of_their_name() {
+    let factor = |name: &str| SIGNALS[usize::from(find(name).unwrap())].factor(2);
+    let per_period = 0.5 * drive_core::io::PERIOD_S;
+    assert!((factor("speed_rpm") * per_period - 15.0).abs() < 1e-4);
+    assert!((factor("flux_hz") * per_period - 0.5).abs() < 1e-6);
+    assert_eq!(factor("i_q_a"), 1.0);
+}

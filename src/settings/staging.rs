@@ -1,0 +1,213 @@
+//! Staged settings: changes that are collected, and put in force together.
+
+use core::fmt;
+
+use drive_core::identify::learning::Learned;
+use drive_core::settings::SettingsError;
+use drive_core::settings::entry::Change;
+use drive_core::settings::value::Value;
+use heapless::Vec;
+
+use super::FirmwareSettings;
+use super::keys::{self, Key};
+use crate::board;
+
+/// Most settings that are set at once.
+pub const MOST: usize = 8;
+
+/// Settings with their new values.
+pub type Assignments = Vec<(Key, Value), MOST>;
+
+/// Settings in force, and the staged copy of them, if there is one.
+pub struct Staging {
+    in_force: FirmwareSettings,
+    staged: Option<Staged>,
+}
+
+struct Staged {
+    settings: FirmwareSettings,
+    /// Whether `settings.learned` is staged, too. Otherwise the learned values in force stay as long as they hold for
+    /// the staged settings.
+    learned: bool,
+}
+
+/// Reason why values were not staged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SetError {
+    /// The setting belongs to the board.
+    Board(Key),
+    /// A value out of range.
+    Range(SettingsError),
+}
+
+impl fmt::Display for SetError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Board(key) => {
+                write!(f, "{} belongs to the board and is no setting of the console", key.name())
+            }
+            Self::Range(why) => why.fmt(f),
+        }
+    }
+}
+
+/// What the user has to know of settings that are in force now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Applied {
+    /// What was learned belonged to other settings and is gone.
+    pub forgotten: bool,
+    /// The dead time of the timer holds from the next reset on.
+    pub dead_time: bool,
+    /// The analog watchdogs and the comparator follow at the next reset.
+    pub protection: bool,
+}
+
+impl fmt::Display for Applied {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let notes = [
+            (self.dead_time, "the dead time holds from the next reset on, if saved"),
+            (
+                self.protection,
+                "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
+            ),
+            (self.forgotten, "what was learned belonged to other settings and is forgotten"),
+        ];
+        let mut separator = ": ";
+        for (_, note) in notes.into_iter().filter(|(so, _)| *so) {
+            write!(f, "{separator}{note}")?;
+            separator = "; ";
+        }
+        Ok(())
+    }
+}
+
+impl Staging {
+    /// These settings in force, none staged.
+    pub const fn new(in_force: FirmwareSettings) -> Self {
+        Self { in_force, staged: None }
+    }
+
+    /// The settings in force.
+    pub fn in_force(&self) -> &FirmwareSettings {
+        &self.in_force
+    }
+
+    /// The staged settings; those in force if there are none.
+    pub fn latest(&self) -> &FirmwareSettings {
+        self.staged.as_ref().map_or(&self.in_force, |staged| &staged.settings)
+    }
+
+    /// Whether settings are staged.
+    pub fn is_staged(&self) -> bool {
+        self.staged.is_some()
+    }
+
+    /// Number of settings whose staged value differs from the one in force.
+    pub fn count(&self) -> usize {
+        keys::all().filter(|key| self.differs(*key)).count()
+    }
+
+    /// Whether the staged value of a setting differs from the one in force.
+    pub fn differs(&self, key: Key) -> bool {
+        key.get(self.latest()) != key.get(&self.in_force)
+    }
+
+    /// Stages values: all of them or none. Each must be in its range beside the other staged values; the settings as a
+    /// whole are checked when they are put in force. Returns whether restored learned values are dropped, which hold for
+    /// the settings that they were restored with.
+    ///
+    /// # Errors
+    /// The first value that is refused.
+    pub fn set(&mut self, values: &Assignments) -> Result<bool, SetError> {
+        if let Some((key, _)) = values.iter().find(|(key, _)| key.change() == Change::Board) {
+            return Err(SetError::Board(*key));
+        }
+        let staged = Self::staged(&mut self.staged, &self.in_force);
+        let mut before = Assignments::new();
+        for (key, value) in values {
+            // There is room: it has the same size.
+            let _ = before.push((*key, key.get(&staged.settings)));
+            key.set(&mut staged.settings, *value);
+        }
+        let checked = values.iter().try_for_each(|(key, _)| key.check(&staged.settings));
+        let mut dropped = false;
+        if checked.is_err() {
+            // Backwards: a setting may be named twice.
+            for (key, value) in before.iter().rev() {
+                key.set(&mut staged.settings, *value);
+            }
+        } else if staged.learned && values.iter().any(|(key, _)| matches!(key, Key::Drive(_))) {
+            dropped = staged.settings.learned.take().is_some();
+        }
+        self.drop_if_same();
+        checked.map(|()| dropped).map_err(SetError::Range)
+    }
+
+    /// Stages the settings of the image, with nothing learned.
+    pub fn set_defaults(&mut self) {
+        let staged = Self::staged(&mut self.staged, &self.in_force);
+        *staged = Staged { settings: FirmwareSettings::of_the_board(), learned: true };
+        self.drop_if_same();
+    }
+
+    /// Stages the result of a learning with the staged settings.
+    pub fn restore(&mut self, learned: Learned) {
+        let staged = Self::staged(&mut self.staged, &self.in_force);
+        (staged.settings.learned, staged.learned) = (Some(learned), true);
+        self.drop_if_same();
+    }
+
+    /// Drops the staged settings.
+    pub fn revert(&mut self) {
+        self.staged = None;
+    }
+
+    /// Whether the controllers have to be designed anew for the staged settings.
+    pub fn needs_design(&self) -> bool {
+        self.staged.as_ref().is_some_and(|Staged { settings, .. }| {
+            settings.drive != self.in_force.drive || settings.learned != self.in_force.learned
+        })
+    }
+
+    /// The staged settings with the learned values that hold for them, to be designed for; `None` if none are staged.
+    pub fn prepare(&mut self) -> Option<&FirmwareSettings> {
+        let Staged { settings, learned } = self.staged.as_mut()?;
+        if !*learned {
+            settings.learned = self.in_force.learned;
+            settings.forget_unless_as(&self.in_force);
+        }
+        Some(settings)
+    }
+
+    /// Takes the [prepared](Self::prepare) settings as those in force.
+    pub fn adopt(&mut self) -> Applied {
+        let Some(Staged { settings, .. }) = &self.staged else { return Applied::default() };
+        let (old, new) = (&self.in_force.drive, &settings.drive);
+        let applied = Applied {
+            forgotten: self.in_force.learned.is_some() && settings.learned.is_none(),
+            dead_time: old.inverter.dead_time_s != new.inverter.dead_time_s,
+            protection: board::protection(old) != board::protection(new),
+        };
+        self.in_force = *settings;
+        self.staged = None;
+        applied
+    }
+
+    /// Changes the settings in force and the staged ones alike: for what the firmware itself finds out.
+    pub fn note(&mut self, change: impl Fn(&mut FirmwareSettings)) {
+        change(&mut self.in_force);
+        if let Some(staged) = &mut self.staged {
+            change(&mut staged.settings);
+        }
+    }
+
+    fn staged<'a>(staged: &'a mut Option<Staged>, in_force: &FirmwareSettings) -> &'a mut Staged {
+        staged.get_or_insert_with(|| Staged { settings: *in_force, learned: false })
+    }
+
+    fn drop_if_same(&mut self) {
+        if self.staged.as_ref().is_some_and(|staged| staged.settings == self.in_force) {
+            self.staged = None;
+        }
+    }
+}
