@@ -6,6 +6,7 @@
 //! come last.
 
 mod alias;
+pub mod file;
 mod key;
 mod keys;
 pub mod motors;
@@ -16,6 +17,7 @@ use std::path::Path;
 
 use drive_core::settings::{Line, Settings};
 
+use file::FileAssignment;
 pub use key::Key;
 pub use keys::*;
 pub use plant::plant_settings;
@@ -31,8 +33,8 @@ impl Config {
     /// The defaults, changed first by the motor, then by the file, and then by the assignments `KEY=VALUE`, in order.
     ///
     /// # Errors
-    /// As [`Config::of_motor`], [`Error::ConfigFile`] when the file cannot be read or is not TOML, [`Error::Assignment`] for an
-    /// assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
+    /// As [`Config::of_motor`] and [`file::read`], [`Error::ConfigLine`] for an assignment of the file that [`Config::set`]
+    /// refuses, [`Error::Assignment`] for an assignment without an equals sign, and as [`Config::set`]. The ranges of the drive's settings depend on each
     /// other: they are checked when the drive is built.
     pub fn load(
         motor: Option<&str>,
@@ -41,16 +43,17 @@ impl Config {
     ) -> Result<Self, Error> {
         let mut config = Self::of_motor(motor)?;
         if let Some(path) = file {
-            let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
-            let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
-            let table: toml::Table =
-                text.parse().map_err(|e: toml::de::Error| failed(e.to_string()))?;
-            config.set_table(&table)?;
+            for FileAssignment { name, value, line } in file::read(path)? {
+                config.set(&name, &value).map_err(|error| Error::ConfigLine {
+                    path: path.to_owned(),
+                    line,
+                    error: Box::new(error),
+                })?;
+            }
         }
         for assignment in assignments {
-            let (key, value) =
-                assignment.split_once('=').ok_or_else(|| Error::Assignment(assignment.clone()))?;
-            config.set(key.trim(), &Value::from_text(value))?;
+            let (name, value) = assigned(assignment)?;
+            config.set(name, &Value::from_text(value))?;
         }
         Ok(config)
     }
@@ -172,6 +175,24 @@ impl Config {
         }
         changes
     }
+}
+
+/// Name and value of an assignment `KEY=VALUE`.
+///
+/// # Errors
+/// [`Error::Assignment`] without an equals sign.
+pub fn assigned(assignment: &str) -> Result<(&str, &str), Error> {
+    let (name, value) =
+        assignment.split_once('=').ok_or_else(|| Error::Assignment(assignment.to_owned()))?;
+    Ok((name.trim(), value))
+}
+
+/// The keys that an assignment to `name` sets; the name may be an old one.
+///
+/// # Errors
+/// As [`Key::named`].
+pub fn keys_of(name: &str) -> Result<Vec<Key>, Error> {
+    Key::named(&alias::today(name, &Value::Unset).0)
 }
 
 /// The assignments of a table, those of the drive alone last.

@@ -53,6 +53,54 @@ pub enum Error {
         /// The reason.
         problem: String,
     },
+    /// An assignment of the configuration file is refused.
+    #[error("{}, line {line}: {error}", .path.display())]
+    ConfigLine {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// The refusal.
+        error: Box<Error>,
+    },
+    /// The experiment does not use a key that was set for it.
+    #[error("{name} does not use `{key}`; it uses: {uses}")]
+    UnusedKey {
+        /// The experiment, or the group.
+        name: String,
+        /// The key.
+        key: String,
+        /// The keys it uses.
+        uses: String,
+    },
+    /// Data of a file cannot be used.
+    #[error("{}{}: {problem}", .path.display(), line_text(.line))]
+    Data {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1; none where the file as a whole is meant.
+        line: Option<u64>,
+        /// The reason.
+        problem: String,
+    },
+    /// A run was lost: its results are written, its end was not as wanted.
+    #[error("{name}: {reason}")]
+    Lost {
+        /// The experiment.
+        name: String,
+        /// The fault, or the other reason.
+        reason: String,
+    },
+    /// Some experiments of a report were refused or lost; the others are in it.
+    #[error("{failed} of {all} experiments failed: {}", .names.join(", "))]
+    Incomplete {
+        /// How many failed.
+        failed: usize,
+        /// How many there are.
+        all: usize,
+        /// Their names.
+        names: Vec<String>,
+    },
     /// Each value is in its range, but a model, a filter or a design rule refuses their combination.
     #[error("{0}")]
     Refused(String),
@@ -83,10 +131,17 @@ impl Error {
     /// Exit code of the process: 2 where the user has to change the request, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Write { .. } | Self::Internal(_) => 1,
+            Self::Write { .. }
+            | Self::Internal(_)
+            | Self::Lost { .. }
+            | Self::Incomplete { .. } => 1,
             _ => 2,
         }
     }
+}
+
+fn line_text(line: &Option<u64>) -> String {
+    line.map(|line| format!(", line {line}")).unwrap_or_default()
 }
 
 fn did_you_mean(nearest: &Option<String>) -> String {

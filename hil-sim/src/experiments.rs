@@ -13,6 +13,7 @@ mod identify_continuous;
 mod identify_discrete;
 mod identify_machine;
 mod identify_recursive;
+pub mod identify_trace;
 mod identify_validate;
 mod injection_map;
 mod learn_reference;
@@ -29,6 +30,7 @@ mod perturbation;
 mod pi_design;
 mod plant_identification;
 mod position;
+mod profile;
 mod reversal;
 mod saliency_check;
 mod sensorless_position;
@@ -42,9 +44,11 @@ pub mod warming_rotor;
 
 pub use torque::assumptions;
 
+use std::path::Path;
+
 use rayon::prelude::*;
 
-use crate::config::Config;
+use crate::config::{Config, Key};
 use crate::error::{Error, nearest};
 use crate::outcome::Outcome;
 use crate::progress::Progress;
@@ -59,6 +63,8 @@ pub struct Context<'a> {
     pub seconds: Option<f64>,
     /// Progress bars.
     pub progress: Progress,
+    /// File of an experiment that takes one.
+    pub file: Option<&'a Path>,
 }
 
 impl Context<'_> {
@@ -90,9 +96,93 @@ pub struct Experiment {
     pub stands_for: &'static str,
     /// Description in one sentence.
     pub about: &'static str,
+    /// The keys that it uses: names, and beginnings of names that end in a full stop.
+    pub uses: &'static [&'static [&'static str]],
+    /// Exceptions from `uses`, likewise: keys that the experiment sets itself, or that do nothing in it.
+    pub not: &'static [&'static [&'static str]],
     /// Runs it.
     pub run: fn(&Context<'_>) -> Result<Outcome, Error>,
 }
+
+impl Experiment {
+    /// Whether a key has an effect on this experiment.
+    pub fn uses_key(&self, key: Key) -> bool {
+        let name = key.assigned_name();
+        let is_in = |given: &&str| {
+            if given.ends_with('.') { name.starts_with(given) } else { name == *given }
+        };
+        self.uses.iter().copied().flatten().any(is_in)
+            && !self.not.iter().copied().flatten().any(is_in)
+    }
+
+    /// The keys that it uses, in words.
+    pub fn uses_text(&self) -> String {
+        let words = |names: &[&str]| {
+            let shown = names.iter().map(|name| match name.strip_suffix('.') {
+                Some(group) => format!("{group}.*"),
+                None => (*name).to_owned(),
+            });
+            shown.collect::<Vec<_>>().join(", ")
+        };
+        match (self.uses.concat().as_slice(), self.not.concat().as_slice()) {
+            ([], _) => "no key".to_owned(),
+            (uses, []) => words(uses),
+            (uses, not) => format!("{}; except {}", words(uses), words(not)),
+        }
+    }
+
+    /// Whether it takes an input file.
+    fn takes_file(&self) -> bool {
+        WITH_INPUT.iter().any(|with| with.name == self.name)
+    }
+
+    /// Checks that a file is given where one is needed, and nowhere else.
+    ///
+    /// # Errors
+    /// [`Error::Refused`].
+    pub fn check_file(&self, file: Option<&Path>) -> Result<(), Error> {
+        let name = self.name;
+        match (self.takes_file(), file) {
+            (true, None) => Err(Error::Refused(format!("{name} needs --input FILE"))),
+            (false, Some(file)) => {
+                let (file, with) = (file.display(), WITH_INPUT.iter().map(|with| with.name));
+                let with = with.collect::<Vec<_>>().join(", ");
+                Err(Error::Refused(format!(
+                    "--input {file}: {name} takes no file; allowed with: {with}"
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Keys of the simulated motor, inverter and sensors.
+pub const BENCH: &[&str] = &["motor.", "saliency.", "inverter.", "measurement."];
+/// Keys of the drive.
+pub const DRIVE: &[&str] = &[
+    "drive.",
+    "nameplate.",
+    "scales.",
+    "angle_source",
+    "current_plant",
+    "current_plant.",
+    "ignore_delays",
+    "injection.",
+    "limits.",
+    "sequence.",
+    "speed.",
+];
+/// Keys of the speed loop, which a drive that regulates torque does not use.
+pub const SPEED_LOOP: &[&str] =
+    &["speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.phase_margin_deg", "drive.motor.inertia"];
+/// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
+pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction"];
+/// Keys of the tracking of the saliency, which a drive with an encoder does not use.
+pub const TRACKING: &[&str] =
+    &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
+/// Keys that do nothing while the shaft is locked.
+pub const TURNING: &[&str] =
+    &["motor.inertia", "motor.friction", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
@@ -133,6 +223,9 @@ pub const EXPERIMENTS: &[Experiment] = &[
     online_tracking::EXPERIMENT,
 ];
 
+/// The experiments that need an input file; they are no part of the report.
+pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
+
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";
 
@@ -150,12 +243,10 @@ pub fn named(name: &str) -> Vec<&str> {
 /// # Errors
 /// [`Error::UnknownExperiment`] with the most similar name.
 pub fn find(name: &str) -> Result<&'static Experiment, Error> {
-    EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
-        Error::UnknownExperiment {
-            name: name.to_owned(),
-            nearest: nearest(name, EXPERIMENTS.iter().map(|experiment| experiment.name))
-                .map(str::to_owned),
-        }
+    let all = || EXPERIMENTS.iter().chain(WITH_INPUT);
+    all().find(|experiment| experiment.name == name).ok_or_else(|| Error::UnknownExperiment {
+        name: name.to_owned(),
+        nearest: nearest(name, all().map(|experiment| experiment.name)).map(str::to_owned),
     })
 }
 
@@ -164,7 +255,7 @@ pub fn find(name: &str) -> Result<&'static Experiment, Error> {
 /// # Errors
 /// As [`find`], and the errors of the experiment.
 pub fn run(name: &str, config: &Config, seed: u64) -> Result<Outcome, Error> {
-    let context = Context { config, seed, seconds: None, progress: Progress::hidden() };
+    let context = Context { config, seed, seconds: None, progress: Progress::hidden(), file: None };
     (find(name)?.run)(&context)
 }
 

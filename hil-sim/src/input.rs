@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::config::{Config, Value};
 use crate::error::Error;
+use crate::progress::Progress;
 
 /// The options that describe a simulation.
 #[derive(Args, Default)]
@@ -25,6 +26,9 @@ pub struct Input {
     /// Simulated time, s; the same as --set seconds=S
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub seconds: Option<f64>,
+    /// No progress: nothing but errors and the result
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 /// Default folder of the pages.
@@ -42,6 +46,11 @@ impl Input {
             config.set("seconds", &Value::Number(seconds))?;
         }
         Ok(config)
+    }
+
+    /// Progress bars, unless they are not wanted.
+    pub fn progress(&self) -> Progress {
+        if self.quiet { Progress::hidden() } else { Progress::default() }
     }
 
     /// The command line that repeats `cargo sim WHAT` with this configuration.

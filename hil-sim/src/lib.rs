@@ -2,6 +2,7 @@
 
 pub mod board;
 pub mod cli;
+pub mod columns;
 pub mod config;
 pub mod console;
 pub mod error;

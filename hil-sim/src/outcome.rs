@@ -32,6 +32,8 @@ pub struct Outcome {
     /// Texts of the faults with which the drive stopped itself when it should have gone on; none for a run
     /// that ended as it should.
     pub faults: Vec<String>,
+    /// The reason why the experiment was refused; there are no results then.
+    pub refusal: Option<String>,
 }
 
 /// Numbers by name, in the order in which they were added.
@@ -147,9 +149,17 @@ impl Origin {
 }
 
 impl Outcome {
-    /// Whether the drive was lost or stopped itself, in words with its faults; nothing for a run that ended
-    /// as it should.
+    /// The outcome of an experiment that was refused.
+    pub fn refused(reason: &impl std::fmt::Display) -> Self {
+        Self { refusal: Some(reason.to_string()), ..Self::default() }
+    }
+
+    /// Whether the experiment was refused, or the drive was lost or stopped itself, in words with its faults; nothing for
+    /// a run that ended as it should.
     pub fn lost(&self) -> Option<String> {
+        if let Some(reason) = &self.refusal {
+            return Some(format!("Refused: {reason}"));
+        }
         let lost = self.metrics.get("lost");
         let whether = if lost.is_some() { "Lost" } else { "The drive stopped itself" };
         match self.faults.as_slice() {

@@ -42,6 +42,11 @@ impl Bar {
     pub fn advance(&self, units: u64) {
         self.0.inc(units);
     }
+
+    /// Changes the label.
+    pub fn label(&self, label: &str) {
+        self.0.set_message(label.to_owned());
+    }
 }
 
 impl Drop for Bar {

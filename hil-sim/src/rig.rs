@@ -220,7 +220,17 @@ impl Rig {
     /// # Errors
     /// When the drive refuses it.
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Error> {
-        self.drive.command(command).map_err(|e| Error::refused(format!("{command:?}: {e}")))
+        self.drive
+            .command(command)
+            .map_err(|e| Error::Refused(format!("the drive refuses {}: {e}", words(command))))
+    }
+
+    /// The fault with which the drive has stopped itself, with its number.
+    pub fn fault(&self) -> Option<String> {
+        match self.drive.state() {
+            State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
+            _ => None,
+        }
     }
 
     /// Couples another load.
@@ -243,6 +253,34 @@ impl Rig {
             turns: plant.mechanical_angle() / TAU,
             ..Point::default()
         }
+    }
+}
+
+/// A command in words.
+fn words(command: &Command) -> String {
+    match command {
+        Command::Start(mode) => format!("to start in {} mode", mode_word(*mode)),
+        Command::Relock => "to magnetise and verify the angle again".into(),
+        Command::CheckWiring => "to check the wiring".into(),
+        Command::Stop => "to stop".into(),
+        Command::Clear => "to clear the fault".into(),
+        Command::Torque(a) => format!("a torque current of {a} A"),
+        Command::Speed(rpm) => format!("a speed of {rpm} rpm"),
+        Command::Position(turns) => format!("a position of {turns} turns"),
+        Command::Magnetising(a) => format!("a magnetising current of {a} A"),
+        Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),
+        Command::TestVoltage(v) => format!("a test voltage of {} V and {} V (d, q)", v.d, v.q),
+        Command::RotorTimeConstant(s) => format!("a rotor time constant of {s} s"),
+        Command::Configure(_) => "other settings".into(),
+    }
+}
+
+fn mode_word(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Torque => "torque",
+        Mode::Speed => "speed",
+        Mode::Position => "position",
+        Mode::Learning => "learning",
     }
 }
 

@@ -1,29 +1,8 @@
 //! What the command line promises: exit codes, messages, one JSON object, no half-written files.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod cli_common;
 
-fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
-    command.current_dir(folder).args(arguments).output().expect("the binary runs")
-}
-
-/// An empty folder of its own for each test.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("a folder can be made");
-    folder
-}
-
-fn files(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("the folder can be read");
-    entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).expect("UTF-8")
-}
+use cli_common::{files, folder, hil_sim, text};
 
 #[test]
 fn a_run_prints_its_table_and_writes_its_page() {
@@ -63,14 +42,16 @@ fn json_is_one_object_and_nothing_else() {
 #[test]
 fn a_group_is_one_json_object_too() {
     let folder = folder("group");
-    let arguments = ["run", "identify", "--json", "--set", "runs=2"];
+    let arguments = ["run", "identify", "--json", "--seconds", "0.5"];
     let output = hil_sim(&folder, &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
     let experiments = object["experiments"].as_array().expect("a list");
     assert_eq!(experiments.len(), hil_sim::experiments::named("identify").len());
     assert!(
-        experiments.iter().all(|one| one["settings"]["runs"] == 2 && one["version"].is_string())
+        experiments
+            .iter()
+            .all(|one| one["settings"]["seconds"] == 0.5 && one["version"].is_string())
     );
 }
 
@@ -94,11 +75,12 @@ fn csv_has_a_file_for_every_figure_and_table() {
 #[test]
 fn a_page_names_itself_its_origin_and_its_settings() {
     let folder = folder("origin");
-    let arguments = ["run", "adc-calibration", "--seed", "5", "--set", "motor.r_s=6"];
+    let arguments =
+        ["run", "torque-steps", "--seconds", "0.5", "--seed", "5", "--set", "motor.rs=6"];
     assert_eq!(hil_sim(&folder, &arguments).status.code(), Some(0));
-    let page = std::fs::read_to_string(folder.join("out/adc-calibration.html")).unwrap();
+    let page = std::fs::read_to_string(folder.join("out/torque-steps.html")).unwrap();
     let version = format!("hil-sim {}", env!("CARGO_PKG_VERSION"));
-    for part in ["<title>adc-calibration – ", &version, "UTC with seed 5", "motor.r_s = 6"] {
+    for part in ["<title>torque-steps – ", &version, "UTC with seed 5", "motor.r_s = 6"] {
         assert!(page.contains(part), "{part}");
     }
 }
@@ -108,14 +90,13 @@ fn a_page_names_itself_its_origin_and_its_settings() {
 fn a_lost_run_names_its_fault_and_prints_no_nan() {
     let folder = folder("lost");
     let set = ["--set", "motor.inertia=0.0005", "--set", "load.torque_nm=0.6"];
-    let run =
-        |more: &[&str]| hil_sim(&folder, &[&["run", "speed-profile"], &set[..], more].concat());
-    let output = run(&[]);
+    let output = hil_sim(&folder, &[&["run", "speed-profile"][..], &set].concat());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let printed = text(&output.stdout);
     assert!(printed.contains("\nLost: fault ") && !printed.contains("NaN"), "{printed}");
     let page = std::fs::read_to_string(folder.join("out/speed-profile.html")).unwrap();
     assert!(page.contains("<p class=\"lost\">Lost: fault ") && !page.contains("NaN"));
-    let output = run(&["--json"]);
+    let output = hil_sim(&folder, &[&["run", "speed-profile", "--json"][..], &set].concat());
     let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
     let fault = object["faults"][0].as_str().expect("a fault");
     assert!(printed.contains(fault), "{fault}");

@@ -10,6 +10,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "adc-calibration",
     stands_for: "Table 4, Figure 17, Eq. 3.5",
     about: "Least-squares lines through the readings of both current channels.",
+    uses: &[],
+    not: &[],
     run,
 };
 

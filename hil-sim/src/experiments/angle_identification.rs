@@ -6,7 +6,7 @@ mod model;
 
 use super::bode::{Bode, frequencies, largest_pole};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
@@ -23,6 +23,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 33, 34, 35, Table 6, Eq. 3.43, 3.44",
     about: "The plant of the angle estimation by a pseudo-random sequence on the injection angle, the \
             controller made from it, and why the loop is closed around another plant.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
     run,
 };
 

@@ -13,6 +13,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "anti-windup",
     stands_for: "Figure 40",
     about: "Step of an integrator under a limited PI controller, without and with anti-windup.",
+    uses: &[],
+    not: &[],
     run,
 };
 

@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 26, 27",
     about: "Step of the closed current loop on the identified plant, with and without reference \
             filter, and with a pole 3 % larger.",
+    uses: &[],
+    not: &[],
     run,
 };
 

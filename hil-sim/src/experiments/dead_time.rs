@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode, State};
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
 use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -17,6 +17,13 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "dead-time",
     stands_for: "Figures 28 and 29, section 3.9",
     about: "Voltage error and current distortion by the dead time, with and without compensation.",
+    uses: &[BENCH, DRIVE],
+    not: &[
+        FREE_SHAFT,
+        SPEED_LOOP,
+        TRACKING,
+        &["angle_source", "inverter.residual_v", "inverter.switched", "inverter.compensate"],
+    ],
     run,
 };
 

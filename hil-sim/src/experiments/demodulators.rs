@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::injection_map::{self, Curve, Variant};
 use super::steady::SteadyRun;
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -23,6 +23,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 10, 19, 20, section 5.2",
     about: "Five demodulations on one motor: what each sees over the injection angle, with and without \
             a saliency, noise, delay, and the angle error without a position sensor.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
     run,
 };
 
@@ -293,7 +295,7 @@ fn steps_figure<'a>(
             }
         }
     }
-    let title = "Torque steps, 1 A to 2 A, without a position sensor";
+    let title = "Torque steps without a position sensor";
     panels.into_iter().fold(Figure::new("steps", title, "Figure 38"), Figure::panel)
 }
 

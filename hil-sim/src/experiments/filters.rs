@@ -19,6 +19,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figure 30, Tables 7, 8",
     about: "Response of the three elliptic filters, and their error in single precision as \
             second-order sections and in the printed direct form.",
+    uses: &[&["seconds"]],
+    not: &[],
     run,
 };
 
@@ -185,8 +187,13 @@ mod tests {
     #[test]
     fn precision() {
         let config = Config::default();
-        let context =
-            Context { config: &config, seed: 1, seconds: Some(10.0), progress: Progress::hidden() };
+        let context = Context {
+            config: &config,
+            seed: 1,
+            seconds: Some(10.0),
+            progress: Progress::hidden(),
+            file: None,
+        };
         let outcome = run(&context).unwrap();
         let metric = |name: &str| outcome.metrics.get(name).unwrap();
         for filter in ["lpf", "bpf", "pp"] {

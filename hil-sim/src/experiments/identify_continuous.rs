@@ -15,6 +15,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "Errors of resistance, rotor time constant, inductances and speed by Models B and C of \
             the paper, beside the printed ones, and by the exact inverse (D) and the structured \
             fit (S).",
+    uses: &[],
+    not: &[],
     run,
 };
 

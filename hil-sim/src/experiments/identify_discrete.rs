@@ -13,6 +13,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Jacobina 1996, Tables 1 and 4",
     about: "Errors of the coefficients of the sampled equation between current and voltage, by \
             least squares on seven noisy simulated measurements each, beside the printed ones.",
+    uses: &[],
+    not: &[],
     run,
 };
 

@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Jacobina 1996, Tables 1 to 6",
     about: "Numbers that follow from the printed tables whatever the noise, beside those of the \
             machine of Table 6 and of one inferred from them.",
+    uses: &[],
+    not: &[],
     run,
 };
 

@@ -19,6 +19,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Jacobina 1996, Figures 2 to 4",
     about: "Parameters and speed by recursive least squares while the machine runs: the f32 code \
             of the drive beside the same in f64, and how long it takes to converge.",
+    uses: &[&["seconds"]],
+    not: &[],
     run,
 };
 

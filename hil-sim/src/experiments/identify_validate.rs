@@ -16,6 +16,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Jacobina 1996, Figure 5, Tables 6 and 7",
     about: "The current of a machine beside the current simulated with estimated and with \
             classical parameters, and the parameters themselves beside the printed ones.",
+    uses: &[],
+    not: &[],
     run,
 };
 

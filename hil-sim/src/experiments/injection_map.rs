@@ -2,7 +2,7 @@
 
 use drive_core::Command;
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -15,6 +15,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "injection-map",
     stands_for: "Figure 19, Figure 18",
     about: "Current difference over the injection angle, with the encoder: what each demodulator sees.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source"]],
     run,
 };
 

@@ -3,7 +3,7 @@
 use drive_core::identify::learning::Fitted;
 
 use super::torque::assumptions;
-use super::{Context, Experiment, learning};
+use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TURNING, learning};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "learn-reference",
     stands_for: "section 3.3, section 5.2",
     about: "The drive learns reference, sensor mismatch and saliency with the shaft locked.",
+    uses: &[BENCH, DRIVE],
+    not: &[TURNING, SPEED_LOOP, &["injection.bandwidth_hz", "injection.current_saliency"]],
     run,
 };
 

@@ -4,7 +4,7 @@ mod trials;
 
 use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::upper_bound_95;
@@ -14,6 +14,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "lock-monitor",
     stands_for: "what section 5.2 leaves open",
     about: "The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
+    not: &[&["angle_source"]],
     run,
 };
 

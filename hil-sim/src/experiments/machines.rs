@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
@@ -18,6 +18,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "beyond the dissertation",
     about: "A drive that has learned its motor, at 16 operating points; with `spread.machine` for machines drawn around \
             the motor.",
+    uses: &[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
     run,
 };
 
@@ -140,6 +142,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     });
 
     let mut outcome = Outcome::default();
+    for machine in &machines {
+        match &machine.runs {
+            Ok(runs) => outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text)),
+            Err(why) => outcome.faults.push(why.clone()),
+        }
+    }
     let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
     let good = machines.iter().filter(|machine| machine.is_good()).count();
     let mut rms: Vec<f64> = machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();

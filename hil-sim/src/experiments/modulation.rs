@@ -19,6 +19,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 4, 5, 11, Table 2",
     about: "Voltage vectors, switching sequence and limits of the space-vector modulation; and the \
             spectrum of the current difference, an amplitude modulation of the carrier.",
+    uses: &[&["inverter.dc_link_v"]],
+    not: &[],
     run,
 };
 

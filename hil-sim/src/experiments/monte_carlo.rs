@@ -5,7 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
@@ -16,6 +16,20 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "monte-carlo",
     stands_for: "the claim behind Figures 38 and 39",
     about: "Random torque current (a seventh to six sevenths of the limit, both signs) and speed, and what `spread.*` adds; `--set runs=N`.",
+    uses: &[
+        BENCH,
+        DRIVE,
+        &[
+            "load.speed_rpm",
+            "prepare.learn",
+            "spread.motor",
+            "spread.noise",
+            "spread.gain",
+            "runs",
+            "seconds",
+        ],
+    ],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 
@@ -48,6 +62,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(results.iter().filter_map(SteadyRun::lost_text));
     let kept: Vec<(&OperatingPoint, &SteadyRun)> =
         cases.iter().map(|(case, _)| case).zip(&results).filter(|(_, r)| !r.lost).collect();
     let mut largest: Vec<f64> = kept.iter().map(|(_, r)| r.error.largest()).collect();

@@ -1,6 +1,6 @@
 //! The tests that gave Table 5, on the simulated motor.
 
-use super::{Context, Experiment};
+use super::{Context, Experiment, TURNING};
 use crate::config::plant_settings;
 use crate::error::Error;
 use crate::identification::bench_tests::{Circuit, Readings, Shaft, measure};
@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Table 5, section 3.6, Eq. 3.17 to 3.19",
     about: "Direct-current, locked-rotor and no-load test of the simulated motor, and the equivalent \
             circuit from them, by the source's formulas and without what these neglect.",
+    uses: &[&["motor.", "saliency.", "nameplate.current_a"]],
+    not: &[TURNING],
     run,
 };
 

@@ -1,7 +1,7 @@
 //! Rotor time constant and speed from the terminals while the drive runs and its rotor warms up.
 
 use super::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -13,6 +13,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Jacobina 1996, on the drive",
     about: "The rotor warms up by 30 % of its resistance: the rotor time constant found while the \
             drive runs, the flux angle error with and without it, and the speed without a sensor.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["angle_source", "inverter.residual_v"]],
     run,
 };
 

@@ -2,7 +2,7 @@
 
 use drive_core::{Command, Mode};
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
 use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
@@ -15,6 +15,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "encoder-orientation",
     stands_for: "Section 2.3, Eq. 2.7 and 2.10",
     about: "Flux angle and torque over speed with the encoder, delays compensated and left in.",
+    uses: &[BENCH, DRIVE, &["seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP, TRACKING, &["angle_source", "ignore_delays"]],
     run,
 };
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::linear_model::{Disturbance, LinearModel};
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -21,6 +21,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "perturbation",
     stands_for: "section 5.2",
     about: "Angle error after load and current steps, measured and by the linear model.",
+    uses: &[BENCH, DRIVE, &["prepare.learn"]],
+    not: &[&["angle_source"]],
     run,
 };
 
@@ -193,6 +195,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     }
 
     let mut outcome = Outcome::default();
+    for m in results.iter().filter(|m| m.lost > 0) {
+        outcome.faults.push(format!("{}: {} of {SEEDS} runs lost", m.case.name, m.lost));
+    }
     let title = format!("Angle error after a step, mean of {SEEDS} runs");
     let mut table = Table::new(title, &[]).note(
         "Steps are named as on the dissertation's motor; on others they are in proportion. The mean before the step is \

@@ -11,7 +11,7 @@ use drive_core::tuning::{
 use num_complex::Complex64;
 
 use super::bode::{Bode, RATE, fictitious, frequencies, omega_t};
-use super::{Context, Experiment};
+use super::{Context, Experiment, TURNING};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Style, Table};
 
@@ -21,6 +21,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 23, 24, 25, Eq. 3.35 to 3.42",
     about: "The current controllers by the rule of section 3.8, beside the printed ones, and their \
             margins with the filter, the delay and the motor.",
+    uses: &[&["motor.", "drive.motor."]],
+    not: &[TURNING, &["drive.motor.inertia"]],
     run,
 };
 

@@ -5,7 +5,7 @@ use drive_core::filter::dissertation::{LPF, LpfState};
 use drive_core::tuning::{FirstOrder, design_current_loop, motor_plant, rule_3_8};
 use drive_core::{AlphaBeta, Command, Dq, Mode};
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TRACKING, TURNING};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::identification::arx::{Arx, Orders, fit};
@@ -20,6 +20,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "Figures 22, 31, 32, Eq. 3.34, 3.41, 3.42, appendix A",
     about: "Current steps and a pseudo-random voltage through the drive's own current loop, the plant \
             by least squares from what the drive saw, and the controllers by the rule of section 3.8.",
+    uses: &[BENCH, DRIVE],
+    not: &[TURNING, SPEED_LOOP, TRACKING, &["angle_source"]],
     run,
 };
 

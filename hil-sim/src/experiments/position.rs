@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::{Command, Mode};
 
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, TRACKING};
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
@@ -17,6 +17,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "position-step",
     stands_for: "Figure 37, Eq. 4.1 to 4.3",
     about: "A position step of five turns with the encoder and a free shaft.",
+    uses: &[BENCH, DRIVE, &["load.", "seconds"]],
+    not: &[TRACKING, &["angle_source"]],
     run,
 };
 
@@ -30,7 +32,7 @@ const ENCODER_LIMIT_RPM: f32 = 1440.0;
 const ENCODER_RAMP_RPM_PER_S: f32 = 700.0;
 
 /// A position step of five turns with this source of the angle. Times and positions count from the
-/// step.
+/// step; with them comes the fault with which the drive has stopped itself.
 ///
 /// # Errors
 /// When the configuration is refused or the drive does not start.
@@ -39,7 +41,7 @@ pub fn step(
     source: AngleSource,
     seed: u64,
     seconds: f64,
-) -> Result<Vec<Point>, Error> {
+) -> Result<(Vec<Point>, Option<String>), Error> {
     let mut config = config.clone();
     config.drive.angle_source = source;
     if source == AngleSource::Encoder {
@@ -57,7 +59,7 @@ pub fn step(
     rig.run(seconds, |p| {
         points.push(Point { t: p.t - start, turns: p.turns - origin, ..*p });
     });
-    Ok(points)
+    Ok((points, rig.fault()))
 }
 
 /// Overshoot in percent, and when the rotor was more than a degree from the reference for the last
@@ -76,9 +78,10 @@ pub fn final_error_deg(points: &[Point]) -> f64 {
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let seconds = context.seconds.unwrap_or(5.0);
-    let points = step(context.config, AngleSource::Encoder, context.seed, seconds)?;
+    let (points, fault) = step(context.config, AngleSource::Encoder, context.seed, seconds)?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(fault);
     let largest = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::MIN, f64::max);
     let (overshoot, settling) = overshoot_and_settling(&points);
     let m = &mut outcome.metrics;
@@ -115,13 +118,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                     .with(Series::line("true minus computed", line(|p| p.angle_error_deg))),
             ),
     );
-    outcome.remarks.push(
+    outcome.remarks.push(format!(
         "The printed gains of Eq. 4.2 are unstable with the plant of Eq. 4.1 (|z| = 1.046): they were \
          designed as if one of its integrators were not there. Here a PI controller of the speed, \
          designed for 60° of phase margin, stands inside a P controller of the position; the speed \
          it may ask for follows a braking curve and a ramp instead of the filter of Eq. 4.3. Inertia \
-         (0.012 kg m²) and friction are assumed: the source gives none."
-            .into(),
-    );
+         ({} kg m²) and friction are assumed: the source gives none.",
+        context.config.motor.inertia
+    ));
     Ok(outcome)
 }

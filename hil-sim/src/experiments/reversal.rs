@@ -1,10 +1,10 @@
 //! Steps and reversals of the torque current without a position sensor.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::rig::{Point, Rig, means_over};
@@ -15,6 +15,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "torque-reversal",
     stands_for: "section 5.2",
     about: "Sudden steps of the torque current up to full reversal, without a position sensor.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run,
 };
 
@@ -33,7 +35,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut table = Table::new("Angle error after each step", &heads);
     let (mut largest, mut before) = (0.0_f64, 0.0);
     for iq in LEVELS.map(|iq| context.config.amperes(iq)) {
-        if matches!(rig.drive.state(), State::Fault(_)) {
+        if rig.fault().is_some() {
             break;
         }
         rig.command(&Command::Torque(iq as f32))?;
@@ -55,9 +57,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         before = iq;
     }
     let mut outcome = Outcome::default();
-    let stopped = matches!(rig.drive.state(), State::Fault(_));
+    outcome.faults.extend(rig.fault());
     outcome.metrics.set("angle_error_max_deg", largest);
-    outcome.metrics.set("lost", f64::from(u8::from(stopped || largest > LOST_DEG)));
+    outcome.metrics.set("lost", f64::from(u8::from(rig.fault().is_some() || largest > LOST_DEG)));
     outcome.tables.push(table);
     let line = |of: fn(&Point) -> f64| means_over(CARRIER_SAMPLES, &points, of);
     let x = "time (s)";

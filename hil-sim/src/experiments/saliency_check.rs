@@ -3,7 +3,7 @@
 use drive_core::{Command, Fault, Mode, State};
 
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TURNING};
 use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
@@ -16,6 +16,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "saliency-check",
     stands_for: "what section 3.5 takes for granted",
     about: "Starts on motors with none, a tenth, half and all of the expected saliency; `--set runs=N`.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
+    not: &[TURNING, SPEED_LOOP],
     run,
 };
 

@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::Mode;
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Mode, State};
 
 use super::position::{final_error_deg, overshoot_and_settling, step};
 use super::torque::assumptions;
-use super::{Context, Experiment, learning};
+use super::{BENCH, Context, DRIVE, Experiment, learning};
 use crate::config::plant_settings;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
@@ -22,6 +22,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "sensorless-position",
     stands_for: "section 4.1 without its encoder, section 5.2",
     about: "A position step of five turns without an encoder, beside the one with it, and the drift.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "seconds"]],
+    not: &[&["angle_source"]],
     run,
 };
 
@@ -45,7 +47,7 @@ struct HeldPosition {
     /// Mean torque current, A.
     iq: f64,
     angle_error: Stats,
-    stopped: bool,
+    fault: Option<String>,
 }
 
 impl HeldPosition {
@@ -90,7 +92,7 @@ fn hold(
         track: Vec::new(),
         iq: 0.0,
         angle_error: Stats::default(),
-        stopped: false,
+        fault: None,
     };
     let mut iq = Stats::default();
     let mut period = 0_u32;
@@ -103,15 +105,15 @@ fn hold(
         period += 1;
     });
     held.iq = iq.mean();
-    held.stopped = matches!(rig.drive.state(), State::Fault(_));
+    held.fault = rig.fault();
     Ok(held)
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (config, seed) = (context.config, context.seed);
     let step_s = context.seconds.unwrap_or(STEP_S);
-    let with = step(config, AngleSource::Encoder, seed, step_s)?;
-    let without = step(config, AngleSource::Injection, seed, step_s)?;
+    let (with, fault_with) = step(config, AngleSource::Encoder, seed, step_s)?;
+    let (without, fault_without) = step(config, AngleSource::Injection, seed, step_s)?;
 
     let hold_s = context.seconds.unwrap_or(HOLD_S);
     let loads = LOADS_NM.map(|nm| context.config.newton_metres(nm));
@@ -122,6 +124,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(fault_with.map(|fault| format!("with the encoder: {fault}")));
+    outcome.faults.extend(fault_without.map(|fault| format!("without it: {fault}")));
+    let stopped = |h: &HeldPosition| {
+        let fault = h.fault.as_ref()?;
+        Some(format!("held under {} Nm: {fault}", h.load_nm))
+    };
+    outcome.faults.extend(held.iter().filter_map(stopped));
     let m = &mut outcome.metrics;
     for (points, suffix) in [(&without, ""), (&with, "_encoder")] {
         let (overshoot, settling) = overshoot_and_settling(points);
@@ -154,7 +163,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     m.set("wander_deg", held[0].wander());
     let rest = without.iter().filter(|p| p.t > 4.0);
     m.set("iq_rest_rms_a", Stats::of(rest.map(|p| p.iq_ref)).rms());
-    m.set("stopped_runs", held.iter().filter(|h| h.stopped).count() as f64);
+    m.set("stopped_runs", held.iter().filter(|h| h.fault.is_some()).count() as f64);
 
     let mut table = Table::new("Drift of a position that is held", &[]).note(
         "Mechanical degrees; the drive holds what it takes for position 0, a free shaft turns against \

@@ -1,10 +1,10 @@
 //! The speed loop without a position sensor: a profile with a reversal and a load step.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode};
 
 use super::torque::{LOST_DEG, assumptions};
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::LoadMode;
 use crate::error::Error;
 use crate::outcome::{Figure, Outcome, Panel, Series};
@@ -17,6 +17,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "speed-profile",
     stands_for: "section 5.2",
     about: "Speed steps with a reversal through standstill and a load, with the angle source as set.",
+    uses: &[BENCH, DRIVE, &["load.torque_nm", "prepare.learn", "seconds"]],
+    not: &[],
     run,
 };
 
@@ -52,7 +54,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let (mut steady, mut seen) = (Stats::default(), Stats::default());
     for (speed, load, seconds) in PROFILE {
         let (rpm, torque) = (speed * largest_rpm, load * load_nm);
-        if matches!(rig.drive.state(), State::Fault(_)) {
+        if rig.fault().is_some() {
             break;
         }
         rig.command(&Command::Speed(rpm as f32))?;
@@ -78,10 +80,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     let error = Stats::of(points.iter().map(|p| p.angle_error_deg));
-    let stopped = match rig.drive.state() {
-        State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
-        _ => None,
-    };
+    let stopped = rig.fault();
     let m = &mut outcome.metrics;
     m.set("angle_error_rms_deg", error.rms());
     m.set("angle_error_max_deg", error.largest());

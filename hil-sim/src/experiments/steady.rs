@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode, Settings, State};
+use drive_core::{Command, Fault, Mode, Settings, State};
 
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
@@ -25,12 +25,28 @@ pub struct OperatingPoint {
 /// Result of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct SteadyRun {
+    /// Operating point and seed.
+    pub case: OperatingPoint,
     /// Angle error, degrees.
     pub error: Stats,
     /// Mean torque, Nm.
     pub torque: f64,
     /// Whether the error went beyond 45° at any time, or the drive stopped itself.
     pub lost: bool,
+    /// The fault with which it stopped itself.
+    pub fault: Option<Fault>,
+}
+
+impl SteadyRun {
+    /// The reason why the run was lost, after its operating point; nothing for one that was not.
+    pub fn lost_text(&self) -> Option<String> {
+        let OperatingPoint { rpm, iq, seed } = self.case;
+        let reason = match self.fault {
+            Some(fault) => format!("fault {}: {fault}", fault.code()),
+            None => format!("angle error beyond {LOST_DEG}°"),
+        };
+        self.lost.then(|| format!("{iq:.2} A at {rpm:.0} rpm, seed {seed}: {reason}"))
+    }
 }
 
 /// How fast the dynamometer gets up to speed, rpm/s.
@@ -105,8 +121,8 @@ pub fn steady_run_of(
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
     let (mut error, mut torque) = (Stats::default(), Stats::default());
-    if matches!(rig.drive.state(), State::Fault(_)) {
-        return Ok(SteadyRun { error, torque: 0.0, lost: true });
+    if let State::Fault(fault) = rig.drive.state() {
+        return Ok(SteadyRun { case, error, torque: 0.0, lost: true, fault: Some(fault) });
     }
     rig.command(&Command::Torque(case.iq as f32))?;
     rig.run(1.0, |_| {});
@@ -114,6 +130,10 @@ pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<Steady
         error.push(p.angle_error_deg);
         torque.push(p.torque);
     });
-    let lost = error.largest() > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
-    Ok(SteadyRun { error, torque: torque.mean(), lost })
+    let fault = match rig.drive.state() {
+        State::Fault(fault) => Some(fault),
+        _ => None,
+    };
+    let lost = error.largest() > LOST_DEG || fault.is_some();
+    Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })
 }

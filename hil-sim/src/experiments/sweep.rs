@@ -2,7 +2,7 @@
 
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -11,6 +11,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "speed-torque-sweep",
     stands_for: "the range behind Figures 38 and 39",
     about: "Angle error over torque current and speed, a dynamometer holding the speed.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 
@@ -30,6 +32,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     })?;
 
     let mut outcome = Outcome::default();
+    outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text));
     let kept = || runs.iter().filter(|r| !r.lost);
     let largest = |of: fn(&SteadyRun) -> f64| kept().map(of).fold(0.0, f64::max);
     let pooled =

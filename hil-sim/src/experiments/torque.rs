@@ -2,12 +2,12 @@
 //! the quadrature axis, shaft locked, without a position sensor.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Accepted, Command, Mode, State};
+use drive_core::{Accepted, Command, Mode};
 
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
-use crate::experiments::{Context, Experiment};
+use crate::experiments::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP};
 use crate::outcome::{Figure, Outcome, Panel, Series, Step};
 use crate::rig::{Point, RATE_HZ, Rig, means_over};
 use crate::stats::Stats;
@@ -18,6 +18,8 @@ pub const STEPS: Experiment = Experiment {
     name: "torque-steps",
     stands_for: "Figure 38, Eq. 4.4",
     about: "Torque steps with a locked shaft and no position sensor: five levels, 1 to 2 times `reference.iq_a`.",
+    uses: &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run: steps,
 };
 
@@ -26,6 +28,8 @@ pub const RAMP: Experiment = Experiment {
     name: "torque-ramp",
     stands_for: "Figure 39, Eq. 4.4",
     about: "Torque ramp with a locked shaft and no position sensor: `reference.iq_a` to twice that and back.",
+    uses: &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]],
+    not: &[SPEED_LOOP],
     run: ramp,
 };
 
@@ -106,7 +110,7 @@ impl Run {
         // References change at the pace of a host, not of the control.
         for n in 0..periods.div_ceil(CARRIER_SAMPLES) {
             let reference = profile((n * CARRIER_SAMPLES) as f64 / RATE_HZ) as f32;
-            if matches!(rig.drive.state(), State::Fault(_)) {
+            if rig.fault().is_some() {
                 break;
             }
             if let Accepted::Limited(a) = rig.command(&Command::Torque(reference))? {
@@ -121,11 +125,8 @@ impl Run {
         if let Some(a) = limited {
             notes.insert(0, format!("The drive limited the torque reference to {a:.3} A."));
         }
-        let fault = match rig.drive.state() {
-            State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
-            _ => None,
-        };
-        Ok(Self { points, demodulator: context.config.drive.injection.demodulator, fault, notes })
+        let (demodulator, fault) = (context.config.drive.injection.demodulator, rig.fault());
+        Ok(Self { points, demodulator, fault, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {

@@ -2,7 +2,7 @@
 
 use super::steady::{OperatingPoint, at_speed};
 use super::torque::assumptions;
-use super::{Context, Experiment};
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::Stats;
@@ -12,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "torque-drift",
     stands_for: "Eq. 4.4 over a minute",
     about: "Torque and angle at standstill over a minute, against the current and the first ten seconds.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP],
     run,
 };
 
@@ -26,6 +28,8 @@ struct HeldTorque {
     angle_deg: Vec<f64>,
     /// Torque of that current at the right angle and nominal flux, Nm.
     ideal: f64,
+    /// Current and fault of a drive that has stopped itself.
+    fault: Option<String>,
 }
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
@@ -68,6 +72,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         ]);
     }
     let mut outcome = Outcome::default();
+    outcome.faults.extend(held.iter().filter_map(|h| h.fault.clone()));
     let m = &mut outcome.metrics;
     m.set("torque_error_to_2a_pct", linear_2a);
     m.set("torque_error_to_3a_pct", linear_3a);
@@ -90,7 +95,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<HeldTorque, Error> {
     let mut rig = at_speed(context.config, case)?;
     rig.run(1.0, |_| {});
-    let mut held = HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0 };
+    let mut held =
+        HeldTorque { torque: Vec::new(), angle_deg: Vec::new(), ideal: 0.0, fault: None };
     let (id, lm) = (f64::from(context.config.drive.i_d()), context.config.motor.l_m);
     for _ in 0..MEANS {
         let (mut torque, mut angle) = (Stats::default(), Stats::default());
@@ -102,5 +108,6 @@ fn hold(context: &Context<'_>, case: OperatingPoint, mean_s: f64) -> Result<Held
         held.torque.push(torque.mean());
         held.angle_deg.push(angle.mean());
     }
+    held.fault = rig.fault().map(|fault| format!("{} A: {fault}", case.iq));
     Ok(held)
 }

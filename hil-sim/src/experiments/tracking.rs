@@ -1,7 +1,9 @@
 //! Everything that shakes the angle, in one report: torque steps, reversals, load steps, and the sweep
 //! over speed and torque.
 
-use super::{Context, Experiment, perturbation, reversal, speed_profile, sweep, torque};
+use super::{
+    BENCH, Context, DRIVE, Experiment, perturbation, reversal, speed_profile, sweep, torque,
+};
 use crate::error::Error;
 use crate::outcome::Outcome;
 
@@ -10,6 +12,8 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "tracking",
     stands_for: "Figure 38, section 5.2",
     about: "Torque steps, reversals, load steps, speed profile and sweep, in one report.",
+    uses: &[BENCH, DRIVE, &["load.", "reference.iq_a", "prepare.learn", "seconds"]],
+    not: &[],
     run,
 };
 
@@ -48,6 +52,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             whole.figures.push(figure);
         }
         whole.steps = whole.steps.or(part.steps);
+        whole.faults.extend(part.faults.iter().map(|fault| format!("{}: {fault}", title(prefix))));
         for remark in part.remarks {
             if !whole.remarks.contains(&remark) {
                 whole.remarks.push(remark);

@@ -18,6 +18,7 @@ pub mod batch;
 pub mod bench_tests;
 pub mod model;
 pub mod models;
+pub mod output_error;
 pub mod printed;
 pub mod ratios;
 pub mod recursive;

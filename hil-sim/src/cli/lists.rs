@@ -1,0 +1,138 @@
+//! The lists of experiments, keys and motors.
+
+use serde_json::json;
+
+use crate::config::motors::Motor;
+use crate::config::{Config, Key, Value, file};
+use crate::error::{Error, nearest};
+use crate::experiments::{EXPERIMENTS, Experiment, WITH_INPUT};
+use crate::input::Input;
+use crate::outcome::{Cell, Table};
+use crate::report;
+
+fn all() -> impl Iterator<Item = &'static Experiment> {
+    EXPERIMENTS.iter().chain(WITH_INPUT)
+}
+
+/// The experiments.
+///
+/// # Errors
+/// [`Error::Internal`] when JSON cannot be made.
+pub fn experiments(as_json: bool) -> Result<String, Error> {
+    if as_json {
+        let object = |e: &Experiment| json!({ "name": e.name, "stands_for": e.stands_for, "about": e.about, "uses": e.uses.concat(), "not": e.not.concat() });
+        return pretty(&all().map(object).collect());
+    }
+    let mut text = String::new();
+    for Experiment { name, stands_for, about, .. } in all() {
+        text.push_str(&format!("{name:<20} {stands_for}\n{}\n\n", report::paragraph(about, 4)));
+    }
+    Ok(text)
+}
+
+fn pretty(value: &serde_json::Value) -> Result<String, Error> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Error::Internal(e.to_string()))?;
+    Ok(format!("{text}\n"))
+}
+
+/// The keys that begin with `prefix`, or the configuration as TOML.
+///
+/// # Errors
+/// As [`Input::config`]; [`Error::UnknownKey`] when no key begins so.
+pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String, Error> {
+    let config = input.config()?;
+    let prefix = prefix.unwrap_or_default();
+    let found: Vec<Key> =
+        Key::all().filter(|key| key.assigned_name().starts_with(prefix)).collect();
+    if found.is_empty() {
+        let groups = Key::all().filter_map(|key| key.name().split_once('.'));
+        let known: Vec<&str> =
+            groups.map(|(group, _)| group).chain(Key::all().map(Key::name)).collect();
+        return Err(Error::UnknownKey {
+            key: prefix.to_owned(),
+            nearest: nearest(prefix, known.into_iter()).map(str::to_owned),
+        });
+    }
+    if as_toml {
+        return Ok(file::toml(&config, &found));
+    }
+    Ok(found.into_iter().map(|key| key_text(key, &config)).collect())
+}
+
+fn key_text(key: Key, config: &Config) -> String {
+    let value = match key.get(config) {
+        Value::Unset => "unset".to_owned(),
+        Value::Number(number) => format!("{number} {}", key.unit()).trim_end().to_owned(),
+        other => other.to_string(),
+    };
+    let text = format!("{}; allowed: {}", key.help(), key.allowed_text());
+    format!("{} = {value}\n{}\n", key.assigned_name(), report::paragraph(&text, 4))
+}
+
+/// All motors; or one, with sources and lines for the console.
+///
+/// # Errors
+/// As [`Motor::find`] and [`Motor::apply`].
+pub fn motors(name: Option<&str>, as_json: bool) -> Result<String, Error> {
+    match (name, as_json) {
+        (None, false) => Ok(report::table(&table_of_motors())),
+        (None, true) => pretty(&Motor::all().iter().map(motor_json).collect()),
+        (Some(name), true) => pretty(&motor_json(&Motor::find(name)?)),
+        (Some(name), false) => motor_text(&Motor::find(name)?),
+    }
+}
+
+fn motor_json(motor: &Motor) -> serde_json::Value {
+    let sources = motor.source.iter().map(
+        |source| json!({ "keys": source.keys, "from": source.from, "unverified": source.unverified }),
+    );
+    let settings: serde_json::Map<_, _> =
+        motor.settings().into_iter().map(|(key, value)| (key, json!(value))).collect();
+    json!({
+        "name": motor.name,
+        "title": motor.title,
+        "about": motor.about.trim(),
+        "settings": settings,
+        "source": sources.collect::<Vec<_>>(),
+    })
+}
+
+fn table_of_motors() -> Table {
+    let mut table = Table::new("", &["motor", "rated data", "numbers"]);
+    for motor in Motor::all() {
+        let recalled = motor.source.iter().filter(|source| source.unverified);
+        let keys: Vec<_> = recalled.flat_map(|source| source.keys.clone()).collect();
+        let numbers = match keys[..] {
+            [] => "all with a source".to_owned(),
+            _ => format!("unverified: {}", keys.join(", ")),
+        };
+        table.row([motor.name, motor.title, numbers].map(Cell::from));
+    }
+    table
+}
+
+fn motor_text(motor: &Motor) -> Result<String, Error> {
+    let mut config = Config::default();
+    motor.apply(&mut config)?;
+    let mut table = Table::new("", &["key", "value", "unit", "source"]);
+    for (key, value) in motor.settings() {
+        let unit = Key::named(&key)?.first().map_or("", |key| key.unit()).to_owned();
+        let source = motor.source_of(&key).map_or(String::new(), |source| {
+            format!("{}{}", if source.unverified { "UNVERIFIED: " } else { "" }, source.from)
+        });
+        table.row([key, value.to_string(), unit, source].map(Cell::from));
+    }
+    let m = config.drive.motor;
+    Ok(format!(
+        "{}: {}\n\n{}\n\n{}\nLeakage inductance {:.4} mH, rotor time constant {:.0} ms, carrier {:.1} V.\n\n\
+         At the console, with the scales of your board:\n{}\n",
+        motor.name,
+        motor.title,
+        motor.about.trim(),
+        report::table(&table),
+        1e3 * m.sigma_l_s(),
+        1e3 * m.tau_r(),
+        config.drive.carrier_v(),
+        motor.console_lines().join("\n"),
+    ))
+}

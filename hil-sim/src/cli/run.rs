@@ -1,0 +1,166 @@
+//! One experiment, or a group of them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{say, used};
+use crate::config::Config;
+use crate::error::Error;
+use crate::experiments::{self, Context, Experiment, identify_trace as trace};
+use crate::input::{Input, OUT};
+use crate::outcome::{self, Origin, Outcome};
+use crate::report::{self, Section};
+
+/// Where the results of a run go.
+#[derive(Args, Default)]
+pub struct Output {
+    /// Folder of the page [default: out; with --json no page unless this is given]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object and nothing else; of a group, one with all in a list
+    #[arg(long)]
+    json: bool,
+    /// Folder of CSV files, one a figure and one a table [default: none]
+    #[arg(long, value_name = "DIR")]
+    csv: Option<PathBuf>,
+}
+
+/// A recorded trace.
+#[derive(Args)]
+pub struct Trace {
+    /// CSV file with a header; its columns are named in the documentation
+    #[arg(long = "input", value_name = "FILE")]
+    file: PathBuf,
+    /// Another name of a column in the file; can be given many times
+    #[arg(long = "column", value_name = "OURS=THEIRS")]
+    columns: Vec<String>,
+    /// Rows by which a voltage acts after the currents of its row; 0 for measured voltages [default: 1 and the delay of
+    /// the current filter, as the drive records it]
+    #[arg(long, value_name = "ROWS", value_parser = delay, allow_negative_numbers = true)]
+    delay: Option<f64>,
+}
+
+fn delay(text: &str) -> Result<f64, String> {
+    let rows = text.parse().ok().filter(|rows| (0.0..=10.0).contains(rows));
+    rows.ok_or_else(|| "allowed: 0 to 10 rows".to_owned())
+}
+
+/// A run, as the functions that write its results need it.
+pub struct Run<'a> {
+    pub experiment: &'a Experiment,
+    pub input: &'a Input,
+    pub config: &'a Config,
+    /// The command behind `cargo sim`, without the configuration.
+    pub command: String,
+}
+
+impl Run<'_> {
+    pub fn section<'a>(&'a self, outcome: &'a Outcome) -> Section<'a> {
+        let Experiment { name, stands_for, about, .. } = self.experiment;
+        let command = self.input.command(&self.command, self.config);
+        Section { name, stands_for, about, command, outcome }
+    }
+
+    /// Writes the files of an outcome and prints its results; returns the JSON object if that is wanted.
+    fn write(&self, outcome: &Outcome, output: &Output) -> Result<String, Error> {
+        let name = self.experiment.name;
+        let origin = Origin::new(self.input.seed, &self.config.changes());
+        let folder = output.out.clone().or_else(|| (!output.json).then(|| OUT.into()));
+        let path = folder.as_ref().map(|folder| folder.join(format!("{name}.html")));
+        if let (Some(folder), Some(path)) = (&folder, &path) {
+            let page = report::page("Induction drive", &origin, &[self.section(outcome)])?;
+            report::write_whole(path, &page)?;
+            for figure in &outcome.figures {
+                let file = folder.join(format!("{name}-{}.svg", figure.name));
+                report::write_whole(&file, &report::svg(figure)?)?;
+            }
+        }
+        if let Some(folder) = &output.csv {
+            for (file, text) in report::csv(outcome)? {
+                report::write_whole(&folder.join(format!("{name}-{file}")), &text)?;
+            }
+        }
+        if output.json {
+            return outcome.to_json(name, &origin).map_err(|e| Error::Internal(e.to_string()));
+        }
+        let Experiment { about, stands_for, .. } = self.experiment;
+        let mut text = format!("{name}: {about} ({stands_for})\n\n{}", report::text(outcome));
+        if let (Some(path), false) = (path, self.input.quiet) {
+            text.push_str(&format!("\nReport: {}\n", path.display()));
+        }
+        say(&text).map(|()| String::new())
+    }
+}
+
+/// The error of an experiment whose run was lost; its results are written before it is returned.
+pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
+    match outcome.lost() {
+        Some(reason) => Err(Error::Lost { name: name.to_owned(), reason }),
+        None => Ok(()),
+    }
+}
+
+/// Runs the experiment of this name, or all of a group, with the file of an experiment that takes one.
+///
+/// # Errors
+/// As [`experiments::find`], [`Input::config`], [`used::check`]; those of the experiment; [`Error::Write`];
+/// [`Error::Lost`] after all is written.
+pub fn run(name: &str, file: Option<&Path>, input: &Input, output: &Output) -> Result<(), Error> {
+    let names = experiments::named(name);
+    let chosen: Vec<_> =
+        names.iter().map(|name| experiments::find(name)).collect::<Result<_, _>>()?;
+    if let Some(one) = chosen.first() {
+        one.check_file(file)?;
+    }
+    let config = input.config()?;
+    used::check(name, &chosen, input)?;
+    let (mut objects, mut lost) = (Vec::new(), Ok(()));
+    for experiment in chosen {
+        let context = Context {
+            config: &config,
+            seed: input.seed,
+            seconds: config.extent.seconds,
+            progress: input.progress(),
+            file,
+        };
+        let outcome = (experiment.run)(&context)?;
+        let command = match file {
+            Some(file) => format!("run {} --input {}", experiment.name, file.display()),
+            None => format!("run {}", experiment.name),
+        };
+        let run = Run { experiment, input, config: &config, command };
+        objects.push(run.write(&outcome, output)?);
+        lost = lost.and(check_lost(experiment.name, &outcome));
+    }
+    print(&objects, output)?;
+    lost
+}
+
+/// Identifies the motor from a trace.
+///
+/// # Errors
+/// As [`trace::identify`], [`Input::config`]; [`Error::Write`].
+pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(), Error> {
+    let config = input.config()?;
+    let outcome = trace::identify(&given.file, &given.columns, given.delay, &config)?;
+    used::check(trace::EXPERIMENT.name, &[&trace::EXPERIMENT], input)?;
+    let mut command = format!("identify-trace --input {}", given.file.display());
+    if let Some(delay) = given.delay {
+        command.push_str(&format!(" --delay {delay}"));
+    }
+    for column in &given.columns {
+        command.push_str(&format!(" --column {column}"));
+    }
+    let run = Run { experiment: &trace::EXPERIMENT, input, config: &config, command };
+    let object = run.write(&outcome, output)?;
+    print(&[object], output)
+}
+
+fn print(objects: &[String], output: &Output) -> Result<(), Error> {
+    match objects {
+        _ if !output.json => Ok(()),
+        [object] => say(&format!("{object}\n")),
+        objects => say(&format!("{}\n", outcome::group(objects))),
+    }
+}

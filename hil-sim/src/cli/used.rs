@@ -1,0 +1,47 @@
+//! Refusal of keys that an experiment does not use.
+
+use crate::config::{Config, assigned, file, keys_of};
+use crate::error::Error;
+use crate::experiments::Experiment;
+use crate::input::Input;
+
+/// Checks that each key set by `--set` or `--seconds` is used by one of the experiments that `name` stands for. A
+/// configuration file may describe more than one experiment needs: its unused keys are only named on standard error,
+/// unless they leave the configuration as it is.
+///
+/// # Errors
+/// [`Error::UnusedKey`]; as [`assigned`], [`keys_of`] and [`file::read`].
+pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(), Error> {
+    let is_used = |key: &str| -> Result<bool, Error> {
+        let keys = keys_of(key)?;
+        Ok(experiments.iter().any(|experiment| keys.iter().any(|key| experiment.uses_key(*key))))
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for assignment in &input.assignments {
+        names.push(assigned(assignment)?.0);
+    }
+    names.extend(input.seconds.map(|_| "seconds"));
+    for key in names {
+        if !is_used(key)? {
+            let uses = match experiments {
+                [one] => one.uses_text(),
+                _ => "see `list --json`".to_owned(),
+            };
+            return Err(Error::UnusedKey { name: name.to_owned(), key: key.to_owned(), uses });
+        }
+    }
+    let Some(path) = &input.config else { return Ok(()) };
+    let mut config = Config::of_motor(input.motor.as_deref())?;
+    let mut unused = Vec::new();
+    for assignment in file::read(path)? {
+        let before = config.clone();
+        config.set(&assignment.name, &assignment.value)?;
+        if config != before && !is_used(&assignment.name)? {
+            unused.push(assignment.name);
+        }
+    }
+    if !unused.is_empty() && !input.quiet {
+        eprintln!("note: {name} does not use {} of {}", unused.join(", "), path.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,114 @@
+//! CSV files that a user brings: a header with the names of the columns, then numbers.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, nearest};
+
+/// Named columns of equal length.
+#[derive(Debug)]
+pub struct Columns {
+    path: PathBuf,
+    names: Vec<String>,
+    /// Row by row, with the line of each.
+    rows: Vec<(u64, Vec<f64>)>,
+}
+
+impl Columns {
+    /// Reads a file. Spaces around names and numbers do not count; lines that begin with `#` are comments.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the line of what is no number, no finite number, or not as wide as the header.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let failed = |line: Option<u64>, problem: String| Error::Data {
+            path: path.to_owned(),
+            line,
+            problem,
+        };
+        let of_csv = |error: csv::Error| {
+            let line = error.position().map(csv::Position::line);
+            let problem = match error.kind() {
+                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                    format!("{len} cells; the header has {expected_len}")
+                }
+                csv::ErrorKind::Io(error) => error.to_string(),
+                _ => "no UTF-8 text".to_owned(),
+            };
+            failed(line, problem)
+        };
+        let mut builder = csv::ReaderBuilder::new();
+        let builder = builder.trim(csv::Trim::All).comment(Some(b'#'));
+        let mut reader = builder.from_path(path).map_err(of_csv)?;
+        let names: Vec<String> =
+            reader.headers().map_err(of_csv)?.iter().map(str::to_owned).collect();
+        for (n, name) in names.iter().enumerate() {
+            if names[..n].contains(name) {
+                return Err(failed(Some(1), format!("two columns are called `{name}`")));
+            }
+        }
+        let mut rows = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(of_csv)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let number = |(cell, name): (&str, &String)| match cell.parse::<f64>() {
+                Ok(number) if number.is_finite() => Ok(number),
+                _ => Err(failed(Some(line), format!("{name} = `{cell}` is not a finite number"))),
+            };
+            rows.push((line, record.iter().zip(&names).map(number).collect::<Result<_, _>>()?));
+        }
+        Ok(Self { path: path.to_owned(), names, rows })
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// A column, if there is one of this name.
+    pub fn get(&self, name: &str) -> Option<Vec<f64>> {
+        let place = self.names.iter().position(|known| known == name)?;
+        Some(self.rows.iter().map(|(_, row)| row[place]).collect())
+    }
+
+    /// A column that must be there.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the columns there are.
+    pub fn need(&self, name: &str) -> Result<Vec<f64>, Error> {
+        self.get(name).ok_or_else(|| {
+            let names = self.names.join(", ");
+            self.error(format!("there is no column `{name}`; the file has: {names}"))
+        })
+    }
+
+    /// Checks that every column is one of these.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the name of the other column, and the allowed ones.
+    pub fn only(&self, allowed: &[&str]) -> Result<(), Error> {
+        let other = self.names.iter().find(|name| !allowed.contains(&name.as_str()));
+        let Some(other) = other else { return Ok(()) };
+        let guess = nearest(other, allowed.iter().copied())
+            .map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+        let allowed = allowed.join(", ");
+        Err(self.at(0, format!("unknown column `{other}`{guess}; allowed: {allowed}")))
+    }
+
+    /// An error of the file as a whole.
+    pub fn error(&self, problem: String) -> Error {
+        Error::Data { path: self.path.clone(), line: None, problem }
+    }
+
+    /// An error of a row, counted from 1; 0 for the header.
+    pub fn at(&self, row: usize, problem: String) -> Error {
+        let line = match row {
+            0 => Some(1),
+            row => self.rows.get(row - 1).map(|(line, _)| *line),
+        };
+        Error::Data { path: self.path.clone(), line, problem }
+    }
+}

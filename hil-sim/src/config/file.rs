@@ -1,0 +1,99 @@
+//! Configuration files: TOML with the names of the keys, in tables or dotted.
+
+use std::path::Path;
+
+use toml::de::{DeTable, DeValue};
+
+use super::{Allowed, Config, Key, Value, flattened};
+use crate::error::Error;
+
+/// An assignment of a file.
+pub struct FileAssignment {
+    /// Name of the key, as written.
+    pub name: String,
+    /// Its value.
+    pub value: Value,
+    /// Its line, counted from 1.
+    pub line: usize,
+}
+
+/// The assignments of a file, those of the drive alone last.
+///
+/// # Errors
+/// [`Error::ConfigFile`] when the file cannot be read or is not TOML.
+pub fn read(path: &Path) -> Result<Vec<FileAssignment>, Error> {
+    let failed = |problem: String| Error::ConfigFile { path: path.to_owned(), problem };
+    let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+    let table: toml::Table =
+        text.parse().map_err(|e: toml::de::Error| failed(e.to_string().trim_end().to_owned()))?;
+    let places = DeTable::parse(&text).map_err(|e| failed(e.to_string()))?;
+    let mut offsets = Vec::new();
+    find("", places.get_ref(), &mut offsets);
+    let line_of = |name: &str| {
+        let offset = offsets.iter().find(|(known, _)| known == name).map_or(0, |found| found.1);
+        1 + text[..offset].matches('\n').count()
+    };
+    let assignments = flattened(&table).into_iter();
+    Ok(assignments
+        .map(|(name, value)| FileAssignment { line: line_of(&name), name, value })
+        .collect())
+}
+
+/// Names of the values in a table, and where their keys stand in the text.
+fn find(prefix: &str, table: &DeTable<'_>, into: &mut Vec<(String, usize)>) {
+    for (key, value) in table {
+        let name = format!("{prefix}{}", key.get_ref());
+        match value.get_ref() {
+            DeValue::Table(inner) => find(&format!("{name}."), inner, into),
+            _ => into.push((name, key.span().start)),
+        }
+    }
+}
+
+/// Keys of the configuration as a file that [`read`] takes, with units and meanings as comments. A key that is not set is
+/// commented out.
+pub fn toml(config: &Config, keys: &[Key]) -> String {
+    let names: Vec<&str> = Key::all().map(Key::name).collect();
+    // A name that is also the beginning of others cannot be a table.
+    let table_of = |name: &str| {
+        name.split_once('.')
+            .filter(|(table, _)| !names.contains(table))
+            .map(|(table, rest)| (table.to_owned(), rest.to_owned()))
+    };
+    let mut tables: Vec<(String, String)> = vec![(String::new(), String::new())];
+    for key in keys {
+        let name = key.assigned_name();
+        let (table, rest) =
+            table_of(&name).unwrap_or_else(|| (String::new(), format!("\"{name}\"")));
+        let place = tables.iter().position(|(known, _)| *known == table);
+        let place = place.unwrap_or_else(|| {
+            tables.push((table.clone(), format!("\n[{table}]\n")));
+            tables.len() - 1
+        });
+        tables[place].1.push_str(&line(*key, &rest, &key.get(config)));
+    }
+    tables.into_iter().map(|(_, text)| text).collect()
+}
+
+fn line(key: Key, name: &str, value: &Value) -> String {
+    let unit = match key.unit() {
+        "" => String::new(),
+        unit => format!("{unit}; "),
+    };
+    let comment = format!("# {unit}{}", key.help());
+    match value {
+        Value::Unset => format!("# {name} = {}  {comment}\n", sample(key)),
+        Value::Switch(on) => format!("{name} = {on}  {comment}\n"),
+        Value::Word(word) => format!("{name} = \"{word}\"  {comment}\n"),
+        Value::Number(number) => format!("{name} = {number}  {comment}\n"),
+    }
+}
+
+/// A value for a key that is not set.
+fn sample(key: Key) -> String {
+    match key.allowed() {
+        Allowed::Range { min, .. } => min.to_string(),
+        Allowed::Words(words) => format!("\"{}\"", words.first().copied().unwrap_or_default()),
+        Allowed::Switch => "true".to_owned(),
+    }
+}

@@ -1,0 +1,192 @@
+//! Which keys an experiment uses, found by changing each of them.
+
+use hil_sim::config::{Allowed, Config, Key, Value};
+use hil_sim::experiments::{Context, EXPERIMENTS, Experiment};
+use hil_sim::outcome::Origin;
+use hil_sim::progress::Progress;
+
+/// Numbers of a run without its texts; or the refusal.
+fn result(experiment: &Experiment, config: &Config) -> Result<serde_json::Value, String> {
+    let seconds = config.extent.seconds;
+    let context = Context { config, seed: 1, seconds, progress: Progress::hidden(), file: None };
+    let outcome = (experiment.run)(&context).map_err(|error| error.to_string())?;
+    let text = outcome.to_json("", &Origin::default()).expect("JSON");
+    let mut object: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    object.as_object_mut().expect("an object").remove("remarks");
+    Ok(object)
+}
+
+/// Values for keys that follow a rule or are zero unless they are set.
+const SAMPLES: [(&str, f64); 12] = [
+    ("saliency.b1", 0.02),
+    ("saliency.hold_a", 0.4),
+    ("saliency.psi_n", 0.1),
+    ("inverter.residual_v", 4.0),
+    ("measurement.noise_a", 0.01),
+    ("measurement.lsb_a", 0.004),
+    ("measurement.dc_link_range_v", 600.0),
+    ("load.torque_nm", 0.3),
+    ("load.speed_rpm", 40.0),
+    ("reference.iq_a", 0.7),
+    ("runs", 4.0),
+    ("seconds", 0.5),
+];
+
+/// Other values that a key allows.
+fn others(key: Key, config: &Config) -> Vec<Value> {
+    let set = match key.get(config) {
+        Value::Number(value) if value != 0.0 => value,
+        Value::Switch(on) => return vec![Value::Switch(!on)],
+        Value::Word(word) if word != "auto" => {
+            let Allowed::Words(words) = key.allowed() else { return Vec::new() };
+            let others = words.iter().filter(|other| **other != word);
+            return others.map(|other| Value::Word((*other).to_owned())).collect();
+        }
+        value => {
+            let sample = SAMPLES.iter().find(|(name, _)| *name == key.name());
+            match (sample, key, value) {
+                (Some((_, sample)), ..) => *sample,
+                (_, Key::Drive(entry), Value::Word(_)) => {
+                    entry.number(&config.drive).unwrap_or(1.0).into()
+                }
+                _ => match key.allowed() {
+                    Allowed::Range { max, .. } if max <= 10.0 => 0.2 * max,
+                    Allowed::Range { min, max } => 0.5 * (min.max(0.0) + max.min(100.0)),
+                    _ => return Vec::new(),
+                },
+            }
+        }
+    };
+    let Allowed::Range { min, max } = key.allowed() else { return Vec::new() };
+    let whole = set.fract() == 0.0 && set.abs() >= 1.0;
+    [1.0, 1.25, 0.3, 4.0]
+        .map(|factor| (factor * set).clamp(min, max))
+        .map(|value| Value::Number(if whole { value.round().max(1.0) } else { value }))
+        .into_iter()
+        .filter(|value| *value != key.get(config))
+        .collect()
+}
+
+fn short(name: &str) -> Config {
+    let mut config = Config::default();
+    config.extent.runs = Some(3);
+    config.extent.seconds = Some(match name {
+        "demodulators" => 1.0,
+        "speed-profile" | "position-step" | "torque-reversal" => 3.0,
+        _ => 0.6,
+    });
+    config
+}
+
+/// Settings beside which a key has an effect that has none beside the defaults.
+const BESIDE: [&[&str]; 9] = [
+    &[],
+    &["load.mode=free"],
+    &["load.mode=speed", "load.speed_rpm=60"],
+    &["angle_source=encoder"],
+    &["injection.beside_encoder=yes"],
+    &["injection.demodulator=rectified"],
+    &["injection.demodulator=rms-impedance"],
+    &["spread.machine=1.5"],
+    &["current_plant=motor"],
+];
+
+/// Keys that are used although a short undisturbed run does not show it.
+const QUIET: [(&[&str], &str); 8] = [
+    (&["nameplate."], "the plate of the motor, whole; the rules take some of its numbers"),
+    (&["limits."], "protections: without effect until they act"),
+    (&["scales.ntc."], "the simulated thermistor and the drive's are the same"),
+    (&["scales.encoder_counts"], "without effect where the encoder is not looked at"),
+    (&["measurement.heat_sink_c"], "without effect below the limit"),
+    (
+        &[
+            "injection.allowed_loss",
+            "injection.loss_s",
+            "injection.tracked_rpm",
+            "injection.check",
+            "injection.monitor",
+        ],
+        "protections: without effect until they act",
+    ),
+    (
+        &[
+            "injection.full_reference_iq_a",
+            "injection.reference_a",
+            "injection.k_s",
+            "injection.z_s",
+            "injection.rms_samples",
+        ],
+        "of other demodulators than the default",
+    ),
+    (&["sequence.stop_a_per_s"], "acts at a stop"),
+];
+
+/// Experiments that count successes: few keys change a count in few runs.
+const COUNTING: [&str; 2] = ["saliency-check", "lock-monitor"];
+
+fn is_quiet(name: &str) -> bool {
+    QUIET.iter().flat_map(|(names, _)| names.iter()).any(|quiet| name.starts_with(quiet))
+}
+
+/// Keys whose change has changed a result, beside some of [`BESIDE`].
+fn observed(experiment: &Experiment) -> Vec<Key> {
+    let mut used: Vec<Key> = Vec::new();
+    for beside in BESIDE {
+        let mut base = short(experiment.name);
+        let set = beside.iter().map(|one| one.split_once('=').expect("KEY=VALUE"));
+        let is_declared =
+            |name: &str| Key::named(name).unwrap().iter().all(|key| experiment.uses_key(*key));
+        if !set.clone().all(|(name, _)| is_declared(name)) {
+            continue;
+        }
+        set.for_each(|(name, value)| base.set(name, &Value::from_text(value)).expect("a key"));
+        let default = result(experiment, &base);
+        for key in Key::all() {
+            let pending = !used.iter().any(|known| known.name() == key.name() && known.assigned_name() == key.assigned_name())
+                // Beside other settings only what is still missing.
+                && (beside.is_empty() || (experiment.uses_key(key) && !is_quiet(key.name())));
+            let changes = |value: Value| {
+                let mut config = base.clone();
+                config.set(&key.assigned_name(), &value).is_ok()
+                    && result(experiment, &config) != default
+            };
+            if pending && others(key, &base).into_iter().any(changes) {
+                used.push(key);
+            }
+        }
+    }
+    used
+}
+
+/// Experiments of which `ONLY` names some; all without it.
+fn chosen() -> impl Iterator<Item = &'static Experiment> {
+    let only = std::env::var("ONLY").unwrap_or_default();
+    EXPERIMENTS.iter().filter(move |experiment| {
+        only.is_empty() || only.split(',').any(|name| name == experiment.name)
+    })
+}
+
+#[test]
+#[ignore = "half an hour"]
+fn each_experiment_uses_the_keys_it_declares_and_no_others() {
+    let mut wrong = Vec::new();
+    for experiment in chosen() {
+        let used: Vec<String> = observed(experiment).into_iter().map(Key::assigned_name).collect();
+        for key in Key::all() {
+            let name = key.assigned_name();
+            match (experiment.uses_key(key), used.contains(&name)) {
+                (true, false) if !is_quiet(key.name()) && !COUNTING.contains(&experiment.name) => {
+                    wrong.push(format!(
+                        "{}: {name} is declared, but changes nothing",
+                        experiment.name
+                    ));
+                }
+                (false, true) => {
+                    wrong.push(format!("{}: {name} is not declared, but used", experiment.name));
+                }
+                _ => {}
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

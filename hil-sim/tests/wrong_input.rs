@@ -1,0 +1,128 @@
+//! Fifty wrong inputs of the command line: each message names the thing, the value and what is allowed; nothing is
+//! written.
+
+mod cli_common;
+
+use cli_common::{files, folder, hil_sim, text};
+
+/// Files of the tests: name and text.
+const FILES: [(&str, &str); 16] = [
+    ("type.toml", "[motor]\nr_s = \"five\"\n"),
+    ("range.toml", "[inverter]\n\ndc_link_v = 5000\n"),
+    ("key.toml", "[motor]\nr_s = 5\nrs_ = 5\n"),
+    ("word.toml", "[load]\nmode = \"free-wheeling\"\n"),
+    ("broken.toml", "[motor\n"),
+    ("twice.toml", "seconds = 1\nseconds = 2\n"),
+    ("array.toml", "[motor]\nr_s = [1, 2]\n"),
+    ("motor.toml", "title = \"x\"\n"),
+    ("unit.csv", "time_s,torque\n0,1\n1,1\n"),
+    ("both.csv", "time_s,torque_current_a,speed_rpm\n0,1,1\n1,1,1\n"),
+    ("back.csv", "time_s,speed_rpm\n0,1\n2,1\n1,1\n"),
+    ("text.csv", "time_s,speed_rpm\n0,1\n1,fast\n"),
+    ("short.csv", "time_s,speed_rpm\n0,1\n1\n"),
+    ("loads.csv", "time_s,speed_rpm,load_nm,load_rpm\n0,1,1,1\n1,1,1,1\n"),
+    ("late.csv", "time_s,position_turns\n0.5,1\n1,1\n"),
+    ("none.csv", "time_s,load_nm\n0,1\n1,1\n"),
+];
+
+/// Arguments, separated by spaces, and parts of the message.
+#[rustfmt::skip] // a case a line
+const CASES: [(&str, &[&str]); 54] = [
+    // Commands and names.
+    ("rum torque-steps", &["rum", "run"]),
+    ("run", &["<NAME>", "cargo sim run"]),
+    ("run torque-step", &["`torque-step`", "did you mean `torque-steps`?", "`list`"]),
+    ("run xyzzy", &["`xyzzy`", "`list` shows all"]),
+    ("run torque-steps extra", &["extra"]),
+    ("run torque-steps --sed 1", &["--sed", "--seed"]),
+    ("keys motr", &["`motr`", "did you mean `motor`?"]),
+    ("keys motor --json", &["--json"]),
+    ("motors motulator", &["`motulator`", "did you mean `motulator-2kw2`?", "`motors`"]),
+    ("motors missing.toml", &["missing.toml", "No such file"]),
+    ("completion cmd", &["cmd", "bash", "fish", "zsh"]),
+    ("list torque", &["torque"]),
+    // Seeds and times.
+    ("run torque-steps --seed -1", &["-1", "--seed"]),
+    ("run torque-steps --seed 1.5", &["1.5", "--seed"]),
+    ("run torque-steps --seconds 0", &["seconds = 0", "0.001 to 3600 s"]),
+    ("run torque-steps --seconds long", &["long", "--seconds"]),
+    ("run torque-steps --seconds inf", &["seconds = inf", "not a finite number", "0.001 to 3600 s"]),
+    ("run pi-design --seconds 2", &["pi-design does not use `seconds`", "it uses: motor.*"]),
+    // Keys and values.
+    ("run torque-steps --set motor.r_s", &["`motor.r_s`", "KEY=VALUE"]),
+    ("run torque-steps --set", &["--set", "KEY=VALUE"]),
+    ("run torque-steps --set =5", &["there is no key ``", "`keys` shows all"]),
+    ("run torque-steps --set motor.r_x=5", &["`motor.r_x`", "did you mean `motor.r_r`?"]),
+    ("run torque-steps --set motor.r_s=0", &["motor.r_s = 0", "0.001 to 1000 ohm"]),
+    ("run torque-steps --set motor.r_s=", &["motor.r_s = ", "not a number", "0.001 to 1000 ohm"]),
+    ("run torque-steps --set motor.r_s=5,4", &["motor.r_s = 5,4", "not a number"]),
+    ("run torque-steps --set motor.r_s=nan", &["motor.r_s = NaN", "not a finite number"]),
+    ("run torque-steps --set motor.pole_pairs=1.5", &["motor.pole_pairs = 1.5", "not a whole number", "1 to 50"]),
+    ("run torque-steps --set load.mode=sideways", &["load.mode = sideways", "locked, free, speed"]),
+    ("run torque-steps --set inverter.switched=maybe", &["inverter.switched = maybe", "yes, no"]),
+    ("run torque-steps --set injection.demodulator=x", &["injection.demodulator = x", "synchronous"]),
+    ("run torque-steps --set limits.trip_a=lots", &["limits.trip_a = lots", "number"]),
+    ("run torque-steps --set measurement.lsb_a=2", &["measurement.lsb_a = 2", "0.0559089175 A"]),
+    ("run monte-carlo --set runs=0", &["runs = 0", "1 to 1000000"]),
+    ("run speed-profile --set runs=5", &["speed-profile does not use `runs`", "it uses: ", "load.torque_nm"]),
+    ("run anti-windup --set motor.r_s=5", &["anti-windup does not use `motor.r_s`", "no key"]),
+    ("run torque-steps --set spread.motor=0.1", &["torque-steps does not use `spread.motor`", "prepare.learn"]),
+    ("run torque-steps --set speed.limit_rpm=9", &["`speed.limit_rpm`", "except speed.limit_rpm"]),
+    ("report --set track_rotor=yes", &["report does not use `track_rotor`"]),
+    // Files.
+    ("run torque-steps --config missing.toml", &["missing.toml", "No such file"]),
+    ("run torque-steps --config broken.toml", &["broken.toml", "line 1"]),
+    ("run torque-steps --config twice.toml", &["twice.toml", "line 2", "duplicate"]),
+    ("run torque-steps --config type.toml", &["type.toml, line 2: motor.r_s = five", "0.001 to 1000 ohm"]),
+    ("run torque-steps --config range.toml", &["range.toml, line 3: inverter.dc_link_v = 5000", "10 to 1000 V"]),
+    ("run torque-steps --config key.toml", &["key.toml, line 3: there is no key `motor.rs_`"]),
+    ("run torque-steps --config word.toml", &["word.toml, line 2: load.mode = free-wheeling", "locked, free, speed"]),
+    ("run torque-steps --config array.toml", &["array.toml, line 2: motor.r_s = [1, 2]", "not a number"]),
+    ("run torque-steps --motor motor.toml", &["motor.toml", "about"]),
+    // Profiles and traces.
+    ("run profile", &["profile needs --input FILE"]),
+    ("run torque-steps --input unit.csv", &["--input unit.csv", "allowed with: profile"]),
+    ("run profile --input unit.csv", &["unit.csv, line 1: unknown column `torque`", "allowed: time_s, torque_current_a"]),
+    ("run profile --input back.csv", &["back.csv, line 4: time_s = 1 after 2"]),
+    ("run profile --input text.csv", &["text.csv, line 3: speed_rpm = `fast`", "finite number"]),
+    ("identify-trace --input text.csv --column n=x", &["--column n=x", "allowed: time_s, speed_rpm"]),
+    ("identify-trace --input text.csv --delay 11", &["11", "--delay", "0 to 10 rows"]),
+];
+
+/// Further profiles, each with its message.
+const PROFILES: [(&str, &str); 5] = [
+    (
+        "both.csv",
+        "both.csv: one of the columns torque_current_a, speed_rpm, position_turns must be there, and only one",
+    ),
+    (
+        "none.csv",
+        "none.csv: one of the columns torque_current_a, speed_rpm, position_turns must be there, and only one",
+    ),
+    ("short.csv", "short.csv, line 3: 1 cells; the header has 2"),
+    ("loads.csv", "loads.csv: load_nm and load_rpm exclude each other"),
+    ("late.csv", "late.csv, line 2: time_s = 0.5; the first row is at 0"),
+];
+
+#[test]
+fn each_message_names_the_thing_the_value_and_what_is_allowed() {
+    let folder = folder("wrong-input");
+    for (name, contents) in FILES {
+        std::fs::write(folder.join(name), contents).unwrap();
+    }
+    let profiles =
+        PROFILES.map(|(file, message)| (format!("run profile --input {file}"), vec![message]));
+    let cases = CASES.iter().map(|(line, parts)| ((*line).to_owned(), parts.to_vec()));
+    for (line, parts) in cases.chain(profiles) {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let output = hil_sim(&folder, &arguments);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        for part in parts {
+            assert!(message.contains(part), "{line}: `{part}` is not in: {message}");
+        }
+        assert!(output.stdout.is_empty(), "{line} prints a result");
+        assert!(!message.contains("hil-sim "), "{line}: the user typed cargo sim: {message}");
+        assert_eq!(files(&folder).len(), FILES.len(), "{line} leaves files: {:?}", files(&folder));
+    }
+}
