@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 24] = [
+const ELSEWHERE: [(&str, &str); 27] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -21,7 +21,6 @@ const ELSEWHERE: [(&str, &str); 24] = [
     ("cargo clippy", "`cargo xtask test` runs it"),
     ("cargo fmt", "`cargo xtask test` checks the format"),
     ("cargo run -p drive-core --example", "compiled by `cargo xtask test`; run by a person"),
-    ("cargo run --release -p hil-sim --example", "compiled by `cargo xtask test`; run by a person"),
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo sim completion", "prints a script"),
@@ -33,6 +32,13 @@ const ELSEWHERE: [(&str, &str); 24] = [
     ("cargo sim run monte-carlo --set runs=1000", "long proof"),
     ("cargo sim run machines --set", "long proof"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
+    ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
+    ("cargo sim run profile --input", "a test runs it with the file of the examples"),
+    (
+        "cargo sim identify-trace --input",
+        "a file of the reader's; a test runs it with a simulated trace",
+    ),
+    ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
     ("cargo flash", "named to be avoided"),
 ];
 
