@@ -2,7 +2,7 @@
 //!
 //! Lines that begin with `!` are commands of this program ([`own`]); all others go to the drive. The protocol is in
 //! [`answer`] (the lines that answer a command), [`catalogue`] (commands and settings, for the completion), [`transfer`]
-//! (backup and restore) and [`trace`] (plots). [`link`] moves lines, [`editor`] edits them.
+//! (backup and restore) and [`trace`] (plots). [`link`] moves lines, `editor` edits them.
 
 pub mod answer;
 pub mod catalogue;
