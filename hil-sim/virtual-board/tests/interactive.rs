@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use hil_sim::Config;
+use hil_sim::console::answer::is_unasked;
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::Link;
 use hil_sim::console::session::{Flow, Session};
@@ -80,7 +81,12 @@ impl Talk {
     fn say(&mut self, line: impl AsRef<[u8]>) -> String {
         self.port.write_all(line.as_ref()).unwrap();
         self.port.write_all(b"\n").unwrap();
-        self.next().trim_end().to_owned()
+        // An announcement may come first.
+        let mut line = self.next();
+        while is_unasked(&line) {
+            line = self.next();
+        }
+        line.trim_end().to_owned()
     }
 
     fn until(&mut self, state: &str) {
@@ -131,6 +137,15 @@ fn mean_within(series: &[(f64, f64)], from: f64, to: f64) -> f64 {
     let inside: Vec<f64> = series.iter().filter(|p| p.0 >= from && p.0 < to).map(|p| p.1).collect();
     assert!(!inside.is_empty(), "nothing from {from} s to {to} s");
     inside.iter().sum::<f64>() / inside.len() as f64
+}
+
+/// The host's console passes over all lines that the firmware says unasked.
+#[test]
+fn the_host_knows_the_announcements_of_the_firmware() {
+    for first in induction_drive::console::announce::ANNOUNCEMENTS {
+        assert!(is_unasked(&format!("{first}something")), "{first}");
+    }
+    assert!(!is_unasked("ok"));
 }
 
 /// The session of the README, in real time, through the pseudo-terminal.
@@ -202,7 +217,7 @@ fn a_program_talks_to_the_drive_and_the_motor_turns_torque_out() {
 fn a_script_turns_a_free_shaft_and_repeats_to_the_bit() {
     let script = "# a pulse of torque\n\
                   at 1.8: start\n\
-                  wait for torque:\n\
+                  wait for running: torque\n\
                   wait 0.2: torque 0.5\n\
                   wait 0.3: torque 0\n\
                   wait 0.5: status\n";

@@ -39,7 +39,7 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     options.counting = Counting::default();
     let mut pair = Pair::new(Image::built()?, options)?;
     assert_eq!(pair.say("learned")?, "ok: nothing learned with these settings");
-    // Fewer currents to learn at: to 1.25 A instead of 3.25.
+    // Points every 0.107 A, a fourteenth of the limit.
     pair.order("set speed.i_q_limit_a 1")?;
     pair.order("set limits.current_a 1.5")?;
     pair.order("start learning")?;
@@ -53,8 +53,8 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     let (_, mismatch) = learned[0].split_once("gain mismatch ").expect("the gains");
     let mismatch: f64 = mismatch.split(' ').next().unwrap_or("").parse()?;
     assert!((mismatch - 0.01).abs() < 0.0025, "{mismatch}");
-    // From 0 A to 1.25 A, with a summary, a header and an end.
-    assert_eq!(learned.len(), 2 + 6 + 1);
+    // From 0 A to 1.29 A, with a summary, a header and an end.
+    assert_eq!(learned.len(), 2 + 13 + 1);
     pair.order("save")?;
 
     power_cycle(&mut pair)?;
