@@ -47,7 +47,7 @@ fn a_hundred_thousand_interrupts_start_at_once_and_leave_registers_stack_and_log
         board.pend(CONTROL_INTERRUPT);
         while board.next_period().is_some() {
             periods += 1;
-            if periods % 60 == 0 {
+            if periods.is_multiple_of(150) {
                 board
                     .type_line(["status", "get motor.r_s", "faults"][rng.random_range(0..3_usize)]);
                 replies += 1;
