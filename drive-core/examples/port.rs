@@ -14,7 +14,7 @@ use drive_core::identify::learning::Learned;
 use drive_core::settings::{Line, Ntc, Scales, Settings};
 use drive_core::{Accepted, Command, Compare, Drive, Hardware, Mode, Refused, Sample, State};
 
-/// What the interrupt needs of the hardware.
+/// Hardware access of the interrupt.
 trait Board {
     /// The readings of this period. The currents were sampled in the middle of the low sides' on-time.
     fn sample(&mut self) -> Sample;

@@ -17,7 +17,7 @@ impl Columns {
     /// Reads a file. Spaces around names and numbers do not count; lines that begin with `#` are comments.
     ///
     /// # Errors
-    /// [`Error::Data`] with the line of what is no number, no finite number, or not as wide as the header.
+    /// [`Error::Data`] with the line of a cell that is not a finite number, or of a row with another width than the header.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let failed = |line: Option<u64>, problem: String| Error::Data {
             path: path.to_owned(),

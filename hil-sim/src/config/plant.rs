@@ -14,7 +14,7 @@ use crate::plant::{
 /// The plant that the configuration describes.
 pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
-    // What is unset follows the dissertation's bench, in proportion.
+    // Unset values follow the dissertation's bench, in proportion.
     let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
     let relative_voltage = i.dc_link_v / f64::from(reference_drive.inverter.dc_link_v);
     let relative_range = s.range_a / reference.range_a;

@@ -12,7 +12,7 @@ use crate::report;
 /// Time between two lines about the progress of a restore.
 const PROGRESS: Duration = Duration::from_secs(5);
 
-/// What follows a line.
+/// Action after a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Flow {
     /// The next line.

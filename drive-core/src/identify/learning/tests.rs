@@ -48,7 +48,7 @@ fn reference(i_q: f64) -> f64 {
     2.0 * 0.034 * 0.7 * i_q / i_q.hypot(0.7)
 }
 
-/// What gains that differ by `mismatch` add.
+/// Signal that a gain difference of `mismatch` adds.
 fn negative_sequence(mismatch: f64, theta: f64) -> f64 {
     let d = 0.5 * mismatch;
     d / 0.75_f64.sqrt() * ((2.0 * theta - TURN / 12.0).sin() - 0.5)
