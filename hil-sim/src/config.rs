@@ -20,7 +20,7 @@ use drive_core::settings::{Line, Settings};
 use file::FileAssignment;
 pub use key::Key;
 pub use keys::*;
-pub use plant::plant_settings;
+pub use plant::{current_lines, plant_settings};
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
@@ -111,20 +111,21 @@ impl Config {
 
     /// A current that is `on_reference`, A, on the dissertation's motor, in proportion to the rated current.
     pub fn amperes(&self, on_reference: f64) -> f64 {
-        let relative = f64::from(self.drive.rated_a()) / f64::from(Settings::default().rated_a());
-        on_reference * relative
+        on_reference * self.relative(Settings::rated_a)
     }
 
     /// A load torque that is `on_reference`, Nm, on the dissertation's motor. A step of it accelerates the shaft as there,
     /// electrically, because the tracking of the angle follows a limited acceleration; and it is not a larger share of
     /// the torque at the current limit.
     pub fn newton_metres(&self, on_reference: f64) -> f64 {
-        let relative = |of: fn(&Settings) -> f32| {
-            f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
-        };
-        let torque = relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
-        let inertia = relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
+        let torque = self.relative(|s| s.motor.torque_per_ampere(s.i_d()) * s.current_limit_a());
+        let inertia = self.relative(|s| s.motor.inertia / f32::from(s.motor.pole_pairs));
         on_reference * torque.min(inertia)
+    }
+
+    /// A quantity of the drive's settings relative to that of the dissertation's drive.
+    fn relative(&self, of: fn(&Settings) -> f32) -> f64 {
+        f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
     }
 
     /// A mechanical speed that is `on_reference`, rpm, on four poles, at the same electrical frequency.
@@ -136,24 +137,13 @@ impl Config {
     /// `measurement` or of the dc link.
     pub fn calibrate(&mut self) {
         let sensors = plant_settings(self).measurement;
-        let [a, b] = sensors
-            .calibration()
-            .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 });
         let scales = &mut self.drive.scales;
-        (scales.current_a, scales.current_b) = (a, b);
+        [scales.current_a, scales.current_b] = current_lines(&sensors);
         scales.full_scale = sensors.calibration()[0].full_scale;
         scales.dc_link = Line { gain: sensors.dc_link_v as f32, offset: 0.0 };
         let filter_hz = self.measurement.filter_hz;
         scales.current_delay_s =
             if filter_hz > 0.0 { (1.0 / (std::f64::consts::TAU * filter_hz)) as f32 } else { 0.0 };
-    }
-
-    /// Sets the keys of a table, those of the drive alone last.
-    ///
-    /// # Errors
-    /// As [`Config::set`].
-    pub fn set_table(&mut self, table: &toml::Table) -> Result<(), Error> {
-        flattened(table).iter().try_for_each(|(name, value)| self.set(name, value))
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.

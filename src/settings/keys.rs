@@ -191,12 +191,8 @@ impl Key {
     /// # Errors
     /// [`SettingsError::Range`].
     pub fn check(self, settings: &FirmwareSettings) -> Result<(), SettingsError> {
-        match (self.number(settings), self.range(settings)) {
-            (Some(value), Some((min, max))) if !(min..=max).contains(&value) => {
-                Err(SettingsError::Range { name: self.name(), unit: self.unit(), value, min, max })
-            }
-            _ => Ok(()),
-        }
+        let range = self.range(settings);
+        with!(self, settings, |entry, s| entry.check_in(range, s))
     }
 
     /// The value that a text stands for. Its range is checked by [`check`](Self::check).

@@ -190,7 +190,8 @@ impl Settings {
         let inj = &self.injection;
         let motion_design = self.motion_design()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
-        let injection = Injection::new(self.carrier_v(), motor_plant, current_lag);
+        let carrier_v = self.carrier_v();
+        let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let (injection_turn, injection_axis) = match inj.demodulator {
             DemodulatorKind::RmsImpedance => (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 }),
             _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
@@ -222,7 +223,7 @@ impl Settings {
             source: self.angle_source,
             track_rotor: self.track_rotor,
             indirect: Indirect::new(m, self.scales.encoder_counts, i_d, 2.0 * speed_trip / 60.0),
-            inject: injecting && self.carrier_v() > 0.0,
+            inject: injecting && carrier_v > 0.0,
             demodulate: injecting,
             injection,
             injection_turn,
@@ -244,7 +245,7 @@ impl Settings {
                 lag_share,
                 current_lag + carrier_lag(motor_plant),
                 self.freq_of_rpm(speed_trip),
-                injection.current_amplitude,
+                (carrier_v, injection.current_amplitude),
             ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
@@ -319,13 +320,13 @@ impl Settings {
     }
 
     /// `carrier_lag` is the delay, samples, from the injection axis to the sampled carrier current;
-    /// `carrier_a` the amplitude of that current, A.
+    /// `carrier_v`, V, and `carrier_a`, A, the amplitudes of the injected voltage and of that current.
     fn estimator(
         &self,
         lag_share: f32,
         carrier_lag: f32,
         speed_limit: f32,
-        carrier_a: f32,
+        (carrier_v, carrier_a): (f32, f32),
     ) -> Estimator {
         let limit = 1.5 * speed_limit;
         let inj = &self.injection;
@@ -356,8 +357,8 @@ impl Settings {
             demodulator: inj.demodulator,
             rms_samples: p.rms_samples,
             // A saliency s makes differences of sqrt2 I s and 2 Z s, Z = V/I.
-            ampere_per_ohm: if self.carrier_v() > 0.0 {
-                carrier_a * carrier_a / self.carrier_v() * core::f32::consts::FRAC_1_SQRT_2
+            ampere_per_ohm: if carrier_v > 0.0 {
+                carrier_a * carrier_a / carrier_v * core::f32::consts::FRAC_1_SQRT_2
             } else {
                 0.0
             },

@@ -173,7 +173,15 @@ impl<S> Entry<S> {
     /// # Errors
     /// [`SettingsError::Range`].
     pub fn check(&self, settings: &S) -> Result<(), SettingsError> {
-        let (Some(value), Some((min, max))) = (self.number(settings), self.range(settings)) else {
+        self.check_in(self.range(settings), settings)
+    }
+
+    /// The same against another range, `(min, max)`: that of a board may be narrower.
+    ///
+    /// # Errors
+    /// [`SettingsError::Range`].
+    pub fn check_in(&self, range: Option<(f32, f32)>, settings: &S) -> Result<(), SettingsError> {
+        let (Some(value), Some((min, max))) = (self.number(settings), range) else {
             return Ok(());
         };
         // NaN fails the comparison.

@@ -16,15 +16,19 @@ pub struct Nameplate {
     pub speed_rpm: f32,
 }
 
+impl Nameplate {
+    /// The dissertation's motor, Table 3.
+    pub const TABLE_3: Self = Self {
+        power_w: 1100.0,
+        voltage_v: 380.0,
+        current_a: 2.56,
+        frequency_hz: 60.0,
+        speed_rpm: 1720.0,
+    };
+}
+
 impl Default for Nameplate {
-    /// Table 3.
     fn default() -> Self {
-        Self {
-            power_w: 1100.0,
-            voltage_v: 380.0,
-            current_a: 2.56,
-            frequency_hz: 60.0,
-            speed_rpm: 1720.0,
-        }
+        Self::TABLE_3
     }
 }

@@ -27,20 +27,20 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use super::Settings;
 use super::table::{CarrierTable, ReferenceTable};
-use super::{IdentifiedPlant, Motor};
+use super::{IdentifiedPlant, Line, Motor, Nameplate};
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
-const RATED_A: f32 = 2.56 * SQRT_2;
+const RATED_A: f32 = Nameplate::TABLE_3.current_a * SQRT_2;
 /// Its rated speed, rpm.
-const RATED_RPM: f32 = 1720.0;
+const RATED_RPM: f32 = Nameplate::TABLE_3.speed_rpm;
 /// Its pole pairs.
 const POLE_PAIRS: f32 = 2.0;
 /// Nominal dc link of its inverter, V.
 const DC_LINK_V: f32 = 311.0;
 /// End of the range of its current sensors, A.
-const RANGE_A: f32 = 4.472_713_4;
+const RANGE_A: f32 = -Line::CHANNEL_A.offset;
 /// Frequency of the carrier, Hz.
 const CARRIER_HZ: f32 = 600.0;
 

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Settings;
 use drive_core::io::CONVERTER_CODES;
+use drive_core::settings::Line;
 
 use super::{Config, LoadMode};
 use crate::plant::{
@@ -11,14 +11,20 @@ use crate::plant::{
     SaliencySettings,
 };
 
+/// Scales of the drive's current channels a and b that match these sensors, without their errors.
+pub fn current_lines(sensors: &MeasurementSettings) -> [Line; 2] {
+    sensors
+        .calibration()
+        .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 })
+}
+
 /// The plant that the configuration describes.
 pub fn plant_settings(config: &Config) -> PlantSettings {
     let (m, i, s) = (&config.motor, &config.inverter, &config.measurement);
     // Unset values follow the dissertation's bench, in proportion.
-    let (reference, reference_drive) = (MeasurementSettings::default(), Settings::default());
-    let relative_voltage = i.dc_link_v / f64::from(reference_drive.inverter.dc_link_v);
+    let reference = MeasurementSettings::default();
+    let relative_voltage = i.dc_link_v / InverterSettings::default().vdc;
     let relative_range = s.range_a / reference.range_a;
-    let relative_current = f64::from(config.drive.rated_a()) / f64::from(reference_drive.rated_a());
     PlantSettings {
         machine: MachineSettings {
             rs: m.r_s,
@@ -30,10 +36,10 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
         },
         saliency: SaliencySettings {
             a_psi: config.saliency.a_psi,
-            b1: config.saliency.b1.unwrap_or(0.036 / relative_current),
+            b1: config.saliency.b1.unwrap_or(0.036 / config.amperes(1.0)),
             chi: config.saliency.chi,
-            hold_a: config.saliency.hold_a.unwrap_or(5.0 * relative_current),
-            psi_n: Some(config.saliency.psi_n.unwrap_or(0.7 * relative_current * m.l_m)),
+            hold_a: config.saliency.hold_a.unwrap_or(config.amperes(5.0)),
+            psi_n: Some(config.saliency.psi_n.unwrap_or(config.amperes(0.7) * m.l_m)),
         },
         inverter: InverterSettings {
             vdc: i.dc_link_v,

@@ -29,19 +29,21 @@ pub const HELP: [(&str, &str); 5] = [
 /// Default file of a plot.
 const PLOT: &str = "out/trace.svg";
 
+/// The command to a program itself in a line: what begins with `!`, and `quit` for `!quit`; `None` for a line to the drive.
+pub fn to_program(line: &str) -> Option<&str> {
+    match line.trim() {
+        "quit" => Some("!quit"),
+        line => line.starts_with('!').then_some(line),
+    }
+}
+
 impl Own {
     /// The command in a line; `None` for a line to the drive.
     ///
     /// # Errors
     /// The line begins with `!` and is no such command, or the file is missing.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
-        let line = line.trim();
-        if line == "quit" {
-            return Ok(Some(Self::Quit));
-        }
-        if !line.starts_with('!') {
-            return Ok(None);
-        }
+        let Some(line) = to_program(line) else { return Ok(None) };
         let (word, file) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let file = PathBuf::from(file.trim());
         let named = !file.as_os_str().is_empty();

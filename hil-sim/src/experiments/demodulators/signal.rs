@@ -6,6 +6,7 @@ use super::demodulation::Demodulation;
 use crate::config::Config;
 use crate::config::plant_settings;
 use crate::error::Error;
+use crate::plant::MeasurementSettings;
 use crate::rig::Rig;
 use crate::stats::Stats;
 
@@ -89,7 +90,8 @@ pub fn delay(
     let mut config = config.clone();
     config.measurement.noise_a = Some(0.0);
     // 16 bits.
-    config.measurement.lsb_a = Some(0.000_14 / 4.472_713_4 * config.measurement.range_a);
+    let fine = MeasurementSettings::IDEAL;
+    config.measurement.lsb_a = Some(fine.lsb_a / fine.range_a * config.measurement.range_a);
     config.calibrate();
     let mut rig = oriented(demodulation, &config, iq, seed)?;
     let plant = plant_settings(&config);

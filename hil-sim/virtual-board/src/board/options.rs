@@ -1,7 +1,7 @@
 //! Options of a board.
 
 use drive_core::settings::{Line, SETTINGS};
-use hil_sim::config::Config;
+use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
 use crate::chip::TICKS_PER_S;
@@ -47,11 +47,8 @@ impl Options {
         wanted.scales.full_scale = default.scales.full_scale;
         let differing = SETTINGS.iter().filter(|entry| entry.get(&wanted) != entry.get(&default));
         let differing: Vec<_> = differing.collect();
-        let [a, b] = Self::plant(config)
-            .measurement
-            .calibration()
-            .map(|line| Line { gain: line.a_per_code as f32, offset: line.a_at_zero as f32 });
-        (wanted.scales.current_a, wanted.scales.current_b) = (a, b);
+        let sensors = Self::plant(config).measurement;
+        [wanted.scales.current_a, wanted.scales.current_b] = current_lines(&sensors);
         let needed = differing.iter().filter(|entry| entry.get(&wanted) != entry.get(&image));
         needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
     }

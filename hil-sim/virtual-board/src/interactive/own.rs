@@ -1,5 +1,7 @@
 //! The commands of the board itself: lines that begin with `!`. All other lines go to the console of the firmware.
 
+use hil_sim::console::own::to_program;
+
 /// A command of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Own {
@@ -31,13 +33,7 @@ impl Own {
     /// # Errors
     /// The line begins with `!`, and there is no such command.
     pub fn parse(line: &str) -> Result<Option<Self>, String> {
-        let line = line.trim();
-        if line == "quit" {
-            return Ok(Some(Self::Quit));
-        }
-        if !line.starts_with('!') {
-            return Ok(None);
-        }
+        let Some(line) = to_program(line) else { return Ok(None) };
         let known = COMMANDS.iter().find(|(name, ..)| *name == line);
         match known {
             Some((_, own, _)) => Ok(Some(*own)),
