@@ -257,6 +257,14 @@ impl Plant {
         self.inverter.set_dc_link(vdc)
     }
 
+    /// Changes the dead time, us.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
+        self.inverter.set_dead_time(us)
+    }
+
     /// Couples another load. A held speed holds at once; a free shaft continues from there.
     ///
     /// # Errors

@@ -29,6 +29,7 @@ pub mod log;
 pub mod memory;
 pub mod pair;
 pub mod periph;
+pub mod power_stage;
 pub mod scs;
 pub mod shadow;
 
@@ -36,4 +37,5 @@ pub use board::{Board, Options, Period};
 pub use cpu::Counting;
 pub use image::Image;
 pub use pair::Pair;
+pub use power_stage::PowerStage;
 pub use shadow::Shadow;

@@ -16,9 +16,12 @@ const EXTI: u32 = 0x4001_0400;
 const TIM1: u32 = 0x4001_2c00;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
+const TIM1_SR: u32 = 0x10;
 const RCC: u32 = 0x4002_1000;
 const FLASH_REGISTERS: u32 = 0x4002_2000;
 const GPIO_FIRST: u32 = 0x4800_0000;
+const GPIO_A: u32 = GPIO_FIRST;
+const GPIO_B: u32 = GPIO_FIRST + 0x400;
 const GPIO_LAST: u32 = 0x4800_1bff;
 const ADC1: u32 = 0x5000_0000;
 const DAC1: u32 = 0x5000_0800;
@@ -183,6 +186,9 @@ impl Chip {
             DAC3 => self.dac.write(1, offset, value)?,
             _ => return None,
         };
+        if moves_gates(address) {
+            self.look_at_gates();
+        }
         self.follow(effect)
     }
 
@@ -203,6 +209,16 @@ impl Chip {
             }
         }
         Some(())
+    }
+}
+
+/// Whether a write may change the levels at the pins of the gates. Compare values change them at the top of the counter,
+/// where the gates are looked at in any case.
+fn moves_gates(address: u32) -> bool {
+    match address & !0x3ff {
+        TIM1 => !COMPARES.contains(&address) && address & 0x3ff != TIM1_SR,
+        GPIO_A | GPIO_B => true,
+        _ => false,
     }
 }
 

@@ -112,6 +112,29 @@ impl Adc {
         }
     }
 
+    /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,
+    /// else of those that a trigger at this time would start.
+    pub fn samplings(&self, trigger: Option<u64>) -> [Vec<(u32, u64)>; 2] {
+        let half_clock = self.half_clock();
+        [0, 1].map(|n| {
+            let one = &self.converters[n];
+            let (first, mut ends) = match (one.done_at, trigger) {
+                (NEVER, None) => return Vec::new(),
+                (NEVER, Some(at)) => (0, at + one.conversion(0) * half_clock),
+                (done_at, _) => (one.rank, done_at),
+            };
+            let ranks = first..=one.store.get(JSQR) & 3;
+            ranks
+                .map(|rank| {
+                    if rank > first {
+                        ends += one.conversion(rank) * half_clock;
+                    }
+                    (one.channel(rank), ends - CONVERSION * half_clock)
+                })
+                .collect()
+        })
+    }
+
     /// When the next conversion ends.
     pub fn next_event(&self) -> u64 {
         self.converters[0].done_at.min(self.converters[1].done_at)
