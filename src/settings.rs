@@ -11,6 +11,7 @@ use drive_core::settings::SettingsError;
 use drive_core::{Coefficients, Settings};
 
 use crate::board;
+use crate::boards::SELECTED;
 
 /// All settings of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,12 +33,24 @@ pub struct CommandSettings {
     pub wiring_checked: bool,
     /// Whether the console sends typed characters back.
     pub echo: bool,
+    /// The [confirmation](crate::boards::Board::confirmation) of the board whose bench steps were done; 0: none.
+    pub confirmed: u32,
 }
 
 impl FirmwareSettings {
     /// The defaults: those of the drive with the numbers of this board.
     pub fn of_the_board() -> Self {
         Self { drive: board::settings(), command: CommandSettings::default(), learned: None }
+    }
+
+    /// Whether the bench steps for the board's assumptions were done, with the values that it has.
+    pub fn board_is_confirmed(&self) -> bool {
+        SELECTED.assumptions().next().is_none() || self.command.confirmed == SELECTED.confirmation()
+    }
+
+    /// Notes that the bench steps of the board were done.
+    pub fn confirm_board(&mut self) {
+        self.command.confirmed = SELECTED.confirmation();
     }
 
     /// Takes the result of a learning, if it was accepted.

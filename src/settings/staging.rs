@@ -146,7 +146,10 @@ impl Staging {
     /// Stages the settings of the image, with nothing learned.
     pub fn set_defaults(&mut self) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
-        *staged = Staged { settings: FirmwareSettings::of_the_board(), learned: true };
+        let mut settings = FirmwareSettings::of_the_board();
+        // A property of the hardware, not of the settings.
+        settings.command.confirmed = self.in_force.command.confirmed;
+        *staged = Staged { settings, learned: true };
         self.drop_if_same();
     }
 

@@ -127,6 +127,8 @@ impl Plant {
         Sample {
             current_a,
             current_b,
+            // Two sensors.
+            current_c: 0,
             dc_link: self.sensors.dc_link(self.inverter.vdc),
             heat_sink: self.sensors.heat_sink(),
             encoder: self.encoder.count(),
