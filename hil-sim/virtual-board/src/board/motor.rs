@@ -112,7 +112,12 @@ impl ShuntReader {
         let from = if time >= self.top.time { &self.top } else { &self.before };
         let mut amplifiers = from.amplifiers;
         let after = time.saturating_sub(from.time) as u32;
-        amplifiers.follow(&self.shunts, &from.bridge, &from.currents, -self.delay, after);
+        let mut currents = from.currents;
+        if !from.bridge.legs.iter().all(|leg| leg.pieces[0].ticks >= after) {
+            // Behind the zero vector the other vectors bring the currents back: the mean of the period goes on.
+            currents.slope = [0.0; 3];
+        }
+        amplifiers.follow(&self.shunts, &from.bridge, &currents, -self.delay, after);
         amplifiers.code(&self.shunts, leg, &mut self.rng)
     }
 

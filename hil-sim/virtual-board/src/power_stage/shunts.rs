@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn pieces_repeat_with_the_period() {
-        let piece = |from, ticks, low| Piece { from, ticks, on: [!low, low] };
+        let piece = |from, ticks, low: bool| Piece { from, ticks, on: [!low, low] };
         let pieces = [piece(0, 10, true), piece(10, 20, false), piece(30, 10, true)];
         let cut: Vec<_> = cut(&pieces, -5, 50).map(|(at, ticks, on)| (at, ticks, on[1])).collect();
         assert_eq!(
