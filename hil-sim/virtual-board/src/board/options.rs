@@ -7,6 +7,7 @@ use hil_sim::plant::{MeasurementSettings, PlantSettings};
 use crate::cpu::Counting;
 use crate::power_stage::{self, CODES, PowerStage, REFERENCE_V};
 use induction_drive::board as firmware_board;
+use induction_drive::boards;
 
 /// Options of a board.
 pub struct Options {
@@ -16,6 +17,8 @@ pub struct Options {
     pub seed: u64,
     /// Counting of cycles and instructions.
     pub counting: Counting,
+    /// Whether its bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
+    pub confirmed: bool,
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
 }
@@ -25,12 +28,13 @@ impl Options {
     pub fn plant(config: &Config) -> PlantSettings {
         let mut plant = hil_sim::config::plant_settings(config);
         // The converters have another reference than the source's; their codes cover the range of the sensors.
-        let gain = f64::from(firmware_board::CURRENT_A.gain / Line::CHANNEL_A.gain);
+        let reference = firmware_board::settings_of(boards::ALL[0]);
+        let gain = f64::from(reference.scales.current_a.gain / Line::CHANNEL_A.gain);
         let source = MeasurementSettings::default();
         let range = plant.measurement.range_a / source.range_a;
         plant.measurement.lsb_a = source.lsb_a * gain * range;
         plant.inverter.dead_time_us =
-            f64::from(firmware_board::dead_time(firmware_board::DEAD_TIME_S).1) * 1e6;
+            f64::from(firmware_board::dead_time(reference.inverter.dead_time_s).1) * 1e6;
         plant.inverter.timer_top = firmware_board::PWM_TOP;
         plant
     }
@@ -71,6 +75,7 @@ impl Options {
             plant,
             seed,
             counting: Counting { cycles: true, every_instruction: false },
+            confirmed: true,
             power_stage,
         }
     }
