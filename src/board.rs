@@ -219,13 +219,12 @@ pub struct Protection {
     pub over_voltage: u16,
 }
 
-/// The protection for these settings: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
-/// `limits.dc_over_v`, both within the range of the converters.
-pub fn protection(settings: &Settings) -> Protection {
+/// The protection for these settings on a board: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
+/// `limits.dc_over_v` but not above the highest voltage of the board, both within the range of the converters.
+pub fn protection(board: &Board, settings: &Settings) -> Protection {
     let Scales { current_a, current_b, dc_link, .. } = settings.scales;
     let trip_a = ANALOG_TRIP_SHARE * settings.trip_a();
-    let over_v =
-        f32::min(OVER_VOLTAGE_SHARE * settings.dc_over_v(), SELECTED.highest_dc_link_v.value);
+    let over_v = f32::min(OVER_VOLTAGE_SHARE * settings.dc_over_v(), board.highest_dc_link_v.value);
     let over_voltage = ((over_v - dc_link.offset) / dc_link.gain) as u16;
     Protection {
         window_a: window(current_a, trip_a),

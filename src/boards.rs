@@ -20,7 +20,9 @@ pub const ALL: [&Board; 3] =
     [&reference::BOARD, &nucleo_g474re_ihm08m1::BOARD, &nucleo_g474re_ihm023v3::BOARD];
 
 /// Their names.
-pub const NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3";
+pub const NAMES: [&str; ALL.len()] = [ALL[0].name, ALL[1].name, ALL[2].name];
+/// Their names in a line.
+pub const ALL_NAMES: &str = "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3";
 
 /// The board that this firmware is built for: `cargo firmware --board NAME`, by default the reference.
 pub const SELECTED: &Board = match option_env!("INDUCTION_DRIVE_BOARD") {
@@ -149,7 +151,7 @@ impl Currents {
 }
 
 /// A board: a NUCLEO-G474RE with its power stage.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Board {
     /// Name at the command line and in saved settings.
     pub name: &'static str,
@@ -181,6 +183,12 @@ pub struct Board {
     pub highest_dc_link_v: Stated<f32>,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
+}
+
+impl core::fmt::Debug for Board {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.name)
+    }
 }
 
 impl PartialEq for Board {

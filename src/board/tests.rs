@@ -17,7 +17,7 @@ fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
 
 #[test]
 fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
-    let trip = SELECTED.dc_link.line.value.at(protection(&settings()).over_voltage);
+    let trip = SELECTED.dc_link.line.value.at(protection(SELECTED, &settings()).over_voltage);
     assert!(trip > settings().dc_over_v() && trip < SELECTED.dc_link.line.value.at(ADC_FULL_SCALE));
     assert!((trip - 430.0).abs() < 0.2, "{trip}");
 }
@@ -30,14 +30,14 @@ fn the_protection_follows_the_settings_and_stays_in_the_range_of_the_converters(
     (s.scales.current_a, s.scales.current_b) = (current, current);
     s.scales.dc_link = Line { gain: 0.02, offset: 0.0 };
     (s.limits.trip_a, s.limits.dc_over_v) = (Some(80.0), Some(60.0));
-    let Protection { window_a, window_b, over_voltage } = protection(&s);
+    let Protection { window_a, window_b, over_voltage } = protection(SELECTED, &s);
     assert_eq!(window_a, window_b);
     assert!(
         (current.at(window_a.1) - 81.6).abs() < 0.1 && (current.at(window_a.0) + 81.6).abs() < 0.1
     );
     assert!((s.scales.dc_link.at(over_voltage) - 64.5).abs() < 0.05);
     (s.limits.trip_a, s.limits.dc_over_v) = (Some(s.sensor_range_a()), Some(s.dc_link_range_v()));
-    let ends = protection(&s);
+    let ends = protection(SELECTED, &s);
     assert_eq!((ends.window_a, ends.over_voltage), ((1, ADC_FULL_SCALE - 1), ADC_FULL_SCALE - 1));
 }
 
@@ -74,7 +74,7 @@ fn the_calibration_follows_the_reference() {
 
 #[test]
 fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
-    let Protection { window_a, window_b, .. } = protection(&settings());
+    let Protection { window_a, window_b, .. } = protection(SELECTED, &settings());
     for (line, (low, high)) in
         [(settings().scales.current_a, window_a), (settings().scales.current_b, window_b)]
     {

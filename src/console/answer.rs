@@ -10,7 +10,6 @@ use super::handle::DriveHandle;
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
-use crate::boards::SELECTED;
 use crate::link::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::FirmwareSettings;
 use crate::settings::staging::{Applied, Assignments};
@@ -123,9 +122,10 @@ impl Console {
             Request::Reboot(now) => self.reboot(now, drive),
             Request::Board => self.begin(ListKind::Board),
             Request::BoardIs(board) => {
-                self.foreign = (board != SELECTED).then_some(board.name);
+                let own = self.settings.in_force().board;
+                self.foreign = (board != own).then_some(board.name);
                 match self.foreign {
-                    Some(other) => self.error(&WrongBoard(other)),
+                    Some(other) => self.error(&WrongBoard(other, own.name)),
                     None => self.ok(),
                 }
             }
@@ -212,7 +212,9 @@ impl Console {
             // The drive says why it does not start.
             Task::Start(mode) if !drive.is_off() => self.start(mode, drive),
             _ if !drive.is_off() => self.error(&MUST_BE_OFF),
-            _ if let Some(other) = self.foreign => self.error(&WrongBoard(other)),
+            _ if let Some(other) = self.foreign => {
+                self.error(&WrongBoard(other, self.settings.in_force().board.name));
+            }
             Task::Start(_) if !self.settings.in_force().board_is_confirmed() => {
                 self.error(&NOT_CONFIRMED);
             }
@@ -353,14 +355,14 @@ impl Console {
 }
 
 /// Settings of another board.
-struct WrongBoard(&'static str);
+struct WrongBoard(&'static str, &'static str);
 
 impl fmt::Display for WrongBoard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
             "these lines belong to the board {}, this is {}; `revert` drops them",
-            self.0, SELECTED.name
+            self.0, self.1
         )
     }
 }

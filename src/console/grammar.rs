@@ -230,7 +230,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             Some(word) => Request::BoardIs(boards::find(word).ok_or(ParseError::OneOf {
                 what: "the board",
                 word,
-                all: boards::NAMES,
+                all: boards::ALL_NAMES,
             })?),
         },
         "confirm" => words.one_of("what to confirm", "board", &[("board", Request::Confirm)])?,

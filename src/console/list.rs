@@ -13,7 +13,6 @@ use super::help::HELP;
 use super::number::Significant;
 use super::reply::{self, Description, Setting};
 use super::restore;
-use crate::boards::SELECTED;
 use crate::link::trace::Plan;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::{self, Key};
@@ -73,7 +72,7 @@ impl Console {
             ListKind::Backup => self.backup(line),
             ListKind::Board => {
                 let confirmed = self.settings.in_force().board_is_confirmed();
-                reply::board(SELECTED, confirmed, line).map(|text| {
+                reply::board(self.settings.in_force().board, confirmed, line).map(|text| {
                     out.line(format_args!("{text}"));
                     next + 1
                 })
@@ -134,7 +133,7 @@ impl Console {
         let (settings, out) = (self.settings.in_force(), &mut self.out);
         if place < FIRST {
             match place {
-                0 => out.line(format_args!("board {}", SELECTED.name)),
+                0 => out.line(format_args!("board {}", settings.board.name)),
                 _ => out.line(format_args!("defaults")),
             }
             return Some(place as u16 + 1);

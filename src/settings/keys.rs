@@ -8,7 +8,7 @@ use drive_core::settings::value::{Value, ValueError, Words};
 use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
-use crate::boards::SELECTED;
+use crate::boards;
 use crate::hash;
 
 /// Longest time-out of commands, s.
@@ -18,8 +18,6 @@ const AUTO_BITS: u32 = 0x7fc0_0000;
 
 /// The setting that names the board.
 pub const BOARD: &str = "board";
-/// The one value of the setting `board`: settings that were saved with another are refused.
-const THIS_BOARD: &[&str] = &[SELECTED.name];
 
 /// The firmware's own settings, in the order in which they are shown.
 static OWN: [Entry<FirmwareSettings>; 5] = [
@@ -48,7 +46,13 @@ static OWN: [Entry<FirmwareSettings>; 5] = [
     Entry::new(
         BOARD,
         "",
-        Access::Word { words: THIS_BOARD, get: |_| 0, set: |_, _| {} },
+        Access::Word {
+            words: &boards::NAMES,
+            get: |s: &FirmwareSettings| {
+                boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0)
+            },
+            set: |s, place| s.board = boards::ALL[place % boards::ALL.len()],
+        },
         "board that the firmware is built for",
     )
     .changed(Change::Board),
@@ -206,7 +210,7 @@ impl Key {
     pub fn range(self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let range = with!(self, settings, |entry, s| entry.range(s));
         // The timer makes no other dead times.
-        if self.name() == DEAD_TIME { Some(SELECTED.dead_time_range_s) } else { range }
+        if self.name() == DEAD_TIME { Some(settings.board.dead_time_range_s) } else { range }
     }
 
     /// Checks the value in effect against its range.

@@ -17,7 +17,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use super::flash::SLOT_WORDS;
 use super::learned;
-use crate::boards::{ALL, SELECTED};
+use crate::boards;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::{self, find_id};
 
@@ -59,8 +59,8 @@ pub enum Rejected {
     Newer(u16),
     /// The value of this setting is unknown to the firmware.
     Value(&'static str),
-    /// They were saved by the firmware of another board.
-    Board,
+    /// They were saved by the firmware of this board, which is another.
+    Board(&'static str),
     /// The design rules refuse the settings.
     Refused,
 }
@@ -73,7 +73,7 @@ impl Rejected {
             Self::Newer(_) => 71,
             Self::Value(_) => 72,
             Self::Refused => 73,
-            Self::Board => 74,
+            Self::Board(_) => 74,
         }
     }
 }
@@ -86,7 +86,7 @@ impl fmt::Display for Rejected {
             Self::Newer(version) => write!(f, "version {version}, known is {VERSION}"),
             Self::Value(key) => write!(f, "unknown value of {key}"),
             Self::Refused => f.write_str("out of range"),
-            Self::Board => write!(f, "saved on another board than {}", SELECTED.name),
+            Self::Board(name) => write!(f, "saved on the board {name}"),
         }
     }
 }
@@ -179,24 +179,19 @@ pub fn settings(
     }
     let mut settings = *defaults;
     let (mut words, mut present) = ([0; learned::WORDS], 0_u64);
-    // Records without the key are older than the second board.
-    let mut same_board = SELECTED == ALL[0];
+    // Records without a board are older than the second one.
+    settings.board = boards::ALL[0];
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
         if let Some(key) = find_id(id) {
-            let taken = key.set_bits(&mut settings, bits);
-            if key.name() == keys::BOARD {
-                taken.ok_or(Rejected::Board)?;
-                same_board = true;
-            }
-            taken.ok_or(Rejected::Value(key.name()))?;
+            key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name()))?;
         } else if let Some(index) = learned::index(id) {
             words[index] = bits;
             present |= 1 << index;
         }
     }
-    if !same_board {
-        return Err(Rejected::Board);
+    if settings.board != defaults.board {
+        return Err(Rejected::Board(settings.board.name));
     }
     if present > 0 {
         let learned = learned::from_words(&words, present);

@@ -17,6 +17,7 @@ use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, stop, time};
 use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
+use induction_drive::boards::SELECTED;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
@@ -157,7 +158,7 @@ pub fn bring_up() -> Result<Board, StartError> {
         let encoder = encoder.filter(|_| timed).ok_or(StartError::NoTimer)?;
         let coefficients = start.build(dead_time_s);
         // After the design, which may have replaced refused settings by the defaults.
-        let protection = board::protection(&start.settings.drive);
+        let protection = board::protection(SELECTED, &start.settings.drive);
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)
             .map_err(StartError::OverVoltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);

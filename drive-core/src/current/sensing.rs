@@ -6,6 +6,9 @@ use crate::io::{Compare, Sample};
 use crate::math::frames::{Abc, AlphaBeta};
 use crate::settings::Line;
 
+/// Samples of the second calibration: the time with the low sides on holds them.
+const SAMPLES_AGAIN: u16 = 32;
+
 /// Coefficients of the sensing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensing {
@@ -127,7 +130,8 @@ impl Sensing {
         sample: &Sample,
     ) -> Result<Option<()>, Fault> {
         let offsets = self.lines().map(|line| line.offset);
-        let Some(mean) = self.mean(state, sample, offsets, self.largest_offset)? else {
+        let limits = (self.calibration_samples, self.largest_offset);
+        let Some(mean) = self.mean(state, sample, offsets, limits)? else {
             return Ok(None);
         };
         for ((zero, offset), mean) in state.zeros.iter_mut().zip(offsets).zip(mean) {
@@ -143,19 +147,19 @@ impl Sensing {
     /// As [`calibrate`](Self::calibrate), at half its limit: the offsets change when the bridge switches.
     pub fn calibrate_again(&self, state: &mut SensingState, sample: &Sample) -> Result<(), Fault> {
         if self.shunts.is_some() {
-            self.mean(state, sample, state.zeros, 0.5 * self.largest_offset)?;
+            self.mean(state, sample, state.zeros, (SAMPLES_AGAIN, 0.5 * self.largest_offset))?;
         }
         Ok(())
     }
 
-    /// Adds a sample to the mean currents, A, with these values at code 0; `Some` when there are enough. None may be above
-    /// `largest`.
+    /// Adds a sample to the mean currents, A, with these values at code 0; `Some` when there are `samples` of them. None may
+    /// be above `largest`, A.
     fn mean(
         &self,
         state: &mut SensingState,
         sample: &Sample,
         zeros: [f32; 3],
-        largest: f32,
+        (samples, largest): (u16, f32),
     ) -> Result<Option<[f32; 3]>, Fault> {
         let codes = [sample.current_a, sample.current_b, sample.current_c];
         let lines = self.lines();
@@ -163,7 +167,7 @@ impl Sensing {
             *sum += line.gain * f32::from(code) + zero;
         }
         state.count = state.count.saturating_add(1);
-        if state.count < self.calibration_samples {
+        if state.count < samples {
             return Ok(None);
         }
         let share = 1.0 / f32::from(state.count);

@@ -19,6 +19,7 @@ use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
+use crate::periph::time_base::TimeBase;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::scs::{self, Scs};
@@ -86,6 +87,8 @@ pub struct Chip {
     pub tim1: Tim1,
     /// Timer of the encoder.
     pub tim2: EncoderTimer,
+    /// Time base.
+    pub tim5: TimeBase,
     /// Converters.
     pub adc: Adc,
     /// Comparators.
@@ -132,6 +135,7 @@ impl Chip {
             exti: Store::new(plain::EXTI),
             tim1,
             tim2: EncoderTimer::default(),
+            tim5: TimeBase::default(),
             adc: Adc::default(),
             comp: Comparators::default(),
             dac: Dacs::default(),

@@ -10,6 +10,7 @@ pub mod lpuart;
 pub mod plain;
 pub mod rcc;
 pub mod tim1;
+pub mod time_base;
 
 use std::fmt;
 

@@ -8,6 +8,7 @@ use crate::periph::{Effect, Reset, plain};
 use crate::scs;
 
 const TIM2: u32 = 0x4000_0000;
+const TIM5: u32 = 0x4000_0c00;
 const IWDG: u32 = 0x4000_3000;
 const PWR: u32 = 0x4000_7000;
 const LPUART1: u32 = 0x4000_8000;
@@ -132,6 +133,7 @@ impl Chip {
             TIM1 => self.tim1.read(offset, now),
             ADC1 => self.adc.read(offset),
             TIM2 => self.tim2.read(offset),
+            TIM5 => self.tim5.read(offset, now),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH_REGISTERS => self.flash.read(offset, now),
@@ -171,6 +173,7 @@ impl Chip {
             TIM1 => self.tim1.write(offset, value, now)?,
             ADC1 => self.adc.write(offset, value)?,
             TIM2 => self.tim2.write(offset, value)?,
+            TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, now)?,
             PWR => self.pwr.write(offset, value)?,
             FLASH_REGISTERS => self.flash.write(offset, value, now)?,
