@@ -23,12 +23,14 @@ pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod cycles;
+pub mod debugger;
 pub mod image;
 pub mod interactive;
 pub mod log;
 pub mod memory;
 pub mod pair;
 pub mod periph;
+pub mod rules;
 pub mod scs;
 pub mod shadow;
 
