@@ -81,19 +81,19 @@ impl Inverter {
     pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
         let s = settings;
         check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
-        check("inverter.dead_time_us", s.dead_time_us, 0.0..=10.0, "us")?;
         check("inverter.propagation_us", s.propagation_us, 0.0..=10.0, "us")?;
         check("inverter.residual_v", s.residual_v, 0.0..=20.0, "V")?;
         let mut inverter = Self {
             vdc: 0.0,
             top: f64::from(s.timer_top),
-            dead_time: s.dead_time_us * 1e-6,
+            dead_time: 0.0,
             propagation: s.propagation_us * 1e-6,
             residual: s.residual_v,
             switched: s.switched,
             previous: Compare::OFF,
         };
         inverter.set_dc_link(s.vdc)?;
+        inverter.set_dead_time(s.dead_time_us)?;
         Ok(inverter)
     }
 
@@ -104,6 +104,16 @@ impl Inverter {
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
         self.vdc = vdc;
+        Ok(())
+    }
+
+    /// Changes the dead time, us.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
+        check("inverter.dead_time_us", us, 0.0..=10.0, "us")?;
+        self.dead_time = us * 1e-6;
         Ok(())
     }
 

@@ -127,6 +127,8 @@ impl Plant {
         Sample {
             current_a,
             current_b,
+            // Two sensors.
+            current_c: 0,
             dc_link: self.sensors.dc_link(self.inverter.vdc),
             heat_sink: self.sensors.heat_sink(),
             encoder: self.encoder.count(),
@@ -253,6 +255,14 @@ impl Plant {
     /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         self.inverter.set_dc_link(vdc)
+    }
+
+    /// Changes the dead time, us.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
+        self.inverter.set_dead_time(us)
     }
 
     /// Couples another load. A held speed holds at once; a free shaft continues from there.

@@ -15,8 +15,8 @@ use drive_core::Sample;
 use hil_sim::plant::Plant;
 
 pub use control::{LongestPath, Period};
+use motor::Connection;
 pub use motor::Disturbance;
-use motor::PowerStage;
 pub use options::Options;
 
 use crate::addresses::Addresses;
@@ -26,7 +26,7 @@ use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
-use crate::periph::tim1::GateLimits;
+use crate::power_stage::watch::GateWatch;
 use crate::rules::Violation;
 use control::RunningInterrupt;
 
@@ -45,8 +45,7 @@ pub struct Board {
     since_log: u32,
     /// The motor with everything around it.
     pub plant: Plant,
-    stage: PowerStage,
-    gates: GateLimits,
+    connection: Connection,
     sleeping: bool,
     hung: bool,
     /// The core executes nothing before this.
@@ -101,8 +100,7 @@ impl Board {
             lines: Vec::new(),
             since_log: 0,
             plant,
-            gates: options.gates,
-            stage: PowerStage::default(),
+            connection: Connection::new(options.power_stage, options.seed),
             sleeping: false,
             hung: false,
             stalled_until: 0,
@@ -120,6 +118,9 @@ impl Board {
             latest_start: 0,
             preempt_at: None,
         };
+        let chip = board.chip();
+        chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
+        chip.look_at_gates();
         board.show_sample();
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.chip_mut().rules.exact = options.counting.every_instruction;
@@ -180,7 +181,7 @@ impl Board {
 
     /// The last sample.
     pub fn sample(&self) -> Sample {
-        self.stage.sample
+        self.connection.sample
     }
 
     /// Seconds since power-on.
@@ -269,6 +270,11 @@ impl Board {
         }
         if let Some(violation) = chip.rules.fatal() {
             bail!("{violation}\n{}", self.image.location(violation.at));
+        }
+        if let Some(seen) = chip.gates.take() {
+            let (place, time) =
+                (self.image.location(seen.at), seen.time as f64 / TICKS_PER_S as f64);
+            bail!("bad gate signals: {} after {time:.6} s, at {place}", seen.what);
         }
         if chip.flash.power_lost {
             chip.reset = Some(Reset::Power);

@@ -26,7 +26,9 @@ use crate::periph::lpuart::Lpuart;
 use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
+use crate::periph::time_base::TimeBase;
 use crate::periph::{NEVER, Reset, Store, plain};
+use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 
@@ -110,6 +112,8 @@ pub struct Chip {
     pub tim1: Tim1,
     /// Timer of the encoder.
     pub tim2: EncoderTimer,
+    /// Time base.
+    pub tim5: TimeBase,
     /// Converters.
     pub adc: Adc,
     /// Comparators.
@@ -122,11 +126,15 @@ pub struct Chip {
     pub iwdg: Iwdg,
     /// Debug support.
     pub debug: Store,
+    /// The power stage at the pins of the gates.
+    pub gates: GateWatch,
 }
 
 impl Chip {
     /// A chip after power-on, whose flash is erased.
     pub fn new() -> Self {
+        let (gpio, tim1) = (std::array::from_fn(Gpio::new), Tim1::default());
+        let gates = GateWatch::new(&power_stage::REFERENCE, &gpio, &tim1);
         Self {
             now: 0,
             deadline: 0,
@@ -157,17 +165,19 @@ impl Chip {
             rcc: Rcc::new(Reset::Power),
             pwr: Pwr::default(),
             flash: Flash::new(),
-            gpio: std::array::from_fn(Gpio::new),
+            gpio,
             syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
-            tim1: Tim1::default(),
+            tim1,
             tim2: EncoderTimer::default(),
+            tim5: TimeBase::default(),
             adc: Adc::default(),
             comp: Comparators::default(),
             dac: Dacs::default(),
             lpuart: Lpuart::default(),
             iwdg: Iwdg::default(),
             debug: Store::new(plain::DEBUG),
+            gates,
         }
     }
 
@@ -204,6 +214,8 @@ impl Chip {
         self.adc.inputs = old.adc.inputs;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
+        self.gates = old.gates;
+        self.look_at_gates();
     }
 
     /// The core locks up: to the break of TIM1, if the firmware wants that.
@@ -239,12 +251,9 @@ impl Chip {
         .unwrap_or(NEVER)
     }
 
-    /// Whether the pins of the gates are the timer's.
-    pub fn gates_connected(&self) -> bool {
-        let [a, b, ..] = &self.gpio;
-        let timer = Some(u32::from(induction_drive::board::PWM_AF));
-        [7, 8, 9, 10].iter().all(|pin| a.alternate(*pin) == timer)
-            && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
+    /// Looks at the gates: whenever a pin or the timer's outputs may have changed.
+    pub fn look_at_gates(&mut self) {
+        self.gates.look(&self.gpio, &self.tim1, self.at, self.now);
     }
 
     /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the

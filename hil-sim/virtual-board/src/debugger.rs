@@ -34,6 +34,7 @@ impl Chip {
         self.frozen_watchdog = self.debug.get(DBG_APB1_FZ) & IWDG_STOP != 0;
         if self.debug.get(DBG_APB2_FZ) & TIM1_STOP != 0 {
             self.tim1.freeze(self.now);
+            self.look_at_gates();
         }
         self.attention = true;
     }
@@ -43,6 +44,7 @@ impl Chip {
         let Some(halt) = self.halt.take() else { return };
         let stood = self.now - halt.since;
         self.tim1.thaw(self.now);
+        self.look_at_gates();
         if std::mem::take(&mut self.frozen_watchdog) {
             self.iwdg.delay(stood);
         }

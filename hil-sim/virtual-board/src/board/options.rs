@@ -4,9 +4,8 @@ use drive_core::settings::{Line, SETTINGS};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
-use crate::chip::TICKS_PER_S;
 use crate::cpu::Counting;
-use crate::periph::tim1::GateLimits;
+use crate::power_stage::{self, CODES, PowerStage, REFERENCE_V};
 use induction_drive::board as firmware_board;
 
 /// Options of a board.
@@ -17,8 +16,8 @@ pub struct Options {
     pub seed: u64,
     /// Counting of cycles and instructions.
     pub counting: Counting,
-    /// Limits of the gate signals.
-    pub gates: GateLimits,
+    /// The power stage at the pins.
+    pub power_stage: &'static PowerStage,
 }
 
 impl Options {
@@ -53,20 +52,26 @@ impl Options {
         needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
     }
 
-    /// A board with the motor of a configuration.
+    /// The reference board with the motor of a configuration.
     pub fn new(config: &Config, seed: u64) -> Self {
-        let us = firmware_board::CYCLES_PER_US;
-        let gates = GateLimits {
-            // As the firmware asks for; the timer makes it a little longer.
-            dead_time: (f64::from(firmware_board::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
-            // A microsecond, less the rounding to counts.
-            pulse: us - 2,
-        };
+        Self::on(&power_stage::REFERENCE, config, seed)
+    }
+
+    /// A board with this power stage and the motor of a configuration; [`PowerStage::config`] gives one that suits it.
+    pub fn on(power_stage: &'static PowerStage, config: &Config, seed: u64) -> Self {
+        let mut plant = Self::plant(config);
+        if let Some(divider) = power_stage.dc_link_divider {
+            plant.measurement.dc_link_v = divider * REFERENCE_V / CODES;
+        }
+        if let Some((delay_s, drop_v)) = power_stage.delay_and_drop {
+            plant.inverter.propagation_us = delay_s * 1e6;
+            plant.inverter.residual_v = drop_v;
+        }
         Self {
-            plant: Self::plant(config),
+            plant,
             seed,
             counting: Counting { cycles: true, every_instruction: false },
-            gates,
+            power_stage,
         }
     }
 }

@@ -80,7 +80,8 @@ pub const CLASSES: &[Class] = &[
         sources: BOTH,
         run: Run::Regulating(|board, _, rng| {
             let which = rng.random();
-            let line = if which { firmware_board::CURRENT_A } else { firmware_board::CURRENT_B };
+            let scales = firmware_board::settings().scales;
+            let line = if which { scales.current_a } else { scales.current_b };
             let zero = (-line.offset / line.gain).round() as u16;
             board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
             name(which).into()
@@ -107,7 +108,7 @@ pub const CLASSES: &[Class] = &[
             let which = rng.random();
             // 5 mA to 2 A rms.
             let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
-            let codes = amperes / f64::from(firmware_board::CURRENT_A.gain);
+            let codes = amperes / f64::from(firmware_board::settings().scales.current_a.gain);
             let mut noise = noise(rng, codes);
             board.disturb = Some(Box::new(move |s| noise(current(which, s))));
             format!("{}, {:.1} mA", name(which), 1e3 * amperes)

@@ -9,6 +9,7 @@ use crate::periph::{Effect, Reset, plain};
 use crate::scs;
 
 pub(super) const TIM2: u32 = 0x4000_0000;
+pub(super) const TIM5: u32 = 0x4000_0c00;
 const IWDG: u32 = 0x4000_3000;
 pub(super) const PWR: u32 = 0x4000_7000;
 pub(super) const LPUART1: u32 = 0x4000_8000;
@@ -18,6 +19,7 @@ const EXTI: u32 = 0x4001_0400;
 pub(super) const TIM1: u32 = 0x4001_2c00;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
+const TIM1_SR: u32 = 0x10;
 pub(super) const RCC: u32 = 0x4002_1000;
 pub(super) const FLASH_REGISTERS: u32 = 0x4002_2000;
 pub(super) const GPIO_FIRST: u32 = 0x4800_0000;
@@ -25,6 +27,8 @@ pub(super) const GPIO_LAST: u32 = 0x4800_1bff;
 pub(super) const ADC1: u32 = 0x5000_0000;
 pub(super) const DAC1: u32 = 0x5000_0800;
 pub(super) const DAC3: u32 = 0x5000_1000;
+const GPIO_A: u32 = GPIO_FIRST;
+const GPIO_B: u32 = GPIO_FIRST + 0x400;
 
 /// An access that the model does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,6 +149,7 @@ impl Chip {
             TIM1 => self.tim1.read(offset, now),
             ADC1 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
+            TIM5 => self.tim5.read(offset, now),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH_REGISTERS => self.flash.read(offset, now),
@@ -188,6 +193,7 @@ impl Chip {
             TIM1 => self.tim1.write(offset, value, now, rules)?,
             ADC1 => self.adc.write(offset, value, now, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
+            TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => {
                 self.pwr.write(offset, value, self.syscfg.get(plain::CFGR2) & plain::PVDL != 0)?
@@ -206,6 +212,9 @@ impl Chip {
             _ => return None,
         };
         self.check_rules(address, value);
+        if moves_gates(address) {
+            self.look_at_gates();
+        }
         self.follow(effect)
     }
 
@@ -248,6 +257,16 @@ impl Chip {
             }
         }
         Some(())
+    }
+}
+
+/// Whether a write may change the levels at the pins of the gates. Compare values change them at the top of the counter,
+/// where the gates are looked at in any case.
+fn moves_gates(address: u32) -> bool {
+    match address & !0x3ff {
+        TIM1 => !COMPARES.contains(&address) && address & 0x3ff != TIM1_SR,
+        GPIO_A | GPIO_B => true,
+        _ => false,
     }
 }
 

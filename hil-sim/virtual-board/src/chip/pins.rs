@@ -1,6 +1,7 @@
 //! The pins against their use (datasheet, tables of pins and alternate functions).
 
 use super::Chip;
+use crate::periph::gpio::Pad;
 use crate::rules::Rule;
 
 /// A pin: its port, A is 0, and its number.
@@ -92,7 +93,7 @@ fn name((port, pin): Pin) -> String {
 
 impl Chip {
     fn reaches(&self, signal: Signal) -> bool {
-        signal.1.iter().any(|((port, pin), af)| self.gpio[*port].alternate(*pin) == Some(*af))
+        signal.1.iter().any(|((port, pin), af)| self.gpio[*port].pad(*pin) == Pad::Alternate(*af))
     }
 
     fn require_pin(&mut self, signal: Signal, use_: &str) {
@@ -134,7 +135,7 @@ impl Chip {
         for (n, channels) in self.adc.take_converted().into_iter().enumerate() {
             for channel in (0..19).filter(|channel| channels >> channel & 1 != 0) {
                 let Some(pin) = analog(n, channel) else { continue };
-                let is_analog = self.gpio[pin.0].is_analog(pin.1);
+                let is_analog = self.gpio[pin.0].pad(pin.1) == Pad::Analog;
                 self.rules.require(is_analog, Rule::PinMode, || {
                     format!(
                         "ADC{} converts channel {channel}, but {} is not analog",

@@ -37,6 +37,7 @@ impl Chip {
         });
         if self.pwr.too_low() {
             self.tim1.system_break();
+            self.look_at_gates();
         }
     }
 }

@@ -94,6 +94,13 @@ impl Adc {
         }
     }
 
+    /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,
+    /// else of those that a trigger at this time would start.
+    pub fn samplings(&self, trigger: Option<u64>) -> [Vec<(u32, u64)>; 2] {
+        let clock = self.clock().unwrap_or(1);
+        [0, 1].map(|n| self.converters[n].samplings(trigger, clock))
+    }
+
     /// When the next conversion ends, or a converter gets ready.
     pub fn next_event(&self) -> u64 {
         self.converters[0].next_event().min(self.converters[1].next_event())

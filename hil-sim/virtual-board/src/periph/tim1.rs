@@ -3,9 +3,9 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
-mod gates;
+mod outputs;
 
-pub use gates::{BadGates, GateLimits};
+pub use outputs::{Output, Wave};
 
 use super::{Effect, NEVER, Plain, Store};
 use crate::rules::{Rule, Rules};
@@ -219,11 +219,15 @@ impl Tim1 {
 
     /// OC4REF rises on the way up where the counter reaches its compare value.
     fn plan_trigger(&mut self) {
+        self.trigger_at = self.trigger_of(self.from).unwrap_or(NEVER);
+    }
+
+    /// The time of the trigger in the period that begins with the counter at 0 at this time.
+    fn trigger_of(&self, from: u64) -> Option<u64> {
         let mode = self.store.get(CCMR2) >> 12 & 7;
         let rises = mode == 7 && self.active[3] > 0 && self.active[3] <= self.top;
         let is_trigger = self.store.get(CR2) >> 20 & 0xf == 7;
-        self.trigger_at =
-            if rises && is_trigger { self.from + u64::from(self.active[3]) } else { NEVER };
+        (rises && is_trigger).then(|| from + u64::from(self.active[3]))
     }
 
     fn update(&mut self, flag: bool) {

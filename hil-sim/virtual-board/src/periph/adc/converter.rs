@@ -110,6 +110,27 @@ impl Converter {
         self.running[sequence as usize] = Running { rank: 0, done_at };
     }
 
+    /// When the injected conversions sample: channel and time. Of the sequence in progress, else of that which a
+    /// trigger at this time would start.
+    pub fn samplings(&self, trigger: Option<u64>, clock: u64) -> Vec<(u32, u64)> {
+        let sequence = Sequence::Injected;
+        let lasts = |rank| self.conversion(sequence, rank) * clock / 2;
+        let running = self.running[sequence as usize];
+        let (first, mut ends) = match (running.done_at, trigger) {
+            (NEVER, None) => return Vec::new(),
+            (NEVER, Some(at)) => (0, at + lasts(0)),
+            (done_at, _) => (running.rank, done_at),
+        };
+        let mut samplings = Vec::new();
+        for rank in first..=self.last(sequence) {
+            if rank > first {
+                ends += lasts(rank);
+            }
+            samplings.push((self.channel(sequence, rank), ends - CONVERSION * clock / 2));
+        }
+        samplings
+    }
+
     /// When the next conversion ends, or the start-up does.
     pub fn next_event(&self) -> u64 {
         self.running[0].done_at.min(self.running[1].done_at).min(self.ready_at)
