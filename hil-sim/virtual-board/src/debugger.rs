@@ -16,6 +16,9 @@ const IWDG_STOP: u32 = 1 << 12;
 /// DBGMCU: TIM1 stops while the core is halted.
 const TIM1_STOP: u32 = 1 << 11;
 
+/// A halt that a watchdog does not have to end, ticks: 5 ms.
+const SHORT_HALT: u64 = TICKS_PER_S / 200;
+
 /// A halt that lasts.
 #[derive(Clone, Copy, Debug)]
 pub struct Halt {
@@ -50,7 +53,8 @@ impl Chip {
         }
         // The cycle counter does not count in debug state.
         self.scs.stand_still(stood);
-        let back = halt.outputs && self.tim1.outputs_on();
+        // After a short halt nothing can keep them off before the next control interrupt, which sees the gap.
+        let back = halt.outputs && self.tim1.outputs_on() && stood > SHORT_HALT;
         self.rules.require(!back, Rule::ResumedOutputs, || {
             "a debugger halted the core and let it go: TIM1's outputs are on again".into()
         });
