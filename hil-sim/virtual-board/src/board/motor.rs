@@ -70,13 +70,7 @@ impl Connection {
                 })
             }
         };
-        Self {
-            at: 0,
-            applied: Compare::OFF,
-            dead_time: None,
-            sample: Sample::default(),
-            shunts,
-        }
+        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
     }
 }
 
