@@ -28,6 +28,7 @@ use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
 use crate::power_stage::watch::GateWatch;
+use crate::rules::Violation;
 use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
@@ -40,7 +41,7 @@ const IDLE_LIMIT: u32 = 100_000;
 pub struct Board {
     cpu: Cpu,
     image: Image,
-    log: Log,
+    log: Option<Log>,
     lines: Vec<String>,
     since_log: u32,
     /// The motor with everything around it.
@@ -52,7 +53,7 @@ pub struct Board {
     stalled_until: u64,
     entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
-    addresses: Addresses,
+    addresses: Option<Addresses>,
     /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
     /// The check that control interrupts leave the preempted code intact, if wanted.
@@ -91,8 +92,8 @@ impl Board {
             ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
-        let addresses = Addresses::new(&image)?;
-        let log = Log::new(&image)?;
+        let addresses = Addresses::find(&image)?;
+        let log = Log::find(&image)?;
         let mut board = Self {
             cpu,
             image,
@@ -126,6 +127,7 @@ impl Board {
         chip.look_at_gates();
         board.show_sample();
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
+        board.cpu.chip_mut().rules.exact = options.counting.every_instruction;
         board.cpu.reset(memory::FLASH);
         Ok(board)
     }
@@ -151,14 +153,24 @@ impl Board {
         self.cpu.read(address, bytes)
     }
 
-    /// Addresses of the firmware's data.
+    /// Addresses of the firmware's data; all zero of an image without the table.
     pub fn addresses(&self) -> &Addresses {
-        &self.addresses
+        self.addresses.as_ref().unwrap_or(&Addresses::NONE)
+    }
+
+    /// The rules of the chip that the program has broken since power-on, in order.
+    pub fn violations(&self) -> &[Violation] {
+        self.cpu.chip().rules.violations()
+    }
+
+    /// From now on broken rules are only recorded and do not end a run.
+    pub fn collect_violations(&mut self) {
+        self.chip().rules.collecting = true;
     }
 
     /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
     pub fn flux_angle(&self) -> f64 {
-        f64::from(self.word(self.addresses.phi).unwrap_or(0)) / 2_f64.powi(32)
+        f64::from(self.word(self.addresses().phi).unwrap_or(0)) / 2_f64.powi(32)
     }
 
     /// The chip.
@@ -240,7 +252,9 @@ impl Board {
                 self.preempt_at = None;
                 return Ok(());
             }
-            self.exceptions()?;
+            if !self.cpu.chip().is_halted() {
+                self.exceptions()?;
+            }
             self.go(end)?;
         }
         Ok(())
@@ -253,9 +267,13 @@ impl Board {
             self.crest(at)?;
         }
         self.follow_outputs();
+        self.cpu.follow_guard().map_err(|e| anyhow!("emulator: {e:?}"))?;
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
             bail!("{unknown} at {}", self.image.location(unknown.at));
+        }
+        if let Some(violation) = chip.rules.fatal() {
+            bail!("{violation}\n{}", self.image.location(violation.at));
         }
         if let Some(seen) = chip.gates.take() {
             let (place, time) =

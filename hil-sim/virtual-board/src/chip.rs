@@ -4,24 +4,32 @@
 //! its PLL.
 
 mod bus;
+mod clocked;
 mod execution;
+pub mod pins;
+mod supply;
 
 pub use bus::Unknown;
+pub use clocked::clock_of;
 pub use execution::Watched;
 
 use crate::cost::Block;
+use crate::debugger::Halt;
 use crate::periph::adc::Adc;
-use crate::periph::analog::{Comparators, Dacs};
+use crate::periph::analog::Comparators;
+use crate::periph::dac::Dacs;
 use crate::periph::encoder::EncoderTimer;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
+use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
 use crate::periph::time_base::TimeBase;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
+use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 
 /// Ticks per second.
@@ -68,13 +76,30 @@ pub struct Chip {
     pub watched: Option<Watched>,
     /// Whether registers that are not known read as 0.
     pub forgiving: bool,
+    /// Rules of the chip that the program has broken.
+    pub rules: Rules,
+    /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
+    /// states, prefetch and caches is expected to take.
+    pub flash_cycles: u64,
+    /// The emulated core is running, and its access that the memory protection denied.
+    pub(crate) core_runs: bool,
+    pub(crate) guard_hit: Option<u32>,
+    /// A debugger has halted the core.
+    pub(crate) halt: Option<Halt>,
+    pub(crate) frozen_watchdog: bool,
+    /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
+    system_hz: u64,
+    bus_hz: u64,
+    system_rose: u64,
+    /// Codes at the pins of current a, current b, dc link.
+    analog: [u16; 3],
     last_block: Option<(u32, u32)>,
     /// Core-private registers.
     pub scs: Scs,
     /// Clocks.
     pub rcc: Rcc,
     /// Supply.
-    pub pwr: Store,
+    pub pwr: Pwr,
     /// Flash.
     pub flash: Flash,
     /// Ports A to G.
@@ -125,10 +150,20 @@ impl Chip {
             compared: (0, 0),
             watched: None,
             forgiving: false,
+            rules: Rules::new(),
+            core_runs: false,
+            guard_hit: None,
+            flash_cycles: 1,
+            halt: None,
+            frozen_watchdog: false,
+            system_hz: 16_000_000,
+            bus_hz: 16_000_000,
+            system_rose: 0,
+            analog: [0; 3],
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
-            pwr: Store::new(plain::PWR),
+            pwr: Pwr::default(),
             flash: Flash::new(),
             gpio,
             syscfg: Store::new(plain::SYSCFG),
@@ -156,6 +191,15 @@ impl Chip {
         self.keep_blocks = old.keep_blocks;
         self.watched = old.watched;
         self.forgiving = old.forgiving;
+        self.rules = old.rules;
+        self.flash_cycles = old.flash_cycles;
+        self.pwr.supply_v = old.pwr.supply_v;
+        self.analog = old.analog;
+        // Only power-on resets the debug support.
+        if cause != Reset::Power {
+            self.debug = old.debug;
+            self.halt = old.halt;
+        }
         let mut flags = old.rcc.reset_flags();
         if cause == Reset::Power {
             flags = 0;
@@ -195,9 +239,11 @@ impl Chip {
             self.tim1.next_event(),
             self.adc.next_event(),
             self.lpuart.next_event(),
-            self.iwdg.next_event(),
+            if self.frozen_watchdog { NEVER } else { self.iwdg.next_event() },
             self.scs.systick.next_event(),
             self.rcc.next_event(),
+            self.comp.next_event(),
+            self.dac.next_event(self.now),
             self.now.saturating_add(PATIENCE),
         ]
         .into_iter()
@@ -213,17 +259,47 @@ impl Chip {
     /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
     /// dc link here, comparator 3 PA0 or PC1.
     pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
+        self.analog = [current_a, current_b, dc_link];
+        self.compare_now();
+    }
+
+    /// The converter and channel whose level comparator 1 or 3, counted from 0, looks at.
+    fn level_of(&self, n: usize) -> Option<(usize, usize)> {
+        // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
+        match self.comp.reference_of(n) {
+            4 => Some((1, 1)),
+            5 => Some((0, 1)),
+            _ => None,
+        }
+    }
+
+    fn compare_now(&mut self) {
+        let [current_a, current_b, dc_link] = self.analog;
         self.comp.inputs[0] = dc_link;
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
-            // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
-            self.comp.references[n] = match self.comp.reference_of(n) {
-                4 => self.dac.code(1, 1),
-                5 => self.dac.code(0, 1),
-                _ => u16::MAX,
-            };
+            let level = self.level_of(n);
+            let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
+            self.comp.references[n] = code.unwrap_or(u16::MAX);
         }
+        self.comp.look(self.now);
         self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
+    }
+
+    /// A comparator was written: the level it looks at must have been seen ready.
+    fn check_reference(&mut self, offset: u32) {
+        let n = ((offset - 0x200) / 4) as usize;
+        let on = self.comp.is_on(n);
+        if let (true, Some((which, channel))) = (on, self.level_of(n)) {
+            let ready = self.dac.seen_ready(which, channel);
+            self.rules.require(ready, Rule::DacReady, || {
+                format!(
+                    "COMP{} is on, but DAC{}_SR.DAC{channel}RDY was never read as set",
+                    n + 1,
+                    [1, 3][which]
+                )
+            });
+        }
     }
 
     /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
@@ -243,8 +319,11 @@ impl Chip {
             self.scs.pend(scs::NMI);
         }
         self.adc.happen(now);
+        (self.rules.now, self.rules.at) = (now, self.at);
+        self.check_analog_pins();
+        self.compare_now();
         self.lpuart.happen(now);
-        if self.iwdg.expired(now) {
+        if !self.frozen_watchdog && self.iwdg.expired(now) {
             self.reset = Some(Reset::Watchdog);
         }
         if self.scs.systick.happen(now) {

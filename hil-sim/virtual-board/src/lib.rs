@@ -23,6 +23,7 @@ pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod cycles;
+pub mod debugger;
 pub mod image;
 pub mod interactive;
 pub mod log;
@@ -30,6 +31,7 @@ pub mod memory;
 pub mod pair;
 pub mod periph;
 pub mod power_stage;
+pub mod rules;
 pub mod scs;
 pub mod shadow;
 

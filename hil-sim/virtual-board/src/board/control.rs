@@ -48,7 +48,7 @@ pub struct LongestPath {
 impl Board {
     /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
-        let Addresses { orders, order_waits, .. } = self.addresses;
+        let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
         let mailbox = self.word(orders);
         mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }

@@ -36,8 +36,9 @@ impl Board {
     }
 
     pub(super) fn drain_log(&mut self) -> Result<()> {
-        let lines = self.log.take(&mut self.cpu)?;
-        self.lines.extend(lines);
+        if let Some(log) = &mut self.log {
+            self.lines.extend(log.take(&mut self.cpu)?);
+        }
         Ok(())
     }
 
@@ -74,6 +75,7 @@ impl Board {
     /// firmware is damaged on purpose.
     pub fn forgive(&mut self) {
         self.cpu.chip_mut().forgiving = true;
+        self.collect_violations();
     }
 
     /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.

@@ -47,6 +47,7 @@ impl Board {
         let forgiving = self.cpu.chip().forgiving;
         *self.cpu.chip_mut() = to.chip.clone();
         self.cpu.chip_mut().forgiving = forgiving;
+        self.cpu.chip_mut().rules.collecting |= forgiving;
         self.plant = to.plant.clone();
         self.connection = to.connection.clone();
         self.sleeping = to.sleeping;
@@ -60,7 +61,9 @@ impl Board {
         self.short_pulses = 0;
         self.periods.clear();
         self.lines.clear();
-        self.log.forget();
+        if let Some(log) = &mut self.log {
+            log.forget();
+        }
         Ok(())
     }
 }

@@ -5,19 +5,20 @@ use super::{Effect, Plain, Store};
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
     (0x00, ALL, ALL),
-    (0x04, 0, ALL),
+    (0x04, 0, 0xffff),
     (0x08, 0, ALL),
     (0x0c, 0, ALL),
     (0x10, 0, 0),
     (0x14, 0, 0xffff),
     (0x18, 0, 0),
-    (0x1c, 0, ALL),
+    (0x1c, 0, 0x1_ffff),
     (0x20, 0, ALL),
     (0x24, 0, ALL),
     (0x28, 0, 0),
 ];
 const MODER: u32 = 0x00;
 const OTYPER: u32 = 0x04;
+const OSPEEDR: u32 = 0x08;
 const PUPDR: u32 = 0x0c;
 const IDR: u32 = 0x10;
 const ODR: u32 = 0x14;
@@ -46,13 +47,15 @@ impl Gpio {
     /// Port A is 0.
     pub fn new(port: usize) -> Self {
         let mut store = Store::new(KNOWN);
-        // The debug port's pins.
         match port {
+            // The debug port's pins.
             0 => {
+                store.write(OSPEEDR, 0x0c00_0000);
                 store.write(MODER, 0xabff_ffff);
                 store.write(PUPDR, 0x6400_0000);
             }
             1 => {
+                store.write(OSPEEDR, 0x0000_00c0);
                 store.write(MODER, 0xffff_febf);
                 store.write(PUPDR, 0x0000_0100);
             }
