@@ -130,6 +130,9 @@ pub struct Chip {
     pub gates: GateWatch,
 }
 
+/// Code at the pin of the dc link, pulled up by 40 kOhm against some 3 kOhm of a divider without voltage.
+const DC_LINK_PULLED_UP: u16 = 285;
+
 impl Chip {
     /// A chip after power-on, whose flash is erased.
     pub fn new() -> Self {
@@ -212,6 +215,7 @@ impl Chip {
         self.tim1.drop_update = old.tim1.drop_update;
         self.tim2.set_position(old.tim2.position());
         self.adc.inputs = old.adc.inputs;
+        self.analog = old.analog;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
         self.gates = old.gates;
@@ -275,7 +279,9 @@ impl Chip {
 
     fn compare_now(&mut self) {
         let [current_a, current_b, dc_link] = self.analog;
-        self.comp.inputs[0] = dc_link;
+        // The chip's own resistor lifts the pin, against the lower resistor of the divider.
+        let lifted = if self.gpio[0].pull(1) == Some(true) { DC_LINK_PULLED_UP } else { 0 };
+        self.comp.inputs[0] = dc_link.max(lifted);
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
             let level = self.level_of(n);
