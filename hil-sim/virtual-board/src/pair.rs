@@ -25,15 +25,17 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// A board that has started and waits for orders.
+    /// A board that has started and waits for orders; its bench steps are confirmed.
     ///
     /// # Errors
     /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
-        let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
+        let shadow = Shadow::new(options.power_stage.board())?;
+        let mut pair = Self { board: Board::new(image, options)?, shadow };
         pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
             pair.board.take_console().ends_with('\n')
         })?;
+        pair.order("confirm board")?;
         Ok(pair)
     }
 

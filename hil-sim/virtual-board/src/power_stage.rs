@@ -9,7 +9,9 @@ pub mod driver;
 pub mod shunts;
 pub mod watch;
 
+use drive_core::Settings;
 use hil_sim::{Config, Error};
+use induction_drive::boards::{self as boards_of_the_firmware, Board};
 
 pub use boards::{ALL, REFERENCE};
 use driver::Driver;
@@ -86,6 +88,17 @@ impl PowerStage {
             let names = ALL.map(|stage| stage.name).join(", ");
             Error::Refused(format!("--board {name}: no such board; there are {names}"))
         })
+    }
+
+    /// The board of the firmware with this name.
+    pub fn board(&self) -> &'static Board {
+        // A test finds one for each power stage.
+        boards_of_the_firmware::find(self.name).unwrap_or(boards_of_the_firmware::SELECTED)
+    }
+
+    /// The settings that the image for this board starts with.
+    pub fn firmware_settings(&self) -> Settings {
+        induction_drive::board::settings_of(self.board())
     }
 
     /// The configuration with a motor and a dc link that suit it.

@@ -5,6 +5,7 @@ use drive_core::{Compare, Hardware, Sample};
 use super::Board;
 use crate::addresses::Addresses;
 use crate::cost::{self, Block};
+use crate::power_stage::Sensors;
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,11 +69,17 @@ impl Board {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
         let [one, two] = chip.adc.data();
+        // A third current comes before the slow signals.
+        let (current_c, slow) = match chip.gates.stage().sensors {
+            Sensors::InLine => (0, 1),
+            Sensors::LowSide(_) => (one[1], 2),
+        };
         let sample = Sample {
             current_a: one[0],
             current_b: two[0],
-            dc_link: one[1],
-            heat_sink: two[1],
+            current_c,
+            dc_link: one[slow],
+            heat_sink: two[slow],
             encoder: chip.tim2.count(),
             hardware,
         };

@@ -26,8 +26,6 @@ pub(super) struct Connection {
     dead_time: Option<u32>,
     /// The last sample.
     pub sample: Sample,
-    /// The last code of current c.
-    current_c: u16,
     shunts: Option<ShuntReader>,
 }
 
@@ -72,14 +70,7 @@ impl Connection {
                 })
             }
         };
-        Self {
-            at: 0,
-            applied: Compare::OFF,
-            dead_time: None,
-            sample: Sample::default(),
-            current_c: 0,
-            shunts,
-        }
+        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
     }
 }
 
@@ -210,28 +201,25 @@ impl Board {
 
     /// Shows the sample to converters, comparators and encoder.
     pub(super) fn show_sample(&mut self) {
-        let Connection { sample, current_c, shunts, .. } = &mut self.connection;
+        let Connection { sample, shunts, .. } = &mut self.connection;
         let chip = self.cpu.chip_mut();
         let seen = shunts.as_mut().map(|reader| reader.codes(chip));
         if let Some([one, two]) = seen {
             // Current a is the first converter's, b the second's.
-            (sample.current_a, sample.current_b, *current_c) = (one[0], two[1], one[2]);
+            (sample.current_a, sample.current_b, sample.current_c) = (one[0], two[1], one[2]);
         }
         let undisturbed = *sample;
         if let Some(disturb) = &mut self.disturb {
             disturb(sample);
         }
+        let of = |s: &Sample| [s.current_a, s.current_b, s.current_c];
+        let (now, before) = (of(sample), of(&undisturbed));
         for (converter, inputs) in chip.adc.inputs.iter_mut().enumerate() {
-            let mut currents =
-                seen.map_or([sample.current_a, sample.current_b, 0], |codes| codes[converter]);
-            // A disturbed sensor is so for both.
-            let [a, b] = [
-                (0, sample.current_a, undisturbed.current_a),
-                (1, sample.current_b, undisturbed.current_b),
-            ];
-            for (leg, now, before) in [a, b] {
-                if now != before {
-                    currents[leg] = now;
+            let mut currents = seen.map_or(now, |codes| codes[converter]);
+            for leg in 0..3 {
+                if now[leg] != before[leg] {
+                    // A disturbed sensor is so for both converters.
+                    currents[leg] = now[leg];
                 }
             }
             for (channel, code) in channel::CURRENTS.into_iter().zip(currents) {
