@@ -1,5 +1,6 @@
 //! The board: the core, its chip, and the motor, from one period to the next.
 
+pub mod confirmed;
 mod control;
 mod exceptions;
 mod motor;
@@ -119,6 +120,9 @@ impl Board {
             preempt_at: None,
         };
         let chip = board.chip();
+        if options.confirmed {
+            confirmed::save(options.power_stage.name, &mut chip.flash)?;
+        }
         chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
         chip.look_at_gates();
         board.show_sample();

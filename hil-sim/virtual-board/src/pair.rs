@@ -25,17 +25,15 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// A board that has started and waits for orders; its bench steps are confirmed.
+    /// A board that has started and waits for orders.
     ///
     /// # Errors
     /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
-        let shadow = Shadow::new(options.power_stage.board())?;
-        let mut pair = Self { board: Board::new(image, options)?, shadow };
+        let mut pair = Self { shadow: Shadow::new(&options)?, board: Board::new(image, options)? };
         pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
             pair.board.take_console().ends_with('\n')
         })?;
-        pair.order("confirm board")?;
         Ok(pair)
     }
 

@@ -6,8 +6,7 @@ use std::collections::VecDeque;
 use anyhow::{Result, bail};
 use drive_core::{Command, Drive, Settings, State};
 
-use crate::board::Period;
-use induction_drive::boards::Board;
+use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
@@ -15,7 +14,6 @@ use induction_drive::settings::staging::Staging;
 
 /// A drive with the settings of the board.
 pub struct Shadow {
-    board: &'static Board,
     /// The drive.
     pub drive: Drive,
     settings: Staging,
@@ -30,20 +28,20 @@ pub struct Shadow {
 }
 
 impl Shadow {
-    /// The drive that the image for a board starts with.
+    /// The drive that the image starts with.
     ///
     /// # Errors
     /// Its settings make no drive.
-    pub fn new(board: &'static Board) -> Result<Self> {
-        let settings = FirmwareSettings {
-            drive: induction_drive::board::settings_of(board),
-            ..FirmwareSettings::of_the_board()
-        };
+    pub fn new(options: &Options) -> Result<Self> {
+        let mut settings = confirmed::settings(options.power_stage.name)?;
+        if !options.confirmed {
+            settings = FirmwareSettings::of(settings.board);
+        }
         let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
         let settings = Staging::new(settings);
-        Ok(Self { board, drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
+        Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
     }
 
     /// Its settings, with the dead time that the timer makes.
@@ -82,11 +80,6 @@ impl Shadow {
             }
             Ok(Request::Revert) => {
                 self.settings.revert();
-                return Ok(());
-            }
-            Ok(Request::Confirm) => {
-                let confirmed = self.board.confirmation();
-                self.settings.note(|settings| settings.command.confirmed = confirmed);
                 return Ok(());
             }
             Ok(Request::Apply | Request::Save) => return self.apply(),

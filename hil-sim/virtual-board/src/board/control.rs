@@ -69,7 +69,7 @@ impl Board {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
         let [one, two] = chip.adc.data();
-        // A third current comes before the slow signals.
+        // With three shunts both convert the third current second.
         let (current_c, slow) = match chip.gates.stage().sensors {
             Sensors::InLine => (0, 1),
             Sensors::LowSide(_) => (one[1], 2),

@@ -70,7 +70,13 @@ impl Connection {
                 })
             }
         };
-        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
+        Self {
+            at: 0,
+            applied: Compare::OFF,
+            dead_time: None,
+            sample: Sample::default(),
+            shunts,
+        }
     }
 }
 
