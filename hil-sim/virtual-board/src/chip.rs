@@ -39,6 +39,8 @@ pub const TICKS_PER_PERIOD: u64 = 2 * induction_drive::board::PWM_TOP as u64;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
+/// Largest code of the analog signals.
+const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.
 const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
@@ -87,6 +89,8 @@ pub struct Chip {
     /// A debugger has halted the core.
     pub(crate) halt: Option<Halt>,
     pub(crate) frozen_watchdog: bool,
+    /// Outputs came back with the core, and are looked at then.
+    pub(crate) back_on: Option<u64>,
     /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
     system_hz: u64,
     bus_hz: u64,
@@ -130,9 +134,6 @@ pub struct Chip {
     pub gates: GateWatch,
 }
 
-/// Code at the pin of the dc link, pulled up by 40 kOhm against some 3 kOhm of a divider without voltage.
-const DC_LINK_PULLED_UP: u16 = 285;
-
 impl Chip {
     /// A chip after power-on, whose flash is erased.
     pub fn new() -> Self {
@@ -159,6 +160,7 @@ impl Chip {
             flash_cycles: 1,
             halt: None,
             frozen_watchdog: false,
+            back_on: None,
             system_hz: 16_000_000,
             bus_hz: 16_000_000,
             system_rose: 0,
@@ -215,7 +217,6 @@ impl Chip {
         self.tim1.drop_update = old.tim1.drop_update;
         self.tim2.set_position(old.tim2.position());
         self.adc.inputs = old.adc.inputs;
-        self.analog = old.analog;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
         self.gates = old.gates;
@@ -248,6 +249,7 @@ impl Chip {
             self.rcc.next_event(),
             self.comp.next_event(),
             self.dac.next_event(self.now),
+            self.back_on.unwrap_or(NEVER),
             self.now.saturating_add(PATIENCE),
         ]
         .into_iter()
@@ -279,9 +281,12 @@ impl Chip {
 
     fn compare_now(&mut self) {
         let [current_a, current_b, dc_link] = self.analog;
-        // The chip's own resistor lifts the pin, against the lower resistor of the divider.
-        let lifted = if self.gpio[0].pull(1) == Some(true) { DC_LINK_PULLED_UP } else { 0 };
-        self.comp.inputs[0] = dc_link.max(lifted);
+        // A pull of the chip moves the pin: 40 kOhm against the 10 kOhm of a divider.
+        self.comp.inputs[0] = match self.gpio[0].pull(1) {
+            Some(true) => dc_link + (FULL_SCALE - dc_link.min(FULL_SCALE)) / 5,
+            Some(false) => dc_link - dc_link / 5,
+            None => dc_link,
+        };
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
             let level = self.level_of(n);
@@ -327,6 +332,7 @@ impl Chip {
         self.adc.happen(now);
         (self.rules.now, self.rules.at) = (now, self.at);
         self.check_analog_pins();
+        self.check_outputs_back();
         self.compare_now();
         self.lpuart.happen(now);
         if !self.frozen_watchdog && self.iwdg.expired(now) {

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::board::Board;
-use crate::chip::{Chip, TICKS_PER_S};
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
 use crate::rules::Rule;
 
@@ -16,8 +16,8 @@ const IWDG_STOP: u32 = 1 << 12;
 /// DBGMCU: TIM1 stops while the core is halted.
 const TIM1_STOP: u32 = 1 << 11;
 
-/// A halt that a watchdog does not have to end, ticks: 5 ms.
-const SHORT_HALT: u64 = TICKS_PER_S / 200;
+/// The program may take this long to switch off outputs that come back as the core goes on, ticks: two periods.
+const NOTICED: u64 = 2 * TICKS_PER_PERIOD;
 
 /// A halt that lasts.
 #[derive(Clone, Copy, Debug)]
@@ -53,12 +53,23 @@ impl Chip {
         }
         // The cycle counter does not count in debug state.
         self.scs.stand_still(stood);
-        // After a short halt nothing can keep them off before the next control interrupt, which sees the gap.
-        let back = halt.outputs && self.tim1.outputs_on() && stood > SHORT_HALT;
-        self.rules.require(!back, Rule::ResumedOutputs, || {
-            "a debugger halted the core and let it go: TIM1's outputs are on again".into()
-        });
+        let back = halt.outputs && self.tim1.outputs_on();
+        self.back_on = back.then_some(self.now + NOTICED);
         self.attention = true;
+    }
+
+    /// Looks at outputs that came back with the core.
+    pub(crate) fn check_outputs_back(&mut self) {
+        if !self.tim1.outputs_on() {
+            self.back_on = None;
+        }
+        if self.back_on.is_some_and(|at| at <= self.now) {
+            self.back_on = None;
+            self.rules.note(
+                Rule::ResumedOutputs,
+                "TIM1's outputs are on two periods after a debugger halted the core and let it go",
+            );
+        }
     }
 
     /// Whether the core is halted.

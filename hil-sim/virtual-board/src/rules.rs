@@ -32,7 +32,7 @@ pub enum Rule {
     IwdgBusy,
     /// A pin is not in the mode, or not at the alternate function, that its use needs.
     PinMode,
-    /// After a halt by a debugger that stopped TIM1, the outputs came back without the program.
+    /// After a halt by a debugger that stopped TIM1, the outputs came back without the program, and it let them.
     ResumedOutputs,
     /// The supply monitor is locked while it is off, so that it cannot be switched on any more.
     SupplyMonitor,

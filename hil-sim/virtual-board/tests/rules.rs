@@ -323,7 +323,12 @@ fn outputs_stay_off_after_a_halt() {
     let stop_timer = [Write(DBGMCU + 0x10, 1 << 11)];
     let on = [GATES, OUTPUTS_ON].concat();
     let off = [Write(BDTR, 1 << 13 | 1 << 12 | 3 << 8 | 0x40)];
-    twins(Rule::ResumedOutputs, &[&stop_timer, &on, &[Halt]], &[&stop_timer, &on, &off, &[Halt]]);
+    let noticed = [Wait(400 * US)];
+    twins(
+        Rule::ResumedOutputs,
+        &[&stop_timer, &on, &[Halt], &noticed],
+        &[&stop_timer, &on, &[Halt], &off, &noticed],
+    );
     // Off as if MOE was reset, while the bit stays.
     let mut chip = after(&[&stop_timer[..], &on].concat());
     assert!(chip.tim1.outputs_on());

@@ -29,15 +29,13 @@ fn text(violations: &[Violation]) -> String {
     violations.iter().map(|violation| format!("{violation}, {} times\n", violation.count)).collect()
 }
 
-/// The outputs on, with the encoder.
+/// The outputs on.
 fn started(board: &mut Board) -> Result<()> {
-    for line in ["start encoder torque", "start torque encoder", "start torque"] {
-        board.type_line(line);
-        for _ in 0..600 {
-            board.run_periods(10)?;
-            if board.chip().tim1.outputs_on() {
-                return Ok(());
-            }
+    board.type_line("start");
+    for _ in 0..600 {
+        board.run_periods(10)?;
+        if board.chip().tim1.outputs_on() {
+            return Ok(());
         }
     }
     anyhow::bail!("it does not switch on: {}", board.take_console())
@@ -48,8 +46,13 @@ fn started(board: &mut Board) -> Result<()> {
 fn our_image_breaks_no_rule() -> Result<()> {
     let mut board = exact(Image::built()?)?;
     board.run_periods(START)?;
-    board.type_line("save");
-    board.run_periods(1200)?;
+    board.type_line("confirm board");
+    // Changed and changed back: there is something to save.
+    for line in ["set limits.current_a 5", "save", "defaults", "save"] {
+        board.type_line(line);
+        board.run_periods(1200)?;
+    }
+    assert!(board.chip().flash.operations > 0, "{}", board.take_console());
     started(&mut board)?;
     board.run_periods(600)?;
     assert!(board.violations().is_empty(), "{}", text(board.violations()));
@@ -57,7 +60,7 @@ fn our_image_breaks_no_rule() -> Result<()> {
     Ok(())
 }
 
-/// A probe halts the core for 10 ms, for 10 s of a coffee, or for two periods, and lets it go: the outputs are off then, and stay off.
+/// A probe halts the core, for two periods or longer, and lets it go: the outputs are off then, and stay off.
 #[test]
 fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
     for ms in [0.35, 10.0, 1000.0] {
@@ -65,14 +68,14 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
         board.attach();
         board.halt(ms)?;
         board.resume();
-        // Not for an instant.
-        let mut on = false;
+        // For a period at most, if the watchdog has not reset the chip in the meantime.
+        let mut on = 0;
         for _ in 0..1200 {
             board.run_ticks(2000)?;
-            on |= board.chip().tim1.outputs_on();
+            on += u32::from(board.chip().tim1.outputs_on());
         }
-        assert!(!on || ms < 1.0, "outputs on after a halt of {ms} ms");
-        assert!(!board.chip().tim1.outputs_on(), "outputs on 14 ms after a halt of {ms} ms");
+        println!("halt of {ms} ms: on for {} us", 2000 * on / 170);
+        assert!(on <= if ms < 5.0 { 15 } else { 0 }, "on {on} times after a halt of {ms} ms");
         assert!(board.violations().is_empty(), "{}", text(board.violations()));
     }
     Ok(())
@@ -140,21 +143,54 @@ fn a_sagging_supply_switches_off() -> Result<()> {
 fn the_old_image_is_caught() -> Result<()> {
     let path = std::env::var_os(OLD).with_context(|| format!("{OLD} names no image"))?;
     let image = || Image::open(Path::new(&path));
+    let broken = |board: &Board, rule| board.violations().iter().any(|v| v.rule == rule);
     let mut board = exact(image()?)?;
     board.run_periods(START)?;
     println!("{}", text(board.violations()));
-    let broken = |board: &Board, rule| board.violations().iter().any(|v| v.rule == rule);
-    // F1, F4, F6, F7.
-    for rule in [
-        Rule::ClockGate,
-        Rule::VoltageRange,
-        Rule::SupplyMonitor,
-        Rule::LockOnce,
-        Rule::EnableDelay,
-        Rule::DacMode,
-        Rule::DacReady,
+    let power = [Rule::ClockGate, Rule::VoltageRange, Rule::Latency, Rule::SupplyMonitor];
+    let level = [Rule::DacMode, Rule::DacReady];
+    for (finding, rules) in [
+        ("F1", &power[..]),
+        ("F4", &[Rule::LockOnce]),
+        ("F6", &[Rule::EnableDelay, Rule::AdcClock]),
+        ("F7", &level),
     ] {
-        assert!(broken(&board, rule), "{rule}");
+        for rule in rules {
+            assert!(broken(&board, *rule), "{finding}: {rule}");
+        }
     }
+    // Without the distance of two accesses its converters start, and the rest can be seen.
+    let running = || -> Result<Board> {
+        let mut board = Board::new(image()?, Options::new(&Config::default(), 1))?;
+        board.collect_violations();
+        board.attach();
+        board.run_periods(START)?;
+        Ok(board)
+    };
+    // The watchdog's registers are busy for longer than it waits: reset while it saves, unless they are quick.
+    let mut board = running()?;
+    board.type_line("save");
+    board.run_periods(1200)?;
+    println!("F13: {:?}", board.resets);
+    assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Watchdog), "F13");
+    let mut board = running()?;
+    board.chip().iwdg.quick = true;
+    board.type_line("save");
+    board.run_periods(1200)?;
+    println!("F5: {:?}", board.take_console());
+    assert!(broken(&board, Rule::DataCache), "F5");
+    started(&mut board)?;
+    board.halt(10_000.0)?;
+    assert!(!board.chip().tim1.outputs_on());
+    board.resume();
+    board.run_periods(3)?;
+    println!("F2: outputs on after the halt: {}", board.chip().tim1.outputs_on());
+    assert!(broken(&board, Rule::ResumedOutputs), "F2");
+    let mut board = running()?;
+    let resets = board.resets.len();
+    board.detach();
+    board.run_periods(START)?;
+    println!("F3: resets after the probe has detached: {:?}", board.resets);
+    assert!(board.resets.len() > resets, "F3");
     Ok(())
 }

@@ -5,7 +5,7 @@ use crate::rules::{Rule, Rules};
 
 /// Ticks per cycle of its clock.
 const CLOCK: u64 = 170_000_000 / 32_000;
-/// Prescaled clocks until a value written has arrived, at most.
+/// Clocks until a value written has arrived, at most.
 const ARRIVES: u64 = 6;
 
 /// The watchdog.
@@ -15,6 +15,8 @@ pub struct Iwdg {
     reload: u32,
     window: u32,
     unlocked: bool,
+    /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
+    pub quick: bool,
     /// Until when the last values of prescaler, reload and window are on their way.
     busy_until: [u64; 3],
     expires: u64,
@@ -27,6 +29,7 @@ impl Default for Iwdg {
             reload: 0xfff,
             window: 0xfff,
             unlocked: false,
+            quick: false,
             busy_until: [0; 3],
             expires: NEVER,
         }
@@ -105,7 +108,8 @@ impl Iwdg {
                 *[&mut self.prescaler, &mut self.reload, &mut self.window][which] =
                     value & [7, 0xfff, 0xfff][which];
                 // With the longer of the two prescalers: the longest time.
-                self.busy_until[which] = now + ARRIVES * before.max(self.count());
+                let clock = if self.quick { CLOCK } else { before.max(self.count()) };
+                self.busy_until[which] = now + ARRIVES * clock;
             }
             (0x04 | 0x08 | 0x10, _) => {}
             _ => return None,
