@@ -50,6 +50,15 @@ pub struct Frame {
     pub place: String,
 }
 
+/// Variable that names the folder with the images of the other boards.
+const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
+
+/// The folder of cargo's results.
+fn target() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from)
+}
+
 impl Image {
     /// Reads an ELF file.
     ///
@@ -60,6 +69,20 @@ impl Image {
         Self::parse(bytes).with_context(|| path.display().to_string())
     }
 
+    /// The image of a board, which `cargo firmware --board NAME` builds.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn of_board(name: &str) -> Result<Self> {
+        if name == crate::power_stage::REFERENCE.name {
+            return Self::built();
+        }
+        let folder =
+            std::env::var_os(BOARDS).map_or_else(|| target().join("boards"), PathBuf::from);
+        let path = folder.join(name).join("induction-drive");
+        Self::open(&path).with_context(|| format!("type `cargo firmware --board {name}`"))
+    }
+
     /// The image that `cargo firmware` built last, or the one that the environment names.
     ///
     /// # Errors
@@ -68,10 +91,7 @@ impl Image {
         if let Some(path) = std::env::var_os(ELF) {
             return Self::open(Path::new(&path));
         }
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let target =
-            std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
-        let places = PLACES.map(|place| target.join(place).join(INSIDE));
+        let places = PLACES.map(|place| target().join(place).join(INSIDE));
         let age = |path: PathBuf| Some((path.metadata().ok()?.modified().ok()?, path));
         let newest = places.into_iter().filter_map(age).max();
         Self::open(&newest.context("no firmware image: type `cargo firmware`")?.1)
