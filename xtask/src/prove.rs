@@ -46,7 +46,9 @@ const PROOFS: [Proof; 5] = [
         name: "campaign",
         about: "2000 faults on the virtual board: outputs off in time, or control correct",
         shards: 20,
-        command: |shard| Ok(board::faults(&image::build()?, FAULTS, 1 + shard * FAULTS)),
+        command: |shard| {
+            Ok(board::faults(&image::build()?, image::REFERENCE, FAULTS, 1 + shard * FAULTS))
+        },
         bounds: &[],
     },
     Proof {

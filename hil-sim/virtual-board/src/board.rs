@@ -126,6 +126,9 @@ impl Board {
         chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
         chip.look_at_gates();
         board.show_sample();
+        // The dc link is there before the first period. (A copy, so that the noise of the periods is the same.)
+        let dc_link = board.plant.clone().sample().dc_link;
+        board.chip().compare(0, 0, dc_link);
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
         board.cpu.chip_mut().rules.exact = options.counting.every_instruction;
         board.cpu.reset(memory::FLASH);

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use virtual_board::{Image, campaign, cycles};
+use virtual_board::power_stage::REFERENCE;
+use virtual_board::{Image, PowerStage, campaign, cycles};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
@@ -29,6 +30,9 @@ enum Task {
         /// Only the classes whose name contains this.
         #[arg(long, default_value = "")]
         class: String,
+        /// The board that the ELF was built for; it has a motor that suits it.
+        #[arg(long, default_value = REFERENCE.name)]
+        board: String,
     },
     /// Counts the cycles of the control interrupt; fails above its limits.
     Cycles {
@@ -52,8 +56,9 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Campaign { elf, count, seed, class } => {
-            let selection = campaign::Selection { count, seed, class };
+        Task::Campaign { elf, count, seed, class, board } => {
+            let stage = PowerStage::named(&board)?;
+            let selection = campaign::Selection { count, seed, class, stage };
             println!("{}", campaign::bounds());
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }

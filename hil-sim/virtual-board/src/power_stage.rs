@@ -10,6 +10,7 @@ pub mod shunts;
 pub mod watch;
 
 use drive_core::Settings;
+use hil_sim::input::Input;
 use hil_sim::{Config, Error};
 use induction_drive::boards::{self as boards_of_the_firmware, Board};
 
@@ -104,21 +105,20 @@ impl PowerStage {
     /// The configuration with a motor and a dc link that suit it.
     ///
     /// # Errors
-    /// The motor's file is not there.
+    /// The motor's file is not there, or the voltage is out of its range.
     pub fn config(&self) -> Result<Config, Error> {
-        let mut config = Config::of_motor(self.motor)?;
-        self.supply(&mut config)?;
-        Ok(config)
+        Config::load(self.motor, None, &self.assignments())
     }
 
-    /// Gives a configuration the dc link of this stage.
-    ///
-    /// # Errors
-    /// The voltage is out of its range.
-    pub fn supply(&self, config: &mut Config) -> Result<(), Error> {
-        let supply = self.supply_v.map(|volts| volts.to_string());
-        supply.map_or(Ok(()), |volts| {
-            config.set("inverter.dc_link_v", &hil_sim::config::Value::from_text(&volts))
-        })
+    /// Gives a session the motor and the dc link that suit it, unless it has a motor.
+    pub fn suit(&self, input: &mut Input) {
+        if input.motor.is_none() {
+            input.motor = self.motor.map(str::to_owned);
+            input.assignments.splice(0..0, self.assignments());
+        }
+    }
+
+    fn assignments(&self) -> Vec<String> {
+        self.supply_v.iter().map(|volts| format!("inverter.dc_link_v={volts}")).collect()
     }
 }

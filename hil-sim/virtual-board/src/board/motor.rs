@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::Board;
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::power_stage::bridge::Bridge;
+use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
 use crate::power_stage::{PowerStage, Sensors, channel};
 
@@ -70,13 +70,7 @@ impl Connection {
                 })
             }
         };
-        Self {
-            at: 0,
-            applied: Compare::OFF,
-            dead_time: None,
-            sample: Sample::default(),
-            shunts,
-        }
+        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
     }
 }
 
@@ -110,7 +104,8 @@ impl ShuntReader {
         let mut amplifiers = from.amplifiers;
         let after = time.saturating_sub(from.time) as u32;
         let mut currents = from.currents;
-        if !from.bridge.legs.iter().all(|leg| leg.pieces[0].ticks >= after) {
+        let first = |leg: &Leg| leg.pieces.first().map_or(0, |piece| piece.ticks);
+        if from.bridge.legs.iter().any(|leg| first(leg) < after) {
             // Behind the zero vector the other vectors bring the currents back: the mean of the period goes on.
             currents.slope = [0.0; 3];
         }

@@ -132,10 +132,11 @@ impl Script {
 
     /// The pins of the gates to the timer.
     pub fn pins(&mut self) -> Result<()> {
-        self.modify(GPIOA + 0x20, 0xf << 28, 6 << 28)?;
+        self.modify(GPIOA + 0x20, 0xff << 24, 0x66 << 24)?;
         self.modify(GPIOA + 0x24, 0xfff, 0x666)?;
         self.modify(GPIOB + 0x20, 0xff, 0x66)?;
-        self.modify(GPIOA + MODER, 0x3f_c000, 0x2a_8000)?;
+        // PA6 is the fault input.
+        self.modify(GPIOA + MODER, 0x3f_f000, 0x2a_a000)?;
         self.modify(GPIOB + MODER, 0xf, 0xa)
     }
 
