@@ -4,9 +4,9 @@ use super::{Effect, NEVER, Plain, Store};
 use crate::rules::{Rule, Rules};
 
 const KNOWN: &[Plain] = &[
-    (CR, 0, 0x7fc7_7fff),
-    (DHR[0], 0, 0xfff),
-    (DHR[1], 0, 0xfff),
+    (CR, 0, 0x7fff_7fff),
+    (DHR[0], 0, 0x0fff_0fff),
+    (DHR[1], 0, 0x0fff_0fff),
     (DOR[0], 0, 0),
     (DOR[1], 0, 0),
     (SR, 0, 0),
@@ -56,6 +56,11 @@ impl Channel {
         self.code = code;
         self.settled_at = (now + lasts).max(if self.ready_at == NEVER { 0 } else { self.ready_at });
     }
+}
+
+/// The code in a data register; that for double data mode lies above it.
+fn data(register: u32) -> u16 {
+    (register & 0xfff) as u16
 }
 
 /// One converter.
@@ -143,11 +148,11 @@ impl Dacs {
             if offset == DHR[n] {
                 channel.has_data = true;
                 if was[n] {
-                    channel.go_to(store.get(offset) as u16, now, SETTLING);
+                    channel.go_to(data(store.get(offset)), now, SETTLING);
                 }
             } else if on(store, n) && !was[n] {
                 channel.ready_at = now + WAKE_UP;
-                channel.go_to(store.get(DHR[n]) as u16, now, WAKE_UP);
+                channel.go_to(data(store.get(DHR[n])), now, WAKE_UP);
             } else if was[n] && !on(store, n) {
                 *channel = Channel { has_data: channel.has_data, ..OFF };
             }

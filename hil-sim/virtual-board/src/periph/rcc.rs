@@ -23,7 +23,7 @@ pub const APB1ENR2: u32 = 0x5c;
 pub const APB2ENR: u32 = 0x60;
 
 const KNOWN: &[Plain] = &[
-    (CR, 0x100, 0x010d_0b00),
+    (CR, 0x100, 0x010d_0300),
     (0x04, 0x4000_0000, 0x7f00_0000),
     (CFGR, 0x5, 0x7f00_3ff3),
     (PLLCFGR, 0x1000, 0xff73_7ff3),
@@ -42,7 +42,7 @@ const KNOWN: &[Plain] = &[
     (APB1ENR1, 0x400, 0xd2fe_cd3f),
     (APB1ENR2, 0, 0x103),
     (APB2ENR, 0, 0x0437_f801),
-    (CCIPR, 0, 0x7ffd_75ff),
+    (CCIPR, 0, u32::MAX),
     (0x90, 0, 0),
     (CSR, 0, 1),
     (0x98, 0, 1),

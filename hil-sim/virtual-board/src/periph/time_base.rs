@@ -4,7 +4,7 @@ use super::{Effect, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] =
-    &[(0x00, 0, 0xfff), (0x14, 0, 0), (0x24, 0, 0), (0x28, 0, 0xffff), (0x2c, ALL, ALL)];
+    &[(0x00, 0, 0x1bff), (0x14, 0, 0), (0x24, 0, 0), (0x28, 0, 0xffff), (0x2c, ALL, ALL)];
 const CR1: u32 = 0x00;
 const EGR: u32 = 0x14;
 const CNT: u32 = 0x24;
