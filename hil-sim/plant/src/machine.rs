@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
+use crate::model::{ElectricalState, MachineModel, increment};
 
 /// Largest length of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
@@ -97,11 +98,38 @@ pub struct MachineState {
     pub i_lp: Complex,
 }
 
+impl ElectricalState for MachineState {
+    #[inline]
+    fn current(&self) -> Complex {
+        self.i
+    }
+
+    #[inline]
+    fn rotor_flux(&self) -> Complex {
+        self.psi
+    }
+
+    #[inline]
+    fn moved(&self, k: &Self, h: f64) -> Self {
+        Self { i: self.i + k.i * h, psi: self.psi + k.psi * h, i_lp: self.i_lp + k.i_lp * h }
+    }
+
+    #[inline]
+    fn advanced(&self, k: [&Self; 4], h: f64) -> Self {
+        let sixth = h * (1.0 / 6.0);
+        Self {
+            i: self.i + increment(k.map(|k| k.i), sixth),
+            psi: self.psi + increment(k.map(|k| k.psi), sixth),
+            i_lp: self.i_lp + increment(k.map(|k| k.i_lp), sixth),
+        }
+    }
+}
+
 /// Coefficients of the machine equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
-    pub(crate) pole_pairs: f64,
-    pub(crate) coupling: f64,
+    pole_pairs: f64,
+    coupling: f64,
     alpha: f64,
     rr_coupling: f64,
     r_prime: f64,
@@ -170,11 +198,6 @@ impl Machine {
         self.torque_factor
     }
 
-    /// Pole pairs.
-    pub fn pole_pairs(&self) -> f64 {
-        self.pole_pairs
-    }
-
     /// Transient inductance `sigma Ls`, H.
     pub fn sigma_ls(&self) -> f64 {
         self.sigma_ls
@@ -199,12 +222,6 @@ impl Machine {
             0.0
         };
         x.psi * x.psi * flux_part + x.i * x.i * current_part
-    }
-
-    /// Electromagnetic torque, N m: Eq. 4.4 in terms of stator current and rotor flux.
-    #[inline]
-    pub fn torque(&self, x: &MachineState) -> f64 {
-        self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
     }
 
     /// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
@@ -240,10 +257,24 @@ impl Machine {
             i_lp: (x.i - x.i_lp) * CHI_CORNER,
         }
     }
+}
 
-    /// Time derivative of the state at terminal voltage `v` (V) and electrical speed `w` (rad/s).
+impl MachineModel for Machine {
+    type State = MachineState;
+
     #[inline]
-    pub fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
+    fn pole_pairs(&self) -> f64 {
+        self.pole_pairs
+    }
+
+    /// Electromagnetic torque, N m: Eq. 4.4 in terms of stator current and rotor flux.
+    #[inline]
+    fn torque(&self, x: &MachineState) -> f64 {
+        self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
+    }
+
+    #[inline]
+    fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
         let decay = self.decay(x.psi, w);
         let y = v + self.drive_voltage(x, decay);
         let s = self.saliency(x);
@@ -251,10 +282,7 @@ impl Machine {
         MachineState { i: (y + s * y.conj()) * scale, ..self.rest(x, decay) }
     }
 
-    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit vector
-    /// `axis`, where the terminal voltage has the component `v_axis`. Also returns the terminal
-    /// voltage, whose other component follows from the machine.
-    pub(crate) fn derivative_on_line(
+    fn derivative_on_line(
         &self,
         x: &MachineState,
         v_axis: f64,
@@ -271,13 +299,19 @@ impl Machine {
         (rates, column * rate - internal)
     }
 
-    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the terminal voltage.
-    pub(crate) fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
+    fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
         let decay = self.decay(x.psi, w);
         (self.rest(x, decay), -self.drive_voltage(x, decay))
     }
-}
 
+    fn with_current(&self, x: &MachineState, i: Complex) -> MachineState {
+        MachineState { i, ..*x }
+    }
+
+    fn with_turned_flux(&self, x: &MachineState, turn: Complex) -> MachineState {
+        MachineState { psi: x.psi * turn, ..*x }
+    }
+}
 /// Refuses saliency that could come near the singularity; see [`Machine::new`].
 fn refuse_singular(
     m: &MachineSettings,

@@ -109,7 +109,7 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         }
         moments.push(WarmingMoment {
             t: (n + 1) as f64 / REFINES_PER_S,
-            tau_r: rig.plant.motor().machine.tau_r(),
+            tau_r: rig.plant.tau_r(),
             omega_m: rig.plant.mechanical_speed() * pole_pairs,
             estimate,
             model_d: inverse(&online),
