@@ -23,6 +23,7 @@
 mod averaged;
 mod complex;
 mod encoder;
+mod energy;
 mod error;
 mod freewheel;
 mod integrate;
@@ -42,6 +43,7 @@ use serde::{Deserialize, Serialize};
 
 pub use complex::{Complex, clarke, phases};
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
+pub use energy::{EnergyMachine, EnergyState, FAMILIES, Family, IronSettings};
 pub use error::PlantError;
 pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
@@ -56,8 +58,10 @@ pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, S
 pub struct PlantSettings {
     /// Parameters of the machine.
     pub machine: MachineSettings,
-    /// Its saliency.
+    /// Its saliency in model A; of no effect with `iron`.
     pub saliency: SaliencySettings,
+    /// The iron of the energy model; without, the machine is model A.
+    pub iron: Option<IronSettings>,
     /// The shaft and its load.
     pub mechanics: MechanicsSettings,
     /// The inverter.
@@ -76,6 +80,7 @@ impl Default for PlantSettings {
         Self {
             machine: MachineSettings::default(),
             saliency: SaliencySettings::default(),
+            iron: None,
             mechanics: MechanicsSettings::default(),
             inverter: InverterSettings::default(),
             measurement: MeasurementSettings::default(),
@@ -89,6 +94,7 @@ impl Default for PlantSettings {
 #[derive(Clone, Debug)]
 enum Motor {
     A(MotorModel<Machine>),
+    Energy(Box<MotorModel<EnergyMachine>>),
 }
 
 /// `$body` with `$motor` bound to the [`MotorModel`] of whichever machine model.
@@ -96,6 +102,7 @@ macro_rules! whichever {
     ($which:expr, $motor:ident => $body:expr) => {
         match $which {
             Motor::A($motor) => $body,
+            Motor::Energy($motor) => $body,
         }
     };
 }
@@ -119,10 +126,19 @@ impl Plant {
     /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
         error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
-        let machine = Machine::new(&settings.machine, &settings.saliency)?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
+        let motor = match &settings.iron {
+            None => {
+                let machine = Machine::new(&settings.machine, &settings.saliency)?;
+                Motor::A(MotorModel::new(machine, mechanics))
+            }
+            Some(iron) => {
+                let machine = EnergyMachine::new(&settings.machine, iron)?;
+                Motor::Energy(Box::new(MotorModel::new(machine, mechanics)))
+            }
+        };
         Ok(Self {
-            motor: Motor::A(MotorModel::new(machine, mechanics)),
+            motor,
             around: Around {
                 inverter: Inverter::new(&settings.inverter)?,
                 sensors: Sensors::new(&settings.measurement)?,
@@ -164,6 +180,15 @@ impl Plant {
     pub fn model_a(&self) -> Option<&MotorModel<Machine>> {
         match &self.motor {
             Motor::A(motor) => Some(motor),
+            Motor::Energy(_) => None,
+        }
+    }
+
+    /// The motor, with its state, where it is the energy model.
+    pub fn energy_model(&self) -> Option<&MotorModel<EnergyMachine>> {
+        match &self.motor {
+            Motor::A(_) => None,
+            Motor::Energy(motor) => Some(motor),
         }
     }
 
@@ -247,17 +272,26 @@ impl Plant {
         Ok(())
     }
 
-    /// Changes the parameters of the machine and keeps its state (a warmer rotor, for example).
+    /// Changes the resistances of stator and rotor, ohm (a warmer motor), and keeps all else.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
+        whichever!(&mut self.motor, motor => motor.machine.set_resistances(rs, rr))
+    }
+
+    /// Changes the assumed saliency of model A and keeps the state; without effect on the energy model,
+    /// whose saliency is that of its iron.
     ///
     /// # Errors
     /// As [`Machine::new`].
-    pub fn set_machine(
+    pub fn set_saliency(
         &mut self,
         machine: &MachineSettings,
         saliency: &SaliencySettings,
     ) -> Result<(), PlantError> {
-        match &mut self.motor {
-            Motor::A(motor) => motor.machine = Machine::new(machine, saliency)?,
+        if let Motor::A(motor) = &mut self.motor {
+            motor.machine = Machine::new(machine, saliency)?;
         }
         Ok(())
     }

@@ -57,6 +57,19 @@ impl Default for MachineSettings {
     }
 }
 
+impl MachineSettings {
+    /// Refuses what is outside its range.
+    pub(crate) fn check(&self) -> Result<(), PlantError> {
+        check("machine.rs", self.rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", self.rr, 1e-4..=1000.0, "ohm")?;
+        check("machine.lls", self.lls, 1e-7..=10.0, "H")?;
+        check("machine.llr", self.llr, 1e-7..=10.0, "H")?;
+        check("machine.lm", self.lm, 1e-5..=100.0, "H")?;
+        check("machine.pole_pairs", f64::from(self.pole_pairs), 1.0..=50.0, "")?;
+        Ok(())
+    }
+}
+
 /// Size of the saliency. The defaults are assumed; all zero (with any `psi_n`) is the textbook
 /// machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -156,12 +169,7 @@ impl Machine {
     /// # Errors
     /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
-        check("machine.rs", m.rs, 1e-4..=1000.0, "ohm")?;
-        check("machine.rr", m.rr, 1e-4..=1000.0, "ohm")?;
-        check("machine.lls", m.lls, 1e-7..=10.0, "H")?;
-        check("machine.llr", m.llr, 1e-7..=10.0, "H")?;
-        check("machine.lm", m.lm, 1e-5..=100.0, "H")?;
-        check("machine.pole_pairs", f64::from(m.pole_pairs), 1.0..=50.0, "")?;
+        m.check()?;
         check("saliency.a_psi", s.a_psi, -0.25..=0.25, "")?;
         check("saliency.hold_a", s.hold_a, 0.01..=10_000.0, "A")?;
         check("saliency.b1", s.b1, -50.0..=50.0, "1/A")?;
@@ -191,6 +199,21 @@ impl Machine {
             psi_n_squared: psi_n * psi_n,
             half_chi_r: 0.5 * s.chi * m.rr * coupling * coupling,
         })
+    }
+
+    /// Changes the resistances and keeps all else.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
+        check("machine.rs", rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
+        let coupling = self.coupling;
+        self.half_chi_r *= rr / (self.alpha * self.lr);
+        self.alpha = rr / self.lr;
+        self.rr_coupling = rr * coupling;
+        self.r_prime = rs + rr * coupling * coupling;
+        Ok(())
     }
 
     /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A).
