@@ -32,6 +32,7 @@ mod plant_identification;
 mod position;
 mod profile;
 mod reversal;
+pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
 mod speed_profile;
@@ -208,6 +209,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    saliency::EXPERIMENT,
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
