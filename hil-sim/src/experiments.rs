@@ -21,6 +21,7 @@ pub mod learning;
 mod linear_model;
 mod lock_monitor;
 mod machines;
+pub mod measured_motors;
 mod modulation;
 mod monte_carlo;
 mod motor_tests;
@@ -234,6 +235,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_machine::EXPERIMENT,
     motor_tests::EXPERIMENT,
     online_tracking::EXPERIMENT,
+    measured_motors::EXPERIMENT,
 ];
 
 /// The experiments that need an input file; they are no part of the report.

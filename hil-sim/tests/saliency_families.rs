@@ -59,7 +59,7 @@ fn main_flux_alone() {
             ("motor.l_lr", "0.01104"),
             ("iron.saturation", factor),
         ];
-        close(at_rest(&set, 0.7).0, printed, PRINTED, &format!("small leakages, {factor}"));
+        close(at_rest(&set, 0.7).0, printed, 0.015, &format!("small leakages, {factor}"));
     }
 }
 

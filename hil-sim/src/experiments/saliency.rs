@@ -1,6 +1,6 @@
 //! The saliency that a motor shows at 600 Hz, over torque current and angle error: what an injection drive can see.
 
-mod steady;
+pub(super) mod steady;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
