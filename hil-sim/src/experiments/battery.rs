@@ -24,7 +24,7 @@ use drive_core::settings::AngleSource;
 use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::Config;
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::Outcome;
 
@@ -65,7 +65,7 @@ impl Battery {
         let tracks = settings.angle_source == AngleSource::Injection
             && settings.injection.demodulator == DemodulatorKind::Synchronous;
         let drive = match config.prepare.learn && tracks {
-            true => learned(config, drive, self.seed)?,
+            true => learned(config, &plant_settings(config), drive, self.seed)?,
             false => Ok(drive),
         };
         // Two threads that came at once found the same.
@@ -89,7 +89,7 @@ impl Study for Battery {
     fn run(&self, number: usize) -> Result<Trial, Error> {
         let (kind, seed) = (KINDS[number % KINDS.len()], seed_of(self.seed, number));
         match self.drive()? {
-            Ok(drive) => trial(&self.config, drive, kind, seed),
+            Ok(drive) => trial(&self.config, &plant_settings(&self.config), drive, kind, seed),
             Err(fault) => Ok(Trial::refused(kind, seed, *fault)),
         }
     }

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::drive::{Condition, DriveUnderTest, Purpose};
 use super::kind::{Kind, Part, Shaft};
-use crate::config::{Config, plant_settings};
+use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::torque::LOST_DEG;
-use crate::plant::{Load, Plant};
+use crate::plant::{Load, Plant, PlantSettings};
 use crate::rig::{RATE_HZ, wrapped_degrees};
 use crate::stats::Stats;
 
@@ -148,8 +148,14 @@ struct Bench<D> {
 }
 
 impl<D: DriveUnderTest> Bench<D> {
-    fn new(config: &Config, drive: &D, load: Load, seed: u64) -> Result<Self, Error> {
-        let mut settings = plant_settings(config);
+    fn new(
+        config: &Config,
+        plant: &PlantSettings,
+        drive: &D,
+        load: Load,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let mut settings = *plant;
         settings.mechanics.load = load;
         Ok(Self {
             plant: Plant::new(&settings, seed).map_err(Error::refused)?,
@@ -219,10 +225,11 @@ impl<D: DriveUnderTest> Bench<D> {
 /// When the plant is refused, or the drive neither learns nor says why.
 pub fn learned<D: DriveUnderTest>(
     config: &Config,
+    plant: &PlantSettings,
     drive: D,
     seed: u64,
 ) -> Result<Result<D, u8>, Error> {
-    let mut bench = Bench::new(config, &drive, Load::Locked, seed)?;
+    let mut bench = Bench::new(config, plant, &drive, Load::Locked, seed)?;
     let refused = |why| Error::Refused(format!("the drive does not learn: {why}"));
     bench.drive.start(Purpose::Learning).map_err(refused)?;
     match bench.wait(LONGEST_LEARNING_S) {
@@ -234,12 +241,13 @@ pub fn learned<D: DriveUnderTest>(
     }
 }
 
-/// Does one run with a copy of a drive that is off.
+/// Does one run with a copy of a drive that is off. The configuration scales currents, speeds and torques.
 ///
 /// # Errors
 /// When the plant is refused, or the drive refuses a command.
 pub fn trial<D: DriveUnderTest>(
     config: &Config,
+    plant: &PlantSettings,
     drive: &D,
     kind: Kind,
     seed: u64,
@@ -252,7 +260,7 @@ pub fn trial<D: DriveUnderTest>(
         Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Purpose::Torque),
         Shaft::Free => (Load::Free { torque: 0.0 }, Purpose::Speed),
     };
-    let mut bench = Bench::new(config, drive, load, seed)?;
+    let mut bench = Bench::new(config, plant, drive, load, seed)?;
     bench.drive.start(purpose).map_err(Error::Refused)?;
     match bench.wait(LONGEST_START_S) {
         Condition::Regulating => {}

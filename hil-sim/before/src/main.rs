@@ -1,0 +1,1 @@
+fn main() { let _ = drive_before::Settings::default(); }
