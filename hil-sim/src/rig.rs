@@ -180,9 +180,7 @@ impl Rig {
             let phi = self.plant.rotor_flux_angle();
             self.step();
             let telemetry = self.drive.telemetry();
-            let rpm = |step: f32| {
-                f64::from(step) * RATE_HZ * 60.0 / self.plant.motor().machine.pole_pairs()
-            };
+            let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
             point.iq_ref = telemetry.reference.q.into();
             point.id = telemetry.current.d.into();
             point.iq = telemetry.current.q.into();
@@ -246,7 +244,7 @@ impl Rig {
         Point {
             t: self.time(),
             torque: plant.torque(),
-            torque_per_flux_ampere: plant.motor().machine.torque_factor(),
+            torque_per_flux_ampere: plant.torque_factor(),
             flux: plant.rotor_flux().norm(),
             current: plant.current().norm(),
             speed_rpm: plant.mechanical_speed() * 60.0 / TAU,

@@ -6,7 +6,7 @@
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
-use crate::machine::MachineState;
+use crate::model::{ElectricalState as _, MachineModel};
 
 /// Current, A, beyond which the sign of a phase current counts fully.
 const KINK: f64 = 0.020;
@@ -44,18 +44,18 @@ impl Averaged {
 
     /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
     #[inline]
-    pub(crate) fn step(&self, motor: &mut MotorModel, h: f64) -> Complex {
+    pub(crate) fn step<M: MachineModel>(&self, motor: &mut MotorModel<M>, h: f64) -> Complex {
         let mut rest = h;
         let mut volt_seconds = Complex::ZERO;
         loop {
             let machine = &motor.machine;
-            let rates = |x: &MachineState, w| {
-                let v = self.voltage(x.i);
+            let rates = |x: &M::State, w| {
+                let v = self.voltage(x.current());
                 (machine.derivative(x, v, w), v)
             };
             let x = &motor.state.electrical;
-            let first = rates(x, machine.pole_pairs * motor.state.speed);
-            let part = match until_kink(x.i, first.0.i, rest) {
+            let first = rates(x, machine.pole_pairs() * motor.state.speed);
+            let part = match until_kink(x.current(), first.0.current(), rest) {
                 None => rest,
                 Some(time) => time.max(SHORTEST * h).min(rest),
             };
