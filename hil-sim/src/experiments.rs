@@ -33,6 +33,7 @@ mod plant_identification;
 mod position;
 mod profile;
 mod reversal;
+pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
 mod speed_profile;
@@ -161,7 +162,18 @@ impl Experiment {
 }
 
 /// Keys of the simulated motor, inverter and sensors.
-pub const BENCH: &[&str] = &["motor.", "saliency.", "inverter.", "measurement."];
+pub const BENCH: &[&str] = &[
+    "motor.",
+    "saliency.",
+    "plant",
+    "flux_level",
+    "iron.",
+    "warming.",
+    "inverter.",
+    "dc_link.",
+    "measurement.",
+    "shaft.",
+];
 /// Keys of the drive.
 pub const DRIVE: &[&str] = &[
     "drive.",
@@ -180,13 +192,13 @@ pub const DRIVE: &[&str] = &[
 pub const SPEED_LOOP: &[&str] =
     &["speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.phase_margin_deg", "drive.motor.inertia"];
 /// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
-pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction"];
+pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
 /// Keys of the tracking of the saliency, which a drive with an encoder does not use.
 pub const TRACKING: &[&str] =
     &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
 /// Keys that do nothing while the shaft is locked.
 pub const TURNING: &[&str] =
-    &["motor.inertia", "motor.friction", "motor.pole_pairs", "drive.motor.pole_pairs"];
+    &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
@@ -201,6 +213,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    saliency::EXPERIMENT,
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,

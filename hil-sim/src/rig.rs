@@ -97,10 +97,12 @@ impl Rig {
     /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`] and [`Rig::learn`].
+    /// As [`Rig::new`], [`Rig::learn`] and [`config::check_model`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
+        config::check_model(config)?;
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
+        rig.plant.set_open_phase(config::open_phase(config)).map_err(Error::refused)?;
         let injecting = config.drive.angle_source == AngleSource::Injection;
         let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
         if config.prepare.learn && injecting && tracks {

@@ -8,15 +8,10 @@
 use crate::complex::{Complex, clarke, dot, phases};
 use crate::integrate::{MotorModel, MotorState};
 use crate::model::{ElectricalState as _, MachineModel};
+use crate::open_phase::{LINES, OpenPhase};
 
 /// Current below which a phase counts as without, A.
 const NO_CURRENT: f64 = 1e-9;
-/// Unit vectors along which the current lies while phase a, b or c floats.
-const LINES: [Complex; 3] = [
-    Complex::new(0.0, 1.0),
-    Complex::new(0.866_025_403_784_438_6, 0.5),
-    Complex::new(0.866_025_403_784_438_6, -0.5),
-];
 /// Most changes of conduction followed within one step; more do not occur in a passive circuit but
 /// through rounding.
 const CHANGES: usize = 8;
@@ -26,11 +21,22 @@ const CHANGES: usize = 8;
 type Conduction = [i8; 3];
 
 /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
-pub(crate) fn step<M: MachineModel>(motor: &mut MotorModel<M>, vdc: f64, h: f64) -> Complex {
+pub(crate) fn step<M: MachineModel>(
+    motor: &mut MotorModel<M>,
+    vdc: f64,
+    open: Option<OpenPhase>,
+    h: f64,
+) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
     // Phases that began to conduct and were found not to: they float for the rest of the step.
     let mut blocked = [false; 3];
+    if let Some(open) = open {
+        blocked[open.0] = true;
+        if phases(motor.state.electrical.current())[open.0] != 0.0 {
+            open.confine(motor);
+        }
+    }
     for _ in 0..CHANGES {
         let conduction = conduction(motor, vdc, blocked);
         let (next, v) = advanced(motor, conduction, vdc, rest);

@@ -45,7 +45,22 @@ impl<M: MachineModel> MotorModel<M> {
 
     /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
+        self.begin_step();
         self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
+        self.end_step(h);
+    }
+
+    /// Fixes the torques on the shaft for an integration step.
+    #[inline]
+    pub(crate) fn begin_step(&mut self) {
+        let torque = self.machine.torque(&self.state.electrical);
+        self.state.speed = self.mechanics.begin(self.state.angle, self.state.speed, torque);
+    }
+
+    /// Ends an integration step of `h` seconds.
+    #[inline]
+    pub(crate) fn end_step(&mut self, h: f64) {
+        self.mechanics.end(self.state.angle, self.state.speed, h);
     }
 
     /// The state after `h` seconds, and the mean terminal voltage. `rates` gives the derivative of

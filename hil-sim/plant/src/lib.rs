@@ -22,6 +22,7 @@
 
 mod averaged;
 mod complex;
+mod dc_link;
 mod encoder;
 mod energy;
 mod error;
@@ -31,17 +32,22 @@ mod inverter;
 mod machine;
 mod mechanics;
 mod model;
+mod open_phase;
 mod period;
 mod sensors;
 mod switched;
+mod warming;
 
+use dc_link::DcLink;
 use drive_core::{Compare, Hardware, Sample};
+use open_phase::OpenPhase;
 use period::Around;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 pub use complex::{Complex, clarke, phases};
+pub use dc_link::DcLinkSettings;
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
 pub use energy::{EnergyMachine, EnergyState, FAMILIES, Family, IronSettings};
 pub use error::PlantError;
@@ -51,6 +57,7 @@ pub use machine::{Machine, MachineSettings, MachineState, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
 pub use model::{ElectricalState, MachineModel};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
+pub use warming::WarmingSettings;
 
 /// Settings of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +71,10 @@ pub struct PlantSettings {
     pub iron: Option<IronSettings>,
     /// The shaft and its load.
     pub mechanics: MechanicsSettings,
+    /// Warming of the resistances.
+    pub warming: WarmingSettings,
+    /// The dc link.
+    pub dc_link: DcLinkSettings,
     /// The inverter.
     pub inverter: InverterSettings,
     /// The current sensors and the converter.
@@ -82,6 +93,8 @@ impl Default for PlantSettings {
             saliency: SaliencySettings::default(),
             iron: None,
             mechanics: MechanicsSettings::default(),
+            warming: WarmingSettings::default(),
+            dc_link: DcLinkSettings::default(),
             inverter: InverterSettings::default(),
             measurement: MeasurementSettings::default(),
             encoder: EncoderSettings::default(),
@@ -107,11 +120,27 @@ macro_rules! whichever {
     };
 }
 
+/// Resistances that follow time.
+#[derive(Clone, Copy, Debug)]
+struct Warming {
+    law: WarmingSettings,
+    cold: (f64, f64),
+}
+
+/// Periods between two changes of the resistances by warming.
+const WARMING_PERIODS: u64 = 64;
+
 /// The plant.
 #[derive(Clone, Debug)]
 pub struct Plant {
     motor: Motor,
     around: Around,
+    dc_link: DcLink,
+    /// None where the resistances are constant.
+    warming: Option<Warming>,
+    periods: u64,
+    /// Whether anything changes once a period.
+    moves: bool,
     encoder: Encoder,
     rng: Xoshiro256PlusPlus,
     applied: Complex,
@@ -126,6 +155,7 @@ impl Plant {
     /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
         error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
+        settings.warming.check()?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
         let motor = match &settings.iron {
             None => {
@@ -143,7 +173,17 @@ impl Plant {
                 inverter: Inverter::new(&settings.inverter)?,
                 sensors: Sensors::new(&settings.measurement)?,
                 substeps: settings.substeps,
+                open: None,
             },
+            dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
+            warming: settings.warming.factors(1.0).map(|_| Warming {
+                law: settings.warming,
+                cold: (settings.machine.rs, settings.machine.rr),
+            }),
+            periods: 0,
+            moves: settings.dc_link.moves()
+                || settings.warming.factors(1.0).is_some()
+                || settings.measurement.dc_lag_us > 0.0,
             encoder: Encoder::new(&settings.encoder)?,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
             applied: Complex::ZERO,
@@ -159,7 +199,7 @@ impl Plant {
         Sample {
             current_a,
             current_b,
-            dc_link: self.around.sensors.dc_link(self.around.inverter.vdc),
+            dc_link: self.around.sensors.dc_link(self.around.inverter.vdc, &mut self.rng),
             heat_sink: self.around.sensors.heat_sink(),
             encoder: self.encoder.count(),
             hardware: std::mem::take(&mut self.hardware),
@@ -174,6 +214,28 @@ impl Plant {
             whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
         self.applied = volt_seconds / period_s;
         self.encoder.follow(self.mechanical_angle());
+        if self.moves {
+            self.slow(period_s);
+        }
+    }
+
+    /// What changes once a period: the dc link and its sensor, and the resistances.
+    fn slow(&mut self, period_s: f64) {
+        let around = &mut self.around;
+        if self.dc_link.moves() {
+            let i = whichever!(&self.motor, motor => motor.state.electrical.current());
+            let taken = 1.5 * (i.conj() * self.applied).re * period_s;
+            around.inverter.vdc = self.dc_link.after(around.inverter.vdc, taken, period_s);
+        }
+        around.sensors.follow_dc_link(around.inverter.vdc, period_s);
+        self.periods += 1;
+        if let Some(Warming { law, cold }) = self.warming
+            && self.periods.is_multiple_of(WARMING_PERIODS)
+            && let Some((rs, rr)) = law.factors(self.periods as f64 * period_s)
+        {
+            // Within the ranges of the settings at every time, which `new` has checked at both ends.
+            let _ = self.set_resistances(cold.0 * rs, cold.1 * rr);
+        }
     }
 
     /// The motor, with its state, where it is model A: machine, shaft and their state.
@@ -252,12 +314,14 @@ impl Plant {
         self.around.inverter.vdc
     }
 
-    /// Changes the dc-link voltage, V.
+    /// Changes the dc-link voltage, V; behind a rectifier, the voltage now and the peak of the rectified mains.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
-        self.around.inverter.set_dc_link(vdc)
+        self.around.inverter.set_dc_link(vdc)?;
+        self.dc_link.nominal = vdc;
+        Ok(())
     }
 
     /// Couples another load. A held speed holds at once; a free shaft continues from there.
@@ -308,6 +372,18 @@ impl Plant {
     /// Sets the fault of a current channel.
     pub fn set_current_fault(&mut self, channel: Channel, fault: CurrentFault) {
         self.around.sensors.set_fault(channel, fault);
+    }
+
+    /// Interrupts a phase between inverter and motor, 0 to 2, at once, or connects all.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] for another number.
+    pub fn set_open_phase(&mut self, phase: Option<usize>) -> Result<(), PlantError> {
+        if let Some(phase) = phase {
+            error::check("open phase", phase as f64, 0.0..=2.0, "")?;
+        }
+        self.around.open = phase.map(OpenPhase);
+        Ok(())
     }
 
     /// Sets the fault of the encoder.

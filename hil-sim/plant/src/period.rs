@@ -6,6 +6,7 @@ use crate::complex::Complex;
 use crate::integrate::MotorModel;
 use crate::inverter::Inverter;
 use crate::model::{ElectricalState as _, MachineModel};
+use crate::open_phase::OpenPhase;
 use crate::sensors::Sensors;
 use crate::{freewheel, switched};
 
@@ -18,6 +19,7 @@ pub(crate) struct Around {
     pub inverter: Inverter,
     pub sensors: Sensors,
     pub substeps: u32,
+    pub open: Option<OpenPhase>,
 }
 
 impl Around {
@@ -50,10 +52,15 @@ impl Around {
         let averaged = self.inverter.averaged(compare, period);
         let h = period / f64::from(self.substeps);
         let mut volt_seconds = Complex::ZERO;
-        for _ in 0..self.substeps {
+        for n in 1..=self.substeps {
             let before = motor.state.electrical.current();
-            volt_seconds += averaged.step(motor, h);
+            motor.begin_step();
+            volt_seconds += averaged.step(motor, self.open, h);
+            motor.end_step(h);
             self.sensors.follow(before, motor.state.electrical.current(), h);
+            if 2 * n == self.substeps {
+                self.sensors.hold_middle();
+            }
         }
         volt_seconds
     }
@@ -71,16 +78,24 @@ impl Around {
             let steps = (duration / longest).ceil().max(1.0);
             let h = duration / steps;
             for _ in 0..steps as u32 {
-                let (machine, inverter) = (&motor.machine, &self.inverter);
+                motor.begin_step();
+                let (machine, inverter, open) = (&motor.machine, &self.inverter, self.open);
                 let i = motor.state.electrical.current();
                 let legs = switched::leg_voltages(levels, i, inverter.vdc);
                 let (state, v) = motor.stepped(h, |x, w| {
                     let v = inverter.dropped(legs, x.current());
-                    (machine.derivative(x, v, w), v)
+                    match open {
+                        None => (machine.derivative(x, v, w), v),
+                        Some(open) => open.rates(machine, x, v, w),
+                    }
                 });
                 volt_seconds += v * h;
-                self.sensors.follow(i, state.electrical.current(), h);
                 motor.state = state;
+                if let Some(open) = open {
+                    open.confine(motor);
+                }
+                motor.end_step(h);
+                self.sensors.follow(i, motor.state.electrical.current(), h);
             }
         }
         volt_seconds
@@ -92,7 +107,9 @@ impl Around {
         let mut volt_seconds = Complex::ZERO;
         for _ in 0..substeps {
             let before = motor.state.electrical.current();
-            volt_seconds += freewheel::step(motor, self.inverter.vdc, h);
+            motor.begin_step();
+            volt_seconds += freewheel::step(motor, self.inverter.vdc, self.open, h);
+            motor.end_step(h);
             self.sensors.follow(before, motor.state.electrical.current(), h);
         }
         volt_seconds

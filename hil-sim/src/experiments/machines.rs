@@ -8,8 +8,7 @@ use super::statistics::{Study, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::Config;
-use crate::config::plant_settings;
+use crate::config::{Config, PlantModel, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 
@@ -106,8 +105,10 @@ fn drawn(config: &Config, seed: u64) -> Config {
     m.l_m *= factor();
     m.l_ls *= leakage;
     m.l_lr *= leakage;
-    drawn.saliency.a_psi = saliency.a_psi * factor();
-    drawn.saliency.b1 = Some(saliency.b1 * factor());
+    if config.model.plant == PlantModel::A {
+        drawn.saliency.a_psi = saliency.a_psi * factor();
+        drawn.saliency.b1 = Some(saliency.b1 * factor());
+    }
     let (m, drive) = (&drawn.motor, &mut drawn.drive.motor);
     (drive.r_s, drive.r_r) = (m.r_s as f32, m.r_r as f32);
     (drive.l_ls, drive.l_lr, drive.l_m) = (m.l_ls as f32, m.l_lr as f32, m.l_m as f32);

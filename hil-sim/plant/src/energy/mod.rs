@@ -121,6 +121,16 @@ impl EnergyMachine {
         Ok(())
     }
 
+    /// Whether the bars have a bottom of their own.
+    pub fn has_skin_effect(&self) -> bool {
+        self.inverse_bar != 0.0
+    }
+
+    /// Whether the iron has losses.
+    pub fn has_iron_loss(&self) -> bool {
+        self.eddy_rate != 0.0
+    }
+
     /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A), at the nominal flux.
     pub fn torque_factor(&self) -> f64 {
         1.5 * self.pole_pairs * self.lm / self.lr

@@ -21,6 +21,11 @@ pub struct EnergyState {
 }
 
 impl EnergyState {
+    /// With these fluxes, Wb, in the order of the fields. [`EnergyMachine`](super::EnergyMachine) settles its currents.
+    pub fn of_fluxes([psi_s, psi_r, psi_deep, psi_iron]: [Complex; 4]) -> Self {
+        Self { psi_s, psi_r, psi_deep, psi_iron, ..Self::default() }
+    }
+
     /// Main flux, Wb.
     pub fn main_flux(&self) -> Complex {
         self.solution.m
