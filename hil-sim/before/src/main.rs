@@ -7,7 +7,7 @@ mod drive;
 use anyhow::{Result, ensure};
 use hil_sim::Config;
 use hil_sim::config::plant_settings;
-use hil_sim::experiments::battery::{KINDS, RUNS, Summary, Trial, learned, seed_of, trial};
+use hil_sim::experiments::battery::{Summary, Trial, learned, seed_of, trial};
 use rayon::prelude::*;
 
 use cases::{CASES, Case};
@@ -20,13 +20,12 @@ const HEAD: &str = include_str!("head.md");
 
 fn main() -> Result<()> {
     let only = std::env::args().nth(1).unwrap_or_default();
-    let config = Config::default();
     println!("{}", HEAD.trim_end());
     println!("\n| finding | plant, tables of the drive | study, on its plants | here |");
     println!("|---|---|---|---|");
     let mut failed = Vec::new();
     for case in CASES.iter().filter(|case| case.name.contains(&only)) {
-        let summary = run(case, &config)?;
+        let summary = run(case)?;
         let Case { finding, name, study, .. } = case;
         println!("| {finding} | {name} | {study} | {} |", text(&summary));
         if !(case.holds)(&summary) {
@@ -37,22 +36,24 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn run(case: &Case, config: &Config) -> Result<Summary> {
-    let mut plant = case.plant(&plant_settings(config))?;
-    let mut drive = Ok(Before::new(config)?);
+fn run(case: &Case) -> Result<Summary> {
+    let mut set: Vec<String> = case.set.iter().map(|&set| set.to_owned()).collect();
+    let config = Config::load(None, None, &set)?;
+    let mut plant = plant_settings(&config);
+    let mut drive = Ok(Before::new(&config)?);
     if let (Some(after), Ok(unlearned)) = (case.learned, &drive) {
-        drive = learned(config, &plant, unlearned.clone(), SEED)?;
-        after(&mut plant);
+        drive = learned(&config, &plant, unlearned.clone(), SEED)?;
+        set.extend(after.iter().map(|&set| set.to_owned()));
+        plant = plant_settings(&Config::load(None, None, &set)?);
     }
-    let kinds = if case.kinds.is_empty() { &KINDS[..] } else { case.kinds };
     let one = |number: usize| {
-        let (kind, seed) = (kinds[number % kinds.len()], seed_of(SEED, number));
+        let (kind, seed) = (case.kinds[number % case.kinds.len()], seed_of(SEED, number));
         match &drive {
-            Ok(drive) => trial(config, &plant, drive, kind, seed),
+            Ok(drive) => trial(&config, &plant, drive, kind, seed),
             Err(fault) => Ok(Trial::refused(kind, seed, *fault)),
         }
     };
-    let trials: Vec<Trial> = (0..RUNS).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let trials: Vec<Trial> = (0..case.runs).into_par_iter().map(one).collect::<Result<_, _>>()?;
     Ok(Summary::of(&trials))
 }
 

@@ -18,6 +18,9 @@ pub enum Kind {
     Speed(i16),
     /// Speed regulated, a step of 0.4 Nm on a free shaft.
     Load,
+    /// Torque current near its largest for six seconds, shaft locked. Not one of the battery: there it would need a
+    /// motor whose flux collapses.
+    Hold,
 }
 
 /// The kinds in the order of the runs.
@@ -83,13 +86,16 @@ impl Kind {
             Self::Ramp => "torque ramp".to_owned(),
             Self::Speed(rpm) => format!("speed {rpm} rpm"),
             Self::Load => "load of 0.4 Nm".to_owned(),
+            Self::Hold => "2.25 to 3 A at rest".to_owned(),
         }
     }
 
     /// The shaft.
     pub fn shaft(self) -> Shaft {
         match self {
-            Self::Constant(0) | Self::Steps | Self::Reversals | Self::Ramp => Shaft::Locked,
+            Self::Constant(0) | Self::Steps | Self::Reversals | Self::Ramp | Self::Hold => {
+                Shaft::Locked
+            }
             Self::Constant(rpm) => Shaft::Held(rpm.into()),
             Self::Speed(_) | Self::Load => Shaft::Free,
         }
@@ -101,6 +107,9 @@ impl Kind {
         match self {
             Self::Constant(_) => {
                 vec![Part::constant(sign * random.random_range(LEAST_A..=MOST_A), 3.0)]
+            }
+            Self::Hold => {
+                vec![Part::constant(sign * random.random_range(0.75..=1.0) * MOST_A, 6.0)]
             }
             Self::Steps => std::iter::repeat_with(|| {
                 Part::constant(random.random_range(-MOST_A..=MOST_A), LEVEL_S)
