@@ -2,6 +2,7 @@
 
 mod cli_common;
 
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
@@ -226,9 +227,16 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
     let folder = folder("shards-recipe");
     let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shards.sh");
+    // Two machines behind a secure shell that notes the machine and stays here.
+    let shell = folder.join("ssh");
+    let text_of_shell =
+        "#!/bin/sh\necho $1 >> hosts; shift; [ $1 = -- ] && shift; exec sh -c \"$*\"\n";
+    std::fs::write(&shell, text_of_shell).unwrap();
+    std::fs::set_permissions(&shell, std::fs::Permissions::from_mode(0o755)).unwrap();
     let recipe = |path: Option<&Path>, place: &str| {
         let mut command = Command::new("/bin/sh");
         command.current_dir(&folder).env("SIM", env!("CARGO_BIN_EXE_hil-sim"));
+        command.env("HOSTS", "1/alpha,1/beta").env("PARALLEL_SSH", &shell);
         path.map(|path| command.env("PATH", path));
         command.arg(&script).args(["3", place]).args(&MONTE_CARLO[1..6]);
         let output = command.output().expect("a shell");
@@ -238,6 +246,8 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
     let has_parallel = Command::new("parallel").arg("--version").output().is_ok();
     if has_parallel {
         assert_eq!(recipe(None, "with-parallel"), whole);
+        let hosts = std::fs::read_to_string(folder.join("hosts")).unwrap();
+        assert!(hosts.contains("alpha") && hosts.contains("beta"), "{hosts}");
         // Again: all runs are there.
         assert_eq!(recipe(None, "with-parallel"), whole);
     }

@@ -24,7 +24,7 @@ use drive_core::settings::AngleSource;
 use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, plant_settings};
+use crate::config::{Config, check_model, plant_settings};
 use crate::error::Error;
 use crate::outcome::Outcome;
 
@@ -78,6 +78,7 @@ impl Study for Battery {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
+        check_model(context.config)?;
         let (config, drive) = (context.config.clone(), OnceLock::new());
         Ok(Self { config, seed: context.seed, drive })
     }

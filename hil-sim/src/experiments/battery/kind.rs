@@ -10,7 +10,7 @@ pub enum Kind {
     Constant(i16),
     /// A torque current drawn anew every half second, shaft locked.
     Steps,
-    /// Torque current of 3 A, reversed every half second, shaft locked.
+    /// Torque current of 3 A, reversed every second, shaft locked.
     Reversals,
     /// Torque current from -3 A to 3 A, or back, in three seconds, shaft locked.
     Ramp,
@@ -116,8 +116,8 @@ impl Kind {
             })
             .take(6)
             .collect(),
-            Self::Reversals => (0..6)
-                .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, LEVEL_S))
+            Self::Reversals => (0..4)
+                .map(|n| Part::constant(if n % 2 == 0 { sign } else { -sign } * MOST_A, 1.0))
                 .collect(),
             Self::Ramp => {
                 let ramp = (-sign * MOST_A, sign * MOST_A);

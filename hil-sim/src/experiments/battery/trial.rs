@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::drive::{Condition, DriveUnderTest, Purpose};
 use super::kind::{Kind, Part, Shaft};
-use crate::config::Config;
+use crate::config::{Config, open_phase};
 use crate::error::Error;
 use crate::experiments::torque::LOST_DEG;
 use crate::plant::{Load, Plant, PlantSettings};
@@ -157,12 +157,14 @@ impl<D: DriveUnderTest> Bench<D> {
     ) -> Result<Self, Error> {
         let mut settings = *plant;
         settings.mechanics.load = load;
+        let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
+        plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
         Ok(Self {
-            plant: Plant::new(&settings, seed).map_err(Error::refused)?,
+            plant,
             drive: drive.clone(),
             pending: Compare::OFF,
             periods: 0,
-            nominal_flux: config.motor.l_m * f64::from(config.drive.i_d()),
+            nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
             counted_from: None,
             counts: vec![0; (180.0 * CLASSES_PER_DEG) as usize + 1],
             wrong: Lasting::default(),
