@@ -3,9 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use hil_sim::plant::{
-    Complex, EncoderSettings, InverterSettings, Load, Machine, MachineModel, MachineSettings,
-    MachineState, MeasurementSettings, Mechanics, MechanicsSettings, MotorModel, Plant,
-    PlantSettings, SaliencySettings,
+    Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
+    MechanicsSettings, MotorModel, Plant, PlantSettings, SaliencySettings,
 };
 
 const FREQUENCY: f64 = 600.0;
