@@ -1,6 +1,7 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
 mod before;
+mod bench;
 mod board;
 mod budget;
 mod control;
@@ -43,6 +44,8 @@ enum Task {
     Flash(Which),
     /// Builds the images and tests them on the virtual board
     Board,
+    /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
+    BenchDump(Which),
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
     /// the worst path, and above 2500 to the last compare value
     Cycles,
@@ -130,6 +133,7 @@ fn run(task: Task) -> Result<()> {
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
+        Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Campaign { count, seed, class, which } => {
             board::campaign(&which.image()?, &which.board, count, seed, &class)

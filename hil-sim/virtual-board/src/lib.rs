@@ -24,6 +24,7 @@ pub mod cost;
 pub mod cpu;
 pub mod cycles;
 pub mod debugger;
+pub mod dump;
 pub mod image;
 pub mod interactive;
 pub mod log;
