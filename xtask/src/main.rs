@@ -5,6 +5,7 @@ mod budget;
 mod control;
 mod documents;
 mod elf;
+mod foreign;
 mod fuzz;
 mod image;
 mod lines;
@@ -42,6 +43,8 @@ enum Task {
     Flash(Which),
     /// Builds the images and tests them on the virtual board
     Board,
+    /// Runs programs of others on the virtual board: examples of stm32g4xx-hal, and ours on embassy-stm32
+    Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
     /// the worst path, and above 2500 to the last compare value
     Cycles,
@@ -129,6 +132,7 @@ fn run(task: Task) -> Result<()> {
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
+        Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Campaign { count, seed, class, which } => {
             board::campaign(&which.image()?, &which.board, count, seed, &class)
