@@ -131,7 +131,8 @@ impl Options {
 pub fn become_board(options: &Options) -> Result<(), Error> {
     // Wrong options are reported before the builds, which take minutes.
     options.config()?;
-    let image = options.elf.is_none().then(|| build::image(options.verbose)).transpose()?;
+    let image =
+        options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
     let mut command = Command::new(build::virtual_board()?);
     command.args(std::env::args_os().skip_while(|argument| argument != "board").skip(1));
     if let Some(image) = image {

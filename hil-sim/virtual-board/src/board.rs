@@ -121,7 +121,7 @@ impl Board {
         };
         let chip = board.chip();
         if options.confirmed {
-            confirmed::save(options.power_stage.name, &mut chip.flash)?;
+            confirmed::save(&options, &mut chip.flash)?;
         }
         chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
         chip.look_at_gates();

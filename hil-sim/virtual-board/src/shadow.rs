@@ -33,7 +33,7 @@ impl Shadow {
     /// # Errors
     /// Its settings make no drive.
     pub fn new(options: &Options) -> Result<Self> {
-        let mut settings = confirmed::settings(options.power_stage.name)?;
+        let mut settings = confirmed::settings(options)?;
         if !options.confirmed {
             settings = FirmwareSettings::of(settings.board);
         }

@@ -47,7 +47,7 @@ fn run(mut options: Options) -> Result<()> {
     let config = options.config()?;
     let script = options.script.as_deref().map(Script::open).transpose()?;
     let script = script.map(|script| if options.lenient { script } else { script.strict() });
-    let image = image(options.elf.as_deref())?;
+    let image = image(stage, options.elf.as_deref())?;
     let pty = Pty::open()?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
@@ -89,10 +89,10 @@ fn run(mut options: Options) -> Result<()> {
     }
 }
 
-fn image(elf: Option<&Path>) -> Result<Image> {
+fn image(stage: &PowerStage, elf: Option<&Path>) -> Result<Image> {
     let image = match elf {
         Some(path) => Image::open(path),
-        None => Image::built(),
+        None => Image::built_for(stage.name),
     };
     image.map_err(|why| Error::Refused(format!("the firmware's ELF: {why:#}")).into())
 }

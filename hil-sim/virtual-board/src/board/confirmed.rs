@@ -1,4 +1,4 @@
-//! The flash of a board whose bench steps were done: the defaults of its firmware, with the confirmation, saved.
+//! The flash of a board whose bench steps were done: its settings, with the confirmation, saved.
 
 use anyhow::{Context, Result};
 use induction_drive::board::settings_address;
@@ -6,16 +6,18 @@ use induction_drive::boards;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec;
 
+use super::Options;
 use crate::memory::BANK_2;
 use crate::periph::flash::Flash;
 
-/// The defaults of a board's firmware, confirmed.
+/// The settings of a board, confirmed.
 ///
 /// # Errors
 /// The firmware has no such board.
-pub fn settings(name: &str) -> Result<FirmwareSettings> {
+pub fn settings(options: &Options) -> Result<FirmwareSettings> {
+    let name = options.power_stage.name;
     let board = boards::find(name).with_context(|| format!("the firmware has no board {name}"))?;
-    let mut settings = FirmwareSettings::of(board);
+    let mut settings = FirmwareSettings { drive: options.saved, ..FirmwareSettings::of(board) };
     settings.confirm_board();
     Ok(settings)
 }
@@ -24,8 +26,8 @@ pub fn settings(name: &str) -> Result<FirmwareSettings> {
 ///
 /// # Errors
 /// As [`settings`].
-pub fn save(name: &str, flash: &mut Flash) -> Result<()> {
-    let record = codec::record(&settings(name)?, 0);
+pub fn save(options: &Options, flash: &mut Flash) -> Result<()> {
+    let record = codec::record(&settings(options)?, 0);
     let (contents, torn) = flash.contents();
     let (mut contents, torn) = (contents.to_vec(), torn.to_vec());
     for (word, value) in record.iter().take(codec::length(&record)).enumerate() {

@@ -1,6 +1,8 @@
 //! Options of a board.
 
-use drive_core::settings::{Line, SETTINGS};
+use anyhow::{Context, Result, anyhow};
+use drive_core::Settings;
+use drive_core::settings::{Line, SETTINGS, find};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
@@ -18,6 +20,8 @@ pub struct Options {
     pub counting: Counting,
     /// Whether its bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
     pub confirmed: bool,
+    /// The drive's settings that are saved with the confirmation: by default those that the image starts with.
+    pub saved: Settings,
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
 }
@@ -82,6 +86,21 @@ impl Options {
         needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
     }
 
+    /// With the settings for a configuration saved, as if [`Options::set_lines_on`] were typed and saved before.
+    ///
+    /// # Errors
+    /// A line that the image would refuse.
+    pub fn set_up(mut self, config: &Config) -> Result<Self> {
+        for line in Self::set_lines_on(self.power_stage, config) {
+            let (name, value) = line.trim_start_matches("set ").split_once(' ').unwrap_or_default();
+            let entry = find(name).with_context(|| line.clone())?;
+            let value = entry.parse(value).map_err(|why| anyhow!("{line}: {why}"))?;
+            entry.set(&mut self.saved, value);
+        }
+        self.saved.check().map_err(|why| anyhow!("{why}"))?;
+        Ok(self)
+    }
+
     /// The reference board with the motor of a configuration.
     pub fn new(config: &Config, seed: u64) -> Self {
         Self::on(&power_stage::REFERENCE, config, seed)
@@ -95,6 +114,7 @@ impl Options {
             seed,
             counting: Counting { cycles: true, every_instruction: false },
             confirmed: true,
+            saved: power_stage.firmware_settings(),
             power_stage,
         }
     }

@@ -3,7 +3,8 @@
 use anyhow::Result;
 
 use super::Board;
-use crate::chip::CONTROL_INTERRUPT;
+use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
+use crate::image::Image;
 use crate::periph::Reset;
 
 impl Board {
@@ -48,6 +49,22 @@ impl Board {
         let now = self.chip().now;
         self.chip().flash.cut(now);
         self.reset(Reset::Power);
+    }
+
+    /// A programmer writes another image for some time, ms: it resets the chip and holds the core, so that nothing sets up
+    /// the pins; a reset ends it.
+    ///
+    /// # Errors
+    /// As of [`Board::run_ticks`].
+    pub fn flash(&mut self, image: &Image, ms: f64) -> Result<()> {
+        self.reset(Reset::Pin);
+        self.hang();
+        self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)?;
+        for segment in image.segments() {
+            self.cpu.write(segment.address, &segment.bytes);
+        }
+        self.reset(Reset::Pin);
+        Ok(())
     }
 
     /// Level of the break pin: low trips.

@@ -108,10 +108,7 @@ impl Scene {
     /// The board does not start.
     pub fn new(image: Image, stage: &'static PowerStage) -> Result<Self> {
         let config = stage.config()?;
-        let mut pair = Pair::new(image, Options::on(stage, &config, 1))?;
-        for line in Options::set_lines_on(stage, &config) {
-            pair.order(&line)?;
-        }
+        let mut pair = Pair::new(image, Options::on(stage, &config, 1).set_up(&config)?)?;
         pair.order("set wiring_checked yes")?;
         // Twice: both pages hold a set.
         for _ in 0..2 {
