@@ -7,6 +7,7 @@ mod budget;
 mod control;
 mod documents;
 mod elf;
+mod foreign;
 mod fuzz;
 mod image;
 mod lines;
@@ -46,6 +47,8 @@ enum Task {
     Board,
     /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
     BenchDump(Which),
+    /// Runs programs of others on the virtual board: examples of stm32g4xx-hal, and ours on embassy-stm32
+    Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
     /// the worst path, and above 2500 to the last compare value
     Cycles,
@@ -134,6 +137,7 @@ fn run(task: Task) -> Result<()> {
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
         Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
+        Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Campaign { count, seed, class, which } => {
             board::campaign(&which.image()?, &which.board, count, seed, &class)
