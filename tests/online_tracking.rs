@@ -105,7 +105,7 @@ fn over(profile: &Profile, speed_rpm: f64, r_r: f64, residual: f64) -> (Vec<f64>
         rig.run(0.01, |_| {});
     }
     let mut online = Online::new(&settings).unwrap();
-    let truth = rig.plant.motor().machine.tau_r();
+    let truth = rig.plant.tau_r();
     let error = |tau_r: f32| f64::from(tau_r) / truth - 1.0;
     let (mut errors, mut used, mut n) = (Vec::new(), settings.motor.tau_r(), 0_u32);
     for (seconds, i_q) in profile {

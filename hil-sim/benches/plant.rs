@@ -5,7 +5,10 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use drive_core::Compare;
-use hil_sim::plant::{Load, MeasurementSettings, Plant, PlantSettings, SaliencySettings};
+use hil_sim::plant::{
+    DcLinkSettings, FAMILIES, IronSettings, Load, MeasurementSettings, Plant, PlantSettings,
+    SaliencySettings, WarmingSettings,
+};
 
 const PERIOD: f64 = 1.0 / 6000.0;
 
@@ -56,6 +59,38 @@ fn plant(c: &mut Criterion) {
     let mut switched = usual;
     switched.inverter.switched = true;
     period(c, "switched", &switched);
+    for family in FAMILIES {
+        let settings = PlantSettings { iron: Some(family.iron), ..usual };
+        period(c, &format!("energy model, {}", family.name), &settings);
+    }
+    // 200 times real time are 833 ns a period.
+    period(c, "energy model, all effects", &all_effects());
+}
+
+/// Everything on at once.
+fn all_effects() -> PlantSettings {
+    let mut all = PlantSettings::default();
+    let f = FAMILIES.iter().find(|family| family.name == "f").expect("f");
+    all.iron = Some(IronSettings {
+        slots: 0.003,
+        stator_fixed: 0.003,
+        stator_fixed_deg: 20.0,
+        loss: 1500.0,
+        ..f.iron
+    });
+    all.warming = WarmingSettings { rs: 0.3, rr: 0.4, ..all.warming };
+    all.dc_link = DcLinkSettings { capacitor: 470e-6, chopper_v: 380.0, ..all.dc_link };
+    all.inverter.extra_dead_time_us = 0.2;
+    all.inverter.node_capacitance = 450e-12;
+    all.inverter.on_resistance = 0.3;
+    let m = &mut all.measurement;
+    (m.cross_talk_a, m.cross_talk_b, m.lag_b_us, m.cubic_error) = (0.005, 0.005, 2.0, 0.005);
+    (m.drift_a, m.drift_b, m.both_zero_vectors) = (1e-3, -1e-3, true);
+    (m.dc_gain_error, m.dc_lag_us, m.dc_noise_v) = (0.005, 300.0, 0.5);
+    let s = &mut all.mechanics;
+    (s.static_torque, s.once_torque) = (0.05, 0.03);
+    (s.load_inertia, s.stiffness, s.damping) = (0.009, 100.0, 0.01);
+    all
 }
 
 criterion_group!(benches, plant);

@@ -20,7 +20,7 @@ use drive_core::settings::{Line, Settings};
 use file::FileAssignment;
 pub use key::Key;
 pub use keys::*;
-pub use plant::{current_lines, plant_settings};
+pub use plant::{check_model, current_lines, flux_level_a, open_phase, plant_settings};
 pub use value::{Allowed, Value};
 
 use crate::error::Error;
@@ -144,6 +144,10 @@ impl Config {
         let filter_hz = self.measurement.filter_hz;
         scales.current_delay_s =
             if filter_hz > 0.0 { (1.0 / (std::f64::consts::TAU * filter_hz)) as f32 } else { 0.0 };
+        if self.measurement.both_zero_vectors {
+            // The mean is as old as the middle between the two conversions.
+            scales.current_delay_s += 0.25 * drive_core::io::PERIOD_S;
+        }
     }
 
     /// The keys whose value is not the default, as `KEY=VALUE` for `--set`.

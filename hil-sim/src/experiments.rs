@@ -4,6 +4,7 @@
 mod adc_calibration;
 mod angle_identification;
 mod anti_windup;
+pub mod battery;
 mod bode;
 mod current_step;
 mod dead_time;
@@ -21,6 +22,7 @@ pub mod learning;
 mod linear_model;
 mod lock_monitor;
 mod machines;
+pub mod measured_motors;
 mod modulation;
 mod monte_carlo;
 mod motor_tests;
@@ -32,9 +34,11 @@ mod plant_identification;
 mod position;
 mod profile;
 mod reversal;
+pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
 mod speed_profile;
+pub mod statistics;
 mod steady;
 mod sweep;
 mod torque;
@@ -43,6 +47,8 @@ mod tracking;
 pub mod warming_rotor;
 
 pub use torque::assumptions;
+
+use statistics::Statistical;
 
 use std::path::Path;
 
@@ -157,7 +163,18 @@ impl Experiment {
 }
 
 /// Keys of the simulated motor, inverter and sensors.
-pub const BENCH: &[&str] = &["motor.", "saliency.", "inverter.", "measurement."];
+pub const BENCH: &[&str] = &[
+    "motor.",
+    "saliency.",
+    "plant",
+    "flux_level",
+    "iron.",
+    "warming.",
+    "inverter.",
+    "dc_link.",
+    "measurement.",
+    "shaft.",
+];
 /// Keys of the drive.
 pub const DRIVE: &[&str] = &[
     "drive.",
@@ -176,13 +193,13 @@ pub const DRIVE: &[&str] = &[
 pub const SPEED_LOOP: &[&str] =
     &["speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.phase_margin_deg", "drive.motor.inertia"];
 /// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
-pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction"];
+pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
 /// Keys of the tracking of the saliency, which a drive with an encoder does not use.
 pub const TRACKING: &[&str] =
     &["injection.bandwidth_hz", "injection.flux_saliency", "injection.current_saliency"];
 /// Keys that do nothing while the shaft is locked.
 pub const TURNING: &[&str] =
-    &["motor.inertia", "motor.friction", "motor.pole_pairs", "drive.motor.pole_pairs"];
+    &["motor.inertia", "motor.friction", "shaft.", "motor.pole_pairs", "drive.motor.pole_pairs"];
 
 /// All experiments, in the order of the report.
 #[rustfmt::skip] // one a line: the list grows
@@ -197,6 +214,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     dead_time::EXPERIMENT,
     orientation::EXPERIMENT,
     injection_map::EXPERIMENT,
+    saliency::EXPERIMENT,
     demodulators::EXPERIMENT,
     angle_identification::EXPERIMENT,
     learn_reference::EXPERIMENT,
@@ -211,6 +229,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
+    battery::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     tracking::EXPERIMENT,
@@ -221,10 +240,36 @@ pub const EXPERIMENTS: &[Experiment] = &[
     identify_machine::EXPERIMENT,
     motor_tests::EXPERIMENT,
     online_tracking::EXPERIMENT,
+    measured_motors::EXPERIMENT,
 ];
 
 /// The experiments that need an input file; they are no part of the report.
 pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
+
+/// The experiments of many independent runs, which can be shared between machines and continued.
+pub const STATISTICAL: &[Statistical] = &[
+    Statistical::of::<sweep::Sweep>(),
+    Statistical::of::<monte_carlo::MonteCarlo>(),
+    Statistical::of::<machines::Machines>(),
+    Statistical::of::<battery::Battery>(),
+    Statistical::of::<lock_monitor::LockMonitor>(),
+    Statistical::of::<saliency_check::SaliencyCheck>(),
+];
+
+/// The runs of the experiment with this name.
+///
+/// # Errors
+/// [`Error::Refused`] when it is not a statistical one.
+pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
+    let found = STATISTICAL.iter().find(|statistical| statistical.experiment.name == name);
+    found.ok_or_else(|| {
+        let known: Vec<_> = STATISTICAL.iter().map(|known| known.experiment.name).collect();
+        Error::Refused(format!(
+            "{name} does not consist of independent runs; those that do: {}",
+            known.join(", ")
+        ))
+    })
+}
 
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";

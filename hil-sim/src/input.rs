@@ -17,6 +17,9 @@ pub struct Input {
     /// Configuration file, TOML
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Model of the motor: a, or a family of iron whose saliency emerges; the same as --set plant=NAME
+    #[arg(long, value_name = "NAME")]
+    pub plant: Option<String>,
     /// Sets one key, after the configuration file; can be given many times
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub assignments: Vec<String>,
@@ -42,6 +45,9 @@ impl Input {
     pub fn config(&self) -> Result<Config, Error> {
         let mut config =
             Config::load(self.motor.as_deref(), self.config.as_deref(), &self.assignments)?;
+        if let Some(plant) = &self.plant {
+            config.set("plant", &Value::Word(plant.clone()))?;
+        }
         if let Some(seconds) = self.seconds {
             config.set("seconds", &Value::Number(seconds))?;
         }

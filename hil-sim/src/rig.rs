@@ -97,10 +97,12 @@ impl Rig {
     /// first, with the shaft locked, and the time begins afterwards.
     ///
     /// # Errors
-    /// As [`Rig::new`] and [`Rig::learn`].
+    /// As [`Rig::new`], [`Rig::learn`] and [`config::check_model`].
     pub fn from_config(config: &Config, seed: u64) -> Result<Self, Error> {
+        config::check_model(config)?;
         let plant = plant_settings(config);
         let mut rig = Self::new(&plant, &config.drive, seed)?;
+        rig.plant.set_open_phase(config::open_phase(config)).map_err(Error::refused)?;
         let injecting = config.drive.angle_source == AngleSource::Injection;
         let tracks = config.drive.injection.demodulator == DemodulatorKind::Synchronous;
         if config.prepare.learn && injecting && tracks {
@@ -180,9 +182,7 @@ impl Rig {
             let phi = self.plant.rotor_flux_angle();
             self.step();
             let telemetry = self.drive.telemetry();
-            let rpm = |step: f32| {
-                f64::from(step) * RATE_HZ * 60.0 / self.plant.motor().machine.pole_pairs()
-            };
+            let rpm = |step: f32| f64::from(step) * RATE_HZ * 60.0 / self.plant.pole_pairs();
             point.iq_ref = telemetry.reference.q.into();
             point.id = telemetry.current.d.into();
             point.iq = telemetry.current.q.into();
@@ -246,7 +246,7 @@ impl Rig {
         Point {
             t: self.time(),
             torque: plant.torque(),
-            torque_per_flux_ampere: plant.motor().machine.torque_factor(),
+            torque_per_flux_ampere: plant.torque_factor(),
             flux: plant.rotor_flux().norm(),
             current: plant.current().norm(),
             speed_rpm: plant.mechanical_speed() * 60.0 / TAU,

@@ -1,8 +1,8 @@
 //! The machine model against the exact solution of the textbook machine, and its power balance.
 
 use hil_sim::plant::{
-    Complex, Load, Machine, MachineSettings, MachineState, Mechanics, MechanicsSettings,
-    MotorModel, SaliencySettings,
+    Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
+    MechanicsSettings, MotorModel, SaliencySettings,
 };
 use nalgebra::{Matrix4, Matrix4x2, SMatrix, Vector2, Vector4};
 use rand::{RngExt, SeedableRng};

@@ -102,7 +102,7 @@ fn with_the_outputs_off_a_high_emf_charges_the_link_and_a_low_one_does_not() {
 /// Largest difference of the currents, A, over these periods with the outputs off, from a bridge
 /// whose diodes are not ideal: its legs go from rail to rail between -1 mA and 1 mA.
 fn worst_against_soft_diodes(plant: &mut Plant, periods: u32) -> f64 {
-    let mut reference = *plant.motor();
+    let mut reference = *plant.model_a().expect("model A");
     let vdc = plant.dc_link();
     let mut worst = 0f64;
     for _ in 0..periods {

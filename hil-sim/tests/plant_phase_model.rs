@@ -5,8 +5,8 @@
 use std::f64::consts::TAU;
 
 use hil_sim::plant::{
-    Complex, Load, Machine, MachineSettings, Mechanics, MechanicsSettings, MotorModel,
-    SaliencySettings, clarke, phases,
+    Complex, Load, Machine, MachineModel, MachineSettings, Mechanics, MechanicsSettings,
+    MotorModel, SaliencySettings, clarke, phases,
 };
 use nalgebra::{Matrix6, Vector6};
 

@@ -1,5 +1,6 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
+mod before;
 mod board;
 mod budget;
 mod control;

@@ -6,7 +6,8 @@
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
-use crate::machine::MachineState;
+use crate::model::{ElectricalState as _, MachineModel};
+use crate::open_phase::OpenPhase;
 
 /// Current, A, beyond which the sign of a phase current counts fully.
 const KINK: f64 = 0.020;
@@ -28,6 +29,20 @@ pub(crate) struct Averaged {
     pub lost: [f64; 3],
     /// Voltage that each leg gains with a negative current, V.
     pub gained: [f64; 3],
+    /// The part of both that is not the dead time's, V.
+    pub residual: f64,
+    /// 1 over the current that just swings a leg within the dead time, 1/A; 0 without capacitance.
+    pub inverse_knee: f64,
+    /// Ohm.
+    pub on_resistance: f64,
+}
+
+/// Share of the dead-time error of a current, in units of that which just swings the leg: while the
+/// leg swings linearly it is `y/2`, and `1 - 1/(2 y)` where it arrives before the end.
+#[inline]
+fn swung(y: f64) -> f64 {
+    let size = y.abs();
+    if size < 1.0 { 0.5 * y } else { (1.0 - 0.5 / size).copysign(y) }
 }
 
 impl Averaged {
@@ -37,30 +52,46 @@ impl Averaged {
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
-            sign * if sign > 0.0 { self.lost[k] } else { self.gained[k] }
+            let size = if sign > 0.0 { self.lost[k] } else { self.gained[k] };
+            if self.inverse_knee == 0.0 {
+                return sign * size;
+            }
+            let dead = swung(currents[k] * self.inverse_knee) * (size - self.residual);
+            dead + sign * self.residual
         };
-        self.v - clarke([error(0), error(1), error(2)])
+        self.v - clarke([error(0), error(1), error(2)]) - i * self.on_resistance
     }
 
     /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
     #[inline]
-    pub(crate) fn step(&self, motor: &mut MotorModel, h: f64) -> Complex {
+    pub(crate) fn step<M: MachineModel>(
+        &self,
+        motor: &mut MotorModel<M>,
+        open: Option<OpenPhase>,
+        h: f64,
+    ) -> Complex {
         let mut rest = h;
         let mut volt_seconds = Complex::ZERO;
         loop {
             let machine = &motor.machine;
-            let rates = |x: &MachineState, w| {
-                let v = self.voltage(x.i);
-                (machine.derivative(x, v, w), v)
+            let rates = |x: &M::State, w| {
+                let v = self.voltage(x.current());
+                match open {
+                    None => (machine.derivative(x, v, w), v),
+                    Some(open) => open.rates(machine, x, v, w),
+                }
             };
             let x = &motor.state.electrical;
-            let first = rates(x, machine.pole_pairs * motor.state.speed);
-            let part = match until_kink(x.i, first.0.i, rest) {
+            let first = rates(x, machine.pole_pairs() * motor.state.speed);
+            let part = match until_kink(x.current(), first.0.current(), rest) {
                 None => rest,
                 Some(time) => time.max(SHORTEST * h).min(rest),
             };
             let (state, v) = motor.stepped_from(first, part, rates);
             motor.state = state;
+            if let Some(open) = open {
+                open.confine(motor);
+            }
             volt_seconds += v * part;
             if part >= rest {
                 return volt_seconds;

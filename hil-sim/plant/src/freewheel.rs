@@ -7,15 +7,11 @@
 
 use crate::complex::{Complex, clarke, dot, phases};
 use crate::integrate::{MotorModel, MotorState};
+use crate::model::{ElectricalState as _, MachineModel};
+use crate::open_phase::{LINES, OpenPhase};
 
 /// Current below which a phase counts as without, A.
 const NO_CURRENT: f64 = 1e-9;
-/// Unit vectors along which the current lies while phase a, b or c floats.
-const LINES: [Complex; 3] = [
-    Complex::new(0.0, 1.0),
-    Complex::new(0.866_025_403_784_438_6, 0.5),
-    Complex::new(0.866_025_403_784_438_6, -0.5),
-];
 /// Most changes of conduction followed within one step; more do not occur in a passive circuit but
 /// through rounding.
 const CHANGES: usize = 8;
@@ -25,11 +21,22 @@ const CHANGES: usize = 8;
 type Conduction = [i8; 3];
 
 /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
-pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
+pub(crate) fn step<M: MachineModel>(
+    motor: &mut MotorModel<M>,
+    vdc: f64,
+    open: Option<OpenPhase>,
+    h: f64,
+) -> Complex {
     let mut rest = h;
     let mut volt_seconds = Complex::ZERO;
     // Phases that began to conduct and were found not to: they float for the rest of the step.
     let mut blocked = [false; 3];
+    if let Some(open) = open {
+        blocked[open.0] = true;
+        if phases(motor.state.electrical.current())[open.0] != 0.0 {
+            open.confine(motor);
+        }
+    }
     for _ in 0..CHANGES {
         let conduction = conduction(motor, vdc, blocked);
         let (next, v) = advanced(motor, conduction, vdc, rest);
@@ -38,28 +45,33 @@ pub(crate) fn step(motor: &mut MotorModel, vdc: f64, h: f64) -> Complex {
             return volt_seconds + v * rest;
         };
         let done = rest * fraction;
-        if phases(motor.state.electrical.i)[phase].abs() <= NO_CURRENT {
+        if phases(motor.state.electrical.current())[phase].abs() <= NO_CURRENT {
             blocked[phase] = true;
             continue;
         }
         let (state, v) = advanced(motor, conduction, vdc, done);
         motor.state = state;
         volt_seconds += v * done;
-        motor.state.electrical.i = without(motor.state.electrical.i, phase);
+        confine(motor, without(motor.state.electrical.current(), phase));
         rest -= done;
     }
     // Rounding keeps the conduction changing: the currents are practically zero.
-    motor.state.electrical.i = Complex::ZERO;
+    confine(motor, Complex::ZERO);
     let (state, v) = advanced(motor, [0; 3], vdc, rest);
     motor.state = state;
     volt_seconds + v * rest
 }
 
+/// Sets the current.
+fn confine<M: MachineModel>(motor: &mut MotorModel<M>, i: Complex) {
+    motor.state.electrical = motor.machine.with_current(&motor.state.electrical, i);
+}
+
 /// Which diodes conduct in the present state.
-fn conduction(motor: &MotorModel, vdc: f64, blocked: [bool; 3]) -> Conduction {
+fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 3]) -> Conduction {
     let x = &motor.state.electrical;
-    let w = motor.machine.pole_pairs * motor.state.speed;
-    let mut flow = phases(x.i).map(sign);
+    let w = motor.machine.pole_pairs() * motor.state.speed;
+    let mut flow = phases(x.current()).map(sign);
     let conducting = flow.iter().filter(|&&f| f != 0).count();
     match conducting {
         // One floats: does its potential leave the range between the rails?
@@ -101,7 +113,12 @@ fn line(k: usize, flow: Conduction, vdc: f64) -> (Complex, f64) {
 }
 
 /// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
-fn advanced(motor: &MotorModel, flow: Conduction, vdc: f64, h: f64) -> (MotorState, Complex) {
+fn advanced<M: MachineModel>(
+    motor: &MotorModel<M>,
+    flow: Conduction,
+    vdc: f64,
+    h: f64,
+) -> (MotorState<M::State>, Complex) {
     let machine = &motor.machine;
     match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
         (3, _) => {
@@ -112,20 +129,26 @@ fn advanced(motor: &MotorModel, flow: Conduction, vdc: f64, h: f64) -> (MotorSta
             let (axis, v_axis) = line(k, flow, vdc);
             let (mut state, v) =
                 motor.stepped(h, |x, w| machine.derivative_on_line(x, v_axis, axis, w));
-            state.electrical.i = axis * dot(state.electrical.i, axis);
+            let i = axis * dot(state.electrical.current(), axis);
+            state.electrical = machine.with_current(&state.electrical, i);
             (state, v)
         }
         _ => {
             let (mut state, v) = motor.stepped(h, |x, w| machine.derivative_open(x, w));
-            state.electrical.i = Complex::ZERO;
+            state.electrical = machine.with_current(&state.electrical, Complex::ZERO);
             (state, v)
         }
     }
 }
 
 /// The phase whose current first goes against its diode, and at which fraction of the step.
-fn first_reversal(motor: &MotorModel, next: &MotorState, flow: Conduction) -> Option<(usize, f64)> {
-    let (before, after) = (phases(motor.state.electrical.i), phases(next.electrical.i));
+fn first_reversal<M: MachineModel>(
+    motor: &MotorModel<M>,
+    next: &MotorState<M::State>,
+    flow: Conduction,
+) -> Option<(usize, f64)> {
+    let (before, after) =
+        (phases(motor.state.electrical.current()), phases(next.electrical.current()));
     (0..3)
         .filter(|&k| f64::from(flow[k]) * after[k] < 0.0)
         .map(|k| (k, (before[k] / (before[k] - after[k])).clamp(0.0, 1.0)))

@@ -1,14 +1,15 @@
 //! The machine and its shaft, integrated by the classical Runge-Kutta rule.
 
 use crate::complex::Complex;
-use crate::machine::{Machine, MachineState};
+use crate::machine::Machine;
 use crate::mechanics::Mechanics;
+use crate::model::{ElectricalState, MachineModel};
 
-/// State of the machine and its shaft.
+/// State of a machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MotorState {
+pub struct MotorState<X> {
     /// Electrical state.
-    pub electrical: MachineState,
+    pub electrical: X,
     /// Mechanical speed, rad/s.
     pub speed: f64,
     /// Mechanical angle of the rotor, rad, not wrapped.
@@ -17,19 +18,20 @@ pub struct MotorState {
 
 /// A machine on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotorModel {
+pub struct MotorModel<M: MachineModel = Machine> {
     /// The machine.
-    pub machine: Machine,
+    pub machine: M,
     /// The shaft and its load.
     pub mechanics: Mechanics,
     /// The state of both.
-    pub state: MotorState,
+    pub state: MotorState<M::State>,
 }
 
-impl MotorModel {
+impl<M: MachineModel> MotorModel<M> {
     /// At rest, without current and flux; turning already where the load holds a speed.
-    pub fn new(machine: Machine, mechanics: Mechanics) -> Self {
+    pub fn new(machine: M, mechanics: Mechanics) -> Self {
         let mut motor = Self { machine, mechanics, state: MotorState::default() };
+        motor.state.electrical = machine.settled(motor.state.electrical);
         motor.hold_speed();
         motor
     }
@@ -43,7 +45,22 @@ impl MotorModel {
 
     /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
+        self.begin_step();
         self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
+        self.end_step(h);
+    }
+
+    /// Fixes the torques on the shaft for an integration step.
+    #[inline]
+    pub(crate) fn begin_step(&mut self) {
+        let torque = self.machine.torque(&self.state.electrical);
+        self.state.speed = self.mechanics.begin(self.state.angle, self.state.speed, torque);
+    }
+
+    /// Ends an integration step of `h` seconds.
+    #[inline]
+    pub(crate) fn end_step(&mut self, h: f64) {
+        self.mechanics.end(self.state.angle, self.state.speed, h);
     }
 
     /// The state after `h` seconds, and the mean terminal voltage. `rates` gives the derivative of
@@ -52,9 +69,9 @@ impl MotorModel {
     pub(crate) fn stepped(
         &self,
         h: f64,
-        rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
-    ) -> (MotorState, Complex) {
-        let w = self.machine.pole_pairs * self.state.speed;
+        rates: impl Fn(&M::State, f64) -> (M::State, Complex),
+    ) -> (MotorState<M::State>, Complex) {
+        let w = self.machine.pole_pairs() * self.state.speed;
         self.stepped_from(rates(&self.state.electrical, w), h, rates)
     }
 
@@ -62,46 +79,35 @@ impl MotorModel {
     #[inline]
     pub(crate) fn stepped_from(
         &self,
-        first: (MachineState, Complex),
+        first: (M::State, Complex),
         h: f64,
-        rates: impl Fn(&MachineState, f64) -> (MachineState, Complex),
-    ) -> (MotorState, Complex) {
-        let (m, p) = (&self.machine, self.machine.pole_pairs);
+        rates: impl Fn(&M::State, f64) -> (M::State, Complex),
+    ) -> (MotorState<M::State>, Complex) {
+        let (m, p) = (&self.machine, self.machine.pole_pairs());
         let (x0, n0) = (self.state.electrical, self.state.speed);
-        let accelerate = |x: &MachineState, n: f64| self.mechanics.acceleration(m.torque(x), n);
+        let accelerate = |x: &M::State, n: f64| self.mechanics.acceleration(m.torque(x), n);
 
         let (k1, v1) = first;
         let a1 = accelerate(&x0, n0);
         let half = 0.5 * h;
-        let (x, n1) = (moved(&x0, &k1, half), n0 + a1 * half);
+        let (x, n1) = (m.settled(x0.moved(&k1, half)), n0 + a1 * half);
         let (k2, v2) = rates(&x, p * n1);
         let a2 = accelerate(&x, n1);
-        let (x, n2) = (moved(&x0, &k2, half), n0 + a2 * half);
+        let (x, n2) = (m.settled(x0.moved(&k2, half)), n0 + a2 * half);
         let (k3, v3) = rates(&x, p * n2);
         let a3 = accelerate(&x, n2);
-        let (x, n3) = (moved(&x0, &k3, h), n0 + a3 * h);
+        let (x, n3) = (m.settled(x0.moved(&k3, h)), n0 + a3 * h);
         let (k4, v4) = rates(&x, p * n3);
         let a4 = accelerate(&x, n3);
 
         let sixth = h * (1.0 / 6.0);
-        let mean = |a, b, c, d| (a + d + (b + c) * 2.0) * sixth;
         let mean_f = |a: f64, b: f64, c: f64, d: f64| (a + d + (b + c) * 2.0) * sixth;
         let state = MotorState {
-            electrical: MachineState {
-                i: x0.i + mean(k1.i, k2.i, k3.i, k4.i),
-                psi: x0.psi + mean(k1.psi, k2.psi, k3.psi, k4.psi),
-                i_lp: x0.i_lp + mean(k1.i_lp, k2.i_lp, k3.i_lp, k4.i_lp),
-            },
+            electrical: m.settled(x0.advanced([&k1, &k2, &k3, &k4], h)),
             speed: n0 + mean_f(a1, a2, a3, a4),
             angle: self.state.angle + mean_f(n0, n1, n2, n3),
         };
         let voltage: Complex = (v1 + v4 + (v2 + v3) * 2.0) * (1.0 / 6.0);
         (state, voltage)
     }
-}
-
-/// `x + k h`
-#[inline]
-fn moved(x: &MachineState, k: &MachineState, h: f64) -> MachineState {
-    MachineState { i: x.i + k.i * h, psi: x.psi + k.psi * h, i_lp: x.i_lp + k.i_lp * h }
 }

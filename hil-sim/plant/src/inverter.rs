@@ -31,6 +31,13 @@ pub struct InverterSettings {
     pub propagation_us: f64,
     /// Drop of the switches against the current, V. Assumed: 40 % of the dead-time error.
     pub residual_v: f64,
+    /// Further dead time, of which the drive does not know, us; negative is less than it believes.
+    pub extra_dead_time_us: f64,
+    /// Capacitance of the output node of each leg, F. During the dead time the current has to
+    /// swing it, so the dead-time error of a small current is smaller. Averaged inverter only.
+    pub node_capacitance: f64,
+    /// Resistance of a switch that conducts, ohm.
+    pub on_resistance: f64,
     /// Whether to integrate between the exact instants of the edges rather than averages.
     pub switched: bool,
 }
@@ -49,6 +56,9 @@ impl InverterSettings {
         dead_time_us: 2.2,
         propagation_us: 2.2,
         residual_v: 1.64,
+        extra_dead_time_us: 0.0,
+        node_capacitance: 0.0,
+        on_resistance: 0.0,
         switched: false,
     };
 
@@ -65,9 +75,15 @@ pub struct Inverter {
     pub(crate) top: f64,
     /// Seconds.
     pub(crate) dead_time: f64,
+    /// Part of it that the drive does not know, us.
+    extra_us: f64,
     /// Seconds.
     pub(crate) propagation: f64,
     pub(crate) residual: f64,
+    /// F.
+    pub(crate) capacitance: f64,
+    /// Ohm.
+    pub(crate) on_resistance: f64,
     pub(crate) switched: bool,
     /// Compare values of the period before.
     pub(crate) previous: Compare,
@@ -83,12 +99,20 @@ impl Inverter {
         check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
         check("inverter.propagation_us", s.propagation_us, 0.0..=10.0, "us")?;
         check("inverter.residual_v", s.residual_v, 0.0..=20.0, "V")?;
+        let least = -s.dead_time_us;
+        check("inverter.extra_dead_time_us", s.extra_dead_time_us, least..=10.0, "us")?;
+        let most = if s.switched { 0.0 } else { 1e-6 };
+        check("inverter.node_capacitance", s.node_capacitance, 0.0..=most, "F")?;
+        check("inverter.on_resistance", s.on_resistance, 0.0..=100.0, "ohm")?;
         let mut inverter = Self {
             vdc: 0.0,
             top: f64::from(s.timer_top),
             dead_time: 0.0,
+            extra_us: s.extra_dead_time_us,
             propagation: s.propagation_us * 1e-6,
             residual: s.residual_v,
+            capacitance: s.node_capacitance,
+            on_resistance: s.on_resistance,
             switched: s.switched,
             previous: Compare::OFF,
         };
@@ -107,13 +131,13 @@ impl Inverter {
         Ok(())
     }
 
-    /// Changes the dead time, us.
+    /// Changes the dead time, us, to which the extra one is added.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 10 us.
     pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
         check("inverter.dead_time_us", us, 0.0..=10.0, "us")?;
-        self.dead_time = us * 1e-6;
+        self.dead_time = (us + self.extra_us) * 1e-6;
         Ok(())
     }
 
@@ -138,16 +162,20 @@ impl Inverter {
         let taken = |available: f64, duty: f64| {
             if duty > 0.0 && duty < 1.0 { self.vdc * dead.min(available) } else { 0.0 }
         };
+        let knee = self.capacitance * self.vdc / self.dead_time.max(1e-9);
         Averaged {
+            inverse_knee: if knee > 0.0 { 1.0 / knee } else { 0.0 },
+            residual: self.residual,
+            on_resistance: self.on_resistance,
             v: v * self.vdc,
             lost: duties.map(|d| taken(d, d) + self.residual),
             gained: duties.map(|d| taken(1.0 - d, d) + self.residual),
         }
     }
 
-    /// The leg voltages `legs` less the residual drop, as a space vector.
+    /// The leg voltages `legs` less the drops of the switches, as a space vector.
     pub(crate) fn dropped(&self, legs: [f64; 3], i: Complex) -> Complex {
         let signs = phases(i).map(smooth_sign);
-        clarke(legs) - clarke(signs) * self.residual
+        clarke(legs) - clarke(signs) * self.residual - i * self.on_resistance
     }
 }

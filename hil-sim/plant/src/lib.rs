@@ -22,32 +22,42 @@
 
 mod averaged;
 mod complex;
+mod dc_link;
 mod encoder;
+mod energy;
 mod error;
 mod freewheel;
 mod integrate;
 mod inverter;
 mod machine;
 mod mechanics;
+mod model;
+mod open_phase;
+mod period;
 mod sensors;
 mod switched;
+mod warming;
 
+use dc_link::DcLink;
 use drive_core::{Compare, Hardware, Sample};
+use open_phase::OpenPhase;
+use period::Around;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 pub use complex::{Complex, clarke, phases};
+pub use dc_link::DcLinkSettings;
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
+pub use energy::{EnergyMachine, EnergyState, FAMILIES, Family, IronSettings};
 pub use error::PlantError;
 pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
 pub use machine::{Machine, MachineSettings, MachineState, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
+pub use model::{ElectricalState, MachineModel};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
-
-/// Integration steps per period while the outputs are off: at most this fraction of the period.
-const FREEWHEEL_SUBSTEPS: u32 = 8;
+pub use warming::WarmingSettings;
 
 /// Settings of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,10 +65,16 @@ const FREEWHEEL_SUBSTEPS: u32 = 8;
 pub struct PlantSettings {
     /// Parameters of the machine.
     pub machine: MachineSettings,
-    /// Its saliency.
+    /// Its saliency in model A; of no effect with `iron`.
     pub saliency: SaliencySettings,
+    /// The iron of the energy model; without, the machine is model A.
+    pub iron: Option<IronSettings>,
     /// The shaft and its load.
     pub mechanics: MechanicsSettings,
+    /// Warming of the resistances.
+    pub warming: WarmingSettings,
+    /// The dc link.
+    pub dc_link: DcLinkSettings,
     /// The inverter.
     pub inverter: InverterSettings,
     /// The current sensors and the converter.
@@ -75,7 +91,10 @@ impl Default for PlantSettings {
         Self {
             machine: MachineSettings::default(),
             saliency: SaliencySettings::default(),
+            iron: None,
             mechanics: MechanicsSettings::default(),
+            warming: WarmingSettings::default(),
+            dc_link: DcLinkSettings::default(),
             inverter: InverterSettings::default(),
             measurement: MeasurementSettings::default(),
             encoder: EncoderSettings::default(),
@@ -84,15 +103,46 @@ impl Default for PlantSettings {
     }
 }
 
+/// The motor, one variant a machine model. A call of the plant chooses once a period.
+#[derive(Clone, Debug)]
+enum Motor {
+    A(MotorModel<Machine>),
+    Energy(Box<MotorModel<EnergyMachine>>),
+}
+
+/// `$body` with `$motor` bound to the [`MotorModel`] of whichever machine model.
+macro_rules! whichever {
+    ($which:expr, $motor:ident => $body:expr) => {
+        match $which {
+            Motor::A($motor) => $body,
+            Motor::Energy($motor) => $body,
+        }
+    };
+}
+
+/// Resistances that follow time.
+#[derive(Clone, Copy, Debug)]
+struct Warming {
+    law: WarmingSettings,
+    cold: (f64, f64),
+}
+
+/// Periods between two changes of the resistances by warming.
+const WARMING_PERIODS: u64 = 64;
+
 /// The plant.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    motor: MotorModel,
-    inverter: Inverter,
-    sensors: Sensors,
+    motor: Motor,
+    around: Around,
+    dc_link: DcLink,
+    /// None where the resistances are constant.
+    warming: Option<Warming>,
+    periods: u64,
+    /// Whether anything changes once a period.
+    moves: bool,
     encoder: Encoder,
     rng: Xoshiro256PlusPlus,
-    substeps: u32,
     applied: Complex,
     hardware: Hardware,
 }
@@ -105,15 +155,37 @@ impl Plant {
     /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
         error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
-        let machine = Machine::new(&settings.machine, &settings.saliency)?;
+        settings.warming.check()?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
+        let motor = match &settings.iron {
+            None => {
+                let machine = Machine::new(&settings.machine, &settings.saliency)?;
+                Motor::A(MotorModel::new(machine, mechanics))
+            }
+            Some(iron) => {
+                let machine = EnergyMachine::new(&settings.machine, iron)?;
+                Motor::Energy(Box::new(MotorModel::new(machine, mechanics)))
+            }
+        };
         Ok(Self {
-            motor: MotorModel::new(machine, mechanics),
-            inverter: Inverter::new(&settings.inverter)?,
-            sensors: Sensors::new(&settings.measurement)?,
+            motor,
+            around: Around {
+                inverter: Inverter::new(&settings.inverter)?,
+                sensors: Sensors::new(&settings.measurement)?,
+                substeps: settings.substeps,
+                open: None,
+            },
+            dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
+            warming: settings.warming.factors(1.0).map(|_| Warming {
+                law: settings.warming,
+                cold: (settings.machine.rs, settings.machine.rr),
+            }),
+            periods: 0,
+            moves: settings.dc_link.moves()
+                || settings.warming.factors(1.0).is_some()
+                || settings.measurement.dc_lag_us > 0.0,
             encoder: Encoder::new(&settings.encoder)?,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
-            substeps: settings.substeps,
             applied: Complex::ZERO,
             hardware: Hardware::empty(),
         })
@@ -123,14 +195,14 @@ impl Plant {
     /// reported hardware events.
     #[inline]
     pub fn sample(&mut self) -> Sample {
-        let [current_a, current_b] = self.sensors.currents(&mut self.rng);
+        let [current_a, current_b] = self.around.sensors.currents(&mut self.rng);
         Sample {
             current_a,
             current_b,
             // Two sensors.
             current_c: 0,
-            dc_link: self.sensors.dc_link(self.inverter.vdc),
-            heat_sink: self.sensors.heat_sink(),
+            dc_link: self.around.sensors.dc_link(self.around.inverter.vdc, &mut self.rng),
+            heat_sink: self.around.sensors.heat_sink(),
             encoder: self.encoder.count(),
             hardware: std::mem::take(&mut self.hardware),
         }
@@ -139,74 +211,69 @@ impl Plant {
     /// One PWM period of `period_s` seconds with these compare values, delayed already.
     #[inline]
     pub fn advance(&mut self, compare: &Compare, period_s: f64) {
-        let volt_seconds = if !compare.enabled {
-            self.freewheel(period_s)
-        } else if self.inverter.switched {
-            self.switched(compare, period_s)
-        } else {
-            self.averaged(compare, period_s)
-        };
+        let around = &mut self.around;
+        let volt_seconds =
+            whichever!(&mut self.motor, motor => around.advance(motor, compare, period_s));
         self.applied = volt_seconds / period_s;
-        self.inverter.previous = *compare;
-        self.encoder.follow(self.motor.state.angle);
-    }
-
-    #[inline]
-    fn averaged(&mut self, compare: &Compare, period: f64) -> Complex {
-        let averaged = self.inverter.averaged(compare, period);
-        let h = period / f64::from(self.substeps);
-        let mut volt_seconds = Complex::ZERO;
-        for _ in 0..self.substeps {
-            let before = self.motor.state.electrical.i;
-            volt_seconds += averaged.step(&mut self.motor, h);
-            self.sensors.follow(before, self.motor.state.electrical.i, h);
+        self.encoder.follow(self.mechanical_angle());
+        if self.moves {
+            self.slow(period_s);
         }
-        volt_seconds
     }
 
-    fn switched(&mut self, compare: &Compare, period: f64) -> Complex {
-        let pattern = switched::Pattern::new(&self.inverter, compare, period);
-        let longest = period / f64::from(self.substeps);
-        let mut volt_seconds = Complex::ZERO;
-        for (duration, levels) in pattern.pieces() {
-            let steps = (duration / longest).ceil().max(1.0);
-            let h = duration / steps;
-            for _ in 0..steps as u32 {
-                let (machine, inverter) = (&self.motor.machine, &self.inverter);
-                let i = self.motor.state.electrical.i;
-                let legs = switched::leg_voltages(levels, i, inverter.vdc);
-                let (state, v) = self.motor.stepped(h, |x, w| {
-                    let v = inverter.dropped(legs, x.i);
-                    (machine.derivative(x, v, w), v)
-                });
-                volt_seconds += v * h;
-                self.sensors.follow(i, state.electrical.i, h);
-                self.motor.state = state;
-            }
+    /// What changes once a period: the dc link and its sensor, and the resistances.
+    fn slow(&mut self, period_s: f64) {
+        let around = &mut self.around;
+        if self.dc_link.moves() {
+            let i = whichever!(&self.motor, motor => motor.state.electrical.current());
+            let taken = 1.5 * (i.conj() * self.applied).re * period_s;
+            around.inverter.vdc = self.dc_link.after(around.inverter.vdc, taken, period_s);
         }
-        volt_seconds
-    }
-
-    fn freewheel(&mut self, period: f64) -> Complex {
-        let substeps = self.substeps.max(FREEWHEEL_SUBSTEPS);
-        let h = period / f64::from(substeps);
-        let mut volt_seconds = Complex::ZERO;
-        for _ in 0..substeps {
-            let before = self.motor.state.electrical.i;
-            volt_seconds += freewheel::step(&mut self.motor, self.inverter.vdc, h);
-            self.sensors.follow(before, self.motor.state.electrical.i, h);
+        around.sensors.follow_dc_link(around.inverter.vdc, period_s);
+        self.periods += 1;
+        if let Some(Warming { law, cold }) = self.warming
+            && self.periods.is_multiple_of(WARMING_PERIODS)
+            && let Some((rs, rr)) = law.factors(self.periods as f64 * period_s)
+        {
+            // Within the ranges of the settings at every time, which `new` has checked at both ends.
+            let _ = self.set_resistances(cold.0 * rs, cold.1 * rr);
         }
-        volt_seconds
     }
 
-    /// The motor: machine, shaft and their state.
-    pub fn motor(&self) -> &MotorModel {
-        &self.motor
+    /// The motor, with its state, where it is model A: machine, shaft and their state.
+    pub fn model_a(&self) -> Option<&MotorModel<Machine>> {
+        match &self.motor {
+            Motor::A(motor) => Some(motor),
+            Motor::Energy(_) => None,
+        }
+    }
+
+    /// The motor, with its state, where it is the energy model.
+    pub fn energy_model(&self) -> Option<&MotorModel<EnergyMachine>> {
+        match &self.motor {
+            Motor::A(_) => None,
+            Motor::Energy(motor) => Some(motor),
+        }
+    }
+
+    /// Pole pairs.
+    pub fn pole_pairs(&self) -> f64 {
+        whichever!(&self.motor, motor => motor.machine.pole_pairs())
+    }
+
+    /// Rotor time constant, s, at the nominal flux.
+    pub fn tau_r(&self) -> f64 {
+        whichever!(&self.motor, motor => motor.machine.tau_r())
+    }
+
+    /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A), at the nominal flux.
+    pub fn torque_factor(&self) -> f64 {
+        whichever!(&self.motor, motor => motor.machine.torque_factor())
     }
 
     /// Stator current, A, in the stator frame.
     pub fn current(&self) -> Complex {
-        self.motor.state.electrical.i
+        whichever!(&self.motor, motor => motor.state.electrical.current())
     }
 
     /// Phase currents, A.
@@ -216,7 +283,7 @@ impl Plant {
 
     /// Rotor flux linkage, Wb, in the stator frame.
     pub fn rotor_flux(&self) -> Complex {
-        self.motor.state.electrical.psi
+        whichever!(&self.motor, motor => motor.state.electrical.rotor_flux())
     }
 
     /// True angle of the rotor flux, electrical rad, -pi to pi; 0 without flux.
@@ -226,17 +293,17 @@ impl Plant {
 
     /// Electromagnetic torque, N m.
     pub fn torque(&self) -> f64 {
-        self.motor.machine.torque(&self.motor.state.electrical)
+        whichever!(&self.motor, motor => motor.machine.torque(&motor.state.electrical))
     }
 
     /// Mechanical angle of the rotor, rad, not wrapped, 0 at the start.
     pub fn mechanical_angle(&self) -> f64 {
-        self.motor.state.angle
+        whichever!(&self.motor, motor => motor.state.angle)
     }
 
     /// Mechanical speed of the rotor, rad/s.
     pub fn mechanical_speed(&self) -> f64 {
-        self.motor.state.speed
+        whichever!(&self.motor, motor => motor.state.speed)
     }
 
     /// Line-to-neutral voltage at the terminals, V, averaged over the last period.
@@ -246,15 +313,29 @@ impl Plant {
 
     /// Dc-link voltage, V.
     pub fn dc_link(&self) -> f64 {
-        self.inverter.vdc
+        self.around.inverter.vdc
     }
 
-    /// Changes the dc-link voltage, V.
+    /// Changes the dc-link voltage, V; behind a rectifier, the voltage now and the peak of the rectified mains.
     ///
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
-        self.inverter.set_dc_link(vdc)
+        self.around.inverter.set_dc_link(vdc)?;
+        self.dc_link.nominal = vdc;
+        Ok(())
+    }
+
+    /// Slopes of the phase currents while the terminals are shorted, A/s.
+    pub fn shorted_slopes(&self) -> [f64; 3] {
+        /// Seconds: short against every time constant of a motor, long against the rounding.
+        const STEP: f64 = 1e-7;
+        let slope = whichever!(&self.motor, motor => {
+            let (machine, x) = (&motor.machine, &motor.state.electrical);
+            let rate = machine.derivative(x, Complex::ZERO, machine.pole_pairs() * motor.state.speed);
+            (machine.settled(x.moved(&rate, STEP)).current() - x.current()) / STEP
+        });
+        phases(slope)
     }
 
     /// Changes the dead time, us.
@@ -262,7 +343,7 @@ impl Plant {
     /// # Errors
     /// [`PlantError::OutOfRange`] outside 0 to 10 us.
     pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
-        self.inverter.set_dead_time(us)
+        self.around.inverter.set_dead_time(us)
     }
 
     /// Couples another load. A held speed holds at once; a free shaft continues from there.
@@ -270,21 +351,34 @@ impl Plant {
     /// # Errors
     /// [`PlantError::OutOfRange`] for its torque or speed.
     pub fn set_load(&mut self, load: Load) -> Result<(), PlantError> {
-        self.motor.mechanics.set_load(load)?;
-        self.motor.hold_speed();
+        whichever!(&mut self.motor, motor => {
+            motor.mechanics.set_load(load)?;
+            motor.hold_speed();
+        });
         Ok(())
     }
 
-    /// Changes the parameters of the machine and keeps its state (a warmer rotor, for example).
+    /// Changes the resistances of stator and rotor, ohm (a warmer motor), and keeps all else.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
+        whichever!(&mut self.motor, motor => motor.machine.set_resistances(rs, rr))
+    }
+
+    /// Changes the assumed saliency of model A and keeps the state; without effect on the energy model,
+    /// whose saliency is that of its iron.
     ///
     /// # Errors
     /// As [`Machine::new`].
-    pub fn set_machine(
+    pub fn set_saliency(
         &mut self,
         machine: &MachineSettings,
         saliency: &SaliencySettings,
     ) -> Result<(), PlantError> {
-        self.motor.machine = Machine::new(machine, saliency)?;
+        if let Motor::A(motor) = &mut self.motor {
+            motor.machine = Machine::new(machine, saliency)?;
+        }
         Ok(())
     }
 
@@ -292,13 +386,26 @@ impl Plant {
     /// wrong by as much.
     pub fn turn_rotor_flux(&mut self, angle: f64) {
         let turn = Complex::new(angle.cos(), angle.sin());
-        let electrical = &mut self.motor.state.electrical;
-        electrical.psi *= turn;
+        whichever!(&mut self.motor, motor => {
+            motor.state.electrical = motor.machine.with_turned_flux(&motor.state.electrical, turn);
+        });
     }
 
     /// Sets the fault of a current channel.
     pub fn set_current_fault(&mut self, channel: Channel, fault: CurrentFault) {
-        self.sensors.set_fault(channel, fault);
+        self.around.sensors.set_fault(channel, fault);
+    }
+
+    /// Interrupts a phase between inverter and motor, 0 to 2, at once, or connects all.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] for another number.
+    pub fn set_open_phase(&mut self, phase: Option<usize>) -> Result<(), PlantError> {
+        if let Some(phase) = phase {
+            error::check("open phase", phase as f64, 0.0..=2.0, "")?;
+        }
+        self.around.open = phase.map(OpenPhase);
+        Ok(())
     }
 
     /// Sets the fault of the encoder.
@@ -308,7 +415,7 @@ impl Plant {
 
     /// Changes the code of the heat-sink temperature.
     pub fn set_heat_sink(&mut self, code: u16) {
-        self.sensors.set_heat_sink(code);
+        self.around.sensors.set_heat_sink(code);
     }
 
     /// Adds events to those that the next sample reports.

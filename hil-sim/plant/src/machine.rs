@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
+use crate::model::{ElectricalState, MachineModel, increment};
 
 /// Largest length of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
@@ -53,6 +54,19 @@ pub struct MachineSettings {
 impl Default for MachineSettings {
     fn default() -> Self {
         Self { rs: 5.4, rr: 1.1, lls: 0.0276, llr: 0.0276, lm: 0.1771, pole_pairs: 2 }
+    }
+}
+
+impl MachineSettings {
+    /// Refuses what is outside its range.
+    pub(crate) fn check(&self) -> Result<(), PlantError> {
+        check("machine.rs", self.rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", self.rr, 1e-4..=1000.0, "ohm")?;
+        check("machine.lls", self.lls, 1e-7..=10.0, "H")?;
+        check("machine.llr", self.llr, 1e-7..=10.0, "H")?;
+        check("machine.lm", self.lm, 1e-5..=100.0, "H")?;
+        check("machine.pole_pairs", f64::from(self.pole_pairs), 1.0..=50.0, "")?;
+        Ok(())
     }
 }
 
@@ -97,11 +111,38 @@ pub struct MachineState {
     pub i_lp: Complex,
 }
 
+impl ElectricalState for MachineState {
+    #[inline]
+    fn current(&self) -> Complex {
+        self.i
+    }
+
+    #[inline]
+    fn rotor_flux(&self) -> Complex {
+        self.psi
+    }
+
+    #[inline]
+    fn moved(&self, k: &Self, h: f64) -> Self {
+        Self { i: self.i + k.i * h, psi: self.psi + k.psi * h, i_lp: self.i_lp + k.i_lp * h }
+    }
+
+    #[inline]
+    fn advanced(&self, k: [&Self; 4], h: f64) -> Self {
+        let sixth = h * (1.0 / 6.0);
+        Self {
+            i: self.i + increment(k.map(|k| k.i), sixth),
+            psi: self.psi + increment(k.map(|k| k.psi), sixth),
+            i_lp: self.i_lp + increment(k.map(|k| k.i_lp), sixth),
+        }
+    }
+}
+
 /// Coefficients of the machine equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
-    pub(crate) pole_pairs: f64,
-    pub(crate) coupling: f64,
+    pole_pairs: f64,
+    coupling: f64,
     alpha: f64,
     rr_coupling: f64,
     r_prime: f64,
@@ -128,12 +169,7 @@ impl Machine {
     /// # Errors
     /// [`PlantError::OutOfRange`]; [`PlantError::TooSalient`].
     pub fn new(m: &MachineSettings, s: &SaliencySettings) -> Result<Self, PlantError> {
-        check("machine.rs", m.rs, 1e-4..=1000.0, "ohm")?;
-        check("machine.rr", m.rr, 1e-4..=1000.0, "ohm")?;
-        check("machine.lls", m.lls, 1e-7..=10.0, "H")?;
-        check("machine.llr", m.llr, 1e-7..=10.0, "H")?;
-        check("machine.lm", m.lm, 1e-5..=100.0, "H")?;
-        check("machine.pole_pairs", f64::from(m.pole_pairs), 1.0..=50.0, "")?;
+        m.check()?;
         check("saliency.a_psi", s.a_psi, -0.25..=0.25, "")?;
         check("saliency.hold_a", s.hold_a, 0.01..=10_000.0, "A")?;
         check("saliency.b1", s.b1, -50.0..=50.0, "1/A")?;
@@ -165,14 +201,24 @@ impl Machine {
         })
     }
 
+    /// Changes the resistances and keeps all else.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
+        check("machine.rs", rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
+        let coupling = self.coupling;
+        self.half_chi_r *= rr / (self.alpha * self.lr);
+        self.alpha = rr / self.lr;
+        self.rr_coupling = rr * coupling;
+        self.r_prime = rs + rr * coupling * coupling;
+        Ok(())
+    }
+
     /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A).
     pub fn torque_factor(&self) -> f64 {
         self.torque_factor
-    }
-
-    /// Pole pairs.
-    pub fn pole_pairs(&self) -> f64 {
-        self.pole_pairs
     }
 
     /// Transient inductance `sigma Ls`, H.
@@ -199,12 +245,6 @@ impl Machine {
             0.0
         };
         x.psi * x.psi * flux_part + x.i * x.i * current_part
-    }
-
-    /// Electromagnetic torque, N m: Eq. 4.4 in terms of stator current and rotor flux.
-    #[inline]
-    pub fn torque(&self, x: &MachineState) -> f64 {
-        self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
     }
 
     /// Rotor current, A, referred to the stator: `(psi - Lm i)/Lr`.
@@ -240,10 +280,24 @@ impl Machine {
             i_lp: (x.i - x.i_lp) * CHI_CORNER,
         }
     }
+}
 
-    /// Time derivative of the state at terminal voltage `v` (V) and electrical speed `w` (rad/s).
+impl MachineModel for Machine {
+    type State = MachineState;
+
     #[inline]
-    pub fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
+    fn pole_pairs(&self) -> f64 {
+        self.pole_pairs
+    }
+
+    /// Electromagnetic torque, N m: Eq. 4.4 in terms of stator current and rotor flux.
+    #[inline]
+    fn torque(&self, x: &MachineState) -> f64 {
+        self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
+    }
+
+    #[inline]
+    fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
         let decay = self.decay(x.psi, w);
         let y = v + self.drive_voltage(x, decay);
         let s = self.saliency(x);
@@ -251,10 +305,7 @@ impl Machine {
         MachineState { i: (y + s * y.conj()) * scale, ..self.rest(x, decay) }
     }
 
-    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit vector
-    /// `axis`, where the terminal voltage has the component `v_axis`. Also returns the terminal
-    /// voltage, whose other component follows from the machine.
-    pub(crate) fn derivative_on_line(
+    fn derivative_on_line(
         &self,
         x: &MachineState,
         v_axis: f64,
@@ -271,13 +322,19 @@ impl Machine {
         (rates, column * rate - internal)
     }
 
-    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the terminal voltage.
-    pub(crate) fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
+    fn derivative_open(&self, x: &MachineState, w: f64) -> (MachineState, Complex) {
         let decay = self.decay(x.psi, w);
         (self.rest(x, decay), -self.drive_voltage(x, decay))
     }
-}
 
+    fn with_current(&self, x: &MachineState, i: Complex) -> MachineState {
+        MachineState { i, ..*x }
+    }
+
+    fn with_turned_flux(&self, x: &MachineState, turn: Complex) -> MachineState {
+        MachineState { psi: x.psi * turn, ..*x }
+    }
+}
 /// Refuses saliency that could come near the singularity; see [`Machine::new`].
 fn refuse_singular(
     m: &MachineSettings,

@@ -1,4 +1,7 @@
-//! The shaft: inertia, friction and load.
+//! The shaft: inertia, friction and load; with an elastic coupling, a second inertia.
+//!
+//! Static friction, a torque once a turn and the coupling are constant within an integration step, so the shaft is of first
+//! order in it with them.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,13 +33,32 @@ pub struct MechanicsSettings {
     pub inertia: f64,
     /// Viscous friction, N m s/rad. The default is assumed: the source gives none.
     pub friction: f64,
+    /// Static friction: the torque to break away, and that against the motion, N m.
+    pub static_torque: f64,
+    /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
+    pub once_torque: f64,
+    /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
+    pub load_inertia: f64,
+    /// Stiffness of the coupling, N m/rad.
+    pub stiffness: f64,
+    /// Damping of the coupling, N m s/rad.
+    pub damping: f64,
     /// Load at the start.
     pub load: Load,
 }
 
 impl Default for MechanicsSettings {
     fn default() -> Self {
-        Self { inertia: 0.012, friction: 0.001, load: Load::Free { torque: 0.0 } }
+        Self {
+            inertia: 0.012,
+            friction: 0.001,
+            static_torque: 0.0,
+            once_torque: 0.0,
+            load_inertia: 0.0,
+            stiffness: 100.0,
+            damping: 0.0,
+            load: Load::Free { torque: 0.0 },
+        }
     }
 }
 
@@ -49,6 +71,29 @@ pub struct Mechanics {
     load_torque: f64,
     /// 1/J when the shaft is free, else 0.
     mobility: f64,
+    extras: Option<Extras>,
+}
+
+/// What most shafts do not have, with its state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extras {
+    static_torque: f64,
+    once_torque: f64,
+    coupling: Option<Coupling>,
+    /// Speed at the start of the step; 0 also while friction holds the shaft.
+    speed: f64,
+}
+
+/// The elastic coupling and the inertia behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Coupling {
+    inertia: f64,
+    stiffness: f64,
+    damping: f64,
+    twist: f64,
+    speed: f64,
+    /// Torque that it takes from the motor in this step.
+    torque: f64,
 }
 
 impl Mechanics {
@@ -59,12 +104,39 @@ impl Mechanics {
     pub fn new(settings: &MechanicsSettings) -> Result<Self, PlantError> {
         check("mechanics.inertia", settings.inertia, 1e-6..=1000.0, "kg m^2")?;
         check("mechanics.friction", settings.friction, 0.0..=10.0, "N m s/rad")?;
+        let s = settings;
+        check("mechanics.static_torque", s.static_torque, 0.0..=1000.0, "N m")?;
+        check("mechanics.once_torque", s.once_torque, 0.0..=1000.0, "N m")?;
+        if s.load_inertia != 0.0 {
+            check("mechanics.load_inertia", s.load_inertia, 1e-6..=1000.0, "kg m^2")?;
+        }
+        // A resonance of at most 500 Hz: the integration follows it.
+        let parallel = s.inertia * s.load_inertia / (s.inertia + s.load_inertia);
+        let most = if s.load_inertia > 0.0 { parallel * 3141.0 * 3141.0 } else { 1e9 };
+        check("mechanics.stiffness", s.stiffness, 1e-3..=most, "N m/rad")?;
+        check("mechanics.damping", s.damping, 0.0..=1000.0, "N m s/rad")?;
+        let coupling = (s.load_inertia > 0.0).then_some(Coupling {
+            inertia: s.load_inertia,
+            stiffness: s.stiffness,
+            damping: s.damping,
+            twist: 0.0,
+            speed: 0.0,
+            torque: 0.0,
+        });
+        let plain = coupling.is_none() && s.static_torque == 0.0 && s.once_torque == 0.0;
+        let extras = Extras {
+            static_torque: s.static_torque,
+            once_torque: s.once_torque,
+            coupling,
+            speed: 0.0,
+        };
         let mut mechanics = Self {
             inertia: settings.inertia,
             friction: settings.friction,
             load: Load::Locked,
             load_torque: 0.0,
             mobility: 0.0,
+            extras: (!plain).then_some(extras),
         };
         mechanics.set_load(settings.load)?;
         Ok(mechanics)
@@ -109,5 +181,54 @@ impl Mechanics {
     #[inline]
     pub fn acceleration(&self, torque: f64, speed: f64) -> f64 {
         (torque - self.load_torque - self.friction * speed) * self.mobility
+    }
+
+    /// Mechanical speed of the inertia behind the elastic coupling, rad/s; none without.
+    pub fn load_speed(&self) -> Option<f64> {
+        self.extras?.coupling.map(|coupling| coupling.speed)
+    }
+
+    /// Fixes the torques of an integration step that begins at this rotor angle, speed and electromagnetic torque.
+    /// Returns the speed, zero where friction holds the shaft.
+    #[inline]
+    pub(crate) fn begin(&mut self, angle: f64, speed: f64, torque: f64) -> f64 {
+        let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
+            return speed;
+        };
+        let at_load = load + extras.once_torque * angle.cos();
+        let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
+            coupling.torque =
+                coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
+            coupling.torque
+        });
+        // A shaft that has come to rest, or passed it, stays where friction can hold it.
+        let rests = extras.speed * speed <= 0.0;
+        let driven = torque - against;
+        extras.speed = speed;
+        self.mobility = 1.0 / self.inertia;
+        self.load_torque = against;
+        if extras.static_torque > 0.0 {
+            if rests && driven.abs() <= extras.static_torque {
+                extras.speed = 0.0;
+                self.mobility = 0.0;
+                return 0.0;
+            }
+            let direction = if rests { driven } else { speed };
+            self.load_torque += extras.static_torque.copysign(direction);
+        }
+        speed
+    }
+
+    /// Ends an integration step of `h` seconds: the inertia behind the coupling follows.
+    #[inline]
+    pub(crate) fn end(&mut self, angle: f64, speed: f64, h: f64) {
+        let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
+            return;
+        };
+        let at_load = load + extras.once_torque * angle.cos();
+        if let Some(coupling) = &mut extras.coupling {
+            coupling.speed += h * (coupling.torque - at_load) / coupling.inertia;
+            coupling.twist += h * (speed - coupling.speed);
+        }
     }
 }

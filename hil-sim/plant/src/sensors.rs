@@ -38,8 +38,29 @@ pub struct MeasurementSettings {
     pub offset_a: f64,
     /// Offset of channel B, A.
     pub offset_b: f64,
+    /// Share of the current of phase b that channel A reads as well.
+    pub cross_talk_a: f64,
+    /// Share of the current of phase a that channel B reads as well.
+    pub cross_talk_b: f64,
+    /// Further lag of channel B, first order, us.
+    pub lag_b_us: f64,
+    /// Relative error at the end of the range that grows with the square of the current.
+    pub cubic_error: f64,
+    /// Drift of the offset of channel A from the start on, A/s.
+    pub drift_a: f64,
+    /// Drift of the offset of channel B, A/s.
+    pub drift_b: f64,
+    /// Whether each sample is the mean of two conversions, in the middle of the period and at its end: in both zero
+    /// vectors.
+    pub both_zero_vectors: bool,
     /// Dc-link voltage per code, V (12 bits).
     pub dc_link_v: f64,
+    /// Relative gain error of the dc-link voltage.
+    pub dc_gain_error: f64,
+    /// Lag of the dc-link voltage, first order, us.
+    pub dc_lag_us: f64,
+    /// Gaussian noise of the dc-link voltage, V rms.
+    pub dc_noise_v: f64,
     /// Code of the heat-sink temperature.
     pub heat_sink_code: u16,
 }
@@ -61,7 +82,17 @@ impl MeasurementSettings {
         gain_error_b: 0.0,
         offset_a: 0.0,
         offset_b: 0.0,
+        cross_talk_a: 0.0,
+        cross_talk_b: 0.0,
+        lag_b_us: 0.0,
+        cubic_error: 0.0,
+        drift_a: 0.0,
+        drift_b: 0.0,
+        both_zero_vectors: false,
         dc_link_v: 0.11,
+        dc_gain_error: 0.0,
+        dc_lag_us: 0.0,
+        dc_noise_v: 0.0,
         heat_sink_code: 1309,
     };
 
@@ -122,6 +153,10 @@ pub enum CurrentFault {
 struct CurrentChannel {
     gain: f64,
     offset: f64,
+    /// 1/A^2.
+    cubic: f64,
+    /// A/s.
+    drift: f64,
     codes_per_a: f64,
     zero: f64,
     full_scale: f64,
@@ -129,10 +164,12 @@ struct CurrentChannel {
 }
 
 impl CurrentChannel {
-    fn new(line: &CalibrationLine, gain_error: f64, offset: f64) -> Self {
+    fn new(line: &CalibrationLine, gain_error: f64, offset: f64, cubic: f64, drift: f64) -> Self {
         Self {
             gain: 1.0 + gain_error,
             offset,
+            cubic: cubic / (line.a_at_zero * line.a_at_zero),
+            drift,
             codes_per_a: 1.0 / line.a_per_code,
             zero: line.a_at_zero,
             full_scale: f64::from(line.full_scale),
@@ -149,7 +186,8 @@ impl CurrentChannel {
             CurrentFault::SaturatedHigh => return self.full_scale as u16,
             CurrentFault::SaturatedLow => return 0,
         };
-        let measured = current * self.gain + self.offset + noise;
+        let bent = if self.cubic == 0.0 { current } else { current + self.cubic * current.powi(3) };
+        let measured = bent * self.gain + self.offset + noise;
         let code = (measured - self.zero) * self.codes_per_a;
         // Rounds half up; the cast of a number that is not negative rounds down.
         (code.clamp(0.0, self.full_scale) + 0.5) as u16
@@ -163,6 +201,21 @@ pub struct Sensors {
     channels: [CurrentChannel; 2],
     corner: f64,
     filtered: Complex,
+    /// Channel B behind its own lag, if it has one.
+    lagged_b: f64,
+    lag_b: f64,
+    pole_b: f64,
+    /// Shares of the other phase.
+    cross_talk: [f64; 2],
+    /// What the channels see in the middle of the period, if that is converted too.
+    both: bool,
+    middle: [f64; 2],
+    /// Seconds from the start.
+    time: f64,
+    dc_gain: f64,
+    dc_lag: f64,
+    dc_seen: f64,
+    dc_noise: f64,
     /// Coefficients of the filter and the time step, s, they are for.
     step: f64,
     pole: f64,
@@ -187,16 +240,36 @@ impl Sensors {
         check("measurement.gain_error_b", s.gain_error_b, -0.5..=0.5, "")?;
         check("measurement.offset_a", s.offset_a, -5.0..=5.0, "A")?;
         check("measurement.offset_b", s.offset_b, -5.0..=5.0, "A")?;
+        check("measurement.cross_talk_a", s.cross_talk_a, -0.2..=0.2, "")?;
+        check("measurement.cross_talk_b", s.cross_talk_b, -0.2..=0.2, "")?;
+        check("measurement.lag_b_us", s.lag_b_us, 0.0..=1000.0, "us")?;
+        check("measurement.cubic_error", s.cubic_error, -0.3..=0.3, "")?;
+        check("measurement.drift_a", s.drift_a, -1.0..=1.0, "A/s")?;
+        check("measurement.drift_b", s.drift_b, -1.0..=1.0, "A/s")?;
         check("measurement.dc_link_v", s.dc_link_v, 0.001..=10.0, "V")?;
+        check("measurement.dc_gain_error", s.dc_gain_error, -0.5..=0.5, "")?;
+        check("measurement.dc_lag_us", s.dc_lag_us, 0.0..=1e5, "us")?;
+        check("measurement.dc_noise_v", s.dc_noise_v, 0.0..=100.0, "V")?;
         let [a, b] = s.calibration();
         Ok(Self {
             noise: s.noise_a,
             channels: [
-                CurrentChannel::new(&a, s.gain_error_a, s.offset_a),
-                CurrentChannel::new(&b, s.gain_error_b, s.offset_b),
+                CurrentChannel::new(&a, s.gain_error_a, s.offset_a, s.cubic_error, s.drift_a),
+                CurrentChannel::new(&b, s.gain_error_b, s.offset_b, s.cubic_error, s.drift_b),
             ],
             corner: TAU * s.filter_hz,
             filtered: Complex::ZERO,
+            lagged_b: 0.0,
+            lag_b: s.lag_b_us * 1e-6,
+            pole_b: 0.0,
+            cross_talk: [s.cross_talk_a, s.cross_talk_b],
+            both: s.both_zero_vectors,
+            middle: [0.0; 2],
+            time: 0.0,
+            dc_gain: 1.0 + s.dc_gain_error,
+            dc_lag: s.dc_lag_us * 1e-6,
+            dc_seen: f64::NAN,
+            dc_noise: s.dc_noise_v,
             step: f64::NAN,
             pole: 0.0,
             from_old: 0.0,
@@ -214,11 +287,33 @@ impl Sensors {
             self.prepare(h);
         }
         self.filtered = self.filtered * self.pole + old * self.from_old + new * self.from_new;
+        self.time += h;
+        if self.lag_b > 0.0 {
+            let b = phases(self.filtered)[1];
+            self.lagged_b = b + (self.lagged_b - b) * self.pole_b;
+        }
+    }
+
+    /// What the channels see now, without their own errors.
+    #[inline]
+    fn seen(&self) -> [f64; 2] {
+        let [a, b, _] = phases(self.filtered);
+        let b = if self.lag_b > 0.0 { self.lagged_b } else { b };
+        [a + self.cross_talk[0] * b, b + self.cross_talk[1] * a]
+    }
+
+    /// Holds the currents of the middle of the period for the sample at its end.
+    #[inline]
+    pub(crate) fn hold_middle(&mut self) {
+        if self.both {
+            self.middle = self.seen();
+        }
     }
 
     #[cold]
     fn prepare(&mut self, h: f64) {
         self.step = h;
+        self.pole_b = (-h / self.lag_b).exp();
         let x = self.corner * h;
         if x == 0.0 {
             return;
@@ -238,21 +333,50 @@ impl Sensors {
     /// The codes of channels A and B now.
     #[inline]
     pub fn currents(&self, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
-        let [a, b, _] = phases(self.filtered);
+        let now = self.converted(self.seen(), rng);
+        if !self.both {
+            return now;
+        }
+        let middle = self.converted(self.middle, rng);
+        [0, 1].map(|k| (now[k] + middle[k]).div_ceil(2))
+    }
+
+    #[inline]
+    fn converted(&self, seen: [f64; 2], rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
+        let code = |k: usize, noise: f64| {
+            let channel = &self.channels[k];
+            channel.code(seen[k], noise + channel.drift * self.time)
+        };
         if self.noise == 0.0 {
-            return [self.channels[0].code(a, 0.0), self.channels[1].code(b, 0.0)];
+            return [code(0, 0.0), code(1, 0.0)];
         }
         let mut noise = || -> f64 {
             let unit: f64 = StandardNormal.sample(rng);
             unit * self.noise
         };
-        [self.channels[0].code(a, noise()), self.channels[1].code(b, noise())]
+        let (a, b) = (noise(), noise());
+        [code(0, a), code(1, b)]
     }
 
-    /// The code of the dc-link voltage, V.
+    /// Follows the dc-link voltage, V, over `h` seconds at whose end it is `vdc`.
     #[inline]
-    pub fn dc_link(&self, vdc: f64) -> u16 {
-        ((vdc * self.codes_per_v).clamp(0.0, FULL_SCALE) + 0.5) as u16
+    pub(crate) fn follow_dc_link(&mut self, vdc: f64, h: f64) {
+        if self.dc_lag > 0.0 {
+            let before = if self.dc_seen.is_nan() { vdc } else { self.dc_seen };
+            self.dc_seen = vdc + (before - vdc) * (-h / self.dc_lag).exp();
+        }
+    }
+
+    /// The code of the dc-link voltage, which is `vdc`, V.
+    #[inline]
+    pub fn dc_link(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> u16 {
+        let lags = self.dc_lag > 0.0 && !self.dc_seen.is_nan();
+        let mut seen = self.dc_gain * if lags { self.dc_seen } else { vdc };
+        if self.dc_noise > 0.0 {
+            let unit: f64 = StandardNormal.sample(rng);
+            seen += unit * self.dc_noise;
+        }
+        ((seen * self.codes_per_v).clamp(0.0, FULL_SCALE) + 0.5) as u16
     }
 
     /// The code of the heat-sink temperature.

@@ -20,6 +20,58 @@ words! {
     }
 }
 
+words! {
+    /// Model of the motor: model A with its assumed saliency, or a family of iron from which saliency emerges.
+    PlantModel {
+        /// Model A.
+        A = "a",
+        /// Energy model, linear iron.
+        Linear = "linear",
+        /// Teeth fixed to the rotor flux, -3.5 %.
+        R = "r",
+        /// Teeth fixed to the rotor flux, -5 %.
+        R5 = "r5",
+        /// Teeth fixed to the air-gap flux, -3.5 %.
+        G = "g",
+        /// Teeth fixed to the air-gap flux, -7 %.
+        G7 = "g7",
+        /// Main flux, n = 4.
+        M4 = "m4",
+        /// Main flux, n = 6.
+        M6 = "m6",
+        /// Main flux, n = 4, and stator leakage.
+        M4b = "m4b",
+        /// Main flux, n = 6, and stator leakage.
+        M6b = "m6b",
+        /// Teeth, main flux, leakages and skin effect.
+        F = "f",
+    }
+}
+
+words! {
+    /// Flux at which the numbers of a family hold.
+    FluxLevel {
+        /// That of a direct current of 0.7 A with the dissertation's motor, in proportion to the rated current.
+        Low = "low",
+        /// The smaller of the rated flux and that of 0.55 times the peak of the rated current.
+        High = "high",
+    }
+}
+
+words! {
+    /// A phase that is interrupted between inverter and motor.
+    OpenPhase {
+        /// None.
+        None = "none",
+        /// Phase a.
+        A = "a",
+        /// Phase b.
+        B = "b",
+        /// Phase c.
+        C = "c",
+    }
+}
+
 /// A row of the table.
 pub struct BenchKey {
     /// How `--set` and TOML name it.
@@ -140,6 +192,60 @@ keys! {
         /// Weight of the high-frequency rotor resistance of Eq. 3.8.
         chi: f64 = 0.0, [0 .. 10], "";
     }
+    /// Choice of the machine model.
+    "" model: ModelConfig {
+        /// Model of the motor: a for the assumed saliency of saliency.*, else the family of iron whose saliency emerges.
+        plant: PlantModel = PlantModel::A, [PlantModel], "";
+        /// Flux at which the numbers of a family hold: low for that of 0.7 A with the dissertation's motor, high for the
+        /// smaller of the rated flux and that of 0.55 times the peak rated current.
+        flux_level: FluxLevel = FluxLevel::Low, [FluxLevel], "";
+    }
+    /// The iron, with plant other than a; unset: that of the family. A positive saliency is low inductance along the axis.
+    "iron." iron: IronConfig {
+        /// Flux at which saturation and teeth hold; unset: that of flux_level.
+        psi_n: Option<f64> = None, [0.0001 .. 100], "Wb";
+        /// Unsaturated magnetising inductance over the chord inductance at psi_n.
+        saturation: Option<f64> = None, [1 .. 10], "";
+        /// Exponent of the main-flux curve.
+        exponent: Option<u32> = None, [1 .. 12], "";
+        /// Whether motor.l_m is the chord inductance at psi_n; otherwise it is the unsaturated one.
+        chord: bool = true, [switch], "";
+        /// Saliency by saturated teeth at psi_n.
+        teeth: Option<f64> = None, [-0.25 .. 0.25], "";
+        /// What the teeth follow: 0 rotor flux, 1 air-gap flux, between them part of the way.
+        teeth_gap: Option<f64> = None, [0 .. 1], "";
+        /// Constant turn of the axis of the teeth ahead of that flux.
+        teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg";
+        /// Turn of the axis of the teeth by load, per torque current.
+        teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A";
+        /// Relative loss of stator leakage inductance by current.
+        leakage_saturation: Option<f64> = None, [0 .. 50], "1/A";
+        /// Relative loss of rotor leakage inductance by current.
+        rotor_leakage_saturation: Option<f64> = None, [0 .. 50], "1/A";
+        /// Rotor resistance at high frequency over that at slip frequency (deep bars).
+        skin_ratio: Option<f64> = None, [1 .. 20], "";
+        /// Rotor leakage inductance lost at high frequency.
+        skin_leakage: Option<f64> = None, [0 .. 10], "H";
+        /// Saliency that turns with the bars of the rotor.
+        slots: f64 = 0.0, [-0.1 .. 0.1], "";
+        /// Bars of the rotor.
+        bars: u32 = 28, [4 .. 400], "";
+        /// Saliency fixed to the stator.
+        stator_fixed: f64 = 0.0, [-0.1 .. 0.1], "";
+        /// Axis of that saliency, electrical, from phase a.
+        stator_fixed_deg: f64 = 0.0, [-180 .. 180], "deg";
+        /// Resistance of the iron losses across the main flux; unset: none.
+        loss: Option<f64> = None, [1 .. 1e6], "ohm";
+    }
+    /// Resistances that rise with time, towards their final value.
+    "warming." warming: WarmingConfig {
+        /// Relative rise of the stator resistance.
+        r_s: f64 = 0.0, [-0.5 .. 2], "";
+        /// Relative rise of the rotor resistance.
+        r_r: f64 = 0.0, [-0.5 .. 2], "";
+        /// Time constant.
+        time_constant_s: f64 = 60.0, [0.01 .. 1e5], "s";
+    }
     /// The inverter.
     "inverter." inverter: InverterConfig {
         /// Voltage of the dc link. The drive's nominal one is set to the same value.
@@ -151,8 +257,39 @@ keys! {
         /// Further voltage per phase that goes with the sign of the current and that no compensation
         /// knows of; unset: 1.64 V at 311 V, 40 % of the dead time's (assumed), in proportion to the dc link.
         residual_v: Option<f64> = None, [0 .. 20], "V";
+        /// Further dead time of which the drive does not know; not below minus the dead time.
+        extra_dead_time_s: f64 = 0.0, [-6e-6 .. 6e-6], "s";
+        /// Capacitance of the output node of each leg; not with switched.
+        node_capacitance_f: f64 = 0.0, [0 .. 1e-6], "F";
+        /// Resistance of a switch that conducts.
+        on_resistance: f64 = 0.0, [0 .. 100], "ohm";
+        /// Phase that is interrupted between inverter and motor.
+        open_phase: OpenPhase = OpenPhase::None, [OpenPhase], "";
         /// Whether every switching edge is simulated; otherwise the mean voltage of a period is.
         switched: bool = false, [switch], "";
+    }
+    /// The dc link, whose nominal voltage is inverter.dc_link_v.
+    "dc_link." dc_link: DcLinkConfig {
+        /// Relative amplitude of a sine ripple on a stiff link.
+        ripple: f64 = 0.0, [0 .. 0.5], "";
+        /// Frequency of that ripple.
+        ripple_hz: f64 = 100.0, [0.1 .. 3000], "Hz";
+        /// Capacitor behind a rectifier, with no way back to the mains; 0 for a stiff link.
+        capacitor_f: f64 = 0.0, [0 .. 0.1], "F";
+        /// Pulses of the rectifier per mains period: 2 or 6.
+        pulses: u32 = 6, [2 .. 6], "";
+        /// Frequency of the mains.
+        mains_hz: f64 = 50.0, [1 .. 1000], "Hz";
+        /// Resistance of mains and rectifier.
+        source: f64 = 1.0, [0.01 .. 1000], "ohm";
+        /// Start of a mains outage.
+        outage_at_s: f64 = 0.0, [0 .. 1e6], "s";
+        /// Duration of the outage; 0 for none.
+        outage_s: f64 = 0.0, [0 .. 1e6], "s";
+        /// Voltage at which the brake chopper goes on; unset: no chopper.
+        chopper_v: Option<f64> = None, [10 .. 1000], "V";
+        /// Resistor of the chopper.
+        chopper: f64 = 100.0, [0.1 .. 1e6], "ohm";
     }
     /// The sensors and their converters. The drive's scales are set to match, without the errors.
     "measurement." measurement: MeasurementConfig {
@@ -172,6 +309,26 @@ keys! {
         offset_a: f64 = 0.0, [-5 .. 5], "A";
         /// Offset of channel b.
         offset_b: f64 = 0.0, [-5 .. 5], "A";
+        /// Share of the current of phase b that channel a reads as well.
+        cross_talk_a: f64 = 0.0, [-0.2 .. 0.2], "";
+        /// Share of the current of phase a that channel b reads as well.
+        cross_talk_b: f64 = 0.0, [-0.2 .. 0.2], "";
+        /// Further lag of channel b, first order.
+        lag_b_us: f64 = 0.0, [0 .. 1000], "us";
+        /// Relative error at the end of the range; it grows with the square of the current.
+        cubic_error: f64 = 0.0, [-0.3 .. 0.3], "";
+        /// Drift of the offset of channel a from the start on.
+        drift_a: f64 = 0.0, [-1 .. 1], "A/s";
+        /// Drift of the offset of channel b from the start on.
+        drift_b: f64 = 0.0, [-1 .. 1], "A/s";
+        /// Whether each sample is the mean of two conversions, in both zero vectors. The drive is set to the age of the mean.
+        both_zero_vectors: bool = false, [switch], "";
+        /// Relative error of the gain of the dc-link voltage.
+        dc_gain_error: f64 = 0.0, [-0.5 .. 0.5], "";
+        /// Lag of the dc-link voltage, first order.
+        dc_lag_us: f64 = 0.0, [0 .. 1e5], "us";
+        /// Noise of the dc-link voltage, rms.
+        dc_noise_v: f64 = 0.0, [0 .. 100], "V";
         /// End of the range of the dc link; unset: 450 V at 311 V, more in proportion to a higher dc link.
         dc_link_range_v: Option<f64> = None, [10 .. 2000], "V";
         /// Temperature of the heat sink.
@@ -185,6 +342,20 @@ keys! {
         speed_rpm: f64 = 0.0, [-24000 .. 24000], "rpm";
         /// Torque of the load, with load.mode = free; unset: none, or the experiment's own.
         torque_nm: Option<f64> = None, [-10000 .. 10000], "Nm";
+    }
+    /// What a shaft may have besides inertia, friction and load.
+    "shaft." shaft: ShaftConfig {
+        /// Static friction: the torque to break away, and that against the motion.
+        static_nm: f64 = 0.0, [0 .. 1000], "Nm";
+        /// Amplitude of a load torque that varies once a turn.
+        once_nm: f64 = 0.0, [0 .. 1000], "Nm";
+        /// Inertia behind an elastic coupling, where the load acts; 0 for a rigid shaft. motor.inertia is then that before
+        /// it.
+        load_inertia: f64 = 0.0, [0 .. 1000], "kg m2";
+        /// Stiffness of the coupling; a resonance of at most 500 Hz.
+        stiffness: f64 = 100.0, [0.001 .. 1e9], "Nm/rad";
+        /// Damping of the coupling.
+        damping: f64 = 0.0, [0 .. 1000], "Nm s/rad";
     }
     /// References, for experiments that do not bring their own.
     "reference." reference: ReferenceConfig {

@@ -71,6 +71,14 @@ impl Motor {
         })
     }
 
+    /// The motor of a text in the form of the files.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] when it is not of that form.
+    pub fn from_text(name: &str, text: &str) -> Result<Self, Error> {
+        parse(name, text).map_err(Error::refused)
+    }
+
     /// The keys that the file sets, with their values.
     pub fn settings(&self) -> Vec<(String, Value)> {
         flattened(&self.settings)

@@ -85,9 +85,8 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         let t = n as f64 / REFINES_PER_S;
         let (from, to, growth) = case.warming;
         let share = ((t - from) / (to - from)).clamp(0.0, 1.0);
-        let mut machine = plant.machine;
-        machine.rr *= 1.0 + growth * share;
-        rig.plant.set_machine(&machine, &plant.saliency).map_err(Error::refused)?;
+        let warm = plant.machine.rr * (1.0 + growth * share);
+        rig.plant.set_resistances(plant.machine.rs, warm).map_err(Error::refused)?;
 
         let mut angle_error = 0.0;
         for k in 0..block {
@@ -109,7 +108,7 @@ pub fn run(config: &Config, case: &WarmingCase, seed: u64) -> Result<Vec<Warming
         }
         moments.push(WarmingMoment {
             t: (n + 1) as f64 / REFINES_PER_S,
-            tau_r: rig.plant.motor().machine.tau_r(),
+            tau_r: rig.plant.tau_r(),
             omega_m: rig.plant.mechanical_speed() * pole_pairs,
             estimate,
             model_d: inverse(&online),

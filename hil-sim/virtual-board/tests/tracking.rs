@@ -44,7 +44,7 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     pair.run(3000, |_, _| {})?;
     let (nominal, found) = status(&mut pair)?;
     assert!(!found, "before the memory of 1.7 s is full");
-    let truth = 1e3 * pair.board.plant.motor().machine.tau_r();
+    let truth = 1e3 * pair.board.plant.tau_r();
     assert!((nominal / truth - 1.3).abs() < 0.01, "{nominal} ms for {truth} ms");
     let before = angle_error(&mut pair, 1200)?;
 

@@ -100,7 +100,7 @@ pub fn delay(
         let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
         let mut saliency = plant.saliency;
         saliency.b1 += 0.5 * sign * CHANGE;
-        rig.plant.set_machine(&plant.machine, &saliency).map_err(Error::refused)?;
+        rig.plant.set_saliency(&plant.machine, &saliency).map_err(Error::refused)?;
         let mut k = 0;
         rig.run(AFTER as f64 / crate::rig::RATE_HZ, |p| {
             // The first change comes from the middle.

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use drive_core::{Compare, Sample};
-use hil_sim::plant::{Complex, Plant, phases};
+use hil_sim::plant::Plant;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -88,11 +88,7 @@ impl ShuntReader {
     fn top(&mut self, time: u64, bridge: &Bridge, plant: &Plant) {
         self.bridge = bridge.clone();
         // All low sides on, or none: the terminals have the same potential.
-        let motor = plant.motor();
-        let (machine, state) = (&motor.machine, &motor.state);
-        let speed = machine.pole_pairs() * state.speed;
-        let shorted = machine.derivative(&state.electrical, Complex::ZERO, speed).i;
-        let slope = if bridge.compare().enabled { phases(shorted) } else { [0.0; 3] };
+        let slope = if bridge.compare().enabled { plant.shorted_slopes() } else { [0.0; 3] };
         let currents = Currents { at: plant.phase_currents(), slope };
         let top = Top { time, amplifiers: self.amplifiers, bridge: bridge.clone(), currents };
         self.before = std::mem::replace(&mut self.top, top);

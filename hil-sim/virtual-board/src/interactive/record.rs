@@ -105,7 +105,7 @@ impl Record {
     /// Takes a control interrupt: the plant at its sample, and the readings of the drive after it.
     pub fn take(&mut self, time: f64, plant: &Plant, period: &Period, readings: &Readings) {
         let rpm = 60.0 / TAU;
-        let turns_to_rpm = RATE_HZ * 60.0 / plant.motor().machine.pole_pairs();
+        let turns_to_rpm = RATE_HZ * 60.0 / plant.pole_pairs();
         let on = period.compare.enabled;
         let flux = plant.rotor_flux().norm();
         let mut bucket = Bucket { periods: 1.0, time, ..Bucket::default() };

@@ -1,0 +1,310 @@
+//! Currents as gradients of one magnetic energy.
+//!
+//! With stator flux `s`, gap-side rotor flux `r`, flux `e` of the iron's eddy currents and main flux `m`,
+//! all in the stator frame, `x = s - m`, `y = r - m`, `z = e - m`:
+//!
+//! ```text
+//! W = Wl(x) + Wl(y) + |z|^2/(2 Le) + Wm(m) + c Re(x^2 m*^2)/(mn^2 + |m|^2) + 1/2 Re(A x*^2)/Ll
+//! Wl:  gradient x/L (1 + b |x|)                    leakage, saturating with its current
+//! Wm:  gradient m/L0 (1 + (|m|/mk)^n)              main flux
+//! A = a_f e^(2 j angle) + a_s e^(j bars theta)     stator-fixed and rotor-slot saliency of the stator leakage
+//! ```
+//!
+//! The currents are its gradients by `s`, `r` and `e`; `m` is where its gradient by `m` vanishes (currents add up to
+//! that of the main flux), found by Newton's rule. So cross-saturation is in it, and no term can
+//! make energy. The exception is a tooth term that does not follow `m`: it is added to the stator
+//! current alone, and the balance of power does not hold to its size (see `IronSettings::conservative`).
+//!
+//! A derivative of a complex function f(u) has two parts, `df = f_u du + f_v du*`.
+
+use crate::complex::{Complex, square};
+
+/// Residual, A, below which one more linear correction ends the iteration: it leaves 1e-11 A.
+const CLOSE: f64 = 1e-5;
+/// Most iterations; two are usual, some ten after a jump of the flux.
+const LIMIT: u32 = 60;
+/// Below this, Wb, a flux has no direction.
+const NO_FLUX: f64 = 1e-12;
+
+/// The two parts of the derivative of a complex function.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Slope {
+    direct: Complex,
+    conjugate: Complex,
+}
+
+impl Slope {
+    #[inline]
+    pub(crate) fn times(&self, d: Complex) -> Complex {
+        self.direct * d + self.conjugate * d.conj()
+    }
+
+    /// The `d` for which `self.times(d)` is `value`.
+    #[inline]
+    pub(crate) fn solve(&self, value: Complex) -> Complex {
+        let scale = 1.0 / (square(self.direct) - square(self.conjugate));
+        (self.direct.conj() * value - self.conjugate * value.conj()) * scale
+    }
+
+    #[inline]
+    fn plus(self, other: Self) -> Self {
+        Self { direct: self.direct + other.direct, conjugate: self.conjugate + other.conjugate }
+    }
+
+    #[inline]
+    fn minus(self, other: Self) -> Self {
+        Self { direct: self.direct - other.direct, conjugate: self.conjugate - other.conjugate }
+    }
+}
+
+/// Slopes of the currents at a solution.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Slopes {
+    /// Stator current by `x` and, at fixed `x`, by `m`.
+    stator_x: Slope,
+    stator_m: Slope,
+    /// Rotor current by `y`.
+    pub rotor: Slope,
+    /// Negative residual by `s` at fixed `m`.
+    residual_s: Slope,
+    /// Residual by `m`.
+    residual_m: Slope,
+}
+
+/// Saturating leakage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Leakage {
+    /// 1/L.
+    pub inverse: f64,
+    /// b, 1/Wb.
+    pub saturation: f64,
+}
+
+impl Leakage {
+    /// With the inductance, H, and its relative loss, 1/A.
+    pub(crate) fn new(inductance: f64, per_ampere: f64) -> Self {
+        Self { inverse: 1.0 / inductance, saturation: per_ampere / inductance }
+    }
+
+    #[inline]
+    fn current(&self, x: Complex) -> (Complex, Slope) {
+        if self.saturation == 0.0 {
+            let direct = self.inverse.into();
+            return (x * self.inverse, Slope { direct, conjugate: Complex::ZERO });
+        }
+        let length = square(x).sqrt();
+        let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
+        let conjugate = if length > NO_FLUX { x * x * (half / length) } else { Complex::ZERO };
+        let direct = (self.inverse * (1.0 + 1.5 * bent)).into();
+        (x * (self.inverse * (1.0 + bent)), Slope { direct, conjugate })
+    }
+}
+
+/// The main-flux curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MainFlux {
+    /// 1/L0.
+    pub inverse: f64,
+    /// 1/mk; 0 without saturation.
+    pub inverse_knee: f64,
+    pub exponent: i32,
+}
+
+impl MainFlux {
+    #[inline]
+    pub(crate) fn current(&self, m: Complex) -> (Complex, Slope) {
+        let length = square(m).sqrt();
+        let bent = (length * self.inverse_knee).powi(self.exponent);
+        let half = 0.5 * f64::from(self.exponent) * bent * self.inverse;
+        let conjugate =
+            if length > NO_FLUX { m * m * (half / (length * length)) } else { Complex::ZERO };
+        let straight = self.inverse * (1.0 + bent);
+        (m * straight, Slope { direct: (straight + half).into(), conjugate })
+    }
+}
+
+/// The tooth term.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Teeth {
+    /// 2 c, 1/H.
+    pub twice: f64,
+    /// mn^2.
+    pub knee_squared: f64,
+    /// Way from rotor flux to main flux, 0 to 1.
+    pub gap: f64,
+    /// Turn of the axis: constant, rad, and per ampere.
+    pub turn: f64,
+    pub turn_per_a: f64,
+    /// Whether it is a gradient: it follows the main flux.
+    pub conservative: bool,
+}
+
+impl Teeth {
+    /// Unit vector by which the axis is turned.
+    #[inline]
+    fn turned(&self, i: Complex, r: Complex) -> Complex {
+        if self.turn == 0.0 && self.turn_per_a == 0.0 {
+            return Complex::new(1.0, 0.0);
+        }
+        let across = (r.conj() * i).im / square(r).sqrt().max(NO_FLUX);
+        Complex::cis(self.turn + self.turn_per_a * across)
+    }
+}
+
+/// The magnetic circuit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Magnetics {
+    pub stator: Leakage,
+    pub rotor: Leakage,
+    pub main: MainFlux,
+    pub teeth: Option<Teeth>,
+    /// Stator-fixed saliency, times 1/Ll.
+    pub fixed: Complex,
+    /// Rotor-slot saliency, times 1/Ll, and bars per pole pair.
+    pub slots: f64,
+    pub bars: f64,
+    /// 1/Le; 0 without iron loss.
+    pub eddy: f64,
+}
+
+/// Fluxes in, currents out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Solution {
+    /// Main flux, Wb.
+    pub m: Complex,
+    /// Stator current, A.
+    pub i: Complex,
+    /// Rotor current, A.
+    pub i_r: Complex,
+    pub slopes: Slopes,
+}
+
+impl Magnetics {
+    /// Saliency of the stator leakage that does not depend on flux, times 1/Ll, at the rotor angle `theta`.
+    #[inline]
+    fn geometric(&self, theta: f64) -> Complex {
+        if self.slots == 0.0 { self.fixed } else { self.fixed + self.slot_vector(theta) }
+    }
+
+    /// The part of it that turns with the bars.
+    #[inline]
+    pub(crate) fn slot_vector(&self, theta: f64) -> Complex {
+        Complex::cis(self.bars * theta) * self.slots
+    }
+
+    /// Finds the currents for the fluxes `s`, `r`, `e`, from a first guess.
+    #[inline]
+    pub(crate) fn solve(&self, [s, r, e]: [Complex; 3], theta: f64, guess: Solution) -> Solution {
+        let geometric = self.geometric(theta);
+        let mut found = guess;
+        for _ in 0..LIMIT {
+            let residual = self.evaluate([s, r, e], geometric, &mut found);
+            let step = -found.slopes.residual_m.solve(residual);
+            found.m += step;
+            if !(square(residual) > CLOSE * CLOSE) {
+                let slopes = &found.slopes;
+                found.i += slopes.stator_m.times(step) - slopes.stator_x.times(step);
+                found.i_r -= slopes.rotor.times(step);
+                break;
+            }
+        }
+        found
+    }
+
+    /// Currents and slopes at `found.m`; returns the gradient of the energy by `m`.
+    #[inline]
+    fn evaluate(
+        &self,
+        [s, r, e]: [Complex; 3],
+        geometric: Complex,
+        found: &mut Solution,
+    ) -> Complex {
+        let m = found.m;
+        let x = s - m;
+        let (mut i, mut stator_x) = self.stator.current(x);
+        i += geometric * x.conj();
+        stator_x.conjugate += geometric;
+        let (i_r, rotor) = self.rotor.current(r - m);
+        let (i_m, main) = self.main.current(m);
+        let mut stator_m = Slope::default();
+        let mut residual = i_m - i_r;
+        let mut residual_s = Slope::default();
+        let mut residual_m = main.plus(rotor);
+        if let Some(t) = &self.teeth {
+            let turn = t.turned(found.i, r);
+            let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
+            let f_m = turn * t.gap;
+            let (fc, xc) = (f.conj(), x.conj());
+            let d = 1.0 / (t.knee_squared + square(f));
+            let base = f * f * (t.twice * d);
+            i += xc * base;
+            stator_x.conjugate += base;
+            let by_f = xc * (f * (2.0 * t.twice * d) - base * fc * d);
+            let by_fc = -(xc * base * f * d);
+            stator_m = Slope { direct: by_f * f_m, conjugate: by_fc * f_m.conj() };
+            if t.conservative {
+                let (xx, dd) = (x * x, d * d);
+                let q = (xx * fc * fc).re;
+                let (q_m, q_mc, q_x, q_xc) = (xc * xc * m, xx * fc, x * fc * fc, xc * m * m);
+                let length = square(m);
+                residual += (fc * xx * d - m * (q * dd)) * t.twice;
+                residual_m.direct += (-(fc * fc * xx) * dd - (q_m * m + q) * dd
+                    + 2.0 * q * length * dd * d)
+                    * t.twice;
+                residual_m.conjugate += (xx * d - fc * xx * m * dd - q_mc * m * dd
+                    + m * m * (2.0 * q * dd * d))
+                    * t.twice;
+                let by_x = Slope {
+                    direct: (fc * x * (2.0 * d) - q_x * m * dd) * t.twice,
+                    conjugate: q_xc * m * (-dd * t.twice),
+                };
+                residual_s = Slope::default().minus(by_x);
+                residual_m = residual_m.minus(by_x);
+            }
+        }
+        residual -= i;
+        residual_s = residual_s.plus(stator_x);
+        residual_m = residual_m.plus(stator_x).minus(stator_m);
+        if self.eddy != 0.0 {
+            residual -= (e - m) * self.eddy;
+            residual_m.direct += self.eddy;
+        }
+        found.i = i;
+        found.i_r = i_r;
+        found.slopes = Slopes { stator_x, stator_m, rotor, residual_s, residual_m };
+        residual
+    }
+
+    /// Rates of main flux and stator current at these rates of the fluxes.
+    #[inline]
+    pub(crate) fn rates(&self, k: &Slopes, [s, r, e]: [Complex; 3]) -> (Complex, Complex) {
+        let pull = k.residual_s.times(s) + k.rotor.times(r) + e * self.eddy;
+        let m = k.residual_m.solve(pull);
+        (m, k.stator_x.times(s - m) + k.stator_m.times(m))
+    }
+
+    /// The energy in Wb A; times 3/2 it is in J. Without the tooth term unless that is a gradient.
+    pub(crate) fn energy(&self, [s, r, e]: [Complex; 3], theta: f64, m: Complex) -> f64 {
+        let leakage = |l: &Leakage, x: Complex| {
+            let length = x.norm();
+            l.inverse * length * length * (0.5 + l.saturation * length / 3.0)
+        };
+        let x = s - m;
+        let length = m.norm();
+        let bent = (length * self.main.inverse_knee).powi(self.main.exponent);
+        let main = self.main.inverse
+            * length
+            * length
+            * (0.5 + bent / (f64::from(self.main.exponent) + 2.0));
+        let teeth = self.teeth.filter(|t| t.conservative).map_or(0.0, |t| {
+            0.5 * t.twice * (x * x * m.conj() * m.conj()).re / (t.knee_squared + square(m))
+        });
+        let geometric = 0.5 * (self.geometric(theta) * x.conj() * x.conj()).re;
+        leakage(&self.stator, x)
+            + leakage(&self.rotor, r - m)
+            + 0.5 * self.eddy * square(e - m)
+            + main
+            + teeth
+            + geometric
+    }
+}

@@ -1,0 +1,287 @@
+//! The induction machine from one magnetic energy ("energy model").
+//!
+//! Saliency is not assumed but emerges: from the saturation of the main flux, of the leakages and of the teeth.
+//! All vectors are complex, in the stator frame. With the currents `i` and `i_r` of
+//! [`magnetics`], electrical rotor speed `w` and mechanical rotor angle `theta_m`:
+//!
+//! ```text
+//! ds/dt = v - rs i                  dr/dt = -r1 (i_r - i_2) + j w r
+//! dd/dt = -r2 i_2 + j w d           i_2   = (d - r)/Lb            bottom of the bars
+//! de/dt = -Re (e - m)/Le                                          eddy currents of the iron
+//! Te    = -3/2 P Im(r* (i_r - i_2) + d* i_2) - 3/2 dW/dtheta_m    explicit: rotor slots
+//! ```
+//!
+//! The ladder of the bar has `r1 = K rr` on the gap side and `r2 = rr K/(K - 1)`, `Lb = Lx/(1 - 1/K)^2`
+//! below it: `rr` and the whole rotor leakage at slip frequency, K times `rr` and the leakage less `Lx` at high frequency.
+//! Without skin effect there is `dr/dt = -rr i_r + j w r` alone. The eddy currents have a leakage
+//! `Le = Re 100 us`: iron loss follows the square of the frequency up to 1.6 kHz. Hysteresis, space
+//! harmonics and the ripple of the PWM edges in the iron are absent.
+
+mod family;
+mod magnetics;
+mod settings;
+mod state;
+
+pub use family::{FAMILIES, Family};
+pub use settings::IronSettings;
+pub use state::EnergyState;
+
+use magnetics::{Leakage, Magnetics, MainFlux, Teeth};
+
+use crate::complex::{Complex, dot, square};
+use crate::error::{PlantError, check};
+use crate::machine::MachineSettings;
+use crate::model::MachineModel;
+
+/// Time constant of the eddy currents, s.
+const EDDY_LAG: f64 = 100e-6;
+/// Corrections that set a current; each squares the error.
+const CURRENT_STEPS: u32 = 8;
+
+/// Coefficients of the energy model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnergyMachine {
+    magnetics: Magnetics,
+    rs: f64,
+    rr: f64,
+    /// Resistances of the gap side and the bottom of the bars over `rr`; the latter 0 without skin effect.
+    top: f64,
+    bottom: f64,
+    /// 1/Lb.
+    inverse_bar: f64,
+    /// 1/Le times Re, 1/s.
+    eddy_rate: f64,
+    pole_pairs: f64,
+    lm: f64,
+    lr: f64,
+}
+
+impl EnergyMachine {
+    /// The machine with these settings.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn new(m: &MachineSettings, iron: &IronSettings) -> Result<Self, PlantError> {
+        m.check()?;
+        iron.check(m)?;
+        let pole_pairs = f64::from(m.pole_pairs);
+        let (ls, lr) = (m.lls + m.lm, m.llr + m.lm);
+        let relative = (ls - m.lm * m.lm / lr) / (m.lls * m.lls);
+        let unsaturated = if iron.chord { m.lm * iron.saturation } else { m.lm };
+        let knee = (iron.saturation - 1.0).powf(1.0 / f64::from(iron.exponent)) / iron.psi_n;
+        let chord = unsaturated / iron.saturation;
+        let skin = iron.skin_ratio > 1.0;
+        let share = 1.0 - 1.0 / iron.skin_ratio;
+        let outside = m.llr - if skin { iron.skin_leakage } else { 0.0 };
+        let bar = iron.skin_leakage / (share * share);
+        let eddy = if iron.loss > 0.0 { 1.0 / (iron.loss * EDDY_LAG) } else { 0.0 };
+        Ok(Self {
+            magnetics: Magnetics {
+                stator: Leakage::new(m.lls, iron.leakage_saturation),
+                rotor: Leakage::new(outside, iron.rotor_leakage_saturation),
+                main: MainFlux {
+                    inverse: 1.0 / unsaturated,
+                    inverse_knee: knee,
+                    exponent: iron.exponent as i32,
+                },
+                teeth: (iron.teeth != 0.0).then(|| Teeth {
+                    twice: 2.0 * iron.teeth * relative,
+                    knee_squared: iron.psi_n * iron.psi_n,
+                    gap: iron.teeth_gap,
+                    turn: iron.teeth_turn_deg.to_radians(),
+                    turn_per_a: iron.teeth_turn_deg_per_a.to_radians(),
+                    conservative: iron.conservative(),
+                }),
+                fixed: Complex::cis(2.0 * iron.stator_fixed_deg.to_radians())
+                    * (iron.stator_fixed * relative),
+                slots: iron.slots * relative,
+                bars: f64::from(iron.bars) / pole_pairs,
+                eddy,
+            },
+            rs: m.rs,
+            rr: m.rr,
+            top: iron.skin_ratio,
+            bottom: if skin { 1.0 / share } else { 0.0 },
+            inverse_bar: if skin { 1.0 / bar } else { 0.0 },
+            eddy_rate: if eddy > 0.0 { 1.0 / EDDY_LAG } else { 0.0 },
+            pole_pairs,
+            lm: chord,
+            lr: chord + m.llr,
+        })
+    }
+
+    /// Changes the resistances and keeps all else.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn set_resistances(&mut self, rs: f64, rr: f64) -> Result<(), PlantError> {
+        check("machine.rs", rs, 1e-4..=1000.0, "ohm")?;
+        check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
+        (self.rs, self.rr) = (rs, rr);
+        Ok(())
+    }
+
+    /// Whether the bars have a bottom of their own.
+    pub fn has_skin_effect(&self) -> bool {
+        self.inverse_bar != 0.0
+    }
+
+    /// Whether the iron has losses.
+    pub fn has_iron_loss(&self) -> bool {
+        self.eddy_rate != 0.0
+    }
+
+    /// Torque per rotor flux and current across it, 3/2 P Lm/Lr, N m/(Wb A), at the nominal flux.
+    pub fn torque_factor(&self) -> f64 {
+        1.5 * self.pole_pairs * self.lm / self.lr
+    }
+
+    /// Rotor time constant `Lr/rr` at the nominal flux, s.
+    pub fn tau_r(&self) -> f64 {
+        self.lr / self.rr
+    }
+
+    /// Magnetic energy, J.
+    pub fn energy(&self, x: &EnergyState) -> f64 {
+        let bar = 0.5 * self.inverse_bar * square(x.psi_deep - x.psi_r);
+        1.5 * (bar + self.magnetics.energy([x.psi_s, x.psi_r, x.psi_iron], x.theta, x.main_flux()))
+    }
+
+    /// Power turned into heat in stator, rotor and iron, W.
+    pub fn losses(&self, x: &EnergyState) -> f64 {
+        let (top, bottom) = self.bar_currents(x);
+        let eddy = (x.psi_iron - x.main_flux()) * self.magnetics.eddy;
+        let iron = if self.eddy_rate > 0.0 {
+            square(eddy) * self.eddy_rate / self.magnetics.eddy
+        } else {
+            0.0
+        };
+        let rotor = self.rr * (self.top * square(top) + self.bottom * square(bottom));
+        1.5 * (self.rs * square(x.solution.i) + rotor + iron)
+    }
+
+    /// Currents of top and bottom of the bars, A.
+    #[inline]
+    fn bar_currents(&self, x: &EnergyState) -> (Complex, Complex) {
+        let bottom = (x.psi_deep - x.psi_r) * self.inverse_bar;
+        (x.solution.i_r - bottom, bottom)
+    }
+
+    /// As `derivative`, without the rates of the dependent quantities.
+    #[inline]
+    fn flux_rates(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyState {
+        let (top, bottom) = self.bar_currents(x);
+        let turning = |psi: Complex| Complex::new(-w * psi.im, w * psi.re);
+        let deep = self.inverse_bar != 0.0;
+        EnergyState {
+            psi_s: v - x.solution.i * self.rs,
+            psi_r: turning(x.psi_r) - top * (self.rr * self.top),
+            psi_deep: if deep {
+                turning(x.psi_deep) - bottom * (self.rr * self.bottom)
+            } else {
+                Complex::ZERO
+            },
+            psi_iron: (x.solution.m - x.psi_iron) * self.eddy_rate,
+            theta: w,
+            ..EnergyState::default()
+        }
+    }
+
+    /// Adds the rates of main flux and current to those of the fluxes.
+    #[inline]
+    fn completed(&self, x: &EnergyState, mut k: EnergyState) -> EnergyState {
+        let rates = [k.psi_s, k.psi_r, k.psi_iron];
+        (k.solution.m, k.solution.i) = self.magnetics.rates(&x.solution.slopes, rates);
+        k
+    }
+
+    /// Change of the current by a change of the stator flux, everything else constant.
+    #[inline]
+    fn current_by_flux(&self, x: &EnergyState, d: Complex) -> Complex {
+        self.magnetics.rates(&x.solution.slopes, [d, Complex::ZERO, Complex::ZERO]).1
+    }
+
+    /// The change of the stator flux that changes the current by `d`.
+    fn flux_for_current(&self, x: &EnergyState, d: Complex) -> Complex {
+        let (a, b) = (
+            self.current_by_flux(x, Complex::new(1.0, 0.0)),
+            self.current_by_flux(x, Complex::new(0.0, 1.0)),
+        );
+        let scale = 1.0 / (a.re * b.im - a.im * b.re);
+        Complex::new(d.re * b.im - d.im * b.re, a.re * d.im - a.im * d.re) * scale
+    }
+}
+
+impl MachineModel for EnergyMachine {
+    type State = EnergyState;
+
+    #[inline]
+    fn pole_pairs(&self) -> f64 {
+        self.pole_pairs
+    }
+
+    #[inline]
+    fn torque(&self, x: &EnergyState) -> f64 {
+        let (top, bottom) = self.bar_currents(x);
+        let cross = |a: Complex, b: Complex| a.re * b.im - a.im * b.re;
+        let torque = -self.pole_pairs * (cross(x.psi_r, top) + cross(x.psi_deep, bottom));
+        if self.magnetics.slots == 0.0 {
+            return 1.5 * torque;
+        }
+        let y = x.psi_s - x.solution.m;
+        let slots = self.magnetics.slot_vector(x.theta) * y.conj() * y.conj();
+        1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots.im)
+    }
+
+    #[inline]
+    fn derivative(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyState {
+        self.completed(x, self.flux_rates(x, v, w))
+    }
+
+    fn derivative_on_line(
+        &self,
+        x: &EnergyState,
+        v_axis: f64,
+        axis: Complex,
+        w: f64,
+    ) -> (EnergyState, Complex) {
+        let normal = axis * Complex::i();
+        let k = self.derivative(x, axis * v_axis, w);
+        let by_normal = self.current_by_flux(x, normal);
+        let v_normal = -dot(k.solution.i, normal) / dot(by_normal, normal);
+        let v = axis * v_axis + normal * v_normal;
+        (self.derivative(x, v, w), v)
+    }
+
+    fn derivative_open(&self, x: &EnergyState, w: f64) -> (EnergyState, Complex) {
+        let k = self.derivative(x, Complex::ZERO, w);
+        let v = self.flux_for_current(x, -k.solution.i);
+        (self.derivative(x, v, w), v)
+    }
+
+    fn with_current(&self, x: &EnergyState, i: Complex) -> EnergyState {
+        let mut x = *x;
+        for _ in 0..CURRENT_STEPS {
+            let missing = i - x.solution.i;
+            if square(missing) < 1e-24 {
+                break;
+            }
+            x.psi_s += self.flux_for_current(&x, missing);
+            x = self.settled(x);
+        }
+        // To the last digit: no current is none.
+        x.solution.i = i;
+        x
+    }
+
+    fn with_turned_flux(&self, x: &EnergyState, turn: Complex) -> EnergyState {
+        let turned = EnergyState { psi_r: x.psi_r * turn, psi_deep: x.psi_deep * turn, ..*x };
+        self.with_current(&self.settled(turned), x.solution.i)
+    }
+
+    #[inline]
+    fn settled(&self, mut x: EnergyState) -> EnergyState {
+        x.solution = self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], x.theta, x.solution);
+        x
+    }
+}

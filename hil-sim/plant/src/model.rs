@@ -1,0 +1,69 @@
+//! What shaft, inverter and sensors need of a machine model.
+
+use crate::complex::Complex;
+
+/// A machine, in the stator frame: amplitude-invariant space vectors, `w` the electrical speed of
+/// the rotor in rad/s. A model is a set of coefficients; its state is apart from it.
+pub trait MachineModel: Copy {
+    /// What the model integrates.
+    type State: ElectricalState;
+
+    /// Pole pairs.
+    fn pole_pairs(&self) -> f64;
+
+    /// Electromagnetic torque, N m.
+    fn torque(&self, x: &Self::State) -> f64;
+
+    /// Time derivative of the state at the terminal voltage `v`, V.
+    fn derivative(&self, x: &Self::State, v: Complex, w: f64) -> Self::State;
+
+    /// As [`Self::derivative`] while the current is confined to the line through zero along the unit
+    /// vector `axis`, where the terminal voltage has the component `v_axis`. Also returns the
+    /// terminal voltage, whose other component follows from the machine.
+    fn derivative_on_line(
+        &self,
+        x: &Self::State,
+        v_axis: f64,
+        axis: Complex,
+        w: f64,
+    ) -> (Self::State, Complex);
+
+    /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the
+    /// terminal voltage.
+    fn derivative_open(&self, x: &Self::State, w: f64) -> (Self::State, Complex);
+
+    /// The state with the stator current `i`, A, and the same rotor flux.
+    fn with_current(&self, x: &Self::State, i: Complex) -> Self::State;
+
+    /// The state with its rotor flux turned by `turn`, a unit vector.
+    fn with_turned_flux(&self, x: &Self::State, turn: Complex) -> Self::State;
+
+    /// The state with its dependent quantities made to match the integrated ones.
+    #[inline]
+    fn settled(&self, x: Self::State) -> Self::State {
+        x
+    }
+}
+
+/// The state of a machine, a vector space for the integration.
+pub trait ElectricalState: Copy + Default {
+    /// Stator current, A.
+    fn current(&self) -> Complex;
+
+    /// Rotor flux linkage, Wb.
+    fn rotor_flux(&self) -> Complex;
+
+    /// `self + rate h`
+    #[must_use]
+    fn moved(&self, rate: &Self, h: f64) -> Self;
+
+    /// `self + (k0 + 2 k1 + 2 k2 + k3) h/6`
+    #[must_use]
+    fn advanced(&self, k: [&Self; 4], h: f64) -> Self;
+}
+
+/// `(k0 + 2 k1 + 2 k2 + k3) sixth`, the increment of the Runge-Kutta rule.
+#[inline]
+pub(crate) fn increment(k: [Complex; 4], sixth: f64) -> Complex {
+    (k[0] + k[3] + (k[1] + k[2]) * 2.0) * sixth
+}
