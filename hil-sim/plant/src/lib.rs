@@ -49,13 +49,13 @@ use serde::{Deserialize, Serialize};
 pub use complex::{Complex, clarke, phases};
 pub use dc_link::DcLinkSettings;
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
-pub use energy::{EnergyMachine, EnergyState, FAMILIES, Family, IronSettings};
+pub use energy::{EnergyMachine, EnergyRate, EnergyState, FAMILIES, Family, IronSettings};
 pub use error::PlantError;
 pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
 pub use machine::{Machine, MachineSettings, MachineState, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
-pub use model::{ElectricalState, MachineModel};
+pub use model::{ElectricalRate, ElectricalState, MachineModel, Rate};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
 pub use warming::WarmingSettings;
 
