@@ -328,14 +328,11 @@ impl Plant {
 
     /// Slopes of the phase currents while the terminals are shorted, A/s.
     pub fn shorted_slopes(&self) -> [f64; 3] {
-        /// Seconds: short against every time constant of a motor, long against the rounding.
-        const STEP: f64 = 1e-7;
-        let slope = whichever!(&self.motor, motor => {
-            let (machine, x) = (&motor.machine, &motor.state.electrical);
-            let rate = machine.derivative(x, Complex::ZERO, machine.pole_pairs() * motor.state.speed);
-            (machine.settled(x.moved(&rate, STEP)).current() - x.current()) / STEP
-        });
-        phases(slope)
+        phases(whichever!(&self.motor, motor => {
+            let speed = motor.machine.pole_pairs() * motor.state.speed;
+            let rate = motor.machine.derivative(&motor.state.electrical, Complex::ZERO, speed);
+            rate.current_rate()
+        }))
     }
 
     /// Changes the dead time, us.
