@@ -86,6 +86,12 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             let Some(seed) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
             let outcome = one(&mut scene, &CLASSES[which], seed / classes, seed);
+            let outcome = outcome.and_then(|outcome| {
+                // A damaged program may break the chip's rules; one that is whole may not.
+                let whole = !matches!(CLASSES[which].run, Run::Regulating(_));
+                let broken = scene.board.violations().first().filter(|_| whole);
+                broken.map_or(Ok(outcome), |broken| Err(anyhow!("{broken}")))
+            });
             if let Err(why) = &outcome {
                 eprintln!("{}, seed {}: {why:#}", CLASSES[which].name, seed);
             }

@@ -166,7 +166,7 @@ impl Chip {
             system_rose: 0,
             analog: [0; 3],
             last_block: None,
-            scs: Scs::default(),
+            scs: Scs::new(),
             rcc: Rcc::new(Reset::Power),
             pwr: Pwr::default(),
             flash: Flash::new(),

@@ -43,26 +43,6 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// Every rule.
-    pub const ALL: [Self; 16] = [
-        Self::ClockGate,
-        Self::EnableDelay,
-        Self::VoltageRange,
-        Self::Latency,
-        Self::ClockStep,
-        Self::LockOnce,
-        Self::DataCache,
-        Self::AdcClock,
-        Self::AdcEarly,
-        Self::JsqrStarted,
-        Self::IwdgBusy,
-        Self::PinMode,
-        Self::ResumedOutputs,
-        Self::SupplyMonitor,
-        Self::DacMode,
-        Self::DacReady,
-    ];
-
     /// Where it is written.
     pub fn source(self) -> &'static str {
         match self {

@@ -24,6 +24,15 @@ pub struct SysTick {
     control: u32,
     reload: u32,
     expires: u64,
+    /// Ticks of a cycle of the core.
+    pub cycle: u64,
+}
+
+impl SysTick {
+    /// Ticks from one zero to the next.
+    fn period(&self) -> u64 {
+        (u64::from(self.reload) + 1) * self.cycle.max(1)
+    }
 }
 
 impl SysTick {
@@ -37,7 +46,7 @@ impl SysTick {
         if now < self.next_event() {
             return false;
         }
-        self.expires += u64::from(self.reload) + 1;
+        self.expires += self.period();
         self.control |= 1 << 16;
         self.control & 2 != 0
     }
@@ -111,6 +120,12 @@ const PLAIN: &[Plain] = &[
 ];
 
 impl Scs {
+    /// After a reset, on the internal oscillator.
+    pub fn new() -> Self {
+        let systick = SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() };
+        Self { systick, ..Self::default() }
+    }
+
     /// The vector of an exception.
     pub fn vector(&self, exception: u16) -> u32 {
         self.vtor + 4 * u32::from(exception)
@@ -232,7 +247,10 @@ impl Scs {
         Some(match address {
             0xe000_e010 => self.systick.control,
             0xe000_e014 => self.systick.reload,
-            0xe000_e018 => (self.systick.expires.saturating_sub(now)) as u32 & 0xff_ffff,
+            0xe000_e018 => {
+                let left = self.systick.expires.saturating_sub(now);
+                (left / self.systick.cycle.max(1)) as u32 & 0xff_ffff
+            }
             0xe000_e01c => 0,
             0xe000_e100..0xe000_e110 => bits(&self.enabled, 0xe000_e100),
             0xe000_e180..0xe000_e190 => bits(&self.enabled, 0xe000_e180),
@@ -288,11 +306,11 @@ impl Scs {
                 let was = self.systick.control;
                 self.systick.control = value & 7;
                 if value & !was & 1 != 0 {
-                    self.systick.expires = now + u64::from(self.systick.reload) + 1;
+                    self.systick.expires = now + self.systick.period();
                 }
             }
             0xe000_e014 => self.systick.reload = value & 0xff_ffff,
-            0xe000_e018 => self.systick.expires = now + u64::from(self.systick.reload) + 1,
+            0xe000_e018 => self.systick.expires = now + self.systick.period(),
             0xe000_e100..0xe000_e110 => set(&mut self.enabled, 0xe000_e100, true),
             0xe000_e180..0xe000_e190 => set(&mut self.enabled, 0xe000_e180, false),
             0xe000_e200..0xe000_e210 => set(&mut self.pending, 0xe000_e200, true),

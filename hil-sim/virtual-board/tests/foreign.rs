@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use hil_sim::Config;
+use virtual_board::periph::gpio::Pad;
 use virtual_board::rules::Rule;
 use virtual_board::{Board, Counting, Image, Options};
 
@@ -25,7 +26,77 @@ struct Program {
     done: fn(&mut Board) -> Result<()>,
 }
 
-const PROGRAMS: &[Program] = &[];
+/// The HAL reads and writes PWR without its clock; on a chip reads give values, and the writes are of no use.
+const POWER: (Rule, &str) =
+    (Rule::ClockGate, "the HAL never switches the clock of PWR on: F1 of this firmware too");
+/// embassy-stm32 at 170 MHz with `boost`.
+const EMBASSY: &[(Rule, &str)] = &[
+    (
+        Rule::VoltageRange,
+        "stm32-metapac 21.0.0 has R1MODE at bit 0 of PWR_CR5; stm32g4 and the reset value 0x100 say bit 8: no boost",
+    ),
+    (Rule::Latency, "follows: four wait states are too few for 170 MHz without boost"),
+    (Rule::ClockStep, "it switches to the PLL and to the whole bus clock in one write"),
+];
+const UNMODELLED: &str = "not modelled: this firmware does not use it";
+
+const fn runs(name: &'static str, breaks: &'static [(Rule, &'static str)]) -> Program {
+    Program { name, periods: 600, breaks, ends: None, done: |_| Ok(()) }
+}
+
+const PROGRAMS: &[Program] = &[
+    Program {
+        done: |board| is(board.chip().gpio[0].pad(5) != Pad::Analog),
+        ..runs("hal-blinky", &[])
+    },
+    runs("hal-comp", &[]),
+    runs("hal-comp_w_dac", &[]),
+    runs("hal-dac", &[]),
+    runs("hal-independent_watchdog", &[]),
+    Program {
+        ends: Some((
+            "high side a may be on",
+            "the clock comes out of PA8, which is a gate on the reference board",
+        )),
+        ..runs(
+            "hal-clockout",
+            &[
+                POWER,
+                (
+                    Rule::EnableDelay,
+                    "the HAL enables PWR for the backup domain and writes at once: F6 of this firmware too",
+                ),
+            ],
+        )
+    },
+    Program { ends: Some(("register 0x40010300", UNMODELLED)), ..runs("hal-opamp", &[POWER]) },
+    Program { ends: Some(("register 0x40012c28", UNMODELLED)), ..runs("hal-pwm", &[]) },
+    runs("hal-adc-one-shot", &[POWER]),
+    Program {
+        done: |board| is(board.chip().rcc.system_hz() == 170_000_000),
+        ..runs("embassy-clock", EMBASSY)
+    },
+    Program {
+        ends: Some(("register 0x40008000 written with 0x2000", UNMODELLED)),
+        ..runs("embassy-serial", EMBASSY)
+    },
+    Program { done: |board| is(board.chip().tim1.outputs_on()), ..runs("embassy-pwm", EMBASSY) },
+    Program {
+        done: |board| {
+            let samples = board.image().symbol("SAMPLES")?.address;
+            is(board.word(samples) == Some(u32::from(CODE)))
+        },
+        ..runs("embassy-adc", EMBASSY)
+    },
+];
+
+/// The code at all analog pins.
+const CODE: u16 = 1234;
+
+fn is(so: bool) -> Result<()> {
+    ensure!(so, "it has not done its work");
+    Ok(())
+}
 
 fn board(name: &str) -> Result<Board> {
     let folder = std::env::var_os(FOLDER).with_context(|| format!("{FOLDER} names no folder"))?;
@@ -34,6 +105,7 @@ fn board(name: &str) -> Result<Board> {
     options.counting = Counting { cycles: false, every_instruction: true };
     let mut board = Board::new(image, options)?;
     board.collect_violations();
+    board.chip().adc.inputs = [[CODE; 19]; 2];
     Ok(board)
 }
 

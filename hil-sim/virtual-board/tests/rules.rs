@@ -397,10 +397,3 @@ fn a_level_is_set_up_in_order_and_waited_for() {
     chip.now += 3 * US;
     assert!(high(&mut chip, 2000), "settled");
 }
-
-#[test]
-fn every_rule_has_its_source() {
-    for rule in Rule::ALL {
-        assert!(!rule.source().is_empty() && !rule.source().contains('\n'), "{rule}");
-    }
-}

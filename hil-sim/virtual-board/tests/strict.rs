@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use hil_sim::Config;
+use virtual_board::cpu::Register;
 use virtual_board::periph::Reset;
 use virtual_board::rules::{Rule, Violation};
 use virtual_board::{Board, Counting, Image, Options};
@@ -128,6 +129,34 @@ fn a_sagging_supply_switches_off() -> Result<()> {
     board.chip().set_supply(3.3);
     board.run_periods(START)?;
     assert!(board.take_console().contains("last run: reset by power-on"));
+    Ok(())
+}
+
+/// A stack that has grown into the guard below it is a fault, and the next run knows it.
+#[test]
+fn a_stack_in_the_guard_faults() -> Result<()> {
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 15))?;
+    board.run_periods(START)?;
+    board.take_console();
+    let guard = board.chip().scs.mpu.guard().context("no guard")?;
+    board.cpu().set(Register::SP, guard.end() + 16);
+    board.run_periods(60)?;
+    assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Software));
+    board.run_periods(START)?;
+    let heard = board.take_console();
+    assert!(heard.contains("reset by software"), "{heard}");
+    Ok(())
+}
+
+/// A chip whose option bytes make one bank of the flash does not start.
+#[test]
+fn a_single_bank_chip_is_refused() -> Result<()> {
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 16))?;
+    board.chip().flash.set_banks(false);
+    board.run_periods(START)?;
+    let heard = board.take_console();
+    assert!(heard.contains("not started") && heard.contains("bank"), "{heard}");
+    assert!(!board.chip().tim1.outputs_on());
     Ok(())
 }
 

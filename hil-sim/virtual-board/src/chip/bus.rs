@@ -228,6 +228,7 @@ impl Chip {
             LPUART1 if address & 0x3ff == 0x28 => self.check_serial_pin(),
             RCC | FLASH_REGISTERS => {
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
+                self.scs.systick.cycle = self.rcc.ticks_per_cycle();
                 self.check_clocks();
             }
             PWR => {

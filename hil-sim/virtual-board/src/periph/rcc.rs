@@ -220,4 +220,4 @@ fn place(register: u32) -> usize {
 }
 
 /// A cycle of 16 MHz, in ticks of 170 MHz, rounded.
-const HSI_TICKS: u64 = 11;
+pub const HSI_TICKS: u64 = 11;

@@ -3,6 +3,7 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
+mod halt;
 mod outputs;
 
 pub use outputs::{Output, Wave};
@@ -166,21 +167,6 @@ impl Tim1 {
         let ccer = self.store.get(CCER);
         let pin = self.store.get(BDTR) & BKE != 0 && self.store.get(AF1) & 1 != 0;
         (std::array::from_fn(|n| ccer >> (2 * n) & 1 != 0), pin)
-    }
-
-    /// A debugger halts the core: the counter stops, and the outputs go off as if MOE was reset.
-    pub fn freeze(&mut self, now: u64) {
-        self.frozen.get_or_insert(now);
-    }
-
-    /// The counter goes on.
-    pub fn thaw(&mut self, now: u64) {
-        let Some(since) = self.frozen.take() else { return };
-        let stood = now - since;
-        self.from += stood;
-        for at in [&mut self.next_end, &mut self.trigger_at] {
-            *at = at.saturating_add(stood);
-        }
     }
 
     /// Whether a break has been seen and not cleared.

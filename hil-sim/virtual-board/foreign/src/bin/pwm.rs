@@ -26,7 +26,8 @@ fn main() -> ! {
         Hertz(6000),
         CountingMode::CenterAlignedBothInterrupts,
     );
-    pwm.set_dead_time(190);
+    // 2.35 us: what the power stage of the reference board needs.
+    pwm.set_dead_time(400);
     let half = pwm.get_max_duty() / 2;
     for channel in [Channel::Ch1, Channel::Ch2, Channel::Ch3] {
         pwm.set_duty(channel, half);
