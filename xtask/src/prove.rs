@@ -11,7 +11,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::{before, board, fuzz, image, run};
+use crate::{before, board, fuzz, image, run, toolchain};
 
 /// Faults of a shard of the campaign.
 const FAULTS: u32 = 100;
@@ -34,7 +34,7 @@ struct Proof {
     page: Option<&'static str>,
 }
 
-const PROOFS: [Proof; 6] = [
+const PROOFS: [Proof; 7] = [
     Proof {
         name: "monte-carlo",
         about: "1000 random operating points each within 150, 300 and 600 rpm: angle error, none lost",
@@ -52,6 +52,19 @@ const PROOFS: [Proof; 6] = [
         shards: 20,
         command: |shard| {
             Ok(board::faults(&image::build()?, image::REFERENCE, FAULTS, 1 + shard * FAULTS))
+        },
+        bounds: &[],
+        page: None,
+    },
+    Proof {
+        name: "boards",
+        about: "200 faults on every other board",
+        shards: 4,
+        command: |shard| {
+            let boards = image::boards()?;
+            let board = &boards[1 + shard as usize / 2];
+            let elf = image::build_for(&toolchain::for_target()?, board)?;
+            Ok(board::faults(&elf, board, FAULTS, 1 + shard % 2 * FAULTS))
         },
         bounds: &[],
         page: None,
