@@ -5,6 +5,8 @@
 //! the bench steps for them were done and confirmed at the console.
 
 mod confirm;
+#[cfg(test)]
+mod manual;
 pub mod pin;
 
 mod nucleo_g474re_ihm023v3;

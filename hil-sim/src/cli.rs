@@ -2,6 +2,7 @@
 #![deny(clippy::use_debug)]
 
 mod lists;
+mod merge;
 mod part;
 mod report;
 mod run;
@@ -149,7 +150,7 @@ pub fn main() -> ExitCode {
         Some(Command::Run { name, file, input, part, output }) => {
             run::run(&name, file.as_deref(), &input, &part, &output)
         }
-        Some(Command::Merge { files, out, csv }) => part::merge(&files, out, csv),
+        Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
         Some(Command::Report { input, out }) => report::report(&input, &out),
         Some(Command::IdentifyTrace { trace, input, output }) => {
             run::identify_trace(&trace, &input, &output)

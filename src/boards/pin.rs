@@ -114,6 +114,11 @@ impl Pin {
 
 impl core::fmt::Display for Pin {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "P{:?}{}", self.port, self.number)
+        let port = match self.port {
+            Port::A => 'A',
+            Port::B => 'B',
+            Port::C => 'C',
+        };
+        write!(f, "P{port}{}", self.number)
     }
 }

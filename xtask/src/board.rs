@@ -47,7 +47,8 @@ pub fn faults(elf: &Path, board: &str, count: u32, seed: u32) -> Command {
     command
 }
 
-fn program(task: &str, elf: &Path) -> Command {
+/// A task of the virtual board as a program.
+pub fn program(task: &str, elf: &Path) -> Command {
     let mut command = run::cargo("run --release --package virtual-board --");
     command.arg(task).arg(elf);
     command

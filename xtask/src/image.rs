@@ -1,16 +1,15 @@
 //! The image for the board: builds and checks it, and writes it to the board.
 
 use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{self, Target};
 use crate::{control, paths, run, sections, sources};
 
 /// The name that probe-rs has for the controller of the board.
-const CHIP: &str = "STM32G474RETx";
+pub const CHIP: &str = "STM32G474RETx";
 
 /// The variable by which the firmware learns its board when it is built.
 const BOARD: &str = "INDUCTION_DRIVE_BOARD";
@@ -79,10 +78,7 @@ fn check(elf: &Path) -> Result<()> {
 /// Builds the image of a board, writes it there and shows its log until interrupted.
 pub fn flash(board: &str) -> Result<()> {
     // Asked before the build, which takes minutes.
-    let probe = run::command("probe-rs").arg("--version").output();
-    if probe.is_err_and(|error| error.kind() == ErrorKind::NotFound) {
-        bail!("probe-rs is missing. Type:\n    cargo install probe-rs-tools --locked");
-    }
+    run::probe_rs()?;
     let elf = build_for(&toolchain::for_target()?, board)?;
     run::step("flash", run::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
 }

@@ -1,6 +1,7 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
 mod before;
+mod bench;
 mod board;
 mod budget;
 mod control;
@@ -44,6 +45,8 @@ enum Task {
     Flash(Which),
     /// Builds the images and tests them on the virtual board
     Board,
+    /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
+    BenchDump(Which),
     /// Runs programs of others on the virtual board: examples of stm32g4xx-hal, and ours on embassy-stm32
     Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
@@ -133,6 +136,7 @@ fn run(task: Task) -> Result<()> {
         Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
         Task::Flash(which) => image::flash(&which.board),
         Task::Board => board::test(&toolchain::for_target()?),
+        Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Campaign { count, seed, class, which } => {

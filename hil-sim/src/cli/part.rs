@@ -1,14 +1,12 @@
-//! A part of the runs of a statistical experiment, runs that are continued, and shards that are merged.
+//! A part of the runs of a statistical experiment, and runs that are continued.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::run::{self, Output, Run};
 use super::say;
 use crate::error::Error;
 use crate::experiments::{self, Context, Experiment};
-use crate::input::Input;
 use crate::outcome::Outcome;
 use crate::shards::{self, Header, Journal, Shard};
 
@@ -75,24 +73,4 @@ fn note(journal: &Journal, header: &Header, quiet: bool) {
     if done > 0 && !quiet {
         eprintln!("note: {done} of {all} runs are in {path}");
     }
-}
-
-/// Merges shards, prints the JSON object of the whole run, and writes its page and its CSV files where wanted.
-///
-/// # Errors
-/// As [`shards::merge`]; [`Error::Write`]; [`Error::Lost`] after all is written.
-pub fn merge(files: &[PathBuf], out: Option<PathBuf>, csv: Option<PathBuf>) -> Result<(), Error> {
-    let merged = shards::merge(files)?;
-    let input = Input { seed: merged.seed, quiet: true, ..Input::default() };
-    let output = Output { out, json: true, csv };
-    let name = merged.experiment.name;
-    let run = Run {
-        experiment: merged.experiment,
-        input: &input,
-        config: &merged.config,
-        command: format!("run {name}"),
-    };
-    let object = run.write(&merged.outcome, &output)?;
-    run::print(&[object], &output)?;
-    run::check_lost(name, &merged.outcome)
 }

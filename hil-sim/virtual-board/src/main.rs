@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use virtual_board::power_stage::REFERENCE;
-use virtual_board::{Image, PowerStage, campaign, cycles};
+use virtual_board::{Image, PowerStage, campaign, cycles, dump};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
@@ -31,6 +31,14 @@ enum Task {
         #[arg(long, default_value = "")]
         class: String,
         /// The board that the ELF was built for; it has a motor that suits it.
+        #[arg(long, default_value = REFERENCE.name)]
+        board: String,
+    },
+    /// Prints the registers of a board that has started, a line each: name, address, value, bits to compare.
+    Dump {
+        /// The ELF.
+        elf: PathBuf,
+        /// The board that the ELF was built for.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
     },
@@ -61,6 +69,10 @@ fn run(arguments: Arguments) -> Result<()> {
             let selection = campaign::Selection { count, seed, class, stage };
             println!("{}", campaign::bounds());
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
+        }
+        Task::Dump { elf, board } => {
+            let lines = dump::lines(Image::open(&elf)?, PowerStage::named(&board)?)?;
+            lines.iter().for_each(|line| println!("{line}"));
         }
         Task::Cycles { elf, functions } => {
             let rows = cycles::measure(|| Image::open(&elf))?;

@@ -13,6 +13,9 @@ use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE, REFERENCE_V, Sensors, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
 
+/// Something that ends a run.
+type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
+
 /// Periods from a reset to the greeting, at most.
 const START: u64 = 30_000;
 /// Periods between two reports of the control to the console.
@@ -144,7 +147,7 @@ fn every_end_leaves_every_gate_off() -> Result<()> {
             pair.board.keep()?
         };
         let image = Image::built_for(stage.name)?;
-        let ends: [(&str, &dyn Fn(&mut Board) -> Result<()>); 6] = [
+        let ends: [(&str, End); 6] = [
             ("fault input", &|board| {
                 board.set_fault_pin(false);
                 board.run_ticks(100)

@@ -7,11 +7,16 @@ use anyhow::Result;
 use drive_core::Compare;
 use script::*;
 use virtual_board::periph::Reset;
-use virtual_board::power_stage::bridge::BadGates;
+use virtual_board::power_stage::bridge::{BadGates, Leg};
 use virtual_board::power_stage::shunts::Shunts;
 use virtual_board::power_stage::{ALL, PowerStage, Sensors};
 
 const MIDDLE: [u32; 3] = [TOP / 2; 3];
+
+/// Ticks of a period in which a switch of a leg is on.
+fn on(leg: &Leg, side: usize) -> u32 {
+    leg.pieces.iter().filter(|piece| piece.on[side]).map(|piece| piece.ticks).sum()
+}
 
 fn st_boards() -> impl Iterator<Item = &'static PowerStage> {
     ALL.into_iter().filter(|stage| !stage.driver.low.on_at_high)
@@ -32,10 +37,7 @@ fn the_right_set_up_is_off_unless_it_is_on() -> Result<()> {
         assert_eq!(gates.compare(), Compare::on([3000, 7000, 11_000]), "{}", stage.name);
         assert_eq!(gates.dead_time, 376);
         for (leg, compare) in gates.legs.iter().zip([3000, 7000, 11_000]) {
-            let on = |side: usize| -> u32 {
-                leg.pieces.iter().filter(|p| p.on[side]).map(|p| p.ticks).sum()
-            };
-            assert_eq!([on(0), on(1)], [2 * compare - 376, 2 * (TOP - compare) - 376]);
+            assert_eq!([on(leg, 0), on(leg, 1)], [2 * compare - 376, 2 * (TOP - compare) - 376]);
             // Around the top of the counter the low side is on.
             assert_eq!(leg.pieces[0].on, [false, true]);
         }
@@ -110,7 +112,7 @@ fn the_short_carries_current() -> Result<()> {
 /// Polarities that are wrong only while the outputs are on.
 #[test]
 fn a_wrong_polarity_is_caught_at_the_first_pulse() -> Result<()> {
-    let on = |stage, change: u32, expected: &dyn Fn(&str) -> bool| -> Result<()> {
+    let caught = |stage, change: u32, expected: &dyn Fn(&str) -> bool| -> Result<()> {
         let mut script = Script::new(stage)?;
         let right = Setup::of(stage);
         script.bring_up(Setup { ccer: right.ccer ^ change, ..right })?;
@@ -134,11 +136,11 @@ fn a_wrong_polarity_is_caught_at_the_first_pulse() -> Result<()> {
             }
         };
         // CC1NP, CC2NP; CC3P.
-        on(stage, 0x8, &together(0))?;
-        on(stage, 0x80, &together(1))?;
-        on(stage, 0x200, &together(2))?;
+        caught(stage, 0x8, &together(0))?;
+        caught(stage, 0x80, &together(1))?;
+        caught(stage, 0x200, &together(2))?;
         // Both of leg a: they alternate, but where the timer makes its dead time both are on.
-        on(stage, 0xa, &together(0))?;
+        caught(stage, 0xa, &together(0))?;
     }
     Ok(())
 }
@@ -174,7 +176,13 @@ fn the_dead_time_at_the_gates_is_the_longer_one() -> Result<()> {
             let result = script.outputs(true).and_then(|()| script.wait(2 * PERIOD));
             let made = if code == 0x9e { 376 } else { 2 * code };
             let dead_time = made.max(own);
-            assert_eq!(script.board.gates().dead_time, dead_time, "{}", stage.name);
+            let gates = script.board.gates();
+            assert_eq!(gates.dead_time, dead_time, "{}", stage.name);
+            for (leg, compare) in gates.legs.iter().zip(MIDDLE) {
+                let on = [on(leg, 0), on(leg, 1)];
+                let ideal = [2 * compare, 2 * (TOP - compare)];
+                assert_eq!(on, ideal.map(|ticks| ticks - dead_time), "{}", stage.name);
+            }
             if dead_time < shortest {
                 let seen = violation(result);
                 assert!(is(&seen, BadGates::Short { leg: 0, dead_time }), "{}: {seen}", stage.name);

@@ -172,7 +172,7 @@ mod tests {
     fn the_percentile_is_over_all_samples_of_all_runs() {
         let errors: Vec<f64> = (0..1000).map(|n| (f64::from(n) + 0.5) * 0.1).collect();
         let (even, odd): (Vec<f64>, Vec<f64>) =
-            errors.iter().partition(|e| (*e * 10.0) as u32 % 2 == 0);
+            errors.iter().partition(|e| ((*e * 10.0) as u32).is_multiple_of(2));
         let trials = [sound(&even), sound(&odd), Trial::refused(Kind::Steps, 2, 25)];
         let summary = Summary::of(&trials);
         assert!((summary.p99_deg - 99.0).abs() < 1e-9, "{}", summary.p99_deg);
