@@ -11,11 +11,14 @@
 //!   [`cost`] counts. Exceptions are taken between instructions in the flash and at the end of the
 //!   control interrupt's blocks; entry and exit take no time.
 //! * Exceptions with priorities, nesting and masks; one stack; no traps for unaligned accesses and
-//!   divisions by zero. Of the MPU a region in RAM without any access, 4 KiB at most. Bus faults are taken at once and become hard faults, as in the firmware.
+//!   divisions by zero. Of the MPU a region in RAM without any access, 4 KiB at most. Bus faults are taken at once and
+//!   become hard faults, as in the firmware.
 //! * Oscillators and PLL are ready at once; converters, references and comparators take their time.
 //! * What the chip would drop or do wrong in silence is recorded and fails the run ([`rules`]): clocks of peripherals,
 //!   voltage range, wait states, locks, order and times of converters, busy registers, pins. A debugger can halt the core
 //!   ([`debugger`]); the supply can sag ([`chip::Chip::set_supply`]).
+//! * The gates are those behind the drivers of a [`power_stage`]: levels follow from pins, timer and resistors, and are
+//!   judged whenever one of them may change. Transients within a dead time are not modelled.
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
 //!   take effect when they do, with the mean voltage of the period until then. It has no model for a bridge of which only
 //!   some legs are driven: such a bridge counts as off, which the judgement at the gates does not do.

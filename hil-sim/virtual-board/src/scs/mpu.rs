@@ -27,7 +27,7 @@ impl Mpu {
             CTRL => self.control,
             RNR => self.number as u32,
             // RBAR and RASR with three aliases each.
-            _ if (address - RBAR) % 8 == 0 => base | self.number as u32,
+            _ if (address - RBAR).is_multiple_of(8) => base | self.number as u32,
             _ => attributes,
         })
     }
@@ -38,7 +38,7 @@ impl Mpu {
             TYPE => {}
             CTRL => self.control = value & 7,
             RNR => self.number = (value as usize).min(REGIONS - 1),
-            _ if (address - RBAR) % 8 == 0 => {
+            _ if (address - RBAR).is_multiple_of(8) => {
                 // VALID: the region comes with the write.
                 if value & 1 << 4 != 0 {
                     self.number = (value as usize & 15).min(REGIONS - 1);
