@@ -106,6 +106,10 @@ impl Default for PlantSettings {
 
 /// The motor, one variant a machine model. A call of the plant chooses once a period.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a plant has one, and model A is not behind a pointer"
+)]
 enum Motor {
     A(MotorModel<Machine>),
     Energy(Box<MotorModel<EnergyMachine>>),

@@ -424,7 +424,8 @@ fn an_open_phase_has_no_current_and_the_others_have_the_same() {
 
 #[test]
 fn refusals_name_the_setting() {
-    let cases: [(&str, fn(&mut PlantSettings)); 10] = [
+    type Case = (&'static str, fn(&mut PlantSettings));
+    let cases: [Case; 10] = [
         ("warming.rr", |s| s.warming.rr = 3.0),
         ("dc_link.pulses", |s| s.dc_link.pulses = 4),
         ("dc_link.capacitor", |s| s.dc_link.capacitor = 1.0),

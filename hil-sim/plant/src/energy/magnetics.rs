@@ -214,7 +214,7 @@ impl Magnetics {
             found.m += step;
             // Not a number ends the iteration too.
             let size = close * close * (CLOSE * CLOSE + square(found.i));
-            if !(square(residual) > size) {
+            if square(residual) <= size || residual.re.is_nan() {
                 let slopes = &found.slopes;
                 found.i += slopes.stator_m.times(step) - slopes.stator_x.times(step);
                 found.i_r -= slopes.rotor.times(step);
