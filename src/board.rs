@@ -1,22 +1,13 @@
-//! The board: every number of the hardware, once.
+//! Numbers of the chip and of the Nucleo board, once, and the settings of the power stage that the firmware is built
+//! for.
 //!
-//! NUCLEO-G474RE on ST's morpho motor-control pins, with the inverter and the current sensors of
-//! the dissertation. Derived numbers are computed here; relations between numbers are asserted when compiling.
+//! Pins, polarities, sensors and limits of the power stages are in [`boards`](crate::boards). Derived numbers are
+//! computed here; relations between numbers are asserted when compiling.
 //!
-//! | pin | signal | peripheral |
+//! | pin of every board | signal | peripheral |
 //! |---|---|---|
-//! | PA8, PA9, PA10 | gates of the high sides a, b, c | TIM1_CH1, CH2, CH3 |
-//! | PA7, PB0, PB1 | gates of the low sides a, b, c | TIM1_CH1N, CH2N, CH3N |
-//! | PA6 | fault output of the power stage, low = trip | TIM1_BKIN |
-//! | PA0 | current a | ADC1_IN1 |
-//! | PC1 | current b | ADC2_IN7 |
-//! | PA1 | dc link | ADC1_IN2, COMP1 |
-//! | PC2 | heat sink | ADC2_IN8 |
 //! | PA15, PB3 | encoder A, B | TIM2_CH1, CH2 |
 //! | PA2, PA3 | console: transmit, receive (the ST-LINK's serial port) | LPUART1 |
-//!
-//! The gate inputs of the power stage need pull-down resistors of their own: while the controller
-//! is in reset or being flashed, its pins float.
 
 mod dead_time;
 mod flash;
@@ -25,8 +16,9 @@ pub use flash::{SETTINGS_SLOT_BYTES, settings_address, settings_page};
 
 use drive_core::Settings;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::Line;
-use drive_core::settings::{Inverter, Scales};
+use drive_core::settings::{CurrentSensors, Inverter, Line, Scales};
+
+use crate::boards::{Board, Currents, SELECTED};
 
 // Clock ---------------------------------------------------------------------------------------
 
@@ -46,10 +38,12 @@ const _: () = assert!(CYCLES_PER_US * 1_000_000 == CLOCK_HZ);
 /// The PLS field of PWR_CR2: a supply below 2.8 V (datasheet), 15 % below the nominal 3.3 V, counts as failed.
 pub const SUPPLY_LEVEL: u8 = 5;
 
+/// Wait states of the flash that [`CLOCK_HZ`] needs with boosted core voltage (RM0440, FLASH wait states: 4 above
+/// 136 MHz).
+pub const WAIT_STATES: u8 = 4;
+
 // Power stage ---------------------------------------------------------------------------------
 
-/// Alternate function of the pins that belong to TIM1 (datasheet).
-pub const PWM_AF: u8 = 6;
 /// PWM and control rate, Hz. The drive's filters and its carrier are designed for this rate alone.
 pub const PWM_HZ: u32 = 6000;
 /// Largest count of TIM1, which counts up and down once per period: half a period in ticks of the core clock,
@@ -69,19 +63,15 @@ const _: () = {
     assert!(error < 1e-4 && error > -1e-4);
 };
 
-/// Dead time of the inverter, s (section 3.9): both switches of a leg are off for this long at every
-/// change. The default of the setting `inverter.dead_time_s`.
-pub const DEAD_TIME_S: f32 = 2.2e-6;
-/// Range of that setting, s: the needs of fast and slow power modules.
-pub const DEAD_TIME_RANGE_S: (f32, f32) = (0.5e-6, 6e-6);
 /// Core clocks per tick of the dead time (TIM1_CR1.CKD = 1). With one, the longest would be 5.93 us.
 pub const DEAD_TIME_CLOCKS: u32 = 2;
 // The timer can make the longest.
 const _: () = assert!(
-    (dead_time::LONGEST * DEAD_TIME_CLOCKS) as f32 >= DEAD_TIME_RANGE_S.1 * CLOCK_HZ as f32
+    (dead_time::LONGEST * DEAD_TIME_CLOCKS) as f32
+        >= SELECTED.dead_time_range_s.1 * CLOCK_HZ as f32
 );
 
-/// The DTG field of TIM1_BDTR for a dead time in s within [`DEAD_TIME_RANGE_S`], and the dead time, s, that the
+/// The DTG field of TIM1_BDTR for a dead time in s within the range of the board, and the dead time, s, that the
 /// timer makes of it: shorter than the requested one by at most a hundredth of a tick.
 pub fn dead_time(seconds: f32) -> (u8, f32) {
     let clock_hz = (CLOCK_HZ / DEAD_TIME_CLOCKS) as f32;
@@ -140,8 +130,14 @@ const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 /// Compare value of the trigger. The sampling of the currents starts while the counter goes up and ends, which
 /// fixes the sampled value, when the counter is at the top and all low sides are on.
 pub const SAMPLE_AT: u16 = PWM_TOP - CURRENT_SAMPLING.ticks() as u16;
-/// From the top of the counter to the control interrupt, in ticks.
-pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks() + SLOW_SAMPLING.ticks();
+/// From the top of the counter to the control interrupt, in ticks. A third current is converted after the first two.
+pub const SAMPLES_READY_TICKS: u32 = 2 * CONVERSION.ticks()
+    + SLOW_SAMPLING.ticks()
+    + if SELECTED.currents.c().is_some() { THIRD_CURRENT_TICKS } else { 0 };
+/// Conversion of a third current, in ticks.
+const THIRD_CURRENT_TICKS: u32 = CURRENT_SAMPLING.ticks() + CONVERSION.ticks();
+// Its sampling ends before the low sides go off, which the modulator leaves on for a settling time and more.
+const _: () = assert!(THIRD_CURRENT_TICKS < CYCLES_PER_US);
 // More than nine tenths of the period are left for the control.
 const _: () = assert!(SAMPLES_READY_TICKS * 10 < 2 * PWM_TOP as u32);
 
@@ -151,11 +147,6 @@ pub const ADC_REGULATOR_START_US: u32 = 20;
 /// 10.
 pub const ADC_TIMEOUT_US: u32 = 1000;
 
-/// Channels in each converter's sequence, currents first: `(current, slow signal)`.
-pub const ADC1_CHANNELS: (u8, u8) = (1, 2);
-/// See [`ADC1_CHANNELS`].
-pub const ADC2_CHANNELS: (u8, u8) = (7, 8);
-
 /// Reference of the converters, V: VREF+ of the Nucleo board is its 3.3 V supply.
 pub const ADC_REFERENCE_V: f32 = 3.3;
 /// Largest code of a conversion: 12 bits.
@@ -163,15 +154,8 @@ pub const ADC_FULL_SCALE: u16 = 4095;
 /// Reference of the converter with which the sensors were calibrated, V (Eq. 3.4).
 const CALIBRATION_REFERENCE_V: f32 = 3.0;
 
-/// Current a, A: Eq. 3.5, converted from the reference of the calibration to this board's.
-pub const CURRENT_A: Line = on_this_board(Line::CHANNEL_A);
-/// Current b, A; see [`CURRENT_A`].
-pub const CURRENT_B: Line = on_this_board(Line::CHANNEL_B);
-/// Dc link, V: a divider by 136.5, so that 450 V are full scale. The dissertation does not describe its own: adapt
-/// this to the divider of the inverter.
-pub const DC_LINK: Line = Line { gain: 0.11, offset: 0.0 };
-
-const fn on_this_board(line: Line) -> Line {
+/// The calibration line of a sensor of the dissertation with the reference of this board, [`ADC_REFERENCE_V`].
+pub const fn on_this_board(line: Line) -> Line {
     // The same voltage gives a smaller code with a higher reference; code 0 stays 0 V.
     Line { gain: line.gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), ..line }
 }
@@ -185,7 +169,9 @@ fn window(line: Line, trip_a: f32) -> (u16, u16) {
     // The casts saturate.
     let code =
         |amperes: f32| (((amperes - line.offset) / line.gain) as u16).clamp(1, ADC_FULL_SCALE - 1);
-    (code(-trip_a), code(trip_a))
+    let (negative, positive) = (code(-trip_a), code(trip_a));
+    // With a negative gain the positive current has the smaller code.
+    (negative.min(positive), negative.max(positive))
 }
 
 // Reaction times --------------------------------------------------------------------------------
@@ -233,12 +219,12 @@ pub struct Protection {
     pub over_voltage: u16,
 }
 
-/// The protection for these settings: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
-/// `limits.dc_over_v`, both within the range of the converters.
-pub fn protection(settings: &Settings) -> Protection {
+/// The protection for these settings on a board: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
+/// `limits.dc_over_v` but not above the highest voltage of the board, both within the range of the converters.
+pub fn protection(board: &Board, settings: &Settings) -> Protection {
     let Scales { current_a, current_b, dc_link, .. } = settings.scales;
     let trip_a = ANALOG_TRIP_SHARE * settings.trip_a();
-    let over_v = OVER_VOLTAGE_SHARE * settings.dc_over_v();
+    let over_v = f32::min(OVER_VOLTAGE_SHARE * settings.dc_over_v(), board.highest_dc_link_v.value);
     let over_voltage = ((over_v - dc_link.offset) / dc_link.gain) as u16;
     Protection {
         window_a: window(current_a, trip_a),
@@ -311,8 +297,10 @@ pub const WATCHDOG_LONG_PRESCALER: u8 = 6;
 /// The RLR field then: ten seconds. The design of the control takes more than one, because the core computes double
 /// precision in software.
 pub const WATCHDOG_LONG_RELOAD: u16 = 1249;
-/// Longest wait until the watchdog has taken both over, us: six of its longest clocks, 12 ms.
-pub const WATCHDOG_SET_US: u32 = 15_000;
+/// Longest wait until the watchdog has taken both over, us: six of its clocks divided by 256, 52 ms with the slowest
+/// (`stm32g4xx_hal_iwdg.c`).
+pub const WATCHDOG_SET_US: u32 = 60_000;
+const _: () = assert!(WATCHDOG_SET_US > 6 * 256 * 1_000_000 / WATCHDOG_HZ);
 /// Longest wait at start for the control interrupt to come at its rate, us.
 pub const INTERRUPT_TIMEOUT_US: u32 = 100_000;
 /// Consecutive unintended resets after which the drive is not started any more.
@@ -334,20 +322,38 @@ const _: () = assert!(
 /// Control periods from one status line to the next: 10 lines a second.
 pub const PERIODS_PER_STATUS: u32 = PWM_HZ / 10;
 
-/// The drive's settings with the numbers of this board in them.
+/// The drive's settings with the numbers of the board that the firmware is built for.
 pub fn settings() -> Settings {
+    settings_of(SELECTED)
+}
+
+/// The drive's settings with the numbers of a board.
+pub fn settings_of(board: &Board) -> Settings {
     let defaults = Settings::default();
-    Settings {
-        inverter: Inverter { top: PWM_TOP, dead_time_s: DEAD_TIME_S, ..defaults.inverter },
-        scales: Scales {
-            current_a: CURRENT_A,
-            current_b: CURRENT_B,
-            dc_link: DC_LINK,
-            full_scale: ADC_FULL_SCALE,
-            ..defaults.scales
-        },
-        ..defaults
-    }
+    let [a, b] = board.currents.a_and_b();
+    let (sensors, shunt_settle_s) = match &board.currents {
+        Currents::InLine(_) => (CurrentSensors::InLine, defaults.scales.shunt_settle_s),
+        Currents::LowSide { settle_s, .. } => (CurrentSensors::LowSide, settle_s.value),
+    };
+    let inverter = Inverter {
+        top: PWM_TOP,
+        dead_time_s: board.dead_time_s.value,
+        dc_link_v: board.dc_link_v,
+        ..defaults.inverter
+    };
+    let scales = Scales {
+        current_a: a.line.value,
+        current_b: b.line.value,
+        current_c: board.currents.c().map_or(b, |c| c).line.value,
+        sensors,
+        shunt_settle_s,
+        dc_link: board.dc_link.line.value,
+        full_scale: ADC_FULL_SCALE,
+        ntc: board.ntc.value,
+        current_delay_s: board.current_delay_s.value,
+        ..defaults.scales
+    };
+    Settings { inverter, scales, ..defaults }
 }
 
 #[cfg(test)]

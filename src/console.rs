@@ -63,6 +63,8 @@ pub struct Console {
     /// Whether a learning has ended that is not announced yet.
     ended: bool,
     restore: Restore,
+    /// The board that the lines that come in belong to, if it is another than this one.
+    foreign: Option<&'static str>,
 }
 
 /// Most bytes read in one poll: a flood must not hold up the main loop.
@@ -87,6 +89,7 @@ impl Console {
             unbelievable: None,
             ended: false,
             restore: Restore::new(),
+            foreign: None,
         }
     }
 

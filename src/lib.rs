@@ -6,6 +6,7 @@
 #![allow(clippy::new_without_default)]
 
 pub mod board;
+pub mod boards;
 pub mod console;
 mod hash;
 pub mod link;

@@ -47,7 +47,7 @@ fn main() -> ! {
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.
-        cortex_m::asm::wfi();
+        chip::sleep::until_interrupt();
     }
 }
 
@@ -63,6 +63,7 @@ This is the firmware of the drive; it runs on an STM32G474, not on this computer
     cargo sim           runs the same drive against a simulated motor, here
 
 Flashing needs probe-rs: cargo install probe-rs-tools --locked
-Before flashing: mains off, and pull-down resistors at the gate inputs of the power stage."
+Before flashing: mains off, and the driver inputs of the power stage checked: many drivers switch a low side on
+at a LOW input, where the outputs of another board's firmware would short the motor (docs/boards.md)."
     );
 }

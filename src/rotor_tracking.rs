@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn the_drive_gets_the_time_constant_of_its_motor() {
         let (mut rig, mut tracking) = tracked();
-        let truth = rig.plant.motor().machine.tau_r();
+        let truth = rig.plant.tau_r();
         let mut ordered = Vec::new();
         // The numbers wrap on the way.
         for n in 0..60_000_u32 {

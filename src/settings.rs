@@ -11,10 +11,13 @@ use drive_core::settings::SettingsError;
 use drive_core::{Coefficients, Settings};
 
 use crate::board;
+use crate::boards::{Board, SELECTED};
 
 /// All settings of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirmwareSettings {
+    /// The board that they belong to.
+    pub board: &'static Board,
     /// Settings of the drive.
     pub drive: Settings,
     /// Settings of the firmware around it.
@@ -32,12 +35,31 @@ pub struct CommandSettings {
     pub wiring_checked: bool,
     /// Whether the console sends typed characters back.
     pub echo: bool,
+    /// The [confirmation](crate::boards::Board::confirmation) of the board whose bench steps were done; 0: none.
+    pub confirmed: u32,
 }
 
 impl FirmwareSettings {
-    /// The defaults: those of the drive with the numbers of this board.
+    /// The defaults: those of the drive with the numbers of the board that the firmware is built for.
     pub fn of_the_board() -> Self {
-        Self { drive: board::settings(), command: CommandSettings::default(), learned: None }
+        Self::of(SELECTED)
+    }
+
+    /// The same for any board.
+    pub fn of(board: &'static Board) -> Self {
+        let drive = board::settings_of(board);
+        Self { board, drive, command: CommandSettings::default(), learned: None }
+    }
+
+    /// Whether the bench steps for the board's assumptions were done, with the values that it has.
+    pub fn board_is_confirmed(&self) -> bool {
+        self.board.assumptions().next().is_none()
+            || self.command.confirmed == self.board.confirmation()
+    }
+
+    /// Notes that the bench steps of the board were done.
+    pub fn confirm_board(&mut self) {
+        self.command.confirmed = self.board.confirmation();
     }
 
     /// Takes the result of a learning, if it was accepted.

@@ -31,6 +31,7 @@ impl Board for Idle {
         Sample {
             current_a: zero,
             current_b: zero,
+            current_c: zero,
             dc_link: 1820,
             heat_sink: 1309,
             encoder: 0,

@@ -5,3 +5,4 @@ pub mod inverter_drop;
 pub mod modulation;
 pub mod pi;
 pub mod sensing;
+pub mod shunts;

@@ -173,10 +173,12 @@ impl Drive {
         let result =
             if self.state.has_current() { self.regulate(sample) } else { self.prepare(sample) };
         self.elapsed = self.elapsed.wrapping_add(1);
-        result.unwrap_or_else(|off| {
+        let compare = result.unwrap_or_else(|off| {
             self.enter(off);
             Compare::OFF
-        })
+        });
+        self.c.sensing.applied(&mut self.control.sensing, &compare);
+        compare
     }
 
     /// Regulates the current: the control law, top to bottom.
@@ -185,8 +187,8 @@ impl Drive {
     /// The state to go to with the outputs off: a fault, or off where it has stopped.
     fn regulate(&mut self, sample: &Sample) -> Result<Compare, State> {
         let (c, s) = (&self.c, &mut self.control);
-        let measured = c.sensing.step(&s.sensing, sample);
-        c.protect(sample, &measured)?;
+        let measured = c.sensing.step(&mut s.sensing, sample);
+        c.protect(&s.sensing, sample, &measured)?;
         if c.source == AngleSource::Encoder {
             s.seen.rotor_count = sample.encoder;
         }

@@ -239,6 +239,15 @@ faults! {
         "lower injection.amplitude_v, the speed or the torque";
     SensorNoisyA = 36, "current sensor a is too noisy for the injection", NOISE.0, NOISE.1;
     SensorNoisyB = 37, "current sensor b is too noisy for the injection", NOISE.0, NOISE.1;
+    SensorSaturatedC = 38, "current sensor c at the end of its range, shorted or open", SENSOR_RANGE.0, SENSOR_RANGE.1;
+    OffsetC = 39, "offset of current sensor c out of range at start", OFFSET.0, OFFSET.1;
+    CurrentSum = 40, "the three phase currents do not sum to zero",
+        &[
+            "gain of a shunt or of its amplifier wrong: scales.current_*",
+            "earth fault in motor or cable",
+            "scales.shunt_settle_s too short for the amplifiers",
+        ],
+        "disconnect the motor and measure its insulation, then compare the three currents in status";
 }
 
 impl Fault {

@@ -32,6 +32,8 @@ pub struct Sample {
     pub current_a: u16,
     /// Converter code of the current into phase b.
     pub current_b: u16,
+    /// Converter code of the current into phase c; not used unless [`Scales::shunts`](crate::settings::Scales) says so.
+    pub current_c: u16,
     /// Converter code of the dc-link voltage.
     pub dc_link: u16,
     /// Converter code of the heat-sink temperature. A board without a thermistor gives a code inside the window of

@@ -23,7 +23,7 @@ use core::fmt;
 use self::value::words;
 use crate::tuning::TuningError;
 
-pub use hardware::{Inverter, Line, Scales};
+pub use hardware::{CurrentSensors, Inverter, Line, Scales};
 pub use injection::{InjectionSettings, PrintedChain, SynchronousTracking};
 pub use list::{SETTINGS, find};
 pub use motor::Motor;

@@ -20,6 +20,9 @@ pub struct Options {
     /// Motor, seed and duration.
     #[command(flatten)]
     pub input: Input,
+    /// Board that the image is built for, with its power stage
+    #[arg(long, value_name = "NAME", default_value = "reference")]
+    pub board: String,
     /// Load on the shaft: `locked`, `free`, or `speed RPM`; the same as --set load.mode=...
     #[arg(long, value_names = ["LOAD", "RPM"], num_args = 1..=2, allow_negative_numbers = true)]
     pub load: Option<Vec<String>>,
@@ -101,6 +104,9 @@ impl Options {
     /// The command line that repeats this session with this configuration.
     pub fn command(&self, config: &Config) -> String {
         let mut command = self.input.command("board", config);
+        if self.board != "reference" {
+            command.push_str(&format!(" --board {}", self.board));
+        }
         if let Some(script) = &self.script {
             command.push_str(&format!(" --script {}", script.display()));
         }
@@ -125,7 +131,8 @@ impl Options {
 pub fn become_board(options: &Options) -> Result<(), Error> {
     // Wrong options are reported before the builds, which take minutes.
     options.config()?;
-    let image = options.elf.is_none().then(|| build::image(options.verbose)).transpose()?;
+    let image =
+        options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
     let mut command = Command::new(build::virtual_board()?);
     command.args(std::env::args_os().skip_while(|argument| argument != "board").skip(1));
     if let Some(image) = image {

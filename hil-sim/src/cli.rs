@@ -2,6 +2,8 @@
 #![deny(clippy::use_debug)]
 
 mod lists;
+mod merge;
+mod part;
 mod report;
 mod run;
 mod used;
@@ -17,6 +19,7 @@ use crate::console;
 use crate::error::Error;
 use crate::experiments;
 use crate::input::{Input, OUT};
+use part::Part;
 use run::{Output, Trace};
 
 /// Simulates an induction-motor drive: the control code of the firmware, closed over a motor model.
@@ -65,7 +68,24 @@ enum Command {
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
+        part: Part,
+        #[command(flatten)]
         output: Output,
+    },
+    /// Merge the shards of a run: prints the JSON object of the whole run
+    ///
+    /// The shards are what `run NAME --shard I/N` printed, in any order. Exit code 2 when one is missing, there twice, torn,
+    /// or of another run.
+    Merge {
+        /// The files
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// Folder of the page [default: no page]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Folder of CSV files, one a figure and one a table [default: none]
+        #[arg(long, value_name = "DIR")]
+        csv: Option<PathBuf>,
     },
     /// Run all experiments into one page
     ///
@@ -117,6 +137,7 @@ pub fn main() -> ExitCode {
             experiments::DEFAULT,
             None,
             &Input { seed: 1, ..Input::default() },
+            &Part::default(),
             &Output::default(),
         ),
         Some(Command::List { json }) => lists::experiments(json).and_then(|text| say(&text)),
@@ -126,9 +147,10 @@ pub fn main() -> ExitCode {
         Some(Command::Keys { prefix, toml, input }) => {
             lists::keys(prefix.as_deref(), toml, &input).and_then(|text| say(&text))
         }
-        Some(Command::Run { name, file, input, output }) => {
-            run::run(&name, file.as_deref(), &input, &output)
+        Some(Command::Run { name, file, input, part, output }) => {
+            run::run(&name, file.as_deref(), &input, &part, &output)
         }
+        Some(Command::Merge { files, out, csv }) => merge::merge(&files, out, csv),
         Some(Command::Report { input, out }) => report::report(&input, &out),
         Some(Command::IdentifyTrace { trace, input, output }) => {
             run::identify_trace(&trace, &input, &output)

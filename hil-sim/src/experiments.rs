@@ -4,6 +4,7 @@
 mod adc_calibration;
 mod angle_identification;
 mod anti_windup;
+pub mod battery;
 mod bode;
 mod current_step;
 mod dead_time;
@@ -37,6 +38,7 @@ pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
 mod speed_profile;
+pub mod statistics;
 mod steady;
 mod sweep;
 mod torque;
@@ -45,6 +47,8 @@ mod tracking;
 pub mod warming_rotor;
 
 pub use torque::assumptions;
+
+use statistics::Statistical;
 
 use std::path::Path;
 
@@ -225,6 +229,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
+    battery::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     tracking::EXPERIMENT,
@@ -240,6 +245,31 @@ pub const EXPERIMENTS: &[Experiment] = &[
 
 /// The experiments that need an input file; they are no part of the report.
 pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
+
+/// The experiments of many independent runs, which can be shared between machines and continued.
+pub const STATISTICAL: &[Statistical] = &[
+    Statistical::of::<sweep::Sweep>(),
+    Statistical::of::<monte_carlo::MonteCarlo>(),
+    Statistical::of::<machines::Machines>(),
+    Statistical::of::<battery::Battery>(),
+    Statistical::of::<lock_monitor::LockMonitor>(),
+    Statistical::of::<saliency_check::SaliencyCheck>(),
+];
+
+/// The runs of the experiment with this name.
+///
+/// # Errors
+/// [`Error::Refused`] when it is not a statistical one.
+pub fn statistical(name: &str) -> Result<&'static Statistical, Error> {
+    let found = STATISTICAL.iter().find(|statistical| statistical.experiment.name == name);
+    found.ok_or_else(|| {
+        let known: Vec<_> = STATISTICAL.iter().map(|known| known.experiment.name).collect();
+        Error::Refused(format!(
+            "{name} does not consist of independent runs; those that do: {}",
+            known.join(", ")
+        ))
+    })
+}
 
 /// The experiment that runs without a command.
 pub const DEFAULT: &str = "torque-steps";

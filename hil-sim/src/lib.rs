@@ -13,6 +13,7 @@ pub mod outcome;
 pub mod progress;
 pub mod report;
 pub mod rig;
+pub mod shards;
 pub mod stats;
 
 pub use config::Config;

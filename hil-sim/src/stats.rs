@@ -1,11 +1,18 @@
 //! Running statistics.
 
+pub mod exact;
+
+use serde::{Deserialize, Serialize};
+
 /// Mean, rms and largest magnitude of a signal.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Stats {
     count: u64,
+    #[serde(with = "exact")]
     sum: f64,
+    #[serde(with = "exact")]
     squares: f64,
+    #[serde(with = "exact")]
     largest: f64,
 }
 
@@ -23,6 +30,19 @@ impl Stats {
         self.sum += value;
         self.squares += value * value;
         self.largest = self.largest.max(value.abs());
+    }
+
+    /// Adds the values of other statistics.
+    pub fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.squares += other.squares;
+        self.largest = self.largest.max(other.largest);
+    }
+
+    /// Number of values.
+    pub fn count(&self) -> u64 {
+        self.count
     }
 
     /// Mean; not a number when there are no values.

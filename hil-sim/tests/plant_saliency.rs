@@ -3,9 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 use hil_sim::plant::{
-    Complex, EncoderSettings, InverterSettings, Load, Machine, MachineModel, MachineSettings,
-    MachineState, MeasurementSettings, Mechanics, MechanicsSettings, MotorModel, Plant,
-    PlantSettings, SaliencySettings,
+    Complex, Load, Machine, MachineModel, MachineSettings, MachineState, Mechanics,
+    MechanicsSettings, MotorModel, Plant, PlantSettings, SaliencySettings,
 };
 
 const FREQUENCY: f64 = 600.0;
@@ -193,10 +192,8 @@ fn settings_are_read_from_toml_with_defaults_and_without_typing_errors() {
         machine: MachineSettings::default(),
         saliency: SaliencySettings { b1: 0.0, ..Default::default() },
         mechanics: MechanicsSettings { load: Load::Speed { speed: 3.0 }, ..Default::default() },
-        inverter: InverterSettings::default(),
-        measurement: MeasurementSettings::default(),
-        encoder: EncoderSettings::default(),
         substeps: 4,
+        ..PlantSettings::default()
     };
     assert_eq!(read, expected);
     let again: PlantSettings = toml::from_str(&toml::to_string(&read).expect("text")).expect("own");

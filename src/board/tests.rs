@@ -17,8 +17,8 @@ fn every_dead_time_that_may_be_set_is_made_within_four_percent() {
 
 #[test]
 fn the_comparator_trips_between_the_software_and_the_end_of_the_range() {
-    let trip = DC_LINK.at(protection(&settings()).over_voltage);
-    assert!(trip > settings().dc_over_v() && trip < DC_LINK.at(ADC_FULL_SCALE));
+    let trip = SELECTED.dc_link.line.value.at(protection(SELECTED, &settings()).over_voltage);
+    assert!(trip > settings().dc_over_v() && trip < SELECTED.dc_link.line.value.at(ADC_FULL_SCALE));
     assert!((trip - 430.0).abs() < 0.2, "{trip}");
 }
 
@@ -30,14 +30,14 @@ fn the_protection_follows_the_settings_and_stays_in_the_range_of_the_converters(
     (s.scales.current_a, s.scales.current_b) = (current, current);
     s.scales.dc_link = Line { gain: 0.02, offset: 0.0 };
     (s.limits.trip_a, s.limits.dc_over_v) = (Some(80.0), Some(60.0));
-    let Protection { window_a, window_b, over_voltage } = protection(&s);
+    let Protection { window_a, window_b, over_voltage } = protection(SELECTED, &s);
     assert_eq!(window_a, window_b);
     assert!(
         (current.at(window_a.1) - 81.6).abs() < 0.1 && (current.at(window_a.0) + 81.6).abs() < 0.1
     );
     assert!((s.scales.dc_link.at(over_voltage) - 64.5).abs() < 0.05);
     (s.limits.trip_a, s.limits.dc_over_v) = (Some(s.sensor_range_a()), Some(s.dc_link_range_v()));
-    let ends = protection(&s);
+    let ends = protection(SELECTED, &s);
     assert_eq!((ends.window_a, ends.over_voltage), ((1, ADC_FULL_SCALE - 1), ADC_FULL_SCALE - 1));
 }
 
@@ -59,7 +59,7 @@ fn reaction_times_are_those_of_the_documentation() {
 #[test]
 fn the_numbers_are_those_of_the_design() {
     assert_eq!(PWM_TOP, 14_167);
-    let (code, seconds) = dead_time(DEAD_TIME_S);
+    let (code, seconds) = dead_time(SELECTED.dead_time_s.value);
     assert_eq!((code, (seconds * 170e6).round()), (0x9e, 376.0)); // 2.21 us
     assert_eq!(SAMPLE_AT, 14_167 - 98);
 }
@@ -67,14 +67,17 @@ fn the_numbers_are_those_of_the_design() {
 /// 0 A gave 2024 with 3.0 V (Table 4): the same voltage is 1840 of 3.3 V.
 #[test]
 fn the_calibration_follows_the_reference() {
-    let zero = -CURRENT_A.offset / CURRENT_A.gain;
+    let line = SELECTED.currents.a_and_b()[0].line.value;
+    let zero = -line.offset / line.gain;
     assert!((zero - 2022.0 / 1.1).abs() < 1.0, "zero at {zero}");
 }
 
 #[test]
 fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
-    let Protection { window_a, window_b, .. } = protection(&settings());
-    for (line, (low, high)) in [(CURRENT_A, window_a), (CURRENT_B, window_b)] {
+    let Protection { window_a, window_b, .. } = protection(SELECTED, &settings());
+    for (line, (low, high)) in
+        [(settings().scales.current_a, window_a), (settings().scales.current_b, window_b)]
+    {
         let software = settings().trip_a();
         assert!(line.at(high) > software && line.at(low) < -software);
         assert!(line.at(high + 1) < 4.47 && line.at(low - 1) > -4.47);

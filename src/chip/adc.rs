@@ -1,29 +1,21 @@
-//! The converters: ADC1 and ADC2 sample both phase currents at the same instant, then dc link and
-//! heat sink, started by TIM1 once per period. The end of the sequence raises the control interrupt.
+//! The converters: ADC1 and ADC2 sample the currents a and b at the same instant, then current c if the board measures it,
+//! then dc link and heat sink, started by TIM1 once per period. The end of the sequence raises the control interrupt.
 
 use cortex_m::asm;
-use stm32g4xx_hal::gpio::{Analog, PA0, PA1, PC1, PC2};
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
 
+use super::clocks::clock_on;
+use super::pins;
 use induction_drive::board;
+use induction_drive::boards::SELECTED;
 
-/// The pins of the converters.
-pub struct Pins {
-    /// Current a.
-    pub current_a: PA0<Analog>,
-    /// Current b.
-    pub current_b: PC1<Analog>,
-    /// Dc link.
-    pub dc_link: PA1<Analog>,
-    /// Heat sink.
-    pub heat_sink: PC2<Analog>,
-}
-
-/// A step that a converter did not finish in time.
-#[derive(Clone, Copy, defmt::Format)]
-pub enum AdcTimeout {
+/// A step that a converter did not finish in time, or could not begin.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum AdcError {
+    /// It has no clock, or not the one that was chosen.
+    NoClock,
     /// Its calibration.
     Calibration,
     /// Its start.
@@ -37,6 +29,8 @@ pub struct Codes {
     pub current_a: u16,
     /// Current b.
     pub current_b: u16,
+    /// Current c; 0 if the board does not measure it.
+    pub current_c: u16,
     /// Dc link.
     pub dc_link: u16,
     /// Heat sink.
@@ -69,20 +63,30 @@ impl Adc {
         one: pac::ADC1,
         two: pac::ADC2,
         common: &pac::ADC12_COMMON,
-        pins: Pins,
         rcc: &mut Rcc,
         protection: &board::Protection,
-    ) -> Result<Self, AdcTimeout> {
-        pins.current_a.into_analog();
-        pins.current_b.into_analog();
-        pins.dc_link.into_analog();
-        pins.heat_sink.into_analog();
+    ) -> Result<Self, AdcError> {
+        let [a, b] = SELECTED.currents.a_and_b();
+        let c = SELECTED.currents.c();
+        let (dc_link, heat_sink) = (SELECTED.dc_link.pin, SELECTED.heat_sink);
+        for pin in [a.pin, b.pin, dc_link, heat_sink].into_iter().chain(c.map(|c| c.pin)) {
+            pins::analog(pin);
+        }
 
-        rcc.ahb2enr().modify(|_, w| w.adc12en().enabled());
+        if !clock_on!(rcc.ahb2enr(), adc12en) {
+            return Err(AdcError::NoClock);
+        }
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4());
-        prepare(&one, board::ADC1_CHANNELS, protection.window_a)?;
-        prepare(&two, board::ADC2_CHANNELS, protection.window_b)?;
+        if !common.ccr().read().ckmode().is_sync_div4() {
+            return Err(AdcError::NoClock);
+        }
+        // `boards` has checked that each pin reaches its converter. Channel 0 is not one of them.
+        let channels = |first: Option<u8>, slow: Option<u8>| {
+            [first, c.and_then(|c| c.pin.adc1()), slow].map(|channel| channel.unwrap_or(0))
+        };
+        prepare(&one, channels(a.pin.adc1(), dc_link.adc1()), protection.window_a)?;
+        prepare(&two, channels(b.pin.adc2(), heat_sink.adc2()), protection.window_b)?;
         // Both sequences take the same time, so one interrupt at their end is enough. The analog watchdogs
         // interrupt earlier, when the current is converted.
         one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
@@ -110,38 +114,63 @@ impl Adc {
         // Before the data are read: a sequence that ends from here on raises a new request.
         self.one.isr().write(|w| w.jeoc().clear().jeos().clear());
         self.two.isr().write(|w| w.jeoc().clear().jeos().clear());
+        let (current_a, current_b) =
+            (self.one.jdr1().read().jdata().bits(), self.two.jdr1().read().jdata().bits());
+        let (one, two) = (self.one.jdr2().read().jdata(), self.two.jdr2().read().jdata());
+        if SELECTED.currents.c().is_none() {
+            let (dc_link, heat_sink) = (one.bits(), two.bits());
+            return Codes { current_a, current_b, current_c: 0, dc_link, heat_sink };
+        }
         Codes {
-            current_a: self.one.jdr1().read().jdata().bits(),
-            current_b: self.two.jdr1().read().jdata().bits(),
-            dc_link: self.one.jdr2().read().jdata().bits(),
-            heat_sink: self.two.jdr2().read().jdata().bits(),
+            current_a,
+            current_b,
+            current_c: one.bits(),
+            dc_link: self.one.jdr3().read().jdata().bits(),
+            heat_sink: self.two.jdr3().read().jdata().bits(),
         }
     }
 }
 
-/// Sets a converter up: power, calibration, sequence, in the order of RM0440.
+/// Sets a converter up: power, calibration, sequence, in the order of RM0440. The channels are those of its own current, of
+/// current c (0: none), and of its slow signal. Both converters convert current c, so that both sequences take the same time.
 fn prepare(
     adc: &RegisterBlock,
-    (current, slow): (u8, u8),
+    [current, third, slow]: [u8; 3],
     (low, high): (u16, u16),
-) -> Result<(), AdcTimeout> {
+) -> Result<(), AdcError> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
 
     adc.cr().modify(|_, w| w.adcaldif().single_ended().adcal().start_calibration());
-    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(AdcTimeout::Calibration)?;
+    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(AdcError::Calibration)?;
     // At least four converter clocks between the calibration and the next step.
     asm::delay(8 * board::ADC_CLOCK_DIVIDER);
 
     adc.isr().write(|w| w.adrdy().clear());
-    adc.cr().modify(|_, w| w.aden().enabled());
-    wait_for(|| adc.isr().read().adrdy().bit()).ok_or(AdcTimeout::Enabling)?;
+    // Again until it is ready: the logic of the calibration may still clear the bit (`stm32g4xx_hal_adc.c`).
+    wait_for(|| {
+        adc.cr().modify(|_, w| w.aden().enabled());
+        adc.isr().read().adrdy().bit()
+    })
+    .ok_or(AdcError::Enabling)?;
 
-    for (channel, time) in [(current, board::CURRENT_SAMPLING), (slow, board::SLOW_SAMPLING)] {
-        // Channels 0 to 9: all that are used.
+    let times = [
+        (current, board::CURRENT_SAMPLING),
+        (third, board::CURRENT_SAMPLING),
+        (slow, board::SLOW_SAMPLING),
+    ];
+    for (channel, time) in times.into_iter().filter(|(channel, _)| *channel != 0) {
+        // Channels 1 to 9: all that a board can have.
         adc.smpr1().modify(|_, w| w.smp(channel).set(time.code));
     }
+    // The first conversion after the calibration may be wrong (ES0430, 2.7.7 and 2.7.8): a regular one, thrown away.
+    // SAFETY: five bits, an existing channel; a sequence of one.
+    adc.sqr1().write(|w| unsafe { w.sq1().bits(current) });
+    adc.cr().modify(|_, w| w.adstart().start_conversion());
+    wait_for(|| adc.isr().read().eoc().bit()).ok_or(AdcError::Enabling)?;
+    adc.isr().write(|w| w.eosmp().clear().eoc().clear().eos().clear());
+
     // The analog watchdog interrupts at the first code outside the window.
     // SAFETY: twelve bits each, from codes of twelve bits.
     adc.tr1().write(|w| unsafe { w.lt1().bits(low).ht1().bits(high) });
@@ -151,10 +180,18 @@ fn prepare(
         w.awd1ch().bits(current).awd1sgl().set_bit().jawd1en().set_bit().jqdis().set_bit()
     });
     adc.jsqr().write(|w| {
+        // Lengths are coded less one.
         // SAFETY: five bits each, existing channels.
-        unsafe { w.jsq1().bits(current).jsq2().bits(slow) };
-        // Length 2, coded as 1; trigger: rising edge of trigger output 2 of TIM1.
-        w.jl().set(1).jextsel().tim1_trgo2().jexten().rising_edge()
+        unsafe {
+            w.jsq1().bits(current);
+            if third == 0 {
+                w.jsq2().bits(slow).jl().set(1);
+            } else {
+                w.jsq2().bits(third).jsq3().bits(slow).jl().set(2);
+            }
+        }
+        // Trigger: rising edge of trigger output 2 of TIM1.
+        w.jextsel().tim1_trgo2().jexten().rising_edge()
     });
     Ok(())
 }

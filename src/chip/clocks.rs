@@ -32,9 +32,42 @@ const fn pll_hz(oscillator_hz: u32, divider: PllMDiv) -> u32 {
 const _: () = assert!(pll_hz(board::HSE_HZ, CRYSTAL_DIVIDER) == board::CLOCK_HZ);
 const _: () = assert!(pll_hz(board::HSI_HZ, INTERNAL_DIVIDER) == board::CLOCK_HZ);
 
-/// Brings core, buses and timers to [`board::CLOCK_HZ`].
-pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) {
+/// Switches on the clock of a peripheral, and waits until the peripheral can be accessed: two bus cycles (ST reads the
+/// enable register back after every enable, `stm32g4xx_ll_bus.h`). `false` if the bit does not stay.
+macro_rules! clock_on {
+    ($register:expr, $bit:ident) => {{
+        $register.modify(|_, w| w.$bit().set_bit());
+        let on = $register.read().$bit().bit();
+        cortex_m::asm::dsb();
+        on
+    }};
+}
+pub(crate) use clock_on;
+
+/// A condition of the supply or of the clock that does not read back as it was set.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum ClockError {
+    /// The power controller has no clock: its registers do not take what is written.
+    PowerController,
+    /// The core voltage is not boosted, which more than 150 MHz need (RM0440, dynamic voltage scaling).
+    Boost,
+    /// The supply monitor is off, or at another level.
+    SupplyMonitor,
+    /// The flash has fewer wait states than 170 MHz need.
+    WaitStates,
+}
+
+/// Brings core, buses and timers to [`board::CLOCK_HZ`], and reads back the conditions for it.
+pub fn start(
+    rcc: pac::RCC,
+    pwr: pac::PWR,
+    flash: &pac::FLASH,
+) -> (Rcc, Source, Result<(), ClockError>) {
     let rcc = rcc.constrain();
+    // Off after reset, and the HAL leaves it off: without it no write below has an effect.
+    let powered = clock_on!(rcc.apb1enr1(), pwren);
+    // The range without boost: from there the HAL takes the steps to 170 MHz. A reset may have kept the boost.
+    pwr.cr5().modify(|_, w| w.r1mode().set_bit());
     let (source, mux, divider) = if crystal_starts(&rcc) {
         (Source::Crystal, PllSrc::HSE(board::HSE_HZ.Hz()), CRYSTAL_DIVIDER)
     } else {
@@ -59,7 +92,26 @@ pub fn start(rcc: pac::RCC, pwr: pac::PWR, flash: &pac::FLASH) -> (Rcc, Source) 
         // A crystal that stops raises the NMI, and TIM1's break with it.
         rcc.cr().modify(|_, w| w.csson().on());
     }
-    (rcc, source)
+    let checked = if powered { read_back(flash) } else { Err(ClockError::PowerController) };
+    (rcc, source, checked)
+}
+
+/// Reads back the conditions under which the core may run at [`board::CLOCK_HZ`].
+fn read_back(flash: &pac::FLASH) -> Result<(), ClockError> {
+    // SAFETY: only reads; the HAL has taken the owner of the registers.
+    let pwr = unsafe { &*pac::PWR::ptr() };
+    // R1MODE clear means boosted; VOSF is set while the voltage is still changing.
+    if pwr.cr5().read().r1mode().bit() || pwr.sr2().read().vosf().bit() {
+        return Err(ClockError::Boost);
+    }
+    let monitor = pwr.cr2().read();
+    if !monitor.pvde().bit() || monitor.pvdls().bits() != board::SUPPLY_LEVEL {
+        return Err(ClockError::SupplyMonitor);
+    }
+    if flash.acr().read().latency().bits() < board::WAIT_STATES {
+        return Err(ClockError::WaitStates);
+    }
+    Ok(())
 }
 
 /// Switches the crystal on and waits for it, with a limit.

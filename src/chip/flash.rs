@@ -11,9 +11,9 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::asm;
-use cortex_m::peripheral::DWT;
 use stm32g4xx_hal::pac;
 
+use super::time;
 use induction_drive::board;
 use induction_drive::store::{Flash, FlashError};
 
@@ -70,22 +70,25 @@ impl Pages {
         }
         // SAFETY: flags only; written as 1 they are cleared.
         self.registers.sr().write(|w| unsafe { w.bits(STATUS_FLAGS) });
+        // Off during the work: the control interrupt reads the flash meanwhile, and the cache would return wrong data
+        // (`stm32g4xx_hal_flash.c` switches it off for the same reason).
+        self.registers.acr().modify(|_, w| w.dcen().clear_bit());
         let status = work(self);
         self.registers.cr().modify(|_, w| w.per().clear_bit().pg().clear_bit());
         self.registers.cr().modify(|_, w| w.lock().set_bit());
-        // The data cache does not follow changes of the flash. It can be cleared only while it is off.
-        self.registers.acr().modify(|_, w| w.dcen().clear_bit());
-        self.registers.acr().modify(|_, w| w.dcrst().set_bit());
-        self.registers.acr().modify(|_, w| w.dcrst().clear_bit());
-        self.registers.acr().modify(|_, w| w.dcen().set_bit());
+        // Neither cache follows changes of the flash. Each can be cleared only while it is off.
+        self.registers.acr().modify(|_, w| w.icen().clear_bit());
+        self.registers.acr().modify(|_, w| w.icrst().set_bit().dcrst().set_bit());
+        self.registers.acr().modify(|_, w| w.icrst().clear_bit().dcrst().clear_bit());
+        self.registers.acr().modify(|_, w| w.icen().set_bit().dcen().set_bit());
         status
     }
 
     /// Waits for the end of the operation; returns its error flags, or all bits if it does not end.
     fn finished(&self) -> u32 {
-        let began = DWT::cycle_count();
+        let began = time::now();
         while self.registers.sr().read().bsy().bit() {
-            let us = DWT::cycle_count().wrapping_sub(began) / board::CYCLES_PER_US;
+            let us = time::now().wrapping_sub(began) / board::CYCLES_PER_US;
             if us > board::FLASH_TIMEOUT_US {
                 return u32::MAX;
             }

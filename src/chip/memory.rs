@@ -1,7 +1,8 @@
-//! Memory laid out by the linker script: the control code in CCM, and the stack, with nothing below it.
+//! Memory laid out by the linker script: the control code in CCM, and the stack, with a guard at its end.
 
 use core::ptr;
 
+use cortex_m::peripheral::MPU;
 use cortex_m::register::msp;
 
 use induction_drive::monitor::memory_check::MemoryRange;
@@ -76,6 +77,24 @@ pub fn build_id() -> [u8; 8] {
     unsafe { (&raw const _build_id).add(BEHIND).cast::<[u8; 8]>().read() }
 }
 
+/// Bytes at the end of the stack that no access reaches: the smallest region of the memory protection unit.
+const GUARD_BYTES: usize = 32;
+
+/// Makes the last bytes of the stack inaccessible: an overflow ends in the fault handler, which begins a fresh stack.
+pub fn guard_stack(mpu: &mut MPU) {
+    let end = &raw const _stack_end as u32;
+    // Region 0: 2^(SIZE + 1) bytes, no access, no execution. Elsewhere the usual map holds, and none in the fault handlers.
+    const SIZE: u32 = GUARD_BYTES.trailing_zeros() - 1;
+    // SAFETY: the region lies below all that is used of the stack, and is no other memory.
+    unsafe {
+        mpu.rbar.write(end | 1 << 4);
+        mpu.rasr.write(1 << 28 | SIZE << 1 | 1);
+        mpu.ctrl.write(1 << 2 | 1);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
 /// Contents of unused stack.
 const PAINT: u32 = 0xc5c5_c5c5;
 /// Words below the stack pointer that are not painted: room for `paint_stack` itself.
@@ -86,7 +105,7 @@ pub fn paint_stack() {
     let end = &raw mut _stack_end;
     let used_from = msp::read() as usize;
     let words = used_from.saturating_sub(end as usize) / size_of::<u32>();
-    for i in 0..words.saturating_sub(MARGIN_WORDS) {
+    for i in GUARD_BYTES / size_of::<u32>()..words.saturating_sub(MARGIN_WORDS) {
         // SAFETY: between the end of the stack and the stack pointer lies nothing that is in use.
         unsafe { ptr::write_volatile(end.add(i), PAINT) };
     }
@@ -94,7 +113,8 @@ pub fn paint_stack() {
 
 /// Most bytes of the stack used so far.
 pub fn stack_used() -> usize {
-    let end = &raw const _stack_end;
+    // SAFETY: within the stack.
+    let end = unsafe { (&raw const _stack_end).add(GUARD_BYTES / size_of::<u32>()) };
     let words = stack_size() / size_of::<u32>();
     // SAFETY: all of it is stack; volatile, because interrupts write there.
     let unused = (0..words).take_while(|i| unsafe { ptr::read_volatile(end.add(*i)) } == PAINT);
@@ -103,5 +123,5 @@ pub fn stack_used() -> usize {
 
 /// Size of the stack, bytes.
 pub fn stack_size() -> usize {
-    (&raw const _stack_start as usize) - (&raw const _stack_end as usize)
+    (&raw const _stack_start as usize) - (&raw const _stack_end as usize) - GUARD_BYTES
 }

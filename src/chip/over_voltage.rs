@@ -8,21 +8,60 @@ use cortex_m::asm;
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
+use super::clocks::clock_on;
+use super::pins;
+use super::pwm::Pwm;
 use induction_drive::board;
+use induction_drive::boards::{Level, SELECTED};
 
-/// Starts the comparator at the level of the converter code `level`, and locks it until the next reset.
-pub fn watch(dac: &pac::DAC3, comparators: &pac::COMP, rcc: &mut Rcc, level: u16) {
-    rcc.ahb2enr().modify(|_, w| w.dac3en().set_bit());
-    rcc.apb2enr().modify(|_, w| w.syscfgen().enabled());
+/// Reason why the protection is not trusted.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum SelfTestError {
+    /// DAC3 or the comparator has no clock.
+    NoClock,
+    /// DAC3 is not ready.
+    LevelNotReady,
+    /// The comparator does not trip at the level zero.
+    DoesNotTrip,
+    /// It trips, but the timer sees no break.
+    NoBreak,
+    /// It trips at its own level: the dc link is above it, or its wire is off.
+    AlwaysTrips,
+}
+
+/// Starts the comparator, proves that it pulls the break of the timer at the level zero and does not at the converter
+/// code `level`, and locks it there until the next reset. The outputs are off.
+///
+/// # Errors
+/// The first step of the proof that fails.
+pub fn watch(
+    dac: &pac::DAC3,
+    comparators: &pac::COMP,
+    rcc: &mut Rcc,
+    pwm: &mut Pwm,
+    level: u16,
+) -> Result<(), SelfTestError> {
+    let clocked = clock_on!(rcc.ahb2enr(), dac3en) && clock_on!(rcc.apb2enr(), syscfgen);
+    if !clocked {
+        return Err(SelfTestError::NoClock);
+    }
+    let set = |code: u16| {
+        dac.dhr12r1().write(|w| w.daccdhr().set(code));
+        asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
+    };
+    // The data first, then the mode, then the enable.
+    dac.dhr12r1().write(|w| w.daccdhr().set(level));
     dac.mcr().write(|w| {
         // Internal output, unbuffered.
         w.mode1().normal_chip_no_buffer();
         // SAFETY: two bits; 2 stands for bus clocks above 160 MHz.
         unsafe { w.hfsel().bits(2) }
     });
-    dac.dhr12r1().write(|w| w.daccdhr().set(level));
     dac.cr().modify(|_, w| w.en1().set_bit());
     asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
+    if !dac.sr().read().dac1rdy().bit() {
+        return Err(SelfTestError::LevelNotReady);
+    }
 
     comparators.c1csr().write(|w| {
         // SAFETY: three bits each; `board` keeps both inside.
@@ -34,5 +73,24 @@ pub fn watch(dac: &pac::DAC3, comparators: &pac::COMP, rcc: &mut Rcc, level: u16
         w.inpsel().clear_bit().pol().clear_bit().en().set_bit()
     });
     asm::delay(board::COMP_START_US * board::CYCLES_PER_US);
+
+    // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it.
+    pins::pulled_input(SELECTED.dc_link.pin, Level::High);
+    set(0);
+    let (trips, broken) = (comparators.c1csr().read().value().bit(), pwm.take_break());
+    pins::analog(SELECTED.dc_link.pin);
+    set(level);
+    pwm.take_break();
+    asm::delay(board::BREAK_FILTER_NS * board::CYCLES_PER_US / 1000 + board::CYCLES_PER_US);
+    let trips_again = comparators.c1csr().read().value().bit();
     comparators.c1csr().modify(|_, w| w.lock().set_bit());
+    if !trips {
+        Err(SelfTestError::DoesNotTrip)
+    } else if !broken {
+        Err(SelfTestError::NoBreak)
+    } else if trips_again {
+        Err(SelfTestError::AlwaysTrips)
+    } else {
+        Ok(())
+    }
 }

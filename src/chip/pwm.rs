@@ -7,29 +7,28 @@
 
 use cortex_m::asm;
 use drive_core::Compare;
-use stm32g4xx_hal::gpio::{Analog, Input, PA6, PA7, PA8, PA9, PA10, PB0, PB1, Pull};
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
+use super::clocks::clock_on;
+use super::pins;
 use induction_drive::board;
+use induction_drive::boards::{Level, SELECTED, pin};
 
-/// The pins of the power stage, as they are after reset.
-pub struct Pins {
-    /// Gates of the high sides a, b, c.
-    pub high: (PA8<Analog>, PA9<Analog>, PA10<Analog>),
-    /// Gates of the low sides a, b, c.
-    pub low: (PA7<Analog>, PB0<Analog>, PB1<Analog>),
-    /// Fault output of the power stage.
-    pub fault: PA6<Analog>,
-}
+/// UIF, BIF and SBIF of TIM1_SR.
+const EVENTS: u32 = 1 | 1 << 7 | 1 << 13;
 
 /// Reason why the timer was not set up or started.
-#[derive(Clone, Copy, defmt::Format)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub enum PwmError {
+    /// It has no clock.
+    NoClock,
     /// The address of its break register is not [`board::TIM1_BDTR`], which the fault handler writes.
     WrongAddress,
     /// It does not take over its compare values where all low sides are on, or does not run.
     NotInStep,
+    /// Dead time, polarities, break or lock do not read back as they were written.
+    NotLocked,
 }
 
 /// Events of the timer.
@@ -38,7 +37,7 @@ pub struct TimerEvents {
     /// It has taken over compare values since the last call.
     pub updated: bool,
     /// The power stage, the comparator or a fault inside the chip has pulled the break since the last
-    /// call, or still pulls it.
+    /// call, or still pulls it; or the outputs are off although they should be on, whatever switched them off.
     pub pulled: bool,
 }
 
@@ -49,13 +48,12 @@ pub struct Pwm {
 }
 
 impl Pwm {
-    /// Sets up the timer, with all six switches off and the counter at rest.
+    /// Sets up the timer, with all six switches off and the counter at rest, and connects it with the pins of the board.
     ///
     /// # Errors
-    /// [`PwmError::WrongAddress`].
+    /// Any [`PwmError`] but [`PwmError::NotInStep`].
     pub fn new(
         timer: pac::TIM1,
-        pins: Pins,
         rcc: &mut Rcc,
         debug: &pac::DBGMCU,
         system: &pac::SYSCFG,
@@ -64,8 +62,11 @@ impl Pwm {
         if timer.bdtr().as_ptr() as u32 != board::TIM1_BDTR {
             return Err(PwmError::WrongAddress);
         }
-        rcc.apb2enr().modify(|_, w| w.tim1en().enabled());
-        // Halted by a debugger, the counter stops and the outputs go off.
+        if !clock_on!(rcc.apb2enr(), tim1en) {
+            return Err(PwmError::NoClock);
+        }
+        // Halted by a debugger, the counter stops and the outputs go off. The watchdog runs on and resets the chip, so they
+        // do not come back with the core.
         debug.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
 
         // Undivided clock; up and down between 0 and the top, so half a period each way.
@@ -85,37 +86,58 @@ impl Pwm {
             timer.ccr(leg).write(|w| w.ccr().set(0));
         }
         timer.ccr(3).write(|w| w.ccr().set(u32::from(board::SAMPLE_AT)));
-        // SAFETY: MMS2 is four bits wide; 7 makes the signal of channel 4 the trigger output 2.
-        timer.cr2().write(|w| unsafe { w.mms2().bits(7) });
-
-        // Both outputs of the legs, active high.
+        let (high, low) = (SELECTED.high.on_at.value, SELECTED.low.on_at.value);
+        // Off is the level opposite to the one that switches on, with the timer enabled or not.
+        let (high_low_active, low_low_active) = (high == Level::Low, low == Level::Low);
+        timer.cr2().write(|w| {
+            for leg in 0..3 {
+                w.ois(leg).bit(high_low_active).oisn(leg).bit(low_low_active);
+            }
+            // SAFETY: MMS2 is four bits wide; 7 makes the signal of channel 4 the trigger output 2.
+            unsafe { w.mms2().bits(7) }
+        });
+        // Both outputs of the legs.
         timer.ccer().write(|w| {
-            w.cc1e().set_bit().cc1ne().set_bit();
-            w.cc2e().set_bit().cc2ne().set_bit();
-            w.cc3e().set_bit().cc3ne().set_bit()
+            for leg in 0..3 {
+                w.cce(leg).set_bit().ccne(leg).set_bit();
+                w.ccp(leg).bit(high_low_active).ccnp(leg).bit(low_low_active);
+            }
+            w
         });
 
-        // To the break as well, until the next reset: lock-up of the core, parity of the RAM, supply
-        // voltage, and errors of the flash that cannot be corrected.
-        rcc.apb2enr().modify(|_, w| w.syscfgen().enabled());
-        system
-            .cfgr2()
-            .modify(|_, w| w.cll().set_bit().spl().set_bit().pvdl().set_bit().eccl().set_bit());
+        // To the break as well, until the next reset: lock-up of the core, supply voltage, and errors of the flash that
+        // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.)
+        if !clock_on!(rcc.apb2enr(), syscfgen) {
+            return Err(PwmError::NoClock);
+        }
+        system.cfgr2().modify(|_, w| w.cll().set_bit().pvdl().set_bit().eccl().set_bit());
 
-        // The break inputs: pin PA6, low trips, so inverted; the comparator of the dc link, high trips.
-        // One OR gate combines them, so each must be low behind its own polarity in normal operation, and the break
-        // itself is active high (BKP below).
-        timer.af1().write(|w| w.bkine().set_bit().bkinp().set_bit().bkcmp1e().set_bit());
+        // The break inputs: the fault output of the power stage; the comparator of the dc link, high trips. One OR gate
+        // combines them, so each must be low behind its own polarity in normal operation, and the break itself is active
+        // high (BKP below).
+        let trips_at_low = SELECTED.fault.trips_at.value == Level::Low;
+        timer.af1().write(|w| w.bkine().set_bit().bkinp().bit(trips_at_low).bkcmp1e().set_bit());
+        // In one write, which the lock belongs to: it counts from the first write after a reset on
+        // (`stm32g4xx_ll_tim.h`). It keeps dead time, polarity, break, idle level and output mode until the next reset.
         timer.bdtr().write(|w| {
             w.dtg().set(dead_time_code);
-            // Off means driven to the idle level, which is low (CR2.OISx = 0): not floating.
+            // Off means driven to the idle level: not floating.
             w.ossi().idle_level().ossr().idle_level();
             // Only software switches the outputs on again.
             w.bke().enabled().bkp().active_high().aoe().manual();
             // SAFETY: BKF is four bits wide; every value is one of the filters.
             unsafe { w.bkf().bits(board::BREAK_FILTER) };
-            w.moe().disabled_idle()
+            w.lock().level3().moe().disabled_idle()
         });
+        let locked = timer.bdtr().read();
+        if locked.dtg().bits() != dead_time_code
+            || locked.lock().bits() != 3
+            || !(locked.ossi().bit() && locked.ossr().bit() && locked.bke().bit())
+            || locked.aoe().bit()
+            || locked.bkf().bits() != board::BREAK_FILTER
+        {
+            return Err(PwmError::NotLocked);
+        }
 
         // Load all of it. The repetition counter is loaded with 0 first, so that the first update
         // comes when the counter first reaches the top; from there on every other one, always at
@@ -126,23 +148,31 @@ impl Pwm {
         timer.egr().write(|w| w.ug().update());
         timer.rcr().write(|w| w.rep().set(board::PWM_UPDATES_LEFT_OUT));
 
-        // Locks dead time, polarity, break, idle level and output mode until the next reset.
-        timer.bdtr().modify(|_, w| w.lock().level3());
-
-        // The pins follow last: they are driven low. The resistors hold them low as well, should the timer ever
-        // release them.
-        let Pins { high, low, fault } = pins;
-        high.0.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        high.1.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        high.2.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        low.0.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        low.1.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        low.2.into_alternate::<{ board::PWM_AF }>().set_internal_resistor(Pull::Down);
-        // Pulled down, so that a broken wire trips. The power stage must pull it up (10 kOhm or less against the
-        // 40 kOhm of the chip).
-        Input::new(fault, Pull::Down).into_alternate::<{ board::PWM_AF }>();
+        // The pins follow last: they are driven off. The resistors hold them off as well, should the timer ever release
+        // them.
+        let off = |on_at: Level| if on_at == Level::Low { Level::High } else { Level::Low };
+        let functions: [(&[pin::Reach], &[pin::Reach]); 3] = [
+            (&pin::TIM1_CH1, &pin::TIM1_CH1N),
+            (&pin::TIM1_CH2, &pin::TIM1_CH2N),
+            (&pin::TIM1_CH3, &pin::TIM1_CH3N),
+        ];
+        for (leg, (positive, negative)) in functions.into_iter().enumerate() {
+            let (high_pin, low_pin) = (SELECTED.high.pins[leg], SELECTED.low.pins[leg]);
+            pins::alternate(high_pin, high_pin.function(positive), Some(off(high)));
+            pins::alternate(low_pin, low_pin.function(negative), Some(off(low)));
+        }
+        // Pulled to the level that trips, so that a broken wire does.
+        let fault = SELECTED.fault;
+        pins::alternate(fault.pin, fault.pin.function(&pin::TIM1_BKIN), Some(fault.trips_at.value));
 
         Ok(Self { timer, on: false })
+    }
+
+    /// Whether a break was flagged since the last call; clears it. For the self-test, with the outputs off.
+    pub fn take_break(&mut self) -> bool {
+        let broken = self.timer.sr().read().bif().bit();
+        self.timer.sr().write(|w| w.bif().clear());
+        broken
     }
 
     /// Starts the counter and checks that the compare values are taken over at the top.
@@ -189,10 +219,13 @@ impl Pwm {
     /// The events since the last call; clears them.
     pub fn take_events(&mut self) -> TimerEvents {
         let status = self.timer.sr().read();
-        let pulled = status.bif().bit_is_set() || status.sbif().bit_is_set();
-        // The break stays set while its input is low.
-        self.timer.sr().write(|w| w.uif().clear().bif().clear().sbif().clear());
-        TimerEvents { updated: status.uif().bit_is_set(), pulled }
+        let (updated, broken) = (status.uif().bit(), status.bif().bit() || status.sbif().bit());
+        // Only what was read: a break since then stays for the next call. (Written as 1 a flag stays.) While its input is
+        // low the break is set again.
+        // SAFETY: flags of the register itself.
+        self.timer.sr().write(|w| unsafe { w.bits(!(status.bits() & EVENTS)) });
+        let lost = self.on && !self.timer.bdtr().read().moe().bit();
+        TimerEvents { updated, pulled: broken || lost }
     }
 
     /// Ticks since the counter was at its top while it counts down; half a period or more while it counts up.

@@ -16,8 +16,9 @@ pub struct Watchdog(IWDG);
 impl Watchdog {
     /// Starts it, with [`board::WATCHDOG_US`].
     pub fn start(timer: IWDG, debug: &DBGMCU) -> Self {
-        // Halted by a debugger, it stops too.
-        debug.apb1l_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+        // It runs on while a debugger halts the core: a halt ends in a reset, so the power stage stays off after it. The
+        // bit survives a reset, so it is cleared here.
+        debug.apb1l_fz().modify(|_, w| w.dbg_iwdg_stop().clear_bit());
         let mut watchdog = Self(timer);
         watchdog.key(START);
         watchdog.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
@@ -43,20 +44,28 @@ impl Watchdog {
         self.0.kr().write(|w| unsafe { w.bits(key) });
     }
 
+    /// Waits until the registers have taken an earlier change: six of its clocks behind the prescaler of that time. The wait
+    /// is limited in case its clock does not run.
+    fn wait(&mut self) {
+        for _ in 0..board::WATCHDOG_SET_US {
+            if self.0.sr().read().bits() == 0 {
+                break;
+            }
+            self.key(RELOAD);
+            asm::delay(board::CYCLES_PER_US);
+        }
+    }
+
     fn set(&mut self, prescaler: u8, reload: u16) {
+        // A write while they are busy could be lost.
+        self.wait();
         self.key(UNLOCK);
         // SAFETY: three bits and twelve bits; `board` keeps both inside.
         unsafe {
             self.0.pr().write(|w| w.bits(u16::from(prescaler)));
             self.0.rlr().write(|w| w.bits(reload));
         }
-        // The watchdog takes both within six of its clocks. The wait is limited in case its clock does not run.
-        for _ in 0..board::WATCHDOG_SET_US {
-            if self.0.sr().read().bits() == 0 {
-                break;
-            }
-            asm::delay(board::CYCLES_PER_US);
-        }
+        self.wait();
         self.key(RELOAD);
     }
 }

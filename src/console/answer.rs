@@ -6,11 +6,12 @@ use drive_core::settings::entry::Change;
 use drive_core::{Accepted, Command, Mode, State};
 
 use super::grammar::Request;
-use super::handle::{CommandError, DriveHandle};
+use super::handle::DriveHandle;
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
 use crate::link::trace::{Plan, SIGNALS, Trigger};
+use crate::settings::FirmwareSettings;
 use crate::settings::staging::{Applied, Assignments};
 
 /// Work that takes long, or has to wait until the answer is sent.
@@ -58,6 +59,7 @@ impl Console {
             }
             Request::Apply => self.design_for(Task::Apply, drive),
             Request::Revert => {
+                self.foreign = None;
                 let count = self.settings.count();
                 self.settings.revert();
                 self.out.line(format_args!("ok: {count} staged values dropped"));
@@ -118,6 +120,20 @@ impl Console {
                 self.ok();
             }
             Request::Reboot(now) => self.reboot(now, drive),
+            Request::Board => self.begin(ListKind::Board),
+            Request::BoardIs(board) => {
+                let own = self.settings.in_force().board;
+                self.foreign = (board != own).then_some(board.name);
+                match self.foreign {
+                    Some(other) => self.error(&WrongBoard(other, own.name)),
+                    None => self.ok(),
+                }
+            }
+            Request::Confirm if !drive.is_off() => self.error(&MUST_BE_OFF),
+            Request::Confirm => {
+                self.settings.note(FirmwareSettings::confirm_board);
+                self.save(drive);
+            }
             Request::Version => {
                 let version = fmt::from_fn(|f| drive.version(f));
                 self.out.line(format_args!("{version}"));
@@ -126,7 +142,7 @@ impl Console {
     }
 
     fn status(&mut self, drive: &impl DriveHandle) {
-        let Some(status) = drive.status() else { return self.error(&CommandError::NoAnswer) };
+        let Some(status) = drive.status() else { return self.error(&drive.no_control()) };
         let tracking = drive.tracking().filter(|_| status.state.regulates());
         let staged = self.settings.count();
         let line = fmt::from_fn(|f| {
@@ -154,7 +170,7 @@ impl Console {
     /// Whether settings may be staged now; answers if not.
     fn may_stage(&mut self, drive: &impl DriveHandle) -> bool {
         if drive.status().is_none() {
-            self.error(&CommandError::NoAnswer);
+            self.error(&drive.no_control());
         } else if !drive.is_off() {
             self.error(&MUST_BE_OFF);
         } else {
@@ -196,6 +212,12 @@ impl Console {
             // The drive says why it does not start.
             Task::Start(mode) if !drive.is_off() => self.start(mode, drive),
             _ if !drive.is_off() => self.error(&MUST_BE_OFF),
+            _ if let Some(other) = self.foreign => {
+                self.error(&WrongBoard(other, self.settings.in_force().board.name));
+            }
+            Task::Start(_) if !self.settings.in_force().board_is_confirmed() => {
+                self.error(&NOT_CONFIRMED);
+            }
             _ if self.settings.needs_design() && drive.status().is_some() => {
                 self.out.line(format_args!("designing..."));
                 self.task = Some(task);
@@ -227,13 +249,18 @@ impl Console {
         }
         match task {
             Task::Start(mode) => self.start(mode, drive),
-            _ => match drive.save(self.settings.in_force()) {
-                Ok(()) => {
-                    self.unsaved = false;
-                    self.ok();
-                }
-                Err(why) => self.error(&why),
-            },
+            _ => self.save(drive),
+        }
+    }
+
+    /// Saves the settings in force.
+    fn save(&mut self, drive: &mut impl DriveHandle) {
+        match drive.save(self.settings.in_force()) {
+            Ok(()) => {
+                self.unsaved = false;
+                self.ok();
+            }
+            Err(why) => self.error(&why),
         }
     }
 
@@ -327,4 +354,18 @@ impl Console {
     }
 }
 
+/// Settings of another board.
+struct WrongBoard(&'static str, &'static str);
+
+impl fmt::Display for WrongBoard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "these lines belong to the board {}, this is {}; `revert` drops them",
+            self.0, self.1
+        )
+    }
+}
+
+const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed: do the bench steps that `board` lists, then `confirm board`";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";

@@ -12,6 +12,7 @@ use heapless::Vec;
 
 use super::suggest::nearest;
 use crate::board;
+use crate::boards::{self, Board};
 use crate::link::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
 use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
@@ -86,6 +87,12 @@ pub enum Request {
     Echo(bool),
     /// Reset the controller; whether unsaved settings may be lost.
     Reboot(bool),
+    /// Show the board with its assumptions.
+    Board,
+    /// Check that what follows belongs to this board.
+    BoardIs(&'static Board),
+    /// Note that the bench steps of the board were done, and save.
+    Confirm,
     /// Show the version of the firmware.
     Version,
 }
@@ -115,10 +122,10 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 27] = [
+pub const COMMANDS: [&str; 29] = [
     "help", "status", "start", "stop", "relock", "torque", "speed", "position", "angle", "get",
     "describe", "set", "apply", "revert", "save", "defaults", "backup", "learned", "faults",
-    "clear", "trace", "log", "echo", "reboot", "version", "h", "?",
+    "clear", "trace", "log", "echo", "reboot", "board", "confirm", "version", "h", "?",
 ];
 
 /// The words of a line.
@@ -134,7 +141,7 @@ impl<'a> Words<'a> {
     }
 
     /// One of these words.
-    fn one_of<T: Copy>(
+    fn one_of<T: Clone>(
         &mut self,
         what: &'static str,
         all: &'static str,
@@ -142,7 +149,7 @@ impl<'a> Words<'a> {
     ) -> Result<T, ParseError<'a>> {
         let word = self.next(what)?;
         let found = words.iter().find(|(known, _)| *known == word);
-        found.map(|(_, value)| *value).ok_or(ParseError::OneOf { what, word, all })
+        found.map(|(_, value)| value.clone()).ok_or(ParseError::OneOf { what, word, all })
     }
 
     fn number(&mut self, what: &'static str) -> Result<f32, ParseError<'a>> {
@@ -218,6 +225,15 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             Some("now") => Request::Reboot(true),
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
+        "board" => match words.optional() {
+            None => Request::Board,
+            Some(word) => Request::BoardIs(boards::find(word).ok_or(ParseError::OneOf {
+                what: "the board",
+                word,
+                all: boards::ALL_NAMES,
+            })?),
+        },
+        "confirm" => words.one_of("what to confirm", "board", &[("board", Request::Confirm)])?,
         "version" => Request::Version,
         word => {
             return Err(ParseError::Command { word, near: nearest(word, COMMANDS.into_iter()) });

@@ -20,6 +20,8 @@ pub enum CommandError {
     Refused(Refused),
     /// The control interrupt does not run.
     NoAnswer,
+    /// It was not started, for this reason.
+    NotStarted(&'static str),
 }
 
 impl fmt::Display for CommandError {
@@ -27,6 +29,7 @@ impl fmt::Display for CommandError {
         match self {
             Self::Refused(why) => why.fmt(f),
             Self::NoAnswer => f.write_str("the control does not run"),
+            Self::NotStarted(why) => write!(f, "the control does not run: {why}"),
         }
     }
 }
@@ -38,6 +41,8 @@ pub trait DriveHandle {
     /// # Errors
     /// The drive refuses it, or does not answer.
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError>;
+    /// Reason why there is no control.
+    fn no_control(&self) -> CommandError;
     /// The last report of the control interrupt; `None` if there was none.
     fn status(&self) -> Option<Status>;
     /// Whether the outputs are off and stay off until the next command.

@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 29] = [
+pub const HELP: [&str; 31] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position, or learn",
@@ -29,6 +29,8 @@ pub const HELP: [&str; 29] = [
     "log off|error|warn|info|debug  how much goes to the log",
     "echo on|off               whether typed characters are sent back",
     "reboot [now]              reset the controller; `now` drops settings that were not saved",
+    "board [NAME]              the board with what is assumed of it; NAME: the lines that follow are for that board",
+    "confirm board             the bench steps of the board are done: allow to start, and save",
     "version                   which firmware this is",
     "one line in, one line out; faults and changes of state are announced; set command.timeout_s stops the drive when no line comes",
 ];

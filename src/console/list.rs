@@ -33,6 +33,7 @@ pub(super) enum ListKind {
     /// The same as JSON.
     Describe(&'static str),
     Backup,
+    Board,
     Learned,
     Fault(Fault),
     Trace,
@@ -69,6 +70,13 @@ impl Console {
                 after
             }),
             ListKind::Backup => self.backup(line),
+            ListKind::Board => {
+                let confirmed = self.settings.in_force().board_is_confirmed();
+                reply::board(self.settings.in_force().board, confirmed, line).map(|text| {
+                    out.line(format_args!("{text}"));
+                    next + 1
+                })
+            }
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| {
                 out.line(format_args!("{text}"));
                 next + 1
@@ -115,19 +123,23 @@ impl Console {
         Some(next + 1)
     }
 
-    /// Writes the next line of a backup, from this place on: `defaults`; the words, since ranges depend on them, and then
+    /// Writes the next line of a backup, from this place on: the board; `defaults`; the words, since ranges depend on them, and then
     /// the numbers that differ from the image; what was learned; `apply`.
     fn backup(&mut self, place: usize) -> Option<u16> {
-        const NUMBERS: usize = 1 + keys::COUNT;
+        const FIRST: usize = 2;
+        const NUMBERS: usize = FIRST + keys::COUNT;
         const LEARNED: usize = NUMBERS + keys::COUNT;
         const LAST: usize = 1000;
         let (settings, out) = (self.settings.in_force(), &mut self.out);
-        if place == 0 {
-            out.line(format_args!("defaults"));
-            return Some(1);
+        if place < FIRST {
+            match place {
+                0 => out.line(format_args!("board {}", settings.board.name)),
+                _ => out.line(format_args!("defaults")),
+            }
+            return Some(place as u16 + 1);
         }
         let image = FirmwareSettings::of_the_board();
-        for (place, key) in (1..).zip(keys::all().chain(keys::all())).skip(place - 1) {
+        for (place, key) in (FIRST..).zip(keys::all().chain(keys::all())).skip(place - FIRST) {
             let value = key.get(settings);
             let in_turn = matches!(value, Value::Word(_)) == (place < NUMBERS);
             let kept = key.change() == Change::Board || key.name() == NOT_IN_BACKUP;

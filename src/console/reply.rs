@@ -10,6 +10,7 @@ use drive_core::settings::value::Value;
 use drive_core::{Fault, Settings, State};
 
 use crate::board::CYCLES_PER_US;
+use crate::boards::Board;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
@@ -149,6 +150,22 @@ impl fmt::Display for Description {
         write!(f, ",\"change\":\"{change}\",\"learned\":{}", key.learned())?;
         write!(f, ",\"staged\":{},\"help\":\"{}\"}}", in_force.is_some(), key.help())
     }
+}
+
+/// Line number `i` of the text of a board: its name, its assumptions with the bench step for each, and whether they are
+/// confirmed.
+pub fn board(board: &'static Board, confirmed: bool, i: usize) -> Option<impl fmt::Display> {
+    let count = board.assumptions().count();
+    (i < count + 2).then_some(fmt::from_fn(move |f| {
+        if i == 0 {
+            return write!(f, "board {}: {}", board.name, board.title);
+        }
+        match board.assumptions().nth(i - 1) {
+            Some((item, step)) => write!(f, "assumed {item}; bench: {step}"),
+            None if confirmed => f.write_str("confirmed"),
+            None => f.write_str("not confirmed: the drive does not start; `confirm board` when all bench steps are done"),
+        }
+    }))
 }
 
 /// Line number `i` of the text of a fault, behind its first: the causes, the likely ones first, and the cure.

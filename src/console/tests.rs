@@ -5,6 +5,7 @@ mod staging;
 mod typing;
 mod wrong;
 
+use crate::boards;
 use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
 use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State};
@@ -29,6 +30,7 @@ impl Talk {
     fn new() -> Self {
         let mut settings = FirmwareSettings::of_the_board();
         settings.command.wiring_checked = true;
+        settings.confirm_board();
         Self {
             console: Console::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
@@ -147,6 +149,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
 #[test]
 fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     let mut settings = FirmwareSettings::of_the_board();
+    settings.confirm_board();
     // The simulated converter is calibrated for its own reference.
     settings.drive.scales = drive_core::settings::Scales::default();
     let mut talk = Talk::new();
@@ -220,11 +223,55 @@ fn damage_on_the_wire_is_told_and_changes_nothing() {
 }
 
 #[test]
+fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved() {
+    let mut talk = Talk::new();
+    let mut settings = FirmwareSettings::of_the_board();
+    settings.command.wiring_checked = true;
+    talk.console = Console::new(settings);
+    for mode in ["", " speed", " position", " learning"] {
+        let answer = talk.ask(&format!("start{mode}"));
+        assert!(answer.starts_with("error: ") && answer.contains("`confirm board`"), "{answer}");
+    }
+    assert!(talk.drive.commands.is_empty(), "{:?}", talk.drive.commands);
+    let lines = talk.say("board\n");
+    assert!(lines[0].starts_with("board reference: NUCLEO-G474RE"), "{lines:?}");
+    assert_eq!(lines.len(), 3 + boards::SELECTED.assumptions().count());
+    assert!(lines[lines.len() - 2].starts_with("not confirmed"), "{lines:?}");
+    assert_eq!(talk.ask("confirm board"), "ok");
+    let saved = talk.drive.saved.unwrap();
+    assert!(saved.board_is_confirmed());
+    // It outlasts the defaults: it belongs to the hardware.
+    assert_eq!(talk.ask("defaults"), "ok: staged");
+    assert_eq!(talk.ask("apply"), "ok");
+    assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
+    // The number of another board, or of other values, does not count.
+    let mut other = saved;
+    other.command.confirmed = boards::ALL[1].confirmation();
+    assert!(!other.board_is_confirmed());
+}
+
+#[test]
+fn lines_of_another_board_are_refused_as_a_whole() {
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("board reference"), "ok");
+    let answer = talk.ask("board nucleo-g474re-ihm08m1");
+    assert!(answer.starts_with("error: ") && answer.contains("this is reference"), "{answer}");
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    for line in ["apply", "save", "start"] {
+        assert!(talk.ask(line).starts_with("error: these lines belong to the board nucleo"));
+    }
+    assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
+    assert_eq!(talk.ask("revert"), "ok: 1 staged values dropped");
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    assert_eq!(talk.say("apply\n"), ["designing...", "ok"]);
+}
+
+#[test]
 fn without_a_control_interrupt_nothing_is_promised() {
     let mut talk = Talk::new();
     talk.drive.running = false;
     for line in ["start", "torque 1", "set motor.r_s 5.5", "status"] {
-        assert_eq!(talk.ask(line), "error: the control does not run");
+        assert_eq!(talk.ask(line), "error: the control does not run: a test");
     }
     assert_eq!(talk.ask("get motor.r_s"), in_force("motor.r_s = 5.4 ohm (0.001 to 1000)"));
 }

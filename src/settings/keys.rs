@@ -8,7 +8,7 @@ use drive_core::settings::value::{Value, ValueError, Words};
 use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
-use crate::board;
+use crate::boards;
 use crate::hash;
 
 /// Longest time-out of commands, s.
@@ -16,8 +16,11 @@ const LONGEST_TIMEOUT_S: f32 = 3600.0;
 /// Bits of `auto` in the flash: not a number, as no value of a setting is.
 const AUTO_BITS: u32 = 0x7fc0_0000;
 
+/// The setting that names the board.
+pub const BOARD: &str = "board";
+
 /// The firmware's own settings, in the order in which they are shown.
-static OWN: [Entry<FirmwareSettings>; 3] = [
+static OWN: [Entry<FirmwareSettings>; 5] = [
     Entry::new(
         "command.timeout_s",
         "s",
@@ -40,6 +43,30 @@ static OWN: [Entry<FirmwareSettings>; 3] = [
         |s, place| s.command.echo = bool::at(place),
         "whether the console sends typed characters back",
     ),
+    Entry::new(
+        BOARD,
+        "",
+        Access::Word {
+            words: &boards::NAMES,
+            get: |s: &FirmwareSettings| {
+                boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0)
+            },
+            set: |s, place| s.board = boards::ALL[place % boards::ALL.len()],
+        },
+        "board that the firmware is built for",
+    )
+    .changed(Change::Board),
+    Entry::new(
+        "board.confirmed",
+        "",
+        Access::Whole {
+            get: |s: &FirmwareSettings| s.command.confirmed,
+            set: |s, value| s.command.confirmed = value,
+        },
+        "number of the board whose bench steps were done; `confirm board` sets it",
+    )
+    .from_to(0.0, 16_777_215.0)
+    .changed(Change::Board),
 ];
 
 const fn yes_or_no(
@@ -183,7 +210,7 @@ impl Key {
     pub fn range(self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let range = with!(self, settings, |entry, s| entry.range(s));
         // The timer makes no other dead times.
-        if self.name() == DEAD_TIME { Some(board::DEAD_TIME_RANGE_S) } else { range }
+        if self.name() == DEAD_TIME { Some(settings.board.dead_time_range_s) } else { range }
     }
 
     /// Checks the value in effect against its range.

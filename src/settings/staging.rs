@@ -146,7 +146,10 @@ impl Staging {
     /// Stages the settings of the image, with nothing learned.
     pub fn set_defaults(&mut self) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
-        *staged = Staged { settings: FirmwareSettings::of_the_board(), learned: true };
+        let mut settings = FirmwareSettings::of(self.in_force.board);
+        // A property of the hardware, not of the settings.
+        settings.command.confirmed = self.in_force.command.confirmed;
+        *staged = Staged { settings, learned: true };
         self.drop_if_same();
     }
 
@@ -186,7 +189,8 @@ impl Staging {
         let applied = Applied {
             forgotten: self.in_force.learned.is_some() && settings.learned.is_none(),
             dead_time: old.inverter.dead_time_s != new.inverter.dead_time_s,
-            protection: board::protection(old) != board::protection(new),
+            protection: board::protection(settings.board, old)
+                != board::protection(settings.board, new),
         };
         self.in_force = *settings;
         self.staged = None;

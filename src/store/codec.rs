@@ -17,6 +17,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use super::flash::SLOT_WORDS;
 use super::learned;
+use crate::boards;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::{self, find_id};
 
@@ -58,6 +59,8 @@ pub enum Rejected {
     Newer(u16),
     /// The value of this setting is unknown to the firmware.
     Value(&'static str),
+    /// They were saved by the firmware of this board, which is another.
+    Board(&'static str),
     /// The design rules refuse the settings.
     Refused,
 }
@@ -70,6 +73,7 @@ impl Rejected {
             Self::Newer(_) => 71,
             Self::Value(_) => 72,
             Self::Refused => 73,
+            Self::Board(_) => 74,
         }
     }
 }
@@ -82,6 +86,7 @@ impl fmt::Display for Rejected {
             Self::Newer(version) => write!(f, "version {version}, known is {VERSION}"),
             Self::Value(key) => write!(f, "unknown value of {key}"),
             Self::Refused => f.write_str("out of range"),
+            Self::Board(name) => write!(f, "saved on the board {name}"),
         }
     }
 }
@@ -174,6 +179,8 @@ pub fn settings(
     }
     let mut settings = *defaults;
     let (mut words, mut present) = ([0; learned::WORDS], 0_u64);
+    // Records without a board are older than the second one.
+    settings.board = boards::ALL[0];
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
         if let Some(key) = find_id(id) {
@@ -182,6 +189,9 @@ pub fn settings(
             words[index] = bits;
             present |= 1 << index;
         }
+    }
+    if settings.board != defaults.board {
+        return Err(Rejected::Board(settings.board.name));
     }
     if present > 0 {
         let learned = learned::from_words(&words, present);

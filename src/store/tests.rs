@@ -344,7 +344,13 @@ proptest! {
         }
         let mut fake = Fake::new();
         save(&mut fake, &settings).unwrap();
-        prop_assert_eq!(load(&mut fake), Loaded::Settings(settings));
+        let name = settings.board.name;
+        let expected = if settings.board == board().board {
+            Loaded::Settings(settings)
+        } else {
+            Loaded::Rejected(Rejected::Board(name))
+        };
+        prop_assert_eq!(load(&mut fake), expected);
     }
 
     #[test]

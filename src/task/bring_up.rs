@@ -2,7 +2,6 @@
 
 use core::sync::atomic::Ordering;
 
-use cortex_m::peripheral::DWT;
 use cortex_m::singleton;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
@@ -14,10 +13,11 @@ use stm32g4xx_hal::pac;
 use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, stop};
+use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, stop, time};
 use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
+use induction_drive::boards::SELECTED;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
@@ -39,20 +39,70 @@ pub struct Board {
 }
 
 /// Reason why the drive was not started.
-#[derive(Clone, Copy, defmt::Format)]
+#[derive(Clone, Copy)]
 pub enum StartError {
     /// The firmware started twice.
     Twice,
+    /// The flash is set to one bank: a save would stop the control interrupt.
+    OneBank,
+    /// Supply or clock are not as they were set.
+    Clock(clocks::ClockError),
+    /// TIM2 or TIM5 has no clock.
+    NoTimer,
+    /// The over-voltage protection does not work.
+    OverVoltage(over_voltage::SelfTestError),
     /// The design rules refuse the settings.
     Settings,
     /// A converter does not respond.
-    Converter(adc::AdcTimeout),
+    Converter(adc::AdcError),
     /// Too many consecutive unintended resets; a power cycle or the reset pin tries again.
     Resets,
     /// The timer of the power stage does not work.
     Timer(pwm::PwmError),
     /// The control interrupt does not come at its rate: the timer does not trigger the converters.
     Interrupt,
+}
+
+impl StartError {
+    /// The reason in words.
+    const fn text(self) -> &'static str {
+        use adc::AdcError as Converter;
+        use clocks::ClockError as Clock;
+        use over_voltage::SelfTestError as Protection;
+        use pwm::PwmError as Timer;
+        match self {
+            Self::Twice => "started twice",
+            Self::OneBank => "option bytes: the flash has one bank; set DBANK to 1",
+            Self::Clock(Clock::PowerController) => "the power controller takes no writes",
+            Self::Clock(Clock::Boost) => "the core voltage is not boosted, which 170 MHz need",
+            Self::Clock(Clock::SupplyMonitor) => "the supply monitor does not read back",
+            Self::Clock(Clock::WaitStates) => "too few wait states of the flash",
+            Self::NoTimer => "a timer has no clock",
+            Self::OverVoltage(Protection::NoClock) => "self-test: DAC3 or COMP1 has no clock",
+            Self::OverVoltage(Protection::LevelNotReady) => "self-test: DAC3 is not ready",
+            Self::OverVoltage(Protection::DoesNotTrip) => {
+                "self-test: the over-voltage comparator does not trip at the level zero"
+            }
+            Self::OverVoltage(Protection::NoBreak) => {
+                "self-test: the over-voltage comparator does not reach the break of TIM1"
+            }
+            Self::OverVoltage(Protection::AlwaysTrips) => {
+                "self-test: the dc link is above the over-voltage level, or its wire is off"
+            }
+            Self::Settings => "the design rules refuse the settings",
+            Self::Converter(Converter::NoClock) => "the converters have no clock",
+            Self::Converter(Converter::Calibration) => "a converter does not calibrate",
+            Self::Converter(Converter::Enabling) => "a converter does not start",
+            Self::Resets => "too many unintended resets; switch the supply off and on",
+            Self::Timer(Timer::WrongAddress) => "TIM1 is not where the fault handler expects it",
+            Self::Timer(Timer::NoClock) => "TIM1 has no clock",
+            Self::Timer(Timer::NotInStep) => "TIM1 does not run in step",
+            Self::Timer(Timer::NotLocked) => {
+                "dead time, polarity, break or lock of TIM1 do not read back"
+            }
+            Self::Interrupt => "the control interrupt does not come at its rate",
+        }
+    }
 }
 
 /// Sets everything up and starts the control interrupt. If the drive cannot be started, the outputs stay off, the log
@@ -77,13 +127,13 @@ pub fn bring_up() -> Result<Board, StartError> {
     if let Some(record) = &record {
         defmt::error!("the last run ended with {}", defmt::Display2Format(record));
     }
-    let (mut rcc, source) = clocks::start(chip.RCC, chip.PWR, &chip.FLASH);
+    memory::guard_stack(&mut core.MPU);
+    let (mut rcc, source, clocked) = clocks::start(chip.RCC, chip.PWR, &chip.FLASH);
     if source == clocks::Source::Internal {
         defmt::warn!("the crystal does not start: on the internal oscillator, 1 % accurate");
     }
-    // Keep the debug port alive while the core sleeps.
-    chip.DBGMCU.cr().modify(|_, w| w.dbg_sleep().set_bit());
-    // The cycle counter measures the control interrupt and is the main loop's clock.
+    let timed = time::start(chip.TIM5, &mut rcc, &chip.DBGMCU);
+    // The cycle counter measures the control interrupt, while which the core does not sleep.
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 
@@ -92,37 +142,40 @@ pub fn bring_up() -> Result<Board, StartError> {
 
     let a = chip.GPIOA.split(&mut rcc);
     let b = chip.GPIOB.split(&mut rcc);
-    let c = chip.GPIOC.split(&mut rcc);
-    let pwm_pins =
-        pwm::Pins { high: (a.pa8, a.pa9, a.pa10), low: (a.pa7, b.pb0, b.pb1), fault: a.pa6 };
-    let adc_pins =
-        adc::Pins { current_a: a.pa0, current_b: c.pc1, dc_link: a.pa1, heat_sink: c.pc2 };
-
-    // First, because the gates are driven low from here on.
-    let over_voltage = board::protection(&start.settings.drive).over_voltage;
-    over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, over_voltage);
-    let pwm =
-        pwm::Pwm::new(chip.TIM1, pwm_pins, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
+    // Port C as well: its clock.
+    let _ = chip.GPIOC.split(&mut rcc);
+    // First, because the drivers are switched off from here on.
+    let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc)
         .ok_or(StartError::Twice)?;
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
-    let link = pwm.map_err(StartError::Timer).and_then(|pwm| {
+    let link = || -> Result<ControlLink, StartError> {
+        let mut pwm = pwm.map_err(StartError::Timer)?;
+        clocked.map_err(StartError::Clock)?;
+        if !dual_bank {
+            return Err(StartError::OneBank);
+        }
+        let encoder = encoder.filter(|_| timed).ok_or(StartError::NoTimer)?;
         let coefficients = start.build(dead_time_s);
         // After the design, which may have replaced refused settings by the defaults.
-        let protection = board::protection(&start.settings.drive);
+        let protection = board::protection(SELECTED, &start.settings.drive);
+        over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)
+            .map_err(StartError::OverVoltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
-        let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, adc_pins, &mut rcc, &protection);
+        let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
         start_control(coefficients, pwm, adc.map_err(StartError::Converter)?, encoder, resets)
-    });
+    }();
     if let Err(error) = &link {
-        defmt::error!("the drive is not started, outputs stay off: {}", error);
+        defmt::error!("the drive is not started, outputs stay off: {=str}", error.text());
     }
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
     let Start { saved, settings, rejected } = start;
     let tracking = singleton!(: Option<Tracking> = None).ok_or(StartError::Twice)?;
     *tracking = Tracking::new(&settings.drive);
-    let chip = Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s };
+    let not_started = link.as_ref().err().map(|error| error.text());
+    let chip =
+        Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
     let supervisor = Supervisor::new(link.ok(), watchdog, chip, tracking, &settings.drive);
     Ok(Board { settings, port, supervisor })
 }
@@ -195,7 +248,7 @@ fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
 /// Waits until the control interrupt satisfies the rule of the watchdog, which is started then; `false` if it does not in
 /// time. A watchdog over an interrupt that does not would reset the chip again and again.
 fn comes_at_its_rate() -> bool {
-    let now = || (DWT::cycle_count(), control::PERIODS.load(Ordering::Relaxed));
+    let now = || (time::now(), control::PERIODS.load(Ordering::Relaxed));
     let (began, periods) = now();
     let mut rule = FeedRule::new(began, periods);
     loop {

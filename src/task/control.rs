@@ -10,6 +10,7 @@ use core::cell::UnsafeCell;
 use core::mem::{MaybeUninit, offset_of};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::identify::learning::Learned;
 use drive_core::{Command, Drive, Hardware, Sample, State};
@@ -20,6 +21,7 @@ use stm32g4xx_hal::stm32::interrupt;
 use crate::chip::adc::Adc;
 use crate::chip::encoder::Encoder;
 use crate::chip::pwm::Pwm;
+use crate::chip::time;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::trace::Recorder;
@@ -126,7 +128,7 @@ struct Running {
     over_current: Hardware,
     /// Events since the last report.
     unreported: Hardware,
-    /// Cycle count at the start of the last period.
+    /// Time of the start of the last period.
     began: u32,
     /// State in the last report.
     reported: Option<State>,
@@ -137,6 +139,9 @@ fn ADC1_2() {
     // SAFETY: see `Owned`; written before the interrupt was unmasked, and the reference ends with this
     // function.
     unsafe { (*RUNNING.0.get()).assume_init_mut() }.period();
+    // The requests are cleared before the return: a write still on its way would raise the interrupt again (Arm erratum
+    // 838869).
+    asm::dsb();
 }
 
 /// Whether the outputs are off, and stay off until the next command.
@@ -165,7 +170,8 @@ impl Running {
         // period before. Otherwise a period was skipped or came late.
         let timer = pwm.take_events();
         let since_top = pwm.since_top();
-        let since_last = began.wrapping_sub(core::mem::replace(&mut self.began, began));
+        let now = time::now();
+        let since_last = now.wrapping_sub(core::mem::replace(&mut self.began, now));
         // (The first period has waited for the interrupt to be enabled.)
         if self.periods > 0
             && (!timer.updated
@@ -186,6 +192,7 @@ impl Running {
         let sample = Sample {
             current_a: codes.current_a,
             current_b: codes.current_b,
+            current_c: codes.current_c,
             dc_link: codes.dc_link,
             heat_sink: codes.heat_sink,
             encoder: encoder.count(),

@@ -3,7 +3,6 @@
 use core::fmt;
 use core::sync::atomic::Ordering;
 
-use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
@@ -13,7 +12,7 @@ use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{memory, pwm, stop};
+use crate::chip::{memory, pwm, stop, time};
 use crate::task::control;
 use induction_drive::board;
 use induction_drive::console::grammar::Level;
@@ -83,9 +82,11 @@ pub struct Chip {
     pub rejected: Option<Rejected>,
     /// Dead time of the timer, s.
     pub dead_time_s: f32,
+    /// Reason why the control was not started, if it was not.
+    pub not_started: Option<&'static str>,
 }
 
-/// Milliseconds from the cycle counter, which wraps every 25 s: to be updated more often.
+/// Milliseconds from the time base, which wraps every 25 s: to be updated more often.
 struct Clock {
     last: u32,
     cycles: u32,
@@ -94,7 +95,7 @@ struct Clock {
 
 impl Clock {
     fn update(&mut self) {
-        let now = DWT::cycle_count();
+        let now = time::now();
         self.cycles += now.wrapping_sub(self.last);
         self.last = now;
         let per_ms = board::CYCLES_PER_US * 1000;
@@ -112,7 +113,7 @@ impl Supervisor {
         tracking: &'static mut Option<Tracking>,
         settings: &Settings,
     ) -> Self {
-        let clock = Clock { last: DWT::cycle_count(), cycles: 0, ms: 0 };
+        let clock = Clock { last: time::now(), cycles: 0, ms: 0 };
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(clock.last, periods)));
         let check = link.is_some().then(|| {
@@ -155,7 +156,7 @@ impl Supervisor {
         let Some((watchdog, rule)) = &mut self.guard else { return };
         let missed = control::MISSED.load(Ordering::Relaxed);
         let periods = control::PERIODS.load(Ordering::Relaxed);
-        match rule.judge(DWT::cycle_count(), periods, missed) {
+        match rule.judge(time::now(), periods, missed) {
             Verdict::Wait => {}
             Verdict::Feed => watchdog.feed(),
             // The watchdog resets the chip in a moment. The main loop itself works, and the console answers until then.
@@ -230,21 +231,24 @@ impl Supervisor {
 
 impl DriveHandle for Supervisor {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
-        let link = self.link.as_mut().ok_or(CommandError::NoAnswer)?;
+        let not_started = self.no_control();
+        let link = self.link.as_mut().ok_or(not_started)?;
         // Discards an answer that came too late for its command.
         link.answers.take();
         if !link.commands.send(command) {
             return Err(CommandError::NoAnswer);
         }
-        let began = DWT::cycle_count();
-        while DWT::cycle_count().wrapping_sub(began)
-            < board::ANSWER_TIMEOUT_US * board::CYCLES_PER_US
-        {
+        let began = time::now();
+        while time::now().wrapping_sub(began) < board::ANSWER_TIMEOUT_US * board::CYCLES_PER_US {
             if let Some(answer) = link.answers.take() {
                 return answer.map_err(CommandError::Refused);
             }
         }
         Err(CommandError::NoAnswer)
+    }
+
+    fn no_control(&self) -> CommandError {
+        self.chip.not_started.map_or(CommandError::NoAnswer, CommandError::NotStarted)
     }
 
     fn status(&self) -> Option<Status> {
@@ -324,6 +328,9 @@ impl DriveHandle for Supervisor {
         if let Some(record) = &self.chip.record {
             write!(to, ", {record}")?;
         }
+        if let Some(why) = self.chip.not_started {
+            write!(to, "; not started: {why}")?;
+        }
         match &self.chip.rejected {
             Some(why) => write!(to, "; {why}"),
             None => Ok(()),
@@ -337,7 +344,7 @@ fn extended<R>(guard: &mut Option<(Watchdog, FeedRule)>, work: impl FnOnce() -> 
     match guard {
         Some((watchdog, rule)) => {
             let result = watchdog.extended(work);
-            rule.restart(DWT::cycle_count(), control::PERIODS.load(Ordering::Relaxed));
+            rule.restart(time::now(), control::PERIODS.load(Ordering::Relaxed));
             result
         }
         None => work(),

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 27] = [
+const ELSEWHERE: [(&str, &str); 28] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -31,6 +31,7 @@ const ELSEWHERE: [(&str, &str); 27] = [
     ("cargo sim run saliency-check --set runs=1000", "long proof"),
     ("cargo sim run monte-carlo --set runs=1000", "long proof"),
     ("cargo sim run machines --set", "long proof"),
+    ("cargo sim merge", "the files are the reader's; a test merges shards"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),

@@ -1,40 +1,84 @@
 //! The image for the board: builds and checks it, and writes it to the board.
 
 use std::fs;
-use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{self, Target};
 use crate::{control, paths, run, sections, sources};
 
 /// The name that probe-rs has for the controller of the board.
-const CHIP: &str = "STM32G474RETx";
+pub const CHIP: &str = "STM32G474RETx";
 
-/// Builds and checks the image; returns its path.
+/// The variable by which the firmware learns its board when it is built.
+const BOARD: &str = "INDUCTION_DRIVE_BOARD";
+/// The board whose image is built unless another is named.
+pub const REFERENCE: &str = "reference";
+
+/// The names of the boards, which `src/boards.rs` lists.
+pub fn boards() -> Result<Vec<String>> {
+    let source = sources::read("src/boards.rs")?;
+    let (_, list) =
+        source.split_once("ALL_NAMES: &str = \"").context("src/boards.rs: ALL_NAMES")?;
+    let list = list.split('"').next().unwrap_or_default();
+    Ok(list.split_whitespace().map(str::to_owned).collect())
+}
+
+/// Builds and checks the image of the reference board; returns its path.
 pub fn build() -> Result<PathBuf> {
     build_with(&toolchain::for_target()?)
 }
 
-/// Builds and checks the image with this compiler; returns its path.
+/// The same with this compiler.
 pub fn build_with(target: &Target) -> Result<PathBuf> {
-    run::step("firmware", target.cargo("build")?.args(["--package", "induction-drive"]))?;
-    let elf = target.image()?;
-    let bytes = fs::read(&elf).with_context(|| elf.display().to_string())?;
-    control::check(&bytes).context("the control interrupt")?;
-    paths::check(&bytes)?;
-    sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)?;
-    Ok(elf)
+    build_for(target, REFERENCE)
 }
 
-/// Builds the image, writes it to the board and shows its log until interrupted.
-pub fn flash() -> Result<()> {
-    // Asked before the build, which takes minutes.
-    let probe = run::command("probe-rs").arg("--version").output();
-    if probe.is_err_and(|error| error.kind() == ErrorKind::NotFound) {
-        bail!("probe-rs is missing. Type:\n    cargo install probe-rs-tools --locked");
+/// Builds and checks the image of a board. The path of the last image built is always the same; images of other boards
+/// than the reference are copied to `target/boards/NAME/`, and that path is returned.
+pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
+    let known = boards()?;
+    ensure!(
+        known.iter().any(|name| name == board),
+        "no board {board}: one of {}",
+        known.join(", ")
+    );
+    let mut command = target.cargo("build")?;
+    command.args(["--package", "induction-drive"]).env(BOARD, board);
+    run::step(&format!("firmware for {board}"), &mut command)?;
+    let elf = target.image()?;
+    check(&elf)?;
+    if board == REFERENCE {
+        return Ok(elf);
     }
-    let elf = build()?;
+    let folder = folder()?.join(board);
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let copy = folder.join("induction-drive");
+    for extension in ["", "map"] {
+        fs::copy(elf.with_extension(extension), copy.with_extension(extension))
+            .with_context(|| copy.display().to_string())?;
+    }
+    Ok(copy)
+}
+
+/// The folder with the images of the boards, one folder a board.
+pub fn folder() -> Result<PathBuf> {
+    Ok(run::target_dir()?.join("boards"))
+}
+
+/// Checks an image: what the control interrupt calls, paths of this machine, sections.
+fn check(elf: &Path) -> Result<()> {
+    let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
+    control::check(&bytes).context("the control interrupt")?;
+    paths::check(&bytes)?;
+    sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)
+}
+
+/// Builds the image of a board, writes it there and shows its log until interrupted.
+pub fn flash(board: &str) -> Result<()> {
+    // Asked before the build, which takes minutes.
+    run::probe_rs()?;
+    let elf = build_for(&toolchain::for_target()?, board)?;
     run::step("flash", run::command("probe-rs").args(["run", "--chip", CHIP]).arg(elf))
 }

@@ -1,10 +1,13 @@
 //! Developer tasks: `cargo xtask`, `cargo firmware`.
 
+mod before;
+mod bench;
 mod board;
 mod budget;
 mod control;
 mod documents;
 mod elf;
+mod foreign;
 mod fuzz;
 mod image;
 mod lines;
@@ -22,11 +25,12 @@ mod stack;
 mod toolchain;
 mod tools;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::Parser;
+use clap::{Args, Parser};
 
 /// Developer tasks.
 #[derive(Parser)]
@@ -35,12 +39,16 @@ enum Task {
     /// Everything a change must pass: format, modules, lints, host tests, documentation, firmware, the
     /// firmware on the virtual board. Installs missing programs, or prints the command to type
     Test,
-    /// Builds and checks the image for the board (also: cargo firmware)
-    Firmware,
-    /// Builds the image, writes it through a debug probe and shows its log
-    Flash,
-    /// Builds the image and tests it on the virtual board
+    /// Builds and checks the image for a board (also: cargo firmware)
+    Firmware(Which),
+    /// Builds the image of a board, writes it through a debug probe and shows its log
+    Flash(Which),
+    /// Builds the images and tests them on the virtual board
     Board,
+    /// Reads the registers of a real board through its debug probe and compares them with the virtual board's
+    BenchDump(Which),
+    /// Runs programs of others on the virtual board: examples of stm32g4xx-hal, and ours on embassy-stm32
+    Foreign,
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
     /// the worst path, and above 2500 to the last compare value
     Cycles,
@@ -55,6 +63,9 @@ enum Task {
         /// Only classes of faults whose name contains this
         #[arg(default_value = "")]
         class: String,
+        /// The board
+        #[command(flatten)]
+        which: Which,
     },
     /// Fuzzes the console and the saved settings
     Fuzz {
@@ -92,6 +103,20 @@ enum Task {
     },
 }
 
+/// Choice of a board.
+#[derive(Args)]
+struct Which {
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = image::REFERENCE)]
+    board: String,
+}
+
+impl Which {
+    fn image(&self) -> Result<PathBuf> {
+        image::build_for(&toolchain::for_target()?, &self.board)
+    }
+}
+
 /// Faults of a whole campaign; `test` injects a twentieth.
 const CAMPAIGN: u32 = 2000;
 
@@ -108,12 +133,14 @@ fn main() -> ExitCode {
 fn run(task: Task) -> Result<()> {
     match task {
         Task::Test => test(),
-        Task::Firmware => image::build().map(|elf| println!("{}", elf.display())),
-        Task::Flash => image::flash(),
-        Task::Board => board::test(&image::build()?),
+        Task::Firmware(which) => which.image().map(|elf| println!("{}", elf.display())),
+        Task::Flash(which) => image::flash(&which.board),
+        Task::Board => board::test(&toolchain::for_target()?),
+        Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
+        Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
-        Task::Campaign { count, seed, class } => {
-            board::campaign(&image::build()?, count, seed, &class)
+        Task::Campaign { count, seed, class, which } => {
+            board::campaign(&which.image()?, &which.board, count, seed, &class)
         }
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report(&image::build()?),
@@ -149,8 +176,8 @@ fn test() -> Result<()> {
     run::step("lints of the firmware", target.cargo("clippy")?.args(lints))?;
     let elf = image::build_with(&target)?;
     size::report(&elf)?;
-    board::test(&elf)?;
-    board::campaign(&elf, CAMPAIGN / 20, 1, "")?;
+    board::campaign(&elf, image::REFERENCE, CAMPAIGN / 20, 1, "")?;
+    board::test(&target)?;
     board::cycles(&elf)?;
 
     budget::report(&run::times());

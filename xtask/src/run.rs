@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 /// The microcontroller: Cortex-M4 with a single-precision floating-point unit.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -112,4 +112,13 @@ mod tests {
         let error = step("nothing", Command::new("false").env("A", "b")).unwrap_err();
         assert!(error.to_string().ends_with("\n    A=\"b\" \"false\""), "{error}");
     }
+}
+
+/// Fails if probe-rs is not there.
+pub fn probe_rs() -> Result<()> {
+    let probe = command("probe-rs").arg("--version").output();
+    if probe.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound) {
+        bail!("probe-rs is missing. Type:\n    cargo install probe-rs-tools --locked");
+    }
+    Ok(())
 }

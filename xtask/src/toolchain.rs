@@ -25,8 +25,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// A cargo command for the microcontroller, in the profile of the image.
-    pub fn cargo(&self, subcommand: &str) -> Result<Command> {
+    /// A cargo command for the microcontroller, for any workspace and profile.
+    pub fn bare(&self, subcommand: &str) -> Command {
         let mut command = run::cargo(subcommand);
         if let Self::Debian = self {
             command = run::command("/usr/bin/cargo");
@@ -45,6 +45,12 @@ impl Target {
         }
         // These variables would replace the flags of the target in .cargo/config.toml.
         command.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
+        command
+    }
+
+    /// A cargo command for the microcontroller, in the profile of the image.
+    pub fn cargo(&self, subcommand: &str) -> Result<Command> {
+        let mut command = self.bare(subcommand);
         let map = format!("-Clink-arg=-Map={}", self.image()?.with_extension("map").display());
         command.args(["--profile", PROFILE, "--target", TARGET, &paths::option(map)?]);
         command.arg("--target-dir").arg(self.target_dir()?);

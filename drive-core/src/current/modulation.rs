@@ -31,6 +31,17 @@ pub struct Modulator {
     shortest: f32,
     /// Share of the dc link that the dead-time compensation leaves.
     usable: f32,
+    /// With shunts below the low sides: largest compare value at which a leg can be read.
+    readable: Option<Readable>,
+}
+
+/// The limit that keeps two of three legs readable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Readable {
+    /// Compare value.
+    top: f32,
+    /// Share of the dc link between the second highest leg and the lowest, without the compensation.
+    share: f32,
 }
 
 /// Result of the modulation for one period.
@@ -57,7 +68,22 @@ impl Modulator {
             top: f32::from(top),
             shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / PERIOD_S) * f32::from(top),
             usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
+            readable: None,
         }
+    }
+
+    /// The same with shunts below the low sides, which can be read up to the compare value `readable`.
+    ///
+    /// The second highest leg then stays at or below it, so two of the three currents can always be read. All legs are moved
+    /// down together where needed, which changes no voltage between phases. The circle inside the hexagon, the whole range
+    /// of linear modulation, needs 93.3 % of the period for the second highest leg: nothing is lost from there on. With less
+    /// the corners of the hexagon are cut.
+    pub fn readable(mut self, readable: Option<u16>) -> Self {
+        self.readable = readable.map(|count| {
+            let top = f32::from(count);
+            Readable { top, share: top / self.top - (1.0 - self.usable) }
+        });
+        self
     }
 
     /// Radius of the circle inside the hexagon, V peak: the largest vector available in every direction
@@ -74,15 +100,28 @@ impl Modulator {
         let mut motor = wanted.to_abc();
         let (low, high) = extremes(motor);
         let (span, usable) = (high - low, self.usable * v_dc);
-        let shortened = span > usable;
+        let mut shortened = span > usable;
         if shortened {
             motor = motor * (usable / span);
+        }
+        if let Some(readable) = self.readable {
+            let (span, usable) = (second(motor) - extremes(motor).0, readable.share * v_dc);
+            if span > usable {
+                motor = motor * (usable / span);
+                shortened = true;
+            }
         }
         // Centre the lowest and the highest leg on half the dc link.
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
         let per_volt = self.top / v_dc;
-        let centre = 0.5 * (self.top - (low + high) * per_volt);
+        let mut centre = 0.5 * (self.top - (low + high) * per_volt);
+        if let Some(readable) = self.readable {
+            let highest = readable.top - second(leg) * per_volt;
+            if centre > highest {
+                centre = highest;
+            }
+        }
         let ideal = [leg.a, leg.b, leg.c].map(|volts| centre + volts * per_volt);
         let [a, b, c] = ideal.map(|count| self.drop_or_extend(count));
         // NaN differs from itself and so counts as limited.
@@ -112,6 +151,12 @@ impl Modulator {
 fn rounded(count: f32) -> u16 {
     // The cast to u32 is one instruction of the core, the saturating cast to u16 twelve.
     (count + 0.5) as u32 as u16
+}
+
+/// The second highest component.
+fn second(v: Abc) -> f32 {
+    let (low, high) = extremes(v);
+    v.a + v.b + v.c - low - high
 }
 
 /// The lowest and the highest component.
@@ -185,6 +230,34 @@ mod tests {
             let put_out = mean(out.compare) - Abc::new(dt, -dt, dt).to_alpha_beta();
             let error = put_out - out.realised;
             assert!(error.length_squared() < (2.0 * COUNT_V as f32).powi(2));
+        }
+    }
+
+    /// 94 % of the period can be read.
+    const READABLE: u16 = 13_316;
+
+    #[test]
+    fn with_shunts_two_legs_are_always_readable_and_the_circle_is_kept() {
+        for compensated in [false, true] {
+            let plain = Modulator::new(TOP, 2.2e-6, compensated);
+            let m = plain.readable(Some(READABLE));
+            for degrees in 0..720 {
+                let angle = f64::from(degrees).to_radians() / 2.0;
+                for share in [0.3, 0.9, 0.999, 1.2, 3.0] {
+                    let wanted = polar(share * f64::from(plain.circle(V_DC)), angle);
+                    let out = m.step(wanted, Abc::ZERO, V_DC);
+                    let readable = out.compare.iter().filter(|&&c| c <= READABLE).count();
+                    assert!(readable >= 2, "{share} at {angle}: {:?}", out.compare);
+                    let error = mean(out.compare) - out.realised;
+                    assert!(error.length_squared().sqrt() < 2.0 * COUNT_V as f32);
+                    if share < 1.0 {
+                        // A pulse that is too short is dropped or extended with shunts as without.
+                        let lost = (out.realised - wanted).length_squared().sqrt();
+                        let shortest = m.shortest / f32::from(TOP) * V_DC;
+                        assert!(lost <= 0.7 * shortest, "{share} at {angle}: {lost} V");
+                    }
+                }
+            }
         }
     }
 

@@ -1,9 +1,13 @@
 //! Conversion of ADC codes to amperes and volts (section 3.2, Eq. 3.5), and offset calibration.
 
+use super::shunts::{ShuntState, Shunts};
 use crate::fault::Fault;
-use crate::io::Sample;
+use crate::io::{Compare, Sample};
 use crate::math::frames::{Abc, AlphaBeta};
 use crate::settings::Line;
+
+/// Samples of the second calibration: the time with the low sides on holds them.
+const SAMPLES_AGAIN: u16 = 32;
 
 /// Coefficients of the sensing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +16,8 @@ pub struct Sensing {
     pub current_a: Line,
     /// Calibration of current b, A.
     pub current_b: Line,
+    /// The third current, with three shunts below the low sides.
+    pub shunts: Option<Shunts>,
     /// Calibration of the dc-link voltage, V.
     pub dc_link: Line,
     /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
@@ -28,10 +34,11 @@ pub struct Sensing {
 /// State of the sensing: the offsets measured at start.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SensingState {
-    /// Offset-corrected value at code 0, channels a and b, A.
-    zeros: [f32; 2],
-    sum: [f32; 2],
+    /// Offset-corrected value at code 0, channels a, b and c, A.
+    zeros: [f32; 3],
+    sum: [f32; 3],
     count: u16,
+    shunts: ShuntState,
 }
 
 /// One sample in SI units.
@@ -53,9 +60,13 @@ impl Sensing {
     }
 
     /// Converts codes to SI units and subtracts the offsets.
-    pub fn step(&self, state: &SensingState, sample: &Sample) -> Measured {
-        let a = self.current_a.gain * f32::from(sample.current_a) + state.zeros[0];
-        let b = self.current_b.gain * f32::from(sample.current_b) + state.zeros[1];
+    pub fn step(&self, state: &mut SensingState, sample: &Sample) -> Measured {
+        let mut a = self.current_a.gain * f32::from(sample.current_a) + state.zeros[0];
+        let mut b = self.current_b.gain * f32::from(sample.current_b) + state.zeros[1];
+        if let Some(shunts) = &self.shunts {
+            let c = shunts.current_c.gain * f32::from(sample.current_c) + state.zeros[2];
+            (a, b) = shunts.choose(&mut state.shunts, [a, b, c]);
+        }
         Measured {
             phases: Abc::new(a, b, -(a + b)),
             current: AlphaBeta::from_two_phases(a, b),
@@ -63,11 +74,19 @@ impl Sensing {
         }
     }
 
-    /// Checks the codes against their limits.
+    /// Notes the output of a step; see [`ShuntState::applied`].
+    pub fn applied(&self, state: &mut SensingState, compare: &Compare) {
+        if self.shunts.is_some() {
+            state.shunts.applied(compare);
+        }
+    }
+
+    /// Checks the codes against their limits, and with three shunts the sum of the currents.
     ///
     /// # Errors
-    /// [`Fault::SensorSaturatedA`], [`Fault::SensorSaturatedB`] or [`Fault::OverTemperature`].
-    pub fn check(&self, sample: &Sample) -> Result<(), Fault> {
+    /// [`Fault::SensorSaturatedA`], [`Fault::SensorSaturatedB`], [`Fault::SensorSaturatedC`], [`Fault::CurrentSum`] or
+    /// [`Fault::OverTemperature`].
+    pub fn check(&self, state: &SensingState, sample: &Sample) -> Result<(), Fault> {
         let saturated = |code: u16| code == 0 || code >= self.full_scale;
         if saturated(sample.current_a) {
             Err(Fault::SensorSaturatedA)
@@ -75,6 +94,14 @@ impl Sensing {
             Err(Fault::SensorSaturatedB)
         } else if sample.heat_sink < self.heat_sink.0 || sample.heat_sink > self.heat_sink.1 {
             Err(Fault::OverTemperature)
+        } else if let Some(shunts) = &self.shunts {
+            if saturated(sample.current_c) {
+                Err(Fault::SensorSaturatedC)
+            } else if !shunts.sums_to_zero(&state.shunts) {
+                Err(Fault::CurrentSum)
+            } else {
+                Ok(())
+            }
         } else {
             Ok(())
         }
@@ -82,41 +109,81 @@ impl Sensing {
 
     /// Resets `state` to the calibration lines of the settings, without offset correction.
     pub fn start(&self, state: &mut SensingState) {
-        *state = SensingState {
-            zeros: [self.current_a.offset, self.current_b.offset],
-            ..SensingState::default()
-        };
+        *state =
+            SensingState { zeros: self.lines().map(|line| line.offset), ..SensingState::default() };
+    }
+
+    /// Calibration of a, b and c; of c that of b if there is no sensor c.
+    fn lines(&self) -> [Line; 3] {
+        let c = self.shunts.as_ref().map_or(self.current_b, |shunts| shunts.current_c);
+        [self.current_a, self.current_b, c]
     }
 
     /// Averages one sample with the outputs off; `Some` when the offsets are measured.
     ///
     /// # Errors
-    /// [`Fault::OffsetA`] or [`Fault::OffsetB`] when an offset is above the limit; the offsets in use
+    /// [`Fault::OffsetA`], [`Fault::OffsetB`] or [`Fault::OffsetC`] when an offset is above the limit; the offsets in use
     /// stay unchanged.
     pub fn calibrate(
         &self,
         state: &mut SensingState,
         sample: &Sample,
     ) -> Result<Option<()>, Fault> {
-        state.sum[0] += self.current_a.at(sample.current_a);
-        state.sum[1] += self.current_b.at(sample.current_b);
+        let offsets = self.lines().map(|line| line.offset);
+        let limits = (self.calibration_samples, self.largest_offset);
+        let Some(mean) = self.mean(state, sample, offsets, limits)? else {
+            return Ok(None);
+        };
+        for ((zero, offset), mean) in state.zeros.iter_mut().zip(offsets).zip(mean) {
+            *zero = offset - mean;
+        }
+        Ok(Some(()))
+    }
+
+    /// Averages one sample with all low sides on, where the currents are zero as well but the shunts are connected as they
+    /// are while the drive runs. Only with shunts.
+    ///
+    /// # Errors
+    /// As [`calibrate`](Self::calibrate), at half its limit: the offsets change when the bridge switches.
+    pub fn calibrate_again(&self, state: &mut SensingState, sample: &Sample) -> Result<(), Fault> {
+        if self.shunts.is_some() {
+            self.mean(state, sample, state.zeros, (SAMPLES_AGAIN, 0.5 * self.largest_offset))?;
+        }
+        Ok(())
+    }
+
+    /// Adds a sample to the mean currents, A, with these values at code 0; `Some` when there are `samples` of them. None may
+    /// be above `largest`, A.
+    fn mean(
+        &self,
+        state: &mut SensingState,
+        sample: &Sample,
+        zeros: [f32; 3],
+        (samples, largest): (u16, f32),
+    ) -> Result<Option<[f32; 3]>, Fault> {
+        let codes = [sample.current_a, sample.current_b, sample.current_c];
+        let lines = self.lines();
+        for (((sum, line), zero), code) in state.sum.iter_mut().zip(lines).zip(zeros).zip(codes) {
+            *sum += line.gain * f32::from(code) + zero;
+        }
         state.count = state.count.saturating_add(1);
-        if state.count < self.calibration_samples {
+        if state.count < samples {
             return Ok(None);
         }
-        let mean = 1.0 / f32::from(state.count);
-        let (a, b) = (state.sum[0] * mean, state.sum[1] * mean);
-        state.sum = [0.0; 2];
+        let share = 1.0 / f32::from(state.count);
+        let mean = state.sum.map(|sum| sum * share);
+        state.sum = [0.0; 3];
         state.count = 0;
         // NaN fails the comparison.
-        let within = |x: f32| x.abs() <= self.largest_offset;
-        match (within(a), within(b)) {
-            (false, _) => Err(Fault::OffsetA),
-            (_, false) => Err(Fault::OffsetB),
-            _ => {
-                state.zeros = [self.current_a.offset - a, self.current_b.offset - b];
-                Ok(Some(()))
-            }
+        let [a, b, c] = mean.map(|x| x.abs() <= largest);
+        if !a {
+            Err(Fault::OffsetA)
+        } else if !b {
+            Err(Fault::OffsetB)
+        } else if !c && self.shunts.is_some() {
+            Err(Fault::OffsetC)
+        } else {
+            Ok(Some(mean))
         }
     }
 }
@@ -129,6 +196,7 @@ mod tests {
         Sensing {
             current_a: Line::CHANNEL_A,
             current_b: Line::CHANNEL_B,
+            shunts: None,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
             heat_sink: (80, 4000),
@@ -153,7 +221,7 @@ mod tests {
             let sample = Sample { current_a, current_b, ..Sample::default() };
             let mut state = SensingState::default();
             sensing().start(&mut state);
-            let m = sensing().step(&state, &sample);
+            let m = sensing().step(&mut state, &sample);
             assert!((m.phases.a - amperes).abs() < 0.0088, "{}", m.phases.a);
             assert!((m.phases.b - amperes).abs() < 0.0103, "{}", m.phases.b);
             assert_eq!(m.phases.c, -(m.phases.a + m.phases.b));
@@ -165,10 +233,10 @@ mod tests {
         let (sensing, mut state) = (sensing(), SensingState::default());
         sensing.start(&mut state);
         let sample = Sample { current_a: 2060, current_b: 1990, ..Sample::default() };
-        let before = sensing.step(&state, &sample);
+        let before = sensing.step(&mut state, &sample);
         assert!(before.phases.a.abs() > 0.05);
         while sensing.calibrate(&mut state, &sample).unwrap().is_none() {}
-        let after = sensing.step(&state, &sample);
+        let after = sensing.step(&mut state, &sample);
         assert!(after.phases.a.abs() < 1e-4 && after.phases.b.abs() < 1e-4);
     }
 
@@ -189,7 +257,8 @@ mod tests {
     fn both_ends_of_the_range_are_saturated() {
         let sample =
             Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
-        assert_eq!(sensing().check(&sample), Ok(()));
+        let state = SensingState::default();
+        assert_eq!(sensing().check(&state, &sample), Ok(()));
         let cases = [
             (Sample { current_a: 0, ..sample }, Err(Fault::SensorSaturatedA)),
             (Sample { current_a: 1, ..sample }, Ok(())),
@@ -200,7 +269,7 @@ mod tests {
             (Sample { heat_sink: 4000, ..sample }, Ok(())),
         ];
         for (sample, found) in cases {
-            assert_eq!(sensing().check(&sample), found, "{sample:?}");
+            assert_eq!(sensing().check(&state, &sample), found, "{sample:?}");
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::current::inverter_drop::InverterDrop;
 use crate::current::modulation::Modulator;
 use crate::current::pi::{DqPi, Pi, ReferenceFilter};
 use crate::current::sensing::Sensing;
+use crate::current::shunts::Shunts;
 use crate::flux::estimator::{AngleLoop, ConstantReference, Estimator, Reference};
 use crate::flux::indirect::Indirect;
 use crate::flux::schedule::GainSchedule;
@@ -25,7 +26,7 @@ use crate::protect::noise_watch::NoiseWatch;
 use crate::protect::plausibility::Prediction;
 use crate::protect::saliency_check::SaliencyCheck;
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
-use crate::settings::{AngleSource, PlantSource, Settings, SettingsError};
+use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
 use num_complex::Complex64;
 
@@ -39,6 +40,11 @@ const VERIFY_S: f32 = 0.3;
 const STANDING_HZ: f32 = 1.0;
 /// Largest accepted offset of a current sensor with the dissertation's sensors, A.
 const LARGEST_OFFSET_A: f32 = 0.2;
+/// Largest mean sum of three phase currents with the dissertation's sensors, A: 7 % of the range.
+const LARGEST_SUM_A: f32 = 0.3;
+/// Sampling time of the converters, s, rounded up: the shunts are connected for so long before the sample, and as long
+/// after it for the third current.
+const SHUNT_SAMPLING_S: f32 = 1e-6;
 /// Peak current of the pulses of the wiring check with the dissertation's motor, A.
 const WIRING_A: f32 = 0.2;
 /// Its margin for noise with the dissertation's sensors, A.
@@ -214,6 +220,7 @@ impl Settings {
             sensing: Sensing {
                 current_a: self.scales.current_a,
                 current_b: self.scales.current_b,
+                shunts: self.shunts(),
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
                 heat_sink: self.scales.ntc.window(self.limits.heat_sink_c),
@@ -258,7 +265,8 @@ impl Settings {
                 self.inverter.top,
                 self.inverter.dead_time_s,
                 self.inverter.compensate,
-            ),
+            )
+            .readable(self.shunts().map(|shunts| shunts.readable)),
             dead_time: if self.inverter.compensate {
                 DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
             } else {
@@ -286,6 +294,15 @@ impl Settings {
             designs,
             motion_design,
         })
+    }
+
+    /// The choice of the phases, with three shunts.
+    fn shunts(&self) -> Option<Shunts> {
+        let s = &self.scales;
+        let window_s = self.inverter.dead_time_s + s.shunt_settle_s + SHUNT_SAMPLING_S;
+        let largest_sum = self.share_of_range(LARGEST_SUM_A);
+        (s.sensors == CurrentSensors::LowSide)
+            .then(|| Shunts::new(s.current_c, self.inverter.top, window_s, largest_sum))
     }
 
     fn motion_design(&self) -> Result<MotionDesign, TuningError> {

@@ -1,7 +1,7 @@
 //! The checks of every step: the sample before it is used, and the state when a result is not finite.
 
 use super::Drive;
-use crate::current::sensing::Measured;
+use crate::current::sensing::{Measured, SensingState};
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Sample};
@@ -11,11 +11,16 @@ impl Coefficients {
     ///
     /// # Errors
     /// The first fault that it shows.
-    pub(super) fn protect(&self, sample: &Sample, measured: &Measured) -> Result<(), Fault> {
+    pub(super) fn protect(
+        &self,
+        sensing: &SensingState,
+        sample: &Sample,
+        measured: &Measured,
+    ) -> Result<(), Fault> {
         if !sample.hardware.is_empty() {
             return Err(of_hardware(sample.hardware));
         }
-        self.sensing.check(sample)?;
+        self.sensing.check(sensing, sample)?;
         let (limits, phases) = (&self.protection, &measured.phases);
         if phases.a.abs() > limits.trip_a {
             Err(Fault::OverCurrentA)
@@ -80,7 +85,11 @@ mod tests {
             Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
         let check = |a: f32, b: f32, dc_link: f32| {
             let (phases, current) = (Abc::new(a, b, -(a + b)), AlphaBeta::ZERO);
-            coefficients.protect(&sample, &Measured { phases, current, dc_link })
+            coefficients.protect(
+                &SensingState::default(),
+                &sample,
+                &Measured { phases, current, dc_link },
+            )
         };
         let (more, half) = (1.001 * trip_a, 0.5 * trip_a);
         for sign in [1.0, -1.0] {

@@ -10,17 +10,20 @@ use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
 use crate::protect::wiring_check::{WiringAction, WiringCheckState};
 use crate::settings::AngleSource;
 
+/// Periods from the order to switch the low sides on until a sample sees them on, with margin.
+const LOW_SIDES_ON_FROM: u32 = 4;
+
 impl Drive {
     /// A step without current control: off, in fault, or on the way to it.
     pub(super) fn prepare(&mut self, sample: &Sample) -> Result<Compare, State> {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Ok(Compare::OFF);
         }
-        let measured = self.c.sensing.step(&self.control.sensing, sample);
-        self.c.protect(sample, &measured)?;
+        let measured = self.c.sensing.step(&mut self.control.sensing, sample);
+        self.c.protect(&self.control.sensing, sample, &measured)?;
         Ok(match self.state {
             State::Calibrating => self.calibrate(sample)?,
-            State::Precharge => self.precharge(sample),
+            State::Precharge => self.precharge(sample)?,
             _ => self.check_wiring(sample, &measured)?,
         })
     }
@@ -32,7 +35,11 @@ impl Drive {
         Ok(Compare::OFF)
     }
 
-    fn precharge(&mut self, sample: &Sample) -> Compare {
+    fn precharge(&mut self, sample: &Sample) -> Result<Compare, Fault> {
+        // The first samples still see the bridge off.
+        if self.elapsed >= LOW_SIDES_ON_FROM {
+            self.c.sensing.calibrate_again(&mut self.control.sensing, sample)?;
+        }
         if self.elapsed >= self.c.sequence.precharge {
             if self.wiring_unchecked {
                 self.wiring = WiringCheckState::default();
@@ -41,7 +48,7 @@ impl Drive {
                 self.magnetising_from_here(sample);
             }
         }
-        Compare::LOW_SIDES_ON
+        Ok(Compare::LOW_SIDES_ON)
     }
 
     /// Short voltage pulses, without control.

@@ -313,6 +313,7 @@ fn any_sample() -> impl Strategy<Value = Sample> {
         |(current_a, current_b, dc_link, encoder, n)| Sample {
             current_a,
             current_b,
+            current_c: current_b,
             dc_link,
             heat_sink: 1309,
             encoder: if n < 10 { 0 } else { encoder },

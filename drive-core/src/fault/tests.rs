@@ -41,6 +41,9 @@ fn codes_never_change() {
         (35, Fault::CarrierNoRoom),
         (36, Fault::SensorNoisyA),
         (37, Fault::SensorNoisyB),
+        (38, Fault::SensorSaturatedC),
+        (39, Fault::OffsetC),
+        (40, Fault::CurrentSum),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

@@ -1,6 +1,7 @@
 //! Timer, power stage, converters and encoder.
 
 use super::Ntc;
+use super::value::words;
 
 /// The timer and the power stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,9 +57,9 @@ impl Line {
     /// let line = Line::of_sensor(0.010 * 20.0, 1.65, 3.3, 4096);
     /// assert!(line.at(2048).abs() < 0.001 && (line.at(4095) - 8.25).abs() < 0.01);
     /// ```
-    pub fn of_sensor(v_per_unit: f32, zero_v: f32, reference_v: f32, codes: u16) -> Self {
+    pub const fn of_sensor(v_per_unit: f32, zero_v: f32, reference_v: f32, codes: u16) -> Self {
         let per_volt = 1.0 / v_per_unit;
-        Self { gain: per_volt * reference_v / f32::from(codes), offset: -per_volt * zero_v }
+        Self { gain: per_volt * reference_v / codes as f32, offset: -per_volt * zero_v }
     }
 
     /// The line multiplied by a factor.
@@ -72,6 +73,18 @@ impl Line {
     }
 }
 
+/// Sensors of the phase currents.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurrentSensors {
+    /// Two, in the lines a and b.
+    #[default]
+    InLine,
+    /// Three shunts below the low sides.
+    LowSide,
+}
+
+words!(CurrentSensors { Self::InLine => CurrentSensors::InLine, "in-line"; Self::LowSide => CurrentSensors::LowSide, "low-side"; });
+
 /// Scales of the converters and of the encoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
@@ -79,6 +92,12 @@ pub struct Scales {
     pub current_a: Line,
     /// Current b, A.
     pub current_b: Line,
+    /// Current c, A; for three shunts.
+    pub current_c: Line,
+    /// Kind of the sensors.
+    pub sensors: CurrentSensors,
+    /// Time from the turn-on of a low side until its shunt can be sampled, without the dead time, s.
+    pub shunt_settle_s: f32,
     /// Dc-link voltage, V.
     pub dc_link: Line,
     /// Largest code of the current channels.
@@ -97,6 +116,9 @@ impl Default for Scales {
         Self {
             current_a: Line::CHANNEL_A,
             current_b: Line::CHANNEL_B,
+            current_c: Line::CHANNEL_B,
+            sensors: CurrentSensors::InLine,
+            shunt_settle_s: 2e-6,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
             ntc: Ntc::default(),

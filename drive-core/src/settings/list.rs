@@ -5,7 +5,7 @@
 
 use super::entry::{Access, Change, Entry, auto, number, whole, word};
 use super::value::Words;
-use super::{AngleSource, PlantSource, Settings};
+use super::{AngleSource, CurrentSensors, Line, PlantSource, Settings};
 use crate::carrier::DemodulatorKind;
 use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
 use crate::io::PERIOD_S;
@@ -33,10 +33,14 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     word!("inverter.compensate", inverter.compensate: bool, "whether the dead time is compensated").learned(),
     auto!("inverter.full_compensation_a", inverter.full_compensation_a, Settings::full_compensation_a, "A", "phase current from which on the compensation is full").from_to(1e-4, 100.0).learned(),
 
-    number!("scales.current_a.gain", scales.current_a.gain, "A", "current a per code").from_to(1e-6, 1.0).learned(),
+    number!("scales.current_a.gain", scales.current_a.gain, "A", "current a per code; negative if a current into the motor lowers the code").beside(|s| gain_range(s.scales.current_a)).learned(),
     number!("scales.current_a.offset", scales.current_a.offset, "A", "current a at code 0").from_to(-1000.0, 1000.0).learned(),
-    number!("scales.current_b.gain", scales.current_b.gain, "A", "current b per code").from_to(1e-6, 1.0).learned(),
+    number!("scales.current_b.gain", scales.current_b.gain, "A", "current b per code").beside(|s| gain_range(s.scales.current_b)).learned(),
     number!("scales.current_b.offset", scales.current_b.offset, "A", "current b at code 0").from_to(-1000.0, 1000.0).learned(),
+    number!("scales.current_c.gain", scales.current_c.gain, "A", "current c per code; with three shunts").beside(|s| gain_range(s.scales.current_c)).learned(),
+    number!("scales.current_c.offset", scales.current_c.offset, "A", "current c at code 0").from_to(-1000.0, 1000.0).learned(),
+    word!("scales.sensors", scales.sensors: CurrentSensors, "sensors of the currents: two in the lines a and b, or three shunts below the low sides").changed(Change::Board).learned(),
+    number!("scales.shunt_settle_s", scales.shunt_settle_s, "s", "time from the turn-on of a low side until its shunt can be sampled").from_to(0.0, 20e-6).changed(Change::Board).learned(),
     number!("scales.dc_link.gain", scales.dc_link.gain, "V", "dc link per code").from_to(1e-4, 10.0).learned(),
     number!("scales.dc_link.offset", scales.dc_link.offset, "V", "dc link at code 0").from_to(-100.0, 100.0).learned(),
     whole!("scales.full_scale", scales.full_scale: u16, "largest code of the currents").from_to(100.0, 65_535.0).changed(Change::Board),
@@ -99,6 +103,11 @@ pub static SETTINGS: &[Entry<Settings>] = &[
 /// The setting with this name.
 pub fn find(name: &str) -> Option<&'static Entry<Settings>> {
     SETTINGS.iter().find(|entry| entry.name == name)
+}
+
+/// A gain has either sign, but is not zero.
+fn gain_range(line: Line) -> (f32, f32) {
+    if line.gain < 0.0 { (-1.0, -1e-6) } else { (1e-6, 1.0) }
 }
 
 /// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.

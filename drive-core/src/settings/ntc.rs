@@ -26,13 +26,17 @@ pub struct Ntc {
 }
 
 impl Default for Ntc {
-    /// Assumed: 10 kohm, B 3435 K, from the reference, with 4.7 kohm to ground. The dissertation describes none.
+    /// [`Ntc::DEFAULT`].
     fn default() -> Self {
-        Self { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm: 4700.0, to_ground: false }
+        Self::DEFAULT
     }
 }
 
 impl Ntc {
+    /// Assumed: 10 kohm, B 3435 K, from the reference, with 4.7 kohm to ground. The dissertation describes none.
+    pub const DEFAULT: Self =
+        Self { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm: 4700.0, to_ground: false };
+
     /// Temperature at a code, °C, within 0.1 °C of the formula from -40 to 150 °C; for telemetry. Codes at either end
     /// of the range give the temperature of the next code.
     pub fn celsius(&self, code: u16) -> f32 {

@@ -27,7 +27,7 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use super::Settings;
 use super::table::{CarrierTable, ReferenceTable};
-use super::{IdentifiedPlant, Line, Motor, Nameplate};
+use super::{CurrentSensors, IdentifiedPlant, Line, Motor, Nameplate};
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
@@ -76,11 +76,19 @@ impl Settings {
         on_reference / DC_LINK_V * self.inverter.dc_link_v
     }
 
-    /// Largest phase current that both sensors can measure in both directions, A.
+    /// Largest phase current that all sensors can measure in both directions, A.
     pub fn sensor_range_a(&self) -> f32 {
         let s = &self.scales;
-        let end = |line: super::Line| f32::min(-line.offset, line.at(s.full_scale));
-        f32::min(end(s.current_a), end(s.current_b))
+        let end = |line: super::Line| {
+            // A negative gain has the positive end at code 0.
+            let (zero, full) = (line.offset, line.at(s.full_scale));
+            if line.gain < 0.0 { f32::min(zero, -full) } else { f32::min(-zero, full) }
+        };
+        let both = f32::min(end(s.current_a), end(s.current_b));
+        match s.sensors {
+            CurrentSensors::InLine => both,
+            CurrentSensors::LowSide => f32::min(both, end(s.current_c)),
+        }
     }
 
     /// Largest dc link that the converter can measure, V.

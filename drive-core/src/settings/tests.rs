@@ -142,7 +142,7 @@ fn values_out_of_range_are_named() {
     for entry in SETTINGS {
         let good = Settings::default();
         let Some((min, max)) = entry.range(&good) else { continue };
-        for bad in [f32::NAN, f32::INFINITY, min - 1.0 - 0.1 * min.abs(), max * 1.1 + 1.0] {
+        for bad in [f32::NAN, f32::INFINITY, min - 3.0 - 0.1 * min.abs(), max * 1.1 + 1.0] {
             let mut settings = good;
             match entry.get(&good) {
                 Value::Whole(_) if bad.is_finite() => entry.set(&mut settings, Value::Whole(0)),

@@ -75,6 +75,8 @@ pub struct Inverter {
     pub(crate) top: f64,
     /// Seconds.
     pub(crate) dead_time: f64,
+    /// Part of it that the drive does not know, us.
+    extra_us: f64,
     /// Seconds.
     pub(crate) propagation: f64,
     pub(crate) residual: f64,
@@ -95,7 +97,6 @@ impl Inverter {
     pub fn new(settings: &InverterSettings) -> Result<Self, PlantError> {
         let s = settings;
         check("inverter.timer_top", f64::from(s.timer_top), 100.0..=65_535.0, "")?;
-        check("inverter.dead_time_us", s.dead_time_us, 0.0..=10.0, "us")?;
         check("inverter.propagation_us", s.propagation_us, 0.0..=10.0, "us")?;
         check("inverter.residual_v", s.residual_v, 0.0..=20.0, "V")?;
         let least = -s.dead_time_us;
@@ -106,7 +107,8 @@ impl Inverter {
         let mut inverter = Self {
             vdc: 0.0,
             top: f64::from(s.timer_top),
-            dead_time: (s.dead_time_us + s.extra_dead_time_us) * 1e-6,
+            dead_time: 0.0,
+            extra_us: s.extra_dead_time_us,
             propagation: s.propagation_us * 1e-6,
             residual: s.residual_v,
             capacitance: s.node_capacitance,
@@ -115,6 +117,7 @@ impl Inverter {
             previous: Compare::OFF,
         };
         inverter.set_dc_link(s.vdc)?;
+        inverter.set_dead_time(s.dead_time_us)?;
         Ok(inverter)
     }
 
@@ -125,6 +128,16 @@ impl Inverter {
     pub fn set_dc_link(&mut self, vdc: f64) -> Result<(), PlantError> {
         check("inverter.vdc", vdc, 0.0..=1000.0, "V")?;
         self.vdc = vdc;
+        Ok(())
+    }
+
+    /// Changes the dead time, us, to which the extra one is added.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
+        check("inverter.dead_time_us", us, 0.0..=10.0, "us")?;
+        self.dead_time = (us + self.extra_us) * 1e-6;
         Ok(())
     }
 

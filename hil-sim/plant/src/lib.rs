@@ -32,6 +32,7 @@ mod inverter;
 mod machine;
 mod mechanics;
 mod model;
+mod motor;
 mod open_phase;
 mod period;
 mod sensors;
@@ -40,6 +41,7 @@ mod warming;
 
 use dc_link::DcLink;
 use drive_core::{Compare, Hardware, Sample};
+use motor::{Motor, whichever};
 use open_phase::OpenPhase;
 use period::Around;
 use rand::SeedableRng;
@@ -102,27 +104,6 @@ impl Default for PlantSettings {
             substeps: 2,
         }
     }
-}
-
-/// The motor, one variant a machine model. A call of the plant chooses once a period.
-#[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "a plant has one, and model A is not behind a pointer"
-)]
-enum Motor {
-    A(MotorModel<Machine>),
-    Energy(Box<MotorModel<EnergyMachine>>),
-}
-
-/// `$body` with `$motor` bound to the [`MotorModel`] of whichever machine model.
-macro_rules! whichever {
-    ($which:expr, $motor:ident => $body:expr) => {
-        match $which {
-            Motor::A($motor) => $body,
-            Motor::Energy($motor) => $body,
-        }
-    };
 }
 
 /// The plant.
@@ -190,6 +171,8 @@ impl Plant {
         Sample {
             current_a,
             current_b,
+            // Two sensors.
+            current_c: 0,
             dc_link: self.around.sensors.dc_link(self.around.inverter.vdc, &mut self.rng),
             heat_sink: self.around.sensors.heat_sink(),
             encoder: self.encoder.count(),
@@ -310,6 +293,23 @@ impl Plant {
         self.around.inverter.set_dc_link(vdc)?;
         self.dc_link.nominal = vdc;
         Ok(())
+    }
+
+    /// Slopes of the phase currents while the terminals are shorted, A/s.
+    pub fn shorted_slopes(&self) -> [f64; 3] {
+        phases(whichever!(&self.motor, motor => {
+            let speed = motor.machine.pole_pairs() * motor.state.speed;
+            let rate = motor.machine.derivative(&motor.state.electrical, Complex::ZERO, speed);
+            rate.current_rate()
+        }))
+    }
+
+    /// Changes the dead time, us.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 10 us.
+    pub fn set_dead_time(&mut self, us: f64) -> Result<(), PlantError> {
+        self.around.inverter.set_dead_time(us)
     }
 
     /// Couples another load. A held speed holds at once; a free shaft continues from there.

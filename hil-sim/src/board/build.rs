@@ -12,14 +12,15 @@ use crate::error::Error;
 /// Time between two lines of [`while_saying`].
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// Builds and checks the image as it is flashed; returns its path.
+/// Builds and checks the image of a board as it is flashed; returns its path.
 ///
 /// # Errors
 /// [`Error::Internal`] when cargo does not run or the build fails.
-pub fn image(verbose: bool) -> Result<PathBuf, Error> {
+pub fn image(board: &str, verbose: bool) -> Result<PathBuf, Error> {
     eprintln!("firmware: built where its source has changed; some minutes the first time");
     let mut command = cargo();
-    command.args(["run", "--package", "xtask", "--", "firmware"]).current_dir(root());
+    command.args(["run", "--package", "xtask", "--", "firmware", "--board", board]);
+    command.current_dir(root());
     // The last line is the path; the others tell what xtask does.
     let mut lines = lines_of("firmware", command)?;
     let path = lines.pop().map(PathBuf::from);

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::part::Part;
 use super::{say, used};
 use crate::config::Config;
 use crate::error::Error;
@@ -17,13 +18,13 @@ use crate::report::{self, Section};
 pub struct Output {
     /// Folder of the page [default: out; with --json no page unless this is given]
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Print one JSON object and nothing else; of a group, one with all in a list
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// Folder of CSV files, one a figure and one a table [default: none]
     #[arg(long, value_name = "DIR")]
-    csv: Option<PathBuf>,
+    pub csv: Option<PathBuf>,
 }
 
 /// A recorded trace.
@@ -63,7 +64,7 @@ impl Run<'_> {
     }
 
     /// Writes the files of an outcome and prints its results; returns the JSON object if that is wanted.
-    fn write(&self, outcome: &Outcome, output: &Output) -> Result<String, Error> {
+    pub fn write(&self, outcome: &Outcome, output: &Output) -> Result<String, Error> {
         let name = self.experiment.name;
         let origin = Origin::new(self.input.seed, &self.config.changes());
         let folder = output.out.clone().or_else(|| (!output.json).then(|| OUT.into()));
@@ -104,9 +105,15 @@ pub fn check_lost(name: &str, outcome: &Outcome) -> Result<(), Error> {
 /// Runs the experiment of this name, or all of a group, with the file of an experiment that takes one.
 ///
 /// # Errors
-/// As [`experiments::find`], [`Input::config`], [`used::check`]; those of the experiment; [`Error::Write`];
-/// [`Error::Lost`] after all is written.
-pub fn run(name: &str, file: Option<&Path>, input: &Input, output: &Output) -> Result<(), Error> {
+/// As [`experiments::find`], [`Input::config`], [`used::check`] and [`Part::run`]; those of the experiment;
+/// [`Error::Write`]; [`Error::Lost`] after all is written.
+pub fn run(
+    name: &str,
+    file: Option<&Path>,
+    input: &Input,
+    part: &Part,
+    output: &Output,
+) -> Result<(), Error> {
     let names = experiments::named(name);
     let chosen: Vec<_> =
         names.iter().map(|name| experiments::find(name)).collect::<Result<_, _>>()?;
@@ -124,7 +131,7 @@ pub fn run(name: &str, file: Option<&Path>, input: &Input, output: &Output) -> R
             progress: input.progress(),
             file,
         };
-        let outcome = (experiment.run)(&context)?;
+        let Some(outcome) = part.run(experiment, &context, input.quiet)? else { continue };
         let command = match file {
             Some(file) => format!("run {} --input {}", experiment.name, file.display()),
             None => format!("run {}", experiment.name),
@@ -133,7 +140,9 @@ pub fn run(name: &str, file: Option<&Path>, input: &Input, output: &Output) -> R
         objects.push(run.write(&outcome, output)?);
         lost = lost.and(check_lost(experiment.name, &outcome));
     }
-    print(&objects, output)?;
+    if !part.is_shard() {
+        print(&objects, output)?;
+    }
     lost
 }
 
@@ -157,7 +166,11 @@ pub fn identify_trace(given: &Trace, input: &Input, output: &Output) -> Result<(
     print(&[object], output)
 }
 
-fn print(objects: &[String], output: &Output) -> Result<(), Error> {
+/// Prints the JSON objects, if they are wanted.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn print(objects: &[String], output: &Output) -> Result<(), Error> {
     match objects {
         _ if !output.json => Ok(()),
         [object] => say(&format!("{object}\n")),

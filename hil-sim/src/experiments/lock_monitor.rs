@@ -2,9 +2,13 @@
 
 mod trials;
 
+use serde::{Deserialize, Serialize};
+
 use self::trials::{ForcedTrial, HealthyRun, KINDS, OVER_SPEED_S, OverSpeedTrial, StartTrial};
+use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
+use crate::config::Config;
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::upper_bound_95;
@@ -16,12 +20,12 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "The angle forced off, false alarms, over-speed, starts on a turning shaft; `--set runs=N`.",
     uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
     not: &[&["angle_source"]],
-    run,
+    run: whole::<LockMonitor>,
 };
 
 /// Trials of each forced offset; ten times as many runs are checked for false alarms.
 const RUNS: u32 = 100;
-const HEALTHY_PER_RUN: u64 = 10;
+const HEALTHY_PER_RUN: usize = 10;
 /// Forced offsets, degrees, and their names in the metrics.
 const OFFSETS: [(f64, &str); 5] =
     [(90.0, "p90"), (-90.0, "m90"), (120.0, "p120"), (-120.0, "m120"), (180.0, "180")];
@@ -32,58 +36,125 @@ const ESTIMATE_RPM: f64 = 50.0;
 /// Speeds of the starts, rpm: beyond the highest the flux does not get to 10 % of its length.
 const START_RPM: [f64; 11] = [0.0, 5.0, -5.0, 15.0, -15.0, 30.0, -50.0, 80.0, 150.0, -150.0, 300.0];
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let runs = u64::from(context.config.extent.runs.unwrap_or(RUNS));
-    let work = Trials { context, runs };
-    let mut outcome = Outcome::default();
-    work.forced(&mut outcome)?;
-    work.healthy(&mut outcome)?;
-    work.over_speed(&mut outcome)?;
-    work.starts(&mut outcome)?;
-    outcome.metrics.set("runs", runs as f64);
-    outcome.remarks = assumptions(context.config);
-    outcome.remarks.push(format!(
-        "The angle is forced off by turning the rotor flux of the motor. In time: on with an error \
-         of 15° or more for at most 0.5 s (1.5 s at 0.5 A), watched for 2 s. Speeds within \
-         ±{SPEED_RPM} rpm."
-    ));
-    Ok(outcome)
+/// The trials, in this order: all of each forced offset, the sound runs, over-speed, and at each speed of
+/// [`START_RPM`] the starts and then the relocks.
+pub struct LockMonitor {
+    config: Config,
+    seed: u64,
+    runs: usize,
 }
 
-/// The trials of one run of the experiment.
-struct Trials<'a> {
-    context: &'a Context<'a>,
-    runs: u64,
+/// The result of a trial.
+#[derive(Serialize, Deserialize)]
+pub enum Trial {
+    /// The angle forced off.
+    Forced(ForcedTrial),
+    /// A run that the drive must not stop.
+    Healthy(HealthyRun),
+    /// A shaft driven past the limit.
+    OverSpeed(OverSpeedTrial),
+    /// A start or a relock on a turning shaft.
+    Start(StartTrial),
 }
 
-impl Trials<'_> {
-    /// `count` trials on all cores, each with a seed of its own.
-    fn all<T: Send>(
-        &self,
-        name: &str,
-        part: u64,
-        count: u64,
-        trial: impl Fn(u64, u64) -> Result<T, Error> + Sync,
-    ) -> Result<Vec<T>, Error> {
-        let first = self.context.seed.wrapping_mul(1_000_003).wrapping_add(part << 40);
-        let seeds: Vec<u64> = (0..count).map(|n| first.wrapping_add(n)).collect();
-        self.context.in_parallel(name, &seeds, |n, &seed| trial(n, seed))
+impl LockMonitor {
+    /// Starts, and relocks, at each speed.
+    fn starts_each(&self) -> usize {
+        self.runs.div_ceil(5)
     }
 
-    fn forced(&self, outcome: &mut Outcome) -> Result<(), Error> {
+    fn healthy_runs(&self) -> usize {
+        HEALTHY_PER_RUN * self.runs
+    }
+
+    /// Speed of the over-speed trials, rpm.
+    fn over_speed_limit(&self) -> f64 {
+        f64::from(self.config.drive.tracked_rpm()) + ESTIMATE_RPM
+    }
+}
+
+impl Study for LockMonitor {
+    type Record = Trial;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let config = context.config.clone();
+        let runs = config.extent.runs.unwrap_or(RUNS) as usize;
+        Ok(Self { config, seed: context.seed, runs })
+    }
+
+    fn runs(&self) -> usize {
+        let forced = OFFSETS.len() * self.runs;
+        forced + self.healthy_runs() + self.runs + 2 * START_RPM.len() * self.starts_each()
+    }
+
+    fn run(&self, number: usize) -> Result<Trial, Error> {
+        // Each part has seeds of its own.
+        let seed = |part: usize, n: usize| {
+            let first = self.seed.wrapping_mul(1_000_003).wrapping_add((part as u64) << 40);
+            first.wrapping_add(n as u64)
+        };
+        let mut n = number;
+        if n < OFFSETS.len() * self.runs {
+            let (offset, n) = (n / self.runs, n % self.runs);
+            let case = trials::case(seed(offset, n), SPEED_RPM);
+            let mut trial = trials::forced(&self.config, case, OFFSETS[offset].0)?;
+            if n > 0 {
+                // The figure shows the first.
+                trial.loss.clear();
+            }
+            return Ok(Trial::Forced(trial));
+        }
+        n -= OFFSETS.len() * self.runs;
+        if n < self.healthy_runs() {
+            let kind = KINDS[n % KINDS.len()];
+            return trials::healthy(&self.config, seed(10, n), kind).map(Trial::Healthy);
+        }
+        n -= self.healthy_runs();
+        if n < self.runs {
+            let limit = self.over_speed_limit();
+            return trials::over_speed(&self.config, seed(11, n), limit).map(Trial::OverSpeed);
+        }
+        n -= self.runs;
+        let (group, n) = (n / self.starts_each(), n % self.starts_each());
+        let (rpm, relock) = (START_RPM[group / 2], group % 2 == 1);
+        trials::start(&self.config, rpm, seed(20 + group, n), relock).map(Trial::Start)
+    }
+
+    fn outcome(&self, _: &Context<'_>, records: Vec<Trial>) -> Result<Outcome, Error> {
+        let (mut forced, mut healthy) = (Vec::new(), Vec::new());
+        let (mut over_speed, mut starts) = (Vec::new(), Vec::new());
+        for trial in records {
+            match trial {
+                Trial::Forced(trial) => forced.push(trial),
+                Trial::Healthy(run) => healthy.push(run),
+                Trial::OverSpeed(trial) => over_speed.push(trial),
+                Trial::Start(trial) => starts.push(trial),
+            }
+        }
+        let mut outcome = Outcome::default();
+        self.forced(&forced, &mut outcome);
+        Self::healthy(&healthy, &mut outcome);
+        self.over_speed(&over_speed, &mut outcome);
+        self.starts(&starts, &mut outcome);
+        outcome.metrics.set("runs", self.runs as f64);
+        outcome.remarks = assumptions(&self.config);
+        outcome.remarks.push(format!(
+            "The angle is forced off by turning the rotor flux of the motor. In time: on with an error \
+             of 15° or more for at most 0.5 s (1.5 s at 0.5 A), watched for 2 s. Speeds within \
+             ±{SPEED_RPM} rpm."
+        ));
+        Ok(outcome)
+    }
+}
+
+impl LockMonitor {
+    fn forced(&self, all: &[ForcedTrial], outcome: &mut Outcome) {
         let mut table = Table::new("Angle forced off: how long it stays wrong", &[]);
         let mut late = Table::new("Not in time", &[]);
         let mut times = Panel::new("quadrature current (A)", "time at a wrong angle (s)");
         let mut losses = Panel::new("time after the angle was forced off (s)", "saliency loss");
-        for (number, (degrees, name)) in OFFSETS.into_iter().enumerate() {
-            let trials: Vec<ForcedTrial> = self.all(
-                &format!("forced by {degrees}°"),
-                number as u64,
-                self.runs,
-                |_, seed| {
-                    trials::forced(self.context.config, trials::case(seed, SPEED_RPM), degrees)
-                },
-            )?;
+        for ((degrees, name), trials) in OFFSETS.into_iter().zip(all.chunks(self.runs)) {
             let mut wrong: Vec<f64> = trials.iter().map(|t| t.wrong_s).collect();
             wrong.sort_by(f64::total_cmp);
             let at = |share: f64| {
@@ -127,15 +198,9 @@ impl Trials<'_> {
         outcome
             .figures
             .push(Figure::new("forced", "Angle forced off", "").panel(times).panel(losses));
-        Ok(())
     }
 
-    fn healthy(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let runs: Vec<HealthyRun> =
-            self.all("false alarms", 10, HEALTHY_PER_RUN * self.runs, |n, seed| {
-                let kind = KINDS[n as usize % KINDS.len()];
-                trials::healthy(self.context.config, seed, kind)
-            })?;
+    fn healthy(runs: &[HealthyRun], outcome: &mut Outcome) {
         let alarms: Vec<&HealthyRun> = runs.iter().filter(|r| r.fault.is_some()).collect();
         let largest = |of: fn(&HealthyRun) -> f64| runs.iter().map(of).fold(0.0, f64::max);
         let bound = upper_bound_95(alarms.len() as u64, runs.len() as u64);
@@ -178,14 +243,10 @@ impl Trials<'_> {
             panel = panel.with(Series::points(kind.name(), points));
         }
         outcome.figures.push(Figure::new("healthy", "Runs without a lost lock", "").panel(panel));
-        Ok(())
     }
 
-    fn over_speed(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let limit = f64::from(self.context.config.drive.tracked_rpm()) + ESTIMATE_RPM;
-        let trials: Vec<OverSpeedTrial> = self.all("over-speed", 11, self.runs, |_, seed| {
-            trials::over_speed(self.context.config, seed, limit)
-        })?;
+    fn over_speed(&self, trials: &[OverSpeedTrial], outcome: &mut Outcome) {
+        let limit = self.over_speed_limit();
         let late: Vec<&OverSpeedTrial> =
             trials.iter().filter(|t| t.fault.is_none() || t.late_s > OVER_SPEED_S).collect();
         let latest = trials.iter().map(|t| t.late_s).fold(0.0, f64::max);
@@ -212,33 +273,26 @@ impl Trials<'_> {
             }
             outcome.tables.push(table);
         }
-        Ok(())
     }
 
-    fn starts(&self, outcome: &mut Outcome) -> Result<(), Error> {
-        let each = self.runs.div_ceil(5);
+    fn starts(&self, all: &[StartTrial], outcome: &mut Outcome) {
+        let each = self.starts_each();
         let heads = ["speed (rpm)", "of each", "starts", "relocks", "accepted at a wrong angle"];
         let mut table = Table::new("Starts and relocks accepted on a turning shaft", &heads);
         let (mut wrong_all, mut refused_at_rest) = (0, 0);
-        for (number, rpm) in START_RPM.into_iter().enumerate() {
-            let of_kind = |relock: bool| {
-                let part = 20 + 2 * number as u64 + u64::from(relock);
-                self.all("starts", part, each, |_, seed| {
-                    trials::start(self.context.config, rpm, seed, relock)
-                })
-            };
-            let (starts, relocks) = (of_kind(false)?, of_kind(true)?);
+        for (rpm, trials) in START_RPM.into_iter().zip(all.chunks(2 * each)) {
+            let (starts, relocks) = trials.split_at(each);
             let accepted = |all: &[StartTrial]| all.iter().filter(|s| s.accepted).count();
-            let wrong = starts.iter().chain(&relocks).filter(|s| !s.is_honest()).count();
+            let wrong = trials.iter().filter(|s| !s.is_honest()).count();
             if rpm == 0.0 {
-                refused_at_rest = 2 * each as usize - accepted(&starts) - accepted(&relocks);
+                refused_at_rest = 2 * each - accepted(starts) - accepted(relocks);
             }
             let count = |n: usize| Cell::fixed(n as f64, 0);
             table.row([
                 Cell::fixed(rpm, 0),
-                count(each as usize),
-                count(accepted(&starts)),
-                count(accepted(&relocks)),
+                count(each),
+                count(accepted(starts)),
+                count(accepted(relocks)),
                 count(wrong),
             ]);
             wrong_all += wrong;
@@ -246,6 +300,5 @@ impl Trials<'_> {
         outcome.metrics.set("refused_at_rest", refused_at_rest as f64);
         outcome.metrics.set("wrong_starts", wrong_all as f64);
         outcome.tables.push(table);
-        Ok(())
     }
 }

@@ -4,6 +4,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::statistics::{Study, whole};
 use super::steady::{OperatingPoint, SteadyRun, judged, prepared};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
@@ -19,7 +20,7 @@ pub const EXPERIMENT: Experiment = Experiment {
             the motor.",
     uses: &[BENCH, DRIVE, &["spread.machine", "runs", "seconds"]],
     not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
-    run,
+    run: whole::<Machines>,
 };
 
 /// Torque currents of the operating points, A on the dissertation's motor; both signs.
@@ -30,6 +31,8 @@ const SPEEDS_RPM: [f64; 2] = [0.0, 150.0];
 const RUN_S: f64 = 2.0;
 /// Angle error of a good machine in every run, degrees: rms, largest.
 const GOOD_DEG: (f64, f64) = (4.0, 14.0);
+/// Machines that are drawn, unless `runs` says otherwise.
+const MACHINES: u32 = 100;
 /// Machines in the table, the worst first.
 const LISTED: usize = 20;
 
@@ -40,16 +43,6 @@ struct Machine {
 }
 
 impl Machine {
-    fn new(config: Config, seed: u64, seconds: f64) -> Result<Self, Error> {
-        let runs = match runs(&config, seed, seconds) {
-            Ok(runs) => Ok(runs),
-            // A refusal of the drive belongs to the result; other errors do not.
-            Err(Error::Refused(why)) => Err(why),
-            Err(other) => return Err(other),
-        };
-        Ok(Self { config, runs })
-    }
-
     fn worst(&self, of: impl Fn(&SteadyRun) -> f64) -> f64 {
         self.runs.iter().flatten().map(of).fold(0.0, f64::max)
     }
@@ -122,93 +115,126 @@ fn drawn(config: &Config, seed: u64) -> Config {
     drawn
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let mut config = context.config.clone();
-    config.prepare.learn = true;
-    let draws = config.spread.machine > 1.0;
-    let count = if draws { config.extent.runs.unwrap_or(100) } else { 1 };
-    let jobs: Vec<(Config, u64)> = (0..u64::from(count))
-        .map(|number| {
-            let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
-            (if draws { drawn(&config, seed) } else { config.clone() }, seed)
-        })
-        .collect();
-    let seconds = context.seconds.unwrap_or(RUN_S);
-    let mut machines = context.in_parallel("machines", &jobs, |_, (config, seed)| {
-        Machine::new(config.clone(), *seed, seconds)
-    })?;
-    machines.sort_by(|a, b| {
-        let key = |m: &Machine| (m.runs.is_err(), m.lost());
-        key(b).cmp(&key(a)).then(b.rms().total_cmp(&a.rms()))
-    });
+/// The machines, each with all its runs.
+pub struct Machines {
+    config: Config,
+    seed: u64,
+    seconds: f64,
+    draws: bool,
+}
 
-    let mut outcome = Outcome::default();
-    for machine in &machines {
-        match &machine.runs {
-            Ok(runs) => outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text)),
-            Err(why) => outcome.faults.push(why.clone()),
+impl Machines {
+    /// Configuration and seed of a machine.
+    fn drawn(&self, number: usize) -> (Config, u64) {
+        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        (if self.draws { drawn(&self.config, seed) } else { self.config.clone() }, seed)
+    }
+}
+
+impl Study for Machines {
+    /// The runs, or the refusal of the drive.
+    type Record = Result<Vec<SteadyRun>, String>;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let mut config = context.config.clone();
+        config.prepare.learn = true;
+        let draws = config.spread.machine > 1.0;
+        let seconds = context.seconds.unwrap_or(RUN_S);
+        Ok(Self { config, seed: context.seed, seconds, draws })
+    }
+
+    fn runs(&self) -> usize {
+        if self.draws { self.config.extent.runs.unwrap_or(MACHINES) as usize } else { 1 }
+    }
+
+    fn run(&self, number: usize) -> Result<Self::Record, Error> {
+        let (config, seed) = self.drawn(number);
+        match runs(&config, seed, self.seconds) {
+            Ok(runs) => Ok(Ok(runs)),
+            // A refusal of the drive belongs to the result; other errors do not.
+            Err(Error::Refused(why)) => Ok(Err(why)),
+            Err(other) => Err(other),
         }
     }
-    let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
-    let good = machines.iter().filter(|machine| machine.is_good()).count();
-    let mut rms: Vec<f64> = machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();
-    rms.sort_by(f64::total_cmp);
-    let m = &mut outcome.metrics;
-    m.set("machines", machines.len() as f64);
-    m.set("learned", learned as f64);
-    m.set("good", good as f64);
-    m.set("good_share", good as f64 / machines.len() as f64);
-    m.set("lost_runs", machines.iter().map(Machine::lost).sum::<usize>() as f64);
-    if let Some(worst) = rms.last() {
-        m.set("worst_rms_median_deg", rms[rms.len() / 2]);
-        m.set("worst_rms_deg", *worst);
-        m.set("largest_deg", machines.iter().map(Machine::largest).fold(0.0, f64::max));
+
+    fn outcome(&self, context: &Context<'_>, records: Vec<Self::Record>) -> Result<Outcome, Error> {
+        let with_config = |(number, runs)| Machine { config: self.drawn(number).0, runs };
+        let mut machines: Vec<Machine> = records.into_iter().enumerate().map(with_config).collect();
+        machines.sort_by(|a, b| {
+            let key = |m: &Machine| (m.runs.is_err(), m.lost());
+            key(b).cmp(&key(a)).then(b.rms().total_cmp(&a.rms()))
+        });
+
+        let mut outcome = Outcome::default();
+        for machine in &machines {
+            match &machine.runs {
+                Ok(runs) => outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text)),
+                Err(why) => outcome.faults.push(why.clone()),
+            }
+        }
+        let learned = machines.iter().filter(|machine| machine.runs.is_ok()).count();
+        let good = machines.iter().filter(|machine| machine.is_good()).count();
+        let mut rms: Vec<f64> =
+            machines.iter().filter(|m| m.runs.is_ok()).map(Machine::rms).collect();
+        rms.sort_by(f64::total_cmp);
+        let m = &mut outcome.metrics;
+        m.set("machines", machines.len() as f64);
+        m.set("learned", learned as f64);
+        m.set("good", good as f64);
+        m.set("good_share", good as f64 / machines.len() as f64);
+        m.set("lost_runs", machines.iter().map(Machine::lost).sum::<usize>() as f64);
+        if let Some(worst) = rms.last() {
+            m.set("worst_rms_median_deg", rms[rms.len() / 2]);
+            m.set("worst_rms_deg", *worst);
+            m.set("largest_deg", machines.iter().map(Machine::largest).fold(0.0, f64::max));
+        }
+        let heads = [
+            "r_s (ohm)",
+            "r_r (ohm)",
+            "σL_s (mH)",
+            "L_m (mH)",
+            "a (%)",
+            "b (%/A)",
+            "carrier (V)",
+            "worst rms (°)",
+            "largest (°)",
+            "verdict",
+        ];
+        let title = if self.draws { "Machines, the worst first" } else { "The motor" };
+        let mut table = Table::new(title, &heads).note(format!(
+            "Good: every run within {}° rms and {}° at most, none lost.",
+            GOOD_DEG.0, GOOD_DEG.1
+        ));
+        for machine in machines.iter().take(LISTED) {
+            let (motor, drive) = (&machine.config.motor, &machine.config.drive);
+            let saliency = plant_settings(&machine.config).saliency;
+            table.row([
+                Cell::fixed(motor.r_s, 3),
+                Cell::fixed(motor.r_r, 3),
+                Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2),
+                Cell::fixed(1e3 * motor.l_m, 1),
+                Cell::fixed(100.0 * saliency.a_psi, 2),
+                Cell::fixed(100.0 * saliency.b1, 2),
+                Cell::fixed(drive.carrier_v().into(), 1),
+                Cell::fixed(machine.rms(), 2),
+                Cell::fixed(machine.largest(), 2),
+                Cell::from(machine.verdict()),
+            ]);
+        }
+        outcome.tables.push(table);
+        let points = |of: &dyn Fn(&Machine) -> f64| -> Vec<(f64, f64)> {
+            let sound = machines.iter().filter(|m| m.runs.is_ok());
+            sound.map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
+        };
+        outcome.figures.push(
+            Figure::new("machines", "Worst of 16 runs over the saliency of the machine", "").panel(
+                Panel::new("saliency fixed to the flux (%)", "angle error (°)")
+                    .with(Series::points("largest", points(&|m| m.largest())))
+                    .with(Series::points("rms", points(&|m| m.rms()))),
+            ),
+        );
+        outcome.remarks = assumptions(context.config);
+        Ok(outcome)
     }
-    let heads = [
-        "r_s (ohm)",
-        "r_r (ohm)",
-        "σL_s (mH)",
-        "L_m (mH)",
-        "a (%)",
-        "b (%/A)",
-        "carrier (V)",
-        "worst rms (°)",
-        "largest (°)",
-        "verdict",
-    ];
-    let title = if draws { "Machines, the worst first" } else { "The motor" };
-    let mut table = Table::new(title, &heads).note(format!(
-        "Good: every run within {}° rms and {}° at most, none lost.",
-        GOOD_DEG.0, GOOD_DEG.1
-    ));
-    for machine in machines.iter().take(LISTED) {
-        let (motor, drive) = (&machine.config.motor, &machine.config.drive);
-        let saliency = plant_settings(&machine.config).saliency;
-        table.row([
-            Cell::fixed(motor.r_s, 3),
-            Cell::fixed(motor.r_r, 3),
-            Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2),
-            Cell::fixed(1e3 * motor.l_m, 1),
-            Cell::fixed(100.0 * saliency.a_psi, 2),
-            Cell::fixed(100.0 * saliency.b1, 2),
-            Cell::fixed(drive.carrier_v().into(), 1),
-            Cell::fixed(machine.rms(), 2),
-            Cell::fixed(machine.largest(), 2),
-            Cell::from(machine.verdict()),
-        ]);
-    }
-    outcome.tables.push(table);
-    let points = |of: &dyn Fn(&Machine) -> f64| -> Vec<(f64, f64)> {
-        let sound = machines.iter().filter(|m| m.runs.is_ok());
-        sound.map(|m| (-100.0 * m.config.saliency.a_psi, of(m))).collect()
-    };
-    outcome.figures.push(
-        Figure::new("machines", "Worst of 16 runs over the saliency of the machine", "").panel(
-            Panel::new("saliency fixed to the flux (%)", "angle error (°)")
-                .with(Series::points("largest", points(&|m| m.largest())))
-                .with(Series::points("rms", points(&|m| m.rms()))),
-        ),
-    );
-    outcome.remarks = assumptions(context.config);
-    Ok(outcome)
 }

@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::statistics::{Study, whole};
 use super::steady::{OperatingPoint, SteadyRun, steady_run};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
@@ -30,7 +31,7 @@ pub const EXPERIMENT: Experiment = Experiment {
         ],
     ],
     not: &[FREE_SHAFT, SPEED_LOOP],
-    run,
+    run: whole::<MonteCarlo>,
 };
 
 const RUNS: u32 = 200;
@@ -41,84 +42,95 @@ const IQ_A: (f64, f64) = (0.5, 3.0);
 /// Speeds up to here on four poles, rpm, unless `load.speed_rpm` says otherwise.
 const SPEED_RPM: f64 = 150.0;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let runs = context.config.extent.runs.unwrap_or(RUNS);
-    let bound = context.config.load.speed_rpm.abs();
-    let bound = if bound > 0.0 { bound } else { context.config.rpm(SPEED_RPM) };
-    let (least, most) = (context.config.amperes(IQ_A.0), context.config.amperes(IQ_A.1));
-    let cases: Vec<(OperatingPoint, Config)> = (0..u64::from(runs))
-        .map(|number| {
-            // A generator of its own for every run: each can be repeated alone by its seed.
-            let seed = context.seed.wrapping_mul(1_000_003).wrapping_add(number);
-            let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-            let iq = sign * random.random_range(least..=most);
-            let case = OperatingPoint { rpm: random.random_range(-bound..=bound), iq, seed };
-            (case, spread(context.config, &mut random))
-        })
-        .collect();
-    let results = context.in_parallel("monte-carlo", &cases, |_, (case, config)| {
-        steady_run(config, *case, context.seconds.unwrap_or(2.0))
-    })?;
+/// The runs.
+pub struct MonteCarlo {
+    config: Config,
+    seed: u64,
+    seconds: f64,
+    /// Largest speed, rpm.
+    bound: f64,
+}
 
-    let mut outcome = Outcome::default();
-    outcome.faults.extend(results.iter().filter_map(SteadyRun::lost_text));
-    let kept: Vec<(&OperatingPoint, &SteadyRun)> =
-        cases.iter().map(|(case, _)| case).zip(&results).filter(|(_, r)| !r.lost).collect();
-    let mut largest: Vec<f64> = kept.iter().map(|(_, r)| r.error.largest()).collect();
-    largest.sort_by(f64::total_cmp);
-    let squares = kept.iter().map(|(_, r)| r.error.rms().powi(2)).sum::<f64>();
-    let m = &mut outcome.metrics;
-    m.set("angle_error_rms_deg", (squares / kept.len() as f64).sqrt());
-    m.set("worst_run_rms_deg", kept.iter().map(|(_, r)| r.error.rms()).fold(0.0, f64::max));
-    m.set("angle_error_max_deg", largest.last().copied().unwrap_or(f64::NAN));
-    // The smallest bound that 99 % of the runs stay below.
-    let p99 = (largest.len() * 99).div_ceil(100).saturating_sub(1);
-    m.set("run_max_p99_deg", largest.get(p99).copied().unwrap_or(f64::NAN));
-    m.set("lost_runs", (results.len() - kept.len()) as f64);
-    m.set("runs", results.len() as f64);
+impl Study for MonteCarlo {
+    type Record = SteadyRun;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
-    let mut table = Table::new("Lost runs", &["seed", "iq (A)", "speed (rpm)"]);
-    for ((case, _), _) in cases.iter().zip(&results).filter(|(_, r)| r.lost) {
-        table.row([
-            Cell::from(case.seed.to_string()),
-            Cell::fixed(case.iq, 3),
-            Cell::fixed(case.rpm, 1),
-        ]);
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let config = context.config.clone();
+        let bound = config.load.speed_rpm.abs();
+        let bound = if bound > 0.0 { bound } else { config.rpm(SPEED_RPM) };
+        Ok(Self { config, seed: context.seed, seconds: context.seconds.unwrap_or(2.0), bound })
     }
-    if !table.rows.is_empty() {
+
+    fn runs(&self) -> usize {
+        self.config.extent.runs.unwrap_or(RUNS) as usize
+    }
+
+    fn run(&self, number: usize) -> Result<SteadyRun, Error> {
+        // A generator of its own for every run: each can be repeated alone by its seed.
+        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+        let (least, most) = (self.config.amperes(IQ_A.0), self.config.amperes(IQ_A.1));
+        let iq = sign * random.random_range(least..=most);
+        let case = OperatingPoint { rpm: random.random_range(-self.bound..=self.bound), iq, seed };
+        steady_run(&spread(&self.config, &mut random), case, self.seconds)
+    }
+
+    fn outcome(&self, _: &Context<'_>, runs: Vec<SteadyRun>) -> Result<Outcome, Error> {
+        let mut outcome = Outcome::default();
+        outcome.faults.extend(runs.iter().filter_map(SteadyRun::lost_text));
+        let kept: Vec<&SteadyRun> = runs.iter().filter(|run| !run.lost).collect();
+        let mut largest: Vec<f64> = kept.iter().map(|run| run.error.largest()).collect();
+        largest.sort_by(f64::total_cmp);
+        let squares = kept.iter().map(|run| run.error.rms().powi(2)).sum::<f64>();
+        let m = &mut outcome.metrics;
+        m.set("angle_error_rms_deg", (squares / kept.len() as f64).sqrt());
+        m.set("worst_run_rms_deg", kept.iter().map(|run| run.error.rms()).fold(0.0, f64::max));
+        m.set("angle_error_max_deg", largest.last().copied().unwrap_or(f64::NAN));
+        // The smallest bound that 99 % of the runs stay below.
+        let p99 = (largest.len() * 99).div_ceil(100).saturating_sub(1);
+        m.set("run_max_p99_deg", largest.get(p99).copied().unwrap_or(f64::NAN));
+        m.set("lost_runs", (runs.len() - kept.len()) as f64);
+        m.set("runs", runs.len() as f64);
+
+        let of_case = |case: &OperatingPoint| {
+            [Cell::from(case.seed.to_string()), Cell::fixed(case.iq, 3), Cell::fixed(case.rpm, 1)]
+        };
+        let mut table = Table::new("Lost runs", &["seed", "iq (A)", "speed (rpm)"]);
+        for run in runs.iter().filter(|run| run.lost) {
+            table.row(of_case(&run.case));
+        }
+        if !table.rows.is_empty() {
+            outcome.tables.push(table);
+        }
+        let heads = ["seed", "iq (A)", "speed (rpm)", "rms (°)", "mean (°)", "largest (°)"];
+        let mut table = Table::new("Worst runs", &heads);
+        let mut by_rms = kept.clone();
+        by_rms.sort_by(|a, b| b.error.rms().total_cmp(&a.error.rms()));
+        for run in by_rms.iter().take(WORST) {
+            let error = &run.error;
+            let errors = [error.rms(), error.mean(), error.largest()];
+            table.row(of_case(&run.case).into_iter().chain(errors.map(|e| Cell::fixed(e, 2))));
+        }
         outcome.tables.push(table);
+        let points = |of: fn(&SteadyRun) -> f64| kept.iter().map(|r| (r.case.iq, of(r))).collect();
+        outcome.figures.push(
+            Figure::new("runs", "Angle error of every run over its torque current", "").panel(
+                Panel::new("quadrature current (A)", "angle error (°)")
+                    .with(Series::points("largest", points(|r| r.error.largest())))
+                    .with(Series::points("rms", points(|r| r.error.rms())))
+                    .with(Series::points("mean", points(|r| r.error.mean()))),
+            ),
+        );
+        outcome.remarks = assumptions(&self.config);
+        outcome.remarks.push(format!(
+            "Speeds within ±{} rpm. Lost: beyond 45° at any time, or stopped by the drive; lost \
+             runs are in no other figure.",
+            self.bound
+        ));
+        Ok(outcome)
     }
-    let heads = ["seed", "iq (A)", "speed (rpm)", "rms (°)", "mean (°)", "largest (°)"];
-    let mut table = Table::new("Worst runs", &heads);
-    let mut by_rms = kept.clone();
-    by_rms.sort_by(|a, b| b.1.error.rms().total_cmp(&a.1.error.rms()));
-    for (case, run) in by_rms.iter().take(WORST) {
-        table.row([
-            Cell::from(case.seed.to_string()),
-            Cell::fixed(case.iq, 3),
-            Cell::fixed(case.rpm, 1),
-            Cell::fixed(run.error.rms(), 2),
-            Cell::fixed(run.error.mean(), 2),
-            Cell::fixed(run.error.largest(), 2),
-        ]);
-    }
-    outcome.tables.push(table);
-    let points = |of: fn(&SteadyRun) -> f64| kept.iter().map(|(c, r)| (c.iq, of(r))).collect();
-    outcome.figures.push(
-        Figure::new("runs", "Angle error of every run over its torque current", "").panel(
-            Panel::new("quadrature current (A)", "angle error (°)")
-                .with(Series::points("largest", points(|r| r.error.largest())))
-                .with(Series::points("rms", points(|r| r.error.rms())))
-                .with(Series::points("mean", points(|r| r.error.mean()))),
-        ),
-    );
-    outcome.remarks = assumptions(context.config);
-    outcome.remarks.push(format!(
-        "Speeds within ±{bound} rpm. Lost: beyond 45° at any time, or stopped by the drive; lost \
-         runs are in no other figure."
-    ));
-    Ok(outcome)
 }
 
 /// The configuration with the errors of `spread` drawn at random.

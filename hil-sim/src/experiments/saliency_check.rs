@@ -2,6 +2,7 @@
 
 use drive_core::{Command, Fault, Mode, State};
 
+use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, SPEED_LOOP, TURNING};
 use crate::config::Config;
@@ -18,7 +19,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "Starts on motors with none, a tenth, half and all of the expected saliency; `--set runs=N`.",
     uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
     not: &[TURNING, SPEED_LOOP],
-    run,
+    run: whole::<SaliencyCheck>,
 };
 
 /// Share of the configured flux-fixed saliency, and its name in the metrics.
@@ -26,32 +27,54 @@ const SHARES: [(f64, &str); 5] =
     [(0.0, "none"), (0.1, "a_tenth"), (0.5, "half"), (1.0, "all"), (1.5, "one_and_a_half")];
 const RUNS: u32 = 100;
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let runs = context.config.extent.runs.unwrap_or(RUNS);
-    let seeds: Vec<u64> = (0..u64::from(runs))
-        .map(|n| context.seed.wrapping_mul(1_000_003).wrapping_add(n))
-        .collect();
-    let mut outcome = Outcome::default();
-    let heads = ["share of the expected saliency", "starts", "accepted", "refused"];
-    let mut table = Table::new("Starts", &heads);
-    for (share, name) in SHARES {
-        let mut config = context.config.clone();
-        config.saliency.a_psi *= share;
-        let accepted =
-            context.in_parallel("saliency-check", &seeds, |_, &seed| accepts(&config, seed))?;
-        let count = accepted.iter().filter(|&&a| a).count() as f64;
-        outcome.metrics.set(format!("accepted_{name}"), count);
-        table.row([
-            Cell::fixed(share, 1),
-            Cell::fixed(f64::from(runs), 0),
-            Cell::fixed(count, 0),
-            Cell::fixed(f64::from(runs) - count, 0),
-        ]);
+/// The starts: `runs` with each share.
+pub struct SaliencyCheck {
+    config: Config,
+    seed: u64,
+    runs: usize,
+}
+
+impl Study for SaliencyCheck {
+    type Record = bool;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let config = context.config.clone();
+        let runs = config.extent.runs.unwrap_or(RUNS) as usize;
+        Ok(Self { config, seed: context.seed, runs })
     }
-    outcome.metrics.set("runs", f64::from(runs));
-    outcome.tables.push(table);
-    outcome.remarks = assumptions(context.config);
-    Ok(outcome)
+
+    fn runs(&self) -> usize {
+        SHARES.len() * self.runs
+    }
+
+    fn run(&self, number: usize) -> Result<bool, Error> {
+        let mut config = self.config.clone();
+        config.saliency.a_psi *= SHARES[number / self.runs].0;
+        let of_share = (number % self.runs) as u64;
+        accepts(&config, self.seed.wrapping_mul(1_000_003).wrapping_add(of_share))
+    }
+
+    fn outcome(&self, _: &Context<'_>, accepted: Vec<bool>) -> Result<Outcome, Error> {
+        let mut outcome = Outcome::default();
+        let heads = ["share of the expected saliency", "starts", "accepted", "refused"];
+        let mut table = Table::new("Starts", &heads);
+        let runs = self.runs as f64;
+        for ((share, name), accepted) in SHARES.iter().zip(accepted.chunks(self.runs)) {
+            let count = accepted.iter().filter(|&&a| a).count() as f64;
+            outcome.metrics.set(format!("accepted_{name}"), count);
+            table.row([
+                Cell::fixed(*share, 1),
+                Cell::fixed(runs, 0),
+                Cell::fixed(count, 0),
+                Cell::fixed(runs - count, 0),
+            ]);
+        }
+        outcome.metrics.set("runs", runs);
+        outcome.tables.push(table);
+        outcome.remarks = assumptions(&self.config);
+        Ok(outcome)
+    }
 }
 
 /// Whether the drive starts on this motor.

@@ -3,16 +3,18 @@
 use std::f64::consts::TAU;
 
 use drive_core::{Command, Fault, Mode, Settings, State};
+use serde::{Deserialize, Serialize};
 
+use super::statistics::fault_code;
 use super::torque::LOST_DEG;
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
 use crate::plant::Load;
 use crate::rig::Rig;
-use crate::stats::Stats;
+use crate::stats::{Stats, exact};
 
 /// Operating point and seed of a run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct OperatingPoint {
     /// Speed, rpm.
     pub rpm: f64,
@@ -23,17 +25,19 @@ pub struct OperatingPoint {
 }
 
 /// Result of a run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct SteadyRun {
     /// Operating point and seed.
     pub case: OperatingPoint,
     /// Angle error, degrees.
     pub error: Stats,
     /// Mean torque, Nm.
+    #[serde(with = "exact")]
     pub torque: f64,
     /// Whether the error went beyond 45° at any time, or the drive stopped itself.
     pub lost: bool,
     /// The fault with which it stopped itself.
+    #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
 }
 

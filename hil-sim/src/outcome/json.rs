@@ -32,11 +32,21 @@ struct Settings<'a>(&'a [(String, String)]);
 
 impl Serialize for Settings<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let typed = |text: &str| match serde_json::from_str(text) {
-            Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
-            _ => serde_json::Value::from(text),
-        };
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, typed(value))))
+    }
+}
+
+fn typed(text: &str) -> serde_json::Value {
+    match serde_json::from_str(text) {
+        Ok(value @ (serde_json::Value::Number(_) | serde_json::Value::Bool(_))) => value,
+        _ => serde_json::Value::from(text),
+    }
+}
+
+impl Origin {
+    /// Names and values of the settings as they stand in JSON.
+    pub fn typed_settings(&self) -> impl Iterator<Item = (String, serde_json::Value)> {
+        self.settings.iter().map(|(name, value)| (name.clone(), typed(value)))
     }
 }
 

@@ -39,6 +39,32 @@ pub struct Addresses {
 }
 
 impl Addresses {
+    /// No table.
+    pub const NONE: Self = {
+        let none = Region { address: 0, size: 0 };
+        Self {
+            control: none,
+            coefficients: none,
+            state: none,
+            orders: 0,
+            order_waits: 0,
+            angle_source: 0,
+            phi: 0,
+            rotor_freq: [0; 2],
+            reference_q: 0,
+            current_q: 0,
+            dc_link: 0,
+        }
+    };
+
+    /// The table of an image that has one.
+    ///
+    /// # Errors
+    /// It is of another version.
+    pub fn find(image: &Image) -> Result<Option<Self>> {
+        image.symbol(SYMBOL).is_ok().then(|| Self::new(image)).transpose()
+    }
+
     /// The table of an image.
     ///
     /// # Errors

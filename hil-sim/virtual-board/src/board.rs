@@ -1,5 +1,6 @@
 //! The board: the core, its chip, and the motor, from one period to the next.
 
+pub mod confirmed;
 mod control;
 mod exceptions;
 mod motor;
@@ -15,8 +16,8 @@ use drive_core::Sample;
 use hil_sim::plant::Plant;
 
 pub use control::{LongestPath, Period};
+use motor::Connection;
 pub use motor::Disturbance;
-use motor::PowerStage;
 pub use options::Options;
 
 use crate::addresses::Addresses;
@@ -26,7 +27,8 @@ use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
-use crate::periph::tim1::GateLimits;
+use crate::power_stage::watch::GateWatch;
+use crate::rules::Violation;
 use control::RunningInterrupt;
 
 /// Periods after which the log is fetched, before its buffer in RAM is full.
@@ -39,20 +41,19 @@ const IDLE_LIMIT: u32 = 100_000;
 pub struct Board {
     cpu: Cpu,
     image: Image,
-    log: Log,
+    log: Option<Log>,
     lines: Vec<String>,
     since_log: u32,
     /// The motor with everything around it.
     pub plant: Plant,
-    stage: PowerStage,
-    gates: GateLimits,
+    connection: Connection,
     sleeping: bool,
     hung: bool,
     /// The core executes nothing before this.
     stalled_until: u64,
     entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
-    addresses: Addresses,
+    addresses: Option<Addresses>,
     /// Changes every sample, if wanted.
     pub disturb: Option<Disturbance>,
     /// The check that control interrupts leave the preempted code intact, if wanted.
@@ -91,8 +92,8 @@ impl Board {
             ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
-        let addresses = Addresses::new(&image)?;
-        let log = Log::new(&image)?;
+        let addresses = Addresses::find(&image)?;
+        let log = Log::find(&image)?;
         let mut board = Self {
             cpu,
             image,
@@ -100,8 +101,7 @@ impl Board {
             lines: Vec::new(),
             since_log: 0,
             plant,
-            gates: options.gates,
-            stage: PowerStage::default(),
+            connection: Connection::new(options.power_stage, options.seed),
             sleeping: false,
             hung: false,
             stalled_until: 0,
@@ -119,8 +119,18 @@ impl Board {
             latest_start: 0,
             preempt_at: None,
         };
+        let chip = board.chip();
+        if options.confirmed {
+            confirmed::save(&options, &mut chip.flash)?;
+        }
+        chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
+        chip.look_at_gates();
         board.show_sample();
+        // The dc link is there before the first period. (A copy, so that the noise of the periods is the same.)
+        let dc_link = board.plant.clone().sample().dc_link;
+        board.chip().compare(0, 0, dc_link);
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
+        board.cpu.chip_mut().rules.exact = options.counting.every_instruction;
         board.cpu.reset(memory::FLASH);
         Ok(board)
     }
@@ -146,14 +156,24 @@ impl Board {
         self.cpu.read(address, bytes)
     }
 
-    /// Addresses of the firmware's data.
+    /// Addresses of the firmware's data; all zero of an image without the table.
     pub fn addresses(&self) -> &Addresses {
-        &self.addresses
+        self.addresses.as_ref().unwrap_or(&Addresses::NONE)
+    }
+
+    /// The rules of the chip that the program has broken since power-on, in order.
+    pub fn violations(&self) -> &[Violation] {
+        self.cpu.chip().rules.violations()
+    }
+
+    /// From now on broken rules are only recorded and do not end a run.
+    pub fn collect_violations(&mut self) {
+        self.chip().rules.collecting = true;
     }
 
     /// Rotor-flux angle that the drive estimated at the last sample, electrical turns from 0 to 1.
     pub fn flux_angle(&self) -> f64 {
-        f64::from(self.word(self.addresses.phi).unwrap_or(0)) / 2_f64.powi(32)
+        f64::from(self.word(self.addresses().phi).unwrap_or(0)) / 2_f64.powi(32)
     }
 
     /// The chip.
@@ -168,7 +188,7 @@ impl Board {
 
     /// The last sample.
     pub fn sample(&self) -> Sample {
-        self.stage.sample
+        self.connection.sample
     }
 
     /// Seconds since power-on.
@@ -235,7 +255,9 @@ impl Board {
                 self.preempt_at = None;
                 return Ok(());
             }
-            self.exceptions()?;
+            if !self.cpu.chip().is_halted() {
+                self.exceptions()?;
+            }
             self.go(end)?;
         }
         Ok(())
@@ -248,9 +270,18 @@ impl Board {
             self.crest(at)?;
         }
         self.follow_outputs();
+        self.cpu.follow_guard().map_err(|e| anyhow!("emulator: {e:?}"))?;
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
             bail!("{unknown} at {}", self.image.location(unknown.at));
+        }
+        if let Some(violation) = chip.rules.fatal() {
+            bail!("{violation}\n{}", self.image.location(violation.at));
+        }
+        if let Some(seen) = chip.gates.take() {
+            let (place, time) =
+                (self.image.location(seen.at), seen.time as f64 / TICKS_PER_S as f64);
+            bail!("bad gate signals: {} after {time:.6} s, at {place}", seen.what);
         }
         if chip.flash.power_lost {
             chip.reset = Some(Reset::Power);

@@ -24,6 +24,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
 use crate::periph::Reset;
+use crate::power_stage::{PowerStage, REFERENCE};
 use class::{CLASSES, Class, Run};
 use judge::Outcome;
 use scene::Scene;
@@ -57,6 +58,8 @@ pub struct Selection {
     pub seed: u64,
     /// Only of the classes whose name contains this.
     pub class: String,
+    /// The power stage that the image was built for.
+    pub stage: &'static PowerStage,
 }
 
 /// A campaign of faults; `open` opens the image. Gives the table.
@@ -64,7 +67,7 @@ pub struct Selection {
 /// # Errors
 /// The table with the failures; no class has that name.
 pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
-    let Selection { count, seed, ref class } = *selection;
+    let Selection { count, seed, ref class, stage } = *selection;
     let classes = CLASSES.len() as u64;
     let is_chosen = |seed: &u64| CLASSES[(seed % classes) as usize].name.contains(class);
     ensure!(
@@ -75,7 +78,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
     let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
     let tallies: Mutex<BTreeMap<usize, Tally>> = Mutex::default();
     let work = || -> Result<()> {
-        let mut scene = Scene::new(open()?)?;
+        let mut scene = Scene::new(open()?, stage)?;
         scene.board.forgive();
         loop {
             // A seed says all: a campaign of one with the seed of a failure repeats it.
@@ -134,11 +137,12 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             scene.regulating(source)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
-            let what = inject(&mut scene.board, &scene.regions, &mut rng);
+            let what = inject(&mut scene.board, &scene.target, &mut rng);
             let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
+            let trip_a = scene.target.settings.trip_a().into();
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
-            let mut outcome =
-                judge::watch(&mut scene.board, ms, promised).with_context(|| what.clone())?;
+            let mut outcome = judge::watch(&mut scene.board, trip_a, ms, promised)
+                .with_context(|| what.clone())?;
             if outcome.off_ms.is_some() {
                 judge::reported(&mut scene.board, whole_start)
                     .with_context(|| format!("{what}; after the end"))?;
@@ -182,7 +186,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
 /// # Errors
 /// The slot and the operation of the first failure.
 pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
-    let mut scene = Scene::new(image)?;
+    let mut scene = Scene::new(image, &REFERENCE)?;
     scene.board.forgive();
     let mut counts = [0; 2];
     for (slot, count) in counts.iter_mut().enumerate() {

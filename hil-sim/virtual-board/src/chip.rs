@@ -4,22 +4,32 @@
 //! its PLL.
 
 mod bus;
+mod clocked;
 mod execution;
+pub mod pins;
+mod supply;
 
 pub use bus::Unknown;
+pub use clocked::clock_of;
 pub use execution::Watched;
 
 use crate::cost::Block;
+use crate::debugger::Halt;
 use crate::periph::adc::Adc;
-use crate::periph::analog::{Comparators, Dacs};
+use crate::periph::analog::Comparators;
+use crate::periph::dac::Dacs;
 use crate::periph::encoder::EncoderTimer;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
 use crate::periph::lpuart::Lpuart;
+use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
+use crate::periph::time_base::TimeBase;
 use crate::periph::{NEVER, Reset, Store, plain};
+use crate::power_stage::{self, watch::GateWatch};
+use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 
 /// Ticks per second.
@@ -29,6 +39,8 @@ pub const TICKS_PER_PERIOD: u64 = 2 * induction_drive::board::PWM_TOP as u64;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
+/// Largest code of the analog signals.
+const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.
 const IRQ_ADC1_2: u16 = 18;
 const IRQ_LPUART: u16 = 91;
@@ -66,13 +78,32 @@ pub struct Chip {
     pub watched: Option<Watched>,
     /// Whether registers that are not known read as 0.
     pub forgiving: bool,
+    /// Rules of the chip that the program has broken.
+    pub rules: Rules,
+    /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
+    /// states, prefetch and caches is expected to take.
+    pub flash_cycles: u64,
+    /// The emulated core is running, and its access that the memory protection denied.
+    pub(crate) core_runs: bool,
+    pub(crate) guard_hit: Option<u32>,
+    /// A debugger has halted the core.
+    pub(crate) halt: Option<Halt>,
+    pub(crate) frozen_watchdog: bool,
+    /// Outputs came back with the core, and are looked at then.
+    pub(crate) back_on: Option<u64>,
+    /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
+    system_hz: u64,
+    bus_hz: u64,
+    system_rose: u64,
+    /// Codes at the pins of current a, current b, dc link.
+    analog: [u16; 3],
     last_block: Option<(u32, u32)>,
     /// Core-private registers.
     pub scs: Scs,
     /// Clocks.
     pub rcc: Rcc,
     /// Supply.
-    pub pwr: Store,
+    pub pwr: Pwr,
     /// Flash.
     pub flash: Flash,
     /// Ports A to G.
@@ -85,6 +116,8 @@ pub struct Chip {
     pub tim1: Tim1,
     /// Timer of the encoder.
     pub tim2: EncoderTimer,
+    /// Time base.
+    pub tim5: TimeBase,
     /// Converters.
     pub adc: Adc,
     /// Comparators.
@@ -97,11 +130,15 @@ pub struct Chip {
     pub iwdg: Iwdg,
     /// Debug support.
     pub debug: Store,
+    /// The power stage at the pins of the gates.
+    pub gates: GateWatch,
 }
 
 impl Chip {
     /// A chip after power-on, whose flash is erased.
     pub fn new() -> Self {
+        let (gpio, tim1) = (std::array::from_fn(Gpio::new), Tim1::default());
+        let gates = GateWatch::new(&power_stage::REFERENCE, &gpio, &tim1);
         Self {
             now: 0,
             deadline: 0,
@@ -117,22 +154,35 @@ impl Chip {
             compared: (0, 0),
             watched: None,
             forgiving: false,
+            rules: Rules::new(),
+            core_runs: false,
+            guard_hit: None,
+            flash_cycles: 1,
+            halt: None,
+            frozen_watchdog: false,
+            back_on: None,
+            system_hz: 16_000_000,
+            bus_hz: 16_000_000,
+            system_rose: 0,
+            analog: [0; 3],
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
-            pwr: Store::new(plain::PWR),
+            pwr: Pwr::default(),
             flash: Flash::new(),
-            gpio: std::array::from_fn(Gpio::new),
+            gpio,
             syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
-            tim1: Tim1::default(),
+            tim1,
             tim2: EncoderTimer::default(),
+            tim5: TimeBase::default(),
             adc: Adc::default(),
             comp: Comparators::default(),
             dac: Dacs::default(),
             lpuart: Lpuart::default(),
             iwdg: Iwdg::default(),
             debug: Store::new(plain::DEBUG),
+            gates,
         }
     }
 
@@ -146,6 +196,15 @@ impl Chip {
         self.keep_blocks = old.keep_blocks;
         self.watched = old.watched;
         self.forgiving = old.forgiving;
+        self.rules = old.rules;
+        self.flash_cycles = old.flash_cycles;
+        self.pwr.supply_v = old.pwr.supply_v;
+        self.analog = old.analog;
+        // Only power-on resets the debug support.
+        if cause != Reset::Power {
+            self.debug = old.debug;
+            self.halt = old.halt;
+        }
         let mut flags = old.rcc.reset_flags();
         if cause == Reset::Power {
             flags = 0;
@@ -160,6 +219,8 @@ impl Chip {
         self.adc.inputs = old.adc.inputs;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
+        self.gates = old.gates;
+        self.look_at_gates();
     }
 
     /// The core locks up: to the break of TIM1, if the firmware wants that.
@@ -183,9 +244,12 @@ impl Chip {
             self.tim1.next_event(),
             self.adc.next_event(),
             self.lpuart.next_event(),
-            self.iwdg.next_event(),
+            if self.frozen_watchdog { NEVER } else { self.iwdg.next_event() },
             self.scs.systick.next_event(),
             self.rcc.next_event(),
+            self.comp.next_event(),
+            self.dac.next_event(self.now),
+            self.back_on.unwrap_or(NEVER),
             self.now.saturating_add(PATIENCE),
         ]
         .into_iter()
@@ -193,28 +257,60 @@ impl Chip {
         .unwrap_or(NEVER)
     }
 
-    /// Whether the pins of the gates are the timer's.
-    pub fn gates_connected(&self) -> bool {
-        let [a, b, ..] = &self.gpio;
-        let timer = Some(u32::from(induction_drive::board::PWM_AF));
-        [7, 8, 9, 10].iter().all(|pin| a.alternate(*pin) == timer)
-            && [0, 1].iter().all(|pin| b.alternate(*pin) == timer)
+    /// Looks at the gates: whenever a pin or the timer's outputs may have changed.
+    pub fn look_at_gates(&mut self) {
+        self.gates.look(&self.gpio, &self.tim1, self.at, self.now);
     }
 
     /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
     /// dc link here, comparator 3 PA0 or PC1.
     pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
-        self.comp.inputs[0] = dc_link;
+        self.analog = [current_a, current_b, dc_link];
+        self.compare_now();
+    }
+
+    /// The converter and channel whose level comparator 1 or 3, counted from 0, looks at.
+    fn level_of(&self, n: usize) -> Option<(usize, usize)> {
+        // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
+        match self.comp.reference_of(n) {
+            4 => Some((1, 1)),
+            5 => Some((0, 1)),
+            _ => None,
+        }
+    }
+
+    fn compare_now(&mut self) {
+        let [current_a, current_b, dc_link] = self.analog;
+        // A pull of the chip moves the pin: 40 kOhm against the 10 kOhm of a divider.
+        self.comp.inputs[0] = match self.gpio[0].pull(1) {
+            Some(true) => dc_link + (FULL_SCALE - dc_link.min(FULL_SCALE)) / 5,
+            Some(false) => dc_link - dc_link / 5,
+            None => dc_link,
+        };
         self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
         for n in [0, 2] {
-            // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
-            self.comp.references[n] = match self.comp.reference_of(n) {
-                4 => self.dac.code(1, 1),
-                5 => self.dac.code(0, 1),
-                _ => u16::MAX,
-            };
+            let level = self.level_of(n);
+            let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
+            self.comp.references[n] = code.unwrap_or(u16::MAX);
         }
+        self.comp.look(self.now);
         self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
+    }
+
+    /// A comparator was written: the level it looks at must have been seen ready.
+    fn check_reference(&mut self, offset: u32) {
+        let n = ((offset - 0x200) / 4) as usize;
+        let on = self.comp.is_on(n);
+        if let (true, Some((which, channel))) = (on, self.level_of(n)) {
+            let ready = self.dac.seen_ready(which, channel);
+            self.rules.require(ready, Rule::DacReady, || {
+                format!(
+                    "COMP{} is on, but DAC{}_SR.DAC{channel}RDY was never read as set",
+                    n + 1,
+                    [1, 3][which]
+                )
+            });
+        }
     }
 
     /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
@@ -234,8 +330,12 @@ impl Chip {
             self.scs.pend(scs::NMI);
         }
         self.adc.happen(now);
+        (self.rules.now, self.rules.at) = (now, self.at);
+        self.check_analog_pins();
+        self.check_outputs_back();
+        self.compare_now();
         self.lpuart.happen(now);
-        if self.iwdg.expired(now) {
+        if !self.frozen_watchdog && self.iwdg.expired(now) {
             self.reset = Some(Reset::Watchdog);
         }
         if self.scs.systick.happen(now) {

@@ -6,6 +6,7 @@
 //! not stop the core: it would do its access again.
 
 mod frame;
+mod guard;
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -41,6 +42,8 @@ pub enum Stop {
 pub enum Fault {
     /// Access to this address.
     Access(u32),
+    /// Access to this address, which the memory protection denies.
+    Denied(u32),
     /// No such instruction, or a fetch from where none is.
     Instruction,
 }
@@ -59,6 +62,7 @@ pub struct Cpu {
     uc: Unicorn<'static, Chip>,
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
+    guard: Option<guard::Guard>,
 }
 
 /// Registers and memories of a stopped core.
@@ -172,7 +176,7 @@ impl Cpu {
             note.set(Some(address as u32));
             false
         })?;
-        Ok(Self { uc, faulted, trapped })
+        Ok(Self { uc, faulted, trapped, guard: None })
     }
 
     /// Keeps registers and memories; the flash of the code is not changed by anything.
@@ -225,9 +229,14 @@ impl Cpu {
         self.faulted.set(None);
         self.trapped.set(false);
         self.chip_mut().first = true;
+        self.chip_mut().core_runs = true;
         let pc = self.get(Register::PC);
         let result = self.uc.emu_start(u64::from(pc | 1), 0xffff_fffe, 0, 0);
         let pc = self.get(Register::PC);
+        self.chip_mut().core_runs = false;
+        if let Some(address) = self.chip_mut().guard_hit.take() {
+            return Stop::Fault(Fault::Denied(address));
+        }
         if pc >= EXC_RETURN {
             return Stop::Return(pc | 1);
         }

@@ -9,11 +9,14 @@ use gimli::{EndianArcSlice, RunTimeEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use crate::memory::Region;
+use crate::power_stage::REFERENCE;
 
 type Slice = EndianArcSlice<RunTimeEndian>;
 
 /// Environment variable that names the ELF.
 pub const ELF: &str = "INDUCTION_DRIVE_ELF";
+/// Environment variable that names the folder with the ELFs of the other boards.
+const BOARDS: &str = "INDUCTION_DRIVE_BOARDS";
 /// Where `cargo firmware` puts it in the target directory, with rustup's and with Debian's compiler.
 const PLACES: [&str; 2] = ["", "debian"];
 const INSIDE: &str = "thumbv7em-none-eabihf/firmware/induction-drive";
@@ -50,6 +53,12 @@ pub struct Frame {
     pub place: String,
 }
 
+/// The target directory.
+fn target() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from)
+}
+
 impl Image {
     /// Reads an ELF file.
     ///
@@ -68,13 +77,25 @@ impl Image {
         if let Some(path) = std::env::var_os(ELF) {
             return Self::open(Path::new(&path));
         }
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let target =
-            std::env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
-        let places = PLACES.map(|place| target.join(place).join(INSIDE));
+        let places = PLACES.map(|place| target().join(place).join(INSIDE));
         let age = |path: PathBuf| Some((path.metadata().ok()?.modified().ok()?, path));
         let newest = places.into_iter().filter_map(age).max();
         Self::open(&newest.context("no firmware image: type `cargo firmware`")?.1)
+    }
+
+    /// The image that `cargo firmware --board NAME` built last for a board, or that in the folder that the environment
+    /// names, with one folder a board. Of the reference, [`Image::built`].
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn built_for(board: &str) -> Result<Self> {
+        if board == REFERENCE.name {
+            return Self::built();
+        }
+        let folder =
+            std::env::var_os(BOARDS).map_or_else(|| target().join("boards"), PathBuf::from);
+        Self::open(&folder.join(board).join("induction-drive"))
+            .with_context(|| format!("no image of {board}: type `cargo firmware --board {board}`"))
     }
 
     /// Understands the contents of an ELF file.

@@ -13,8 +13,13 @@
 //! * Exceptions with priorities, nesting and masks; one stack; no MPU, no traps for unaligned accesses and
 //!   divisions by zero. Bus faults are taken at once and become hard faults, as in the firmware.
 //! * Oscillators, PLL, converters' calibration and references are ready at once.
+//! * The gates are those behind the drivers of a [`power_stage`]: levels follow from pins, timer and resistors, and are
+//!   judged whenever one of them may change. Transients within a dead time are not modelled.
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
-//!   take effect when they do, with the mean voltage of the period until then.
+//!   take effect when they do, with the mean voltage of the period until then. It has no model for a bridge of which only
+//!   some legs are driven: such a bridge counts as off, which the judgement at the gates does not do.
+//! * Shunts see the mean current of the period between two tops, and after a top its slope in the zero vector; the ripple
+//!   of the other vectors is not modelled.
 
 pub mod addresses;
 pub mod board;
@@ -23,12 +28,16 @@ pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod cycles;
+pub mod debugger;
+pub mod dump;
 pub mod image;
 pub mod interactive;
 pub mod log;
 pub mod memory;
 pub mod pair;
 pub mod periph;
+pub mod power_stage;
+pub mod rules;
 pub mod scs;
 pub mod shadow;
 
@@ -36,4 +45,5 @@ pub use board::{Board, Options, Period};
 pub use cpu::Counting;
 pub use image::Image;
 pub use pair::Pair;
+pub use power_stage::PowerStage;
 pub use shadow::Shadow;

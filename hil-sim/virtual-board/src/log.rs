@@ -18,6 +18,14 @@ pub struct Log {
 }
 
 impl Log {
+    /// The log of an image that has one.
+    ///
+    /// # Errors
+    /// It cannot be decoded.
+    pub fn find(image: &Image) -> Result<Option<Self>> {
+        image.symbol("_SEGGER_RTT").is_ok().then(|| Self::new(image)).transpose()
+    }
+
     /// The log of an image.
     ///
     /// # Errors

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use virtual_board::{Image, campaign, cycles};
+use virtual_board::power_stage::REFERENCE;
+use virtual_board::{Image, PowerStage, campaign, cycles, dump};
 
 /// Runs the firmware's ELF on an emulated board with a simulated motor.
 #[derive(Parser)]
@@ -29,6 +30,17 @@ enum Task {
         /// Only the classes whose name contains this.
         #[arg(long, default_value = "")]
         class: String,
+        /// The board that the ELF was built for; it has a motor that suits it.
+        #[arg(long, default_value = REFERENCE.name)]
+        board: String,
+    },
+    /// Prints the registers of a board that has started, a line each: name, address, value, bits to compare.
+    Dump {
+        /// The ELF.
+        elf: PathBuf,
+        /// The board that the ELF was built for.
+        #[arg(long, default_value = REFERENCE.name)]
+        board: String,
     },
     /// Counts the cycles of the control interrupt; fails above its limits.
     Cycles {
@@ -52,10 +64,15 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Campaign { elf, count, seed, class } => {
-            let selection = campaign::Selection { count, seed, class };
+        Task::Campaign { elf, count, seed, class, board } => {
+            let stage = PowerStage::named(&board)?;
+            let selection = campaign::Selection { count, seed, class, stage };
             println!("{}", campaign::bounds());
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
+        }
+        Task::Dump { elf, board } => {
+            let lines = dump::lines(Image::open(&elf)?, PowerStage::named(&board)?)?;
+            lines.iter().for_each(|line| println!("{line}"));
         }
         Task::Cycles { elf, functions } => {
             let rows = cycles::measure(|| Image::open(&elf))?;

@@ -55,6 +55,8 @@ pub const CCM: u32 = 0x1000_0000;
 pub const CCM_ALIAS: u32 = RAM + RAM_SIZE;
 /// CCM SRAM, bytes.
 pub const CCM_SIZE: u32 = 32 * 1024;
+/// The smallest piece of memory that the emulator maps, bytes.
+pub const GUARD_PAGE: u32 = 4096;
 /// Where single bits of peripheral registers appear as words.
 pub const BIT_BAND: u32 = 0x4200_0000;
 /// Peripheral registers that have such an alias.

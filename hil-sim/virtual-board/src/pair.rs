@@ -30,7 +30,7 @@ impl Pair {
     /// # Errors
     /// The board does not start.
     pub fn new(image: Image, options: Options) -> Result<Self> {
-        let mut pair = Self { board: Board::new(image, options)?, shadow: Shadow::new()? };
+        let mut pair = Self { shadow: Shadow::new(&options)?, board: Board::new(image, options)? };
         pair.until("the greeting", LONGEST_ANSWER, |pair, _| {
             pair.board.take_console().ends_with('\n')
         })?;

@@ -2,14 +2,17 @@
 
 pub mod adc;
 pub mod analog;
+pub mod dac;
 pub mod encoder;
 pub mod flash;
 pub mod gpio;
 pub mod iwdg;
 pub mod lpuart;
 pub mod plain;
+pub mod pwr;
 pub mod rcc;
 pub mod tim1;
+pub mod time_base;
 
 use std::fmt;
 

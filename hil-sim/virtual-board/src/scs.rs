@@ -1,6 +1,9 @@
 //! The core's own registers: NVIC, SCB, SysTick, cycle counter (ARMv7-M, chapter B3; Cortex-M4 TRM).
 
+mod mpu;
+
 use crate::periph::{Effect, Plain, Store};
+pub use mpu::Mpu;
 
 /// Exception numbers.
 pub const NMI: u16 = 2;
@@ -59,6 +62,8 @@ pub struct Scs {
     /// Address of a bus fault.
     pub bfar: u32,
     plain: Store,
+    /// Memory protection.
+    pub mpu: Mpu,
     demcr: u32,
     dwt_control: u32,
     /// The cycle counter is this less than time.
@@ -83,6 +88,7 @@ impl Default for Scs {
             hfsr: 0,
             bfar: 0,
             plain: Store::new(PLAIN),
+            mpu: Mpu::default(),
             demcr: 0,
             dwt_control: 0,
             cycles_from: 0,
@@ -202,6 +208,17 @@ impl Scs {
         if self.counting() { now.wrapping_sub(self.cycles_from) as u32 } else { self.cycles_held }
     }
 
+    /// Whether the memory protection denies every access to an address now.
+    pub fn denies(&self, address: u32) -> bool {
+        let inside = self.mpu.guard().is_some_and(|g| (g.address..g.end()).contains(&address));
+        inside && (self.running() >= 0 || self.mpu.holds_in_faults())
+    }
+
+    /// The cycle counter stood still for some ticks.
+    pub fn stand_still(&mut self, ticks: u64) {
+        self.cycles_from = self.cycles_from.wrapping_add(ticks);
+    }
+
     fn counting(&self) -> bool {
         self.dwt_control & 1 != 0 && self.demcr & 1 << 24 != 0
     }
@@ -241,6 +258,7 @@ impl Scs {
             0xe000_ed28 => self.cfsr,
             0xe000_ed2c => self.hfsr,
             0xe000_ed38 => self.bfar,
+            0xe000_ed90..0xe000_edbc => return self.mpu.read(address),
             0xe000_edf0 => 0,
             0xe000_edfc => self.demcr,
             0xe000_1000 => 0x4000_0000 | self.dwt_control,
@@ -308,6 +326,10 @@ impl Scs {
             }
             0xe000_ed28 => self.cfsr &= !value,
             0xe000_ed2c => self.hfsr &= !value,
+            0xe000_ed90..0xe000_edbc => {
+                self.mpu.write(address, value)?;
+                return Some(Effect::Look);
+            }
             0xe000_edfc | 0xe000_1000 => {
                 let cycles = self.cycles(now);
                 if address == 0xe000_edfc {

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use anyhow::{Result, bail};
 use drive_core::{Command, Drive, Settings, State};
 
-use crate::board::Period;
+use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
@@ -32,8 +32,11 @@ impl Shadow {
     ///
     /// # Errors
     /// Its settings make no drive.
-    pub fn new() -> Result<Self> {
-        let settings = FirmwareSettings::of_the_board();
+    pub fn new(options: &Options) -> Result<Self> {
+        let mut settings = confirmed::settings(options)?;
+        if !options.confirmed {
+            settings = FirmwareSettings::of(settings.board);
+        }
         let dead_time_s = induction_drive::board::dead_time(settings.drive.inverter.dead_time_s).1;
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));

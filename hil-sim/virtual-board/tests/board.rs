@@ -105,7 +105,7 @@ fn without_the_control_interrupt_it_stays_off() -> Result<()> {
     assert!(heard.contains("last run: reset by power-on"), "{heard}");
     let log = board.take_log()?;
     assert!(
-        log.iter().any(|line| line.contains("not started") && line.contains("Interrupt")),
+        log.iter().any(|line| line.contains("not started") && line.contains("control interrupt")),
         "{log:#?}"
     );
     board.type_line("start");

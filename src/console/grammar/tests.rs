@@ -122,7 +122,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
         ("trace 5 on i_q_a above x", "not a number: x (the level)"),
         ("trace 5 on fault now", "too many words, from `now` on"),
-        ("faults 38", "the fault = 38: not a whole number from 1 to 37"),
+        ("faults 41", "the fault = 41: not a whole number from 1 to 40"),
         ("learned 38 00000000", "the index = 38: not a whole number from 0 to 37"),
         ("learned 0 12", "not eight hexadecimal digits: 12"),
         ("learned 0 +1234567", "not eight hexadecimal digits: +1234567"),

@@ -64,10 +64,13 @@ impl FakeDrive {
 impl DriveHandle for FakeDrive {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         if !self.running {
-            return Err(CommandError::NoAnswer);
+            return Err(self.no_control());
         }
         self.commands.push(command);
         self.drive.command(&command).map_err(CommandError::Refused)
+    }
+    fn no_control(&self) -> CommandError {
+        CommandError::NotStarted("a test")
     }
     fn status(&self) -> Option<Status> {
         self.running.then(|| Status {

@@ -154,7 +154,7 @@ fn a_start_after_a_design_is_not_stopped_for_silence() {
 #[test]
 fn a_backup_restores_settings_and_what_was_learned() {
     let mut talk = Talk::new();
-    assert_eq!(talk.say("backup\n"), ["defaults", "apply", "ok"]);
+    assert_eq!(talk.say("backup\n"), ["board reference", "defaults", "apply", "ok"]);
     for line in [
         "set scales.current_a.gain 0.001 scales.current_a.offset -2 limits.dc_over_v 371.3",
         "set scales.current_b.gain 0.001 scales.current_b.offset -2",
@@ -170,7 +170,7 @@ fn a_backup_restores_settings_and_what_was_learned() {
     talk.say("");
     let backup = talk.say("backup\n");
     let (end, lines) = backup.split_last().unwrap();
-    assert_eq!((end.as_str(), lines[0].as_str()), ("ok", "defaults"));
+    assert_eq!((end.as_str(), lines[0].as_str()), ("ok", "board reference"));
     assert_eq!(lines.iter().filter(|line| line.starts_with("set ")).count(), 9);
     assert!(lines.iter().all(|line| line.len() <= line::LONGEST));
 

@@ -1,7 +1,7 @@
 use super::*;
 
 /// Wrong lines, and what the answer has to name: thing, value, and what is allowed or meant.
-const WRONG: [(&str, &[&str]); 60] = [
+const WRONG: [(&str, &[&str]); 64] = [
     ("stpo", &["stpo", "`stop`"]),
     ("torqe 1", &["torqe", "`torque`"]),
     ("quit", &["quit", "`help`"]),
@@ -57,7 +57,7 @@ const WRONG: [(&str, &[&str]); 60] = [
     ("learned 0 12", &["12", "eight hexadecimal digits"]),
     ("learned 99 00000000", &["index", "99", "0 to 37"]),
     ("learned check 00000000", &["word 0 is missing"]),
-    ("faults 99", &["fault", "99", "1 to 37"]),
+    ("faults 99", &["fault", "99", "1 to 40"]),
     ("trace 0", &["records", "0", "1 to 1024"]),
     ("trace 5 0", &["divider", "0", "1 to 1000"]),
     ("trace 5 i_x", &["i_x", "i_q_a"]),
@@ -65,6 +65,10 @@ const WRONG: [(&str, &[&str]); 60] = [
     ("log loud", &["level", "loud", "off error warn info debug"]),
     ("echo maybe", &["maybe", "on off"]),
     ("reboot later", &["later"]),
+    ("board mine", &["board", "mine", "reference nucleo-g474re-ihm08m1 nucleo-g474re-ihm023v3"]),
+    ("confirm", &["what to confirm"]),
+    ("confirm motor", &["motor", "board"]),
+    ("set board.confirmed 1", &["board.confirmed", "belongs to the board"]),
 ];
 
 #[test]

@@ -5,9 +5,11 @@ use std::f64::consts::TAU;
 use drive_core::{Command, Fault, Mode, State};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
 
 use crate::config::{Config, LoadMode};
 use crate::error::Error;
+use crate::experiments::statistics::fault_code;
 use crate::experiments::steady::{OperatingPoint, at_speed};
 use crate::plant::Load;
 use crate::rig::{Point, Rig};
@@ -38,7 +40,7 @@ pub fn case(seed: u64, bound: f64) -> OperatingPoint {
 }
 
 /// A trial with the angle forced off.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ForcedTrial {
     /// Where.
     pub case: OperatingPoint,
@@ -46,6 +48,7 @@ pub struct ForcedTrial {
     /// 15° or more.
     pub wrong_s: f64,
     /// The fault with which the drive stopped.
+    #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
     /// Loss of saliency over time.
     pub loss: Vec<(f64, f64)>,
@@ -95,7 +98,7 @@ pub fn forced(config: &Config, case: OperatingPoint, degrees: f64) -> Result<For
 }
 
 /// Disturbance in a run that the drive must not stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum HealthyKind {
     /// Nothing, within 150 rpm.
     Slow,
@@ -124,7 +127,7 @@ pub const KINDS: [HealthyKind; 4] =
     [HealthyKind::Slow, HealthyKind::Fast, HealthyKind::Reversal, HealthyKind::LoadStep];
 
 /// A run that the drive must not stop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HealthyRun {
     /// Where.
     pub case: OperatingPoint,
@@ -135,6 +138,7 @@ pub struct HealthyRun {
     /// Largest angle error, degrees.
     pub largest_error: f64,
     /// The fault with which the drive stopped nevertheless.
+    #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
 }
 
@@ -202,7 +206,7 @@ fn load_step(
 }
 
 /// A shaft that is driven past the limit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct OverSpeedTrial {
     /// Where it began.
     pub case: OperatingPoint,
@@ -211,6 +215,7 @@ pub struct OverSpeedTrial {
     /// Time from the limit to off, s; not more than zero when it stopped before.
     pub late_s: f64,
     /// The fault with which the drive stopped.
+    #[serde(with = "fault_code")]
     pub fault: Option<Fault>,
 }
 
@@ -239,7 +244,7 @@ pub fn over_speed(config: &Config, seed: u64, limit: f64) -> Result<OverSpeedTri
 }
 
 /// A start on a shaft that turns.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct StartTrial {
     /// Whether the drive went on.
     pub accepted: bool,

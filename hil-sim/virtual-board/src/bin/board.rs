@@ -19,7 +19,7 @@ use virtual_board::interactive::page;
 use virtual_board::interactive::pty::Pty;
 use virtual_board::interactive::script::Script;
 use virtual_board::interactive::session::{End, Inputs, Session};
-use virtual_board::{Board, Image};
+use virtual_board::{Board, Image, PowerStage};
 
 /// Runs the firmware's image on an emulated board, with a simulated motor and a serial port.
 #[derive(Parser)]
@@ -30,7 +30,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse().options) {
+    match run(Arguments::parse().options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -39,18 +39,22 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(options: &Options) -> Result<()> {
+fn run(mut options: Options) -> Result<()> {
     // Everything that can be refused, before the session begins.
+    let stage = PowerStage::named(&options.board)?;
+    stage.suit(&mut options.input);
+    let options = &options;
     let config = options.config()?;
     let script = options.script.as_deref().map(Script::open).transpose()?;
     let script = script.map(|script| if options.lenient { script } else { script.strict() });
-    let image = image(options.elf.as_deref())?;
+    let image = image(stage, options.elf.as_deref())?;
     let pty = Pty::open()?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
     }
-    let mut board = Board::new(image, virtual_board::Options::new(&config, options.input.seed))?;
+    let mut board =
+        Board::new(image, virtual_board::Options::on(stage, &config, options.input.seed))?;
     let flash = options.flash.as_deref().map(|path| FlashFile::open(path, &mut board.chip().flash));
     let flash = flash.transpose()?;
 
@@ -59,7 +63,7 @@ fn run(options: &Options) -> Result<()> {
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
-    let set_lines = virtual_board::Options::set_lines(&config);
+    let set_lines = virtual_board::Options::set_lines_on(stage, &config);
     if !set_lines.is_empty() {
         say(
             "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",
@@ -85,10 +89,10 @@ fn run(options: &Options) -> Result<()> {
     }
 }
 
-fn image(elf: Option<&Path>) -> Result<Image> {
+fn image(stage: &PowerStage, elf: Option<&Path>) -> Result<Image> {
     let image = match elf {
         Some(path) => Image::open(path),
-        None => Image::built(),
+        None => Image::built_for(stage.name),
     };
     image.map_err(|why| Error::Refused(format!("the firmware's ELF: {why:#}")).into())
 }

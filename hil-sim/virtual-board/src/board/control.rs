@@ -5,6 +5,7 @@ use drive_core::{Compare, Hardware, Sample};
 use super::Board;
 use crate::addresses::Addresses;
 use crate::cost::{self, Block};
+use crate::power_stage::Sensors;
 
 /// One control interrupt, as seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +48,7 @@ pub struct LongestPath {
 impl Board {
     /// Whether an order waits for the control interrupt.
     fn has_order(&self) -> bool {
-        let Addresses { orders, order_waits, .. } = self.addresses;
+        let Some(Addresses { orders, order_waits, .. }) = self.addresses else { return false };
         let mailbox = self.word(orders);
         mailbox.and_then(|mailbox| self.byte(mailbox.wrapping_add(order_waits))) == Some(1)
     }
@@ -68,11 +69,17 @@ impl Board {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
         let [one, two] = chip.adc.data();
+        // With three shunts both convert the third current second.
+        let (current_c, slow) = match chip.gates.stage().sensors {
+            Sensors::InLine => (0, 1),
+            Sensors::LowSide(_) => (one[1], 2),
+        };
         let sample = Sample {
             current_a: one[0],
             current_b: two[0],
-            dc_link: one[1],
-            heat_sink: two[1],
+            current_c,
+            dc_link: one[slow],
+            heat_sink: two[slow],
             encoder: chip.tim2.count(),
             hardware,
         };

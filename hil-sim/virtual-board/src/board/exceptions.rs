@@ -72,12 +72,16 @@ impl Board {
             chip.now = chip.now.max(chip.deadline.min(self.stalled_until));
             return Ok(());
         }
-        if self.hung || self.sleeping {
-            if self.sleeping && chip.scs.wakes() {
+        if self.hung || self.sleeping || chip.is_halted() || chip.browned_out() {
+            if self.sleeping && !chip.is_halted() && chip.scs.wakes() {
                 self.sleeping = false;
                 return Ok(());
             }
+            let before = chip.now;
             chip.now = chip.now.max(chip.deadline);
+            if self.sleeping && !chip.is_halted() {
+                chip.sleep(chip.now - before);
+            }
             return Ok(());
         }
         if chip.attention || chip.reset.is_some() {
@@ -99,6 +103,12 @@ impl Board {
                 if memory::is_reserved(address) || self.cpu.chip().forgiving =>
             {
                 self.hard_fault(1 << 9, Some(address))?;
+            }
+            Stop::Fault(Fault::Denied(address)) => {
+                // MMFAR, MMARVALID and DACCVIOL.
+                let now = self.cpu.chip().now;
+                self.cpu.chip_mut().scs.write(0xe000_ed34, address, now);
+                self.hard_fault(1 << 7 | 1 << 1, None)?;
             }
             Stop::Fault(Fault::Instruction) => self.hard_fault(1 << 16, None)?,
             Stop::Fault(Fault::Access(address)) => {

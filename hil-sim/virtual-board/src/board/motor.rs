@@ -1,57 +1,169 @@
-//! The motor beside the chip: it moves with the time, gets the voltages, and is sampled.
+//! The motor beside the chip: it moves with the time, gets the voltages of the bridge, and is sampled.
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, bail};
 use drive_core::{Compare, Sample};
+use hil_sim::plant::Plant;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::Board;
-use crate::chip::{TICKS_PER_PERIOD, TICKS_PER_S};
-use crate::periph::tim1::BadGates;
-use induction_drive::board as firmware_board;
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::power_stage::bridge::{Bridge, Leg};
+use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
+use crate::power_stage::{PowerStage, Sensors, channel};
 
 /// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
 
-/// The power stage between the chip and the motor.
-#[derive(Clone, Copy, Default)]
-pub(super) struct PowerStage {
+/// The connection between the chip and the motor.
+#[derive(Clone, Debug)]
+pub(super) struct Connection {
     /// Time up to which the motor has moved, ticks.
-    pub at: u64,
-    /// Compare values of this period.
-    pub applied: Compare,
-    /// Whether the outputs are on.
-    pub outputs: bool,
+    at: u64,
+    /// Compare values that the motor sees.
+    applied: Compare,
+    /// Dead time that it sees, ticks; none before the outputs were on.
+    dead_time: Option<u32>,
     /// The last sample.
     pub sample: Sample,
+    shunts: Option<ShuntReader>,
+}
+
+/// The shunts with their amplifiers, and what is needed to read them at any time of a period.
+#[derive(Clone, Debug)]
+struct ShuntReader {
+    shunts: Shunts,
+    /// Ticks that the drivers delay the gates by.
+    delay: i64,
+    rng: Xoshiro256PlusPlus,
+    amplifiers: Amplifiers,
+    /// The gates now.
+    bridge: Bridge,
+    /// The last top of the counter, ticks, and the one before.
+    top: Top,
+    before: Top,
+}
+
+/// The state at a top of the counter, from which a reading after it follows.
+#[derive(Clone, Debug, Default)]
+struct Top {
+    time: u64,
+    amplifiers: Amplifiers,
+    bridge: Bridge,
+    currents: Currents,
+}
+
+impl Connection {
+    pub(super) fn new(stage: &PowerStage, seed: u64) -> Self {
+        let shunts = match stage.sensors {
+            Sensors::InLine => None,
+            Sensors::LowSide(shunts) => {
+                let delay_s = stage.delay_and_drop.map_or(0.0, |(delay, _)| delay);
+                Some(ShuntReader {
+                    shunts,
+                    delay: (delay_s * TICKS_PER_S as f64) as i64,
+                    rng: Xoshiro256PlusPlus::seed_from_u64(seed),
+                    amplifiers: Amplifiers::default(),
+                    bridge: Bridge::default(),
+                    top: Top::default(),
+                    before: Top::default(),
+                })
+            }
+        };
+        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
+    }
+}
+
+impl ShuntReader {
+    /// Follows the shunts for some ticks, in which the currents went straight from `begin` to `end`.
+    fn follow(&mut self, at: u64, ticks: u64, begin: [f64; 3], end: [f64; 3]) {
+        let seconds = ticks as f64 / TICKS_PER_S as f64;
+        let slope = [0, 1, 2].map(|n| (end[n] - begin[n]) / seconds);
+        let currents = Currents { at: begin, slope };
+        let phase = at as i64 - self.top.time as i64 - self.delay;
+        self.amplifiers.follow(&self.shunts, &self.bridge, &currents, phase, ticks as u32);
+    }
+
+    /// A top of the counter: the gates may be others from here on.
+    fn top(&mut self, time: u64, bridge: &Bridge, plant: &Plant) {
+        self.bridge = bridge.clone();
+        // All low sides on, or none: the terminals have the same potential.
+        let slope = if bridge.compare().enabled { plant.shorted_slopes() } else { [0.0; 3] };
+        let currents = Currents { at: plant.phase_currents(), slope };
+        let top = Top { time, amplifiers: self.amplifiers, bridge: bridge.clone(), currents };
+        self.before = std::mem::replace(&mut self.top, top);
+    }
+
+    /// The code of a leg's current that a converter samples at a time, ticks.
+    fn code(&mut self, leg: usize, time: u64) -> u16 {
+        let from = if time >= self.top.time { &self.top } else { &self.before };
+        let mut amplifiers = from.amplifiers;
+        let after = time.saturating_sub(from.time) as u32;
+        let mut currents = from.currents;
+        let first = |leg: &Leg| leg.pieces.first().map_or(0, |piece| piece.ticks);
+        if from.bridge.legs.iter().any(|leg| first(leg) < after) {
+            // Behind the zero vector the other vectors bring the currents back: the mean of the period goes on.
+            currents.slope = [0.0; 3];
+        }
+        amplifiers.follow(&self.shunts, &from.bridge, &currents, -self.delay, after);
+        amplifiers.code(&self.shunts, leg, &mut self.rng)
+    }
+
+    /// The codes of the three currents for each converter, at the instants at which it samples them, for a chip whose
+    /// counter is at its top.
+    fn codes(&mut self, chip: &Chip) -> [[u16; 3]; 2] {
+        let now = self.top.time;
+        let samplings = chip.adc.samplings(chip.tim1.trigger_after_top().map(|after| now + after));
+        let asked = |converter: usize, leg: usize| {
+            let channel = channel::CURRENTS[leg] as u32;
+            samplings[converter].iter().find(|one| one.0 == channel).map(|one| one.1)
+        };
+        let instants = [0, 1].map(|converter| [0, 1, 2].map(|leg| asked(converter, leg)));
+        // What no converter asks for is read at the top.
+        instants.map(|legs| [0, 1, 2].map(|leg| self.code(leg, legs[leg].unwrap_or(now))))
+    }
 }
 
 impl Board {
+    /// The gates as they are now.
+    pub fn gates(&mut self) -> &Bridge {
+        let chip = self.cpu.chip_mut();
+        chip.look_at_gates();
+        chip.gates.bridge()
+    }
+
     /// Lets the motor see the outputs as they are from now on.
     pub(super) fn follow_outputs(&mut self) {
-        let chip = self.cpu.chip();
-        let (on, now) = (chip.tim1.outputs_on(), chip.now);
-        if on != self.stage.outputs {
-            if on && !chip.gates_connected() {
-                return; // the pins are not the timer's
-            }
+        let chip = self.cpu.chip_mut();
+        // A break switches them off without a write.
+        if chip.gates.bridge().outputs_on != chip.tim1.outputs_on() {
+            chip.look_at_gates();
+        }
+        let (now, compare) = (chip.now, chip.gates.bridge().compare());
+        if compare.enabled != self.connection.applied.enabled {
             self.advance_plant(now);
-            self.stage.outputs = on;
-            if !on {
+            self.connection.applied = compare;
+            if let Some(reader) = &mut self.connection.shunts {
+                reader.bridge = self.cpu.chip().gates.bridge().clone();
+            }
+            if !compare.enabled {
                 self.went_off = Some(now);
             }
         }
     }
 
     pub(super) fn advance_plant(&mut self, to: u64) {
-        let compare = if self.stage.outputs {
-            Compare { enabled: true, ..self.stage.applied }
-        } else {
-            Compare::OFF
-        };
-        while self.stage.at < to {
+        let connection = &mut self.connection;
+        let compare = if connection.applied.enabled { connection.applied } else { Compare::OFF };
+        while connection.at < to {
             // The plant divides the time that it is given into steps: a period at most.
-            let ticks = (to - self.stage.at).min(TICKS_PER_PERIOD);
+            let ticks = (to - connection.at).min(TICKS_PER_PERIOD);
+            let begin = self.plant.phase_currents();
             self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
-            self.stage.at += ticks;
+            if let Some(reader) = &mut connection.shunts {
+                reader.follow(connection.at, ticks, begin, self.plant.phase_currents());
+            }
+            connection.at += ticks;
         }
     }
 
@@ -59,36 +171,61 @@ impl Board {
     /// compare values taken over are in force.
     pub(super) fn crest(&mut self, at: u64) -> Result<()> {
         self.advance_plant(at);
-        self.stage.sample = self.plant.sample();
-        if let Some(disturb) = &mut self.disturb {
-            disturb(&mut self.stage.sample);
-        }
-        self.show_sample();
         let chip = self.cpu.chip_mut();
-        let [a, b, c] = chip.tim1.in_force().map(|value| value as u16);
-        self.stage.applied = Compare { a, b, c, enabled: true };
-        if self.stage.outputs {
-            match chip.tim1.check_gates(self.gates) {
-                Err(BadGates::Pulse { .. }) if chip.forgiving => self.short_pulses += 1,
-                checked => checked.map_err(|bad| anyhow!("bad gate signals: {bad:?}"))?,
-            }
+        chip.look_at_gates();
+        let (bridge, stage) = (chip.gates.bridge(), chip.gates.stage());
+        let (outputs_on, dead_time) = (bridge.outputs_on, bridge.dead_time);
+        let pulses = bridge.check_pulses(stage);
+        self.connection.applied = bridge.compare();
+        if let Some(reader) = &mut self.connection.shunts {
+            reader.top(at, bridge, &self.plant);
+        }
+        if outputs_on && self.connection.dead_time != Some(dead_time) {
+            self.connection.dead_time = Some(dead_time);
+            // As the firmware computes it from the register, so that both are the same to the bit.
+            let us = f64::from(dead_time as f32 / TICKS_PER_S as f32) * 1e6;
+            self.plant.set_dead_time(us)?;
+        }
+        self.connection.sample = self.plant.sample();
+        self.show_sample();
+        match pulses {
+            Err(_) if outputs_on && self.cpu.chip().forgiving => self.short_pulses += 1,
+            Err(bad) if outputs_on => bail!("bad gate signals: {bad}"),
+            _ => {}
         }
         Ok(())
     }
 
     /// Shows the sample to converters, comparators and encoder.
     pub(super) fn show_sample(&mut self) {
-        let s = self.stage.sample;
+        let Connection { sample, shunts, .. } = &mut self.connection;
         let chip = self.cpu.chip_mut();
-        let pins = [
-            (0, firmware_board::ADC1_CHANNELS.0, s.current_a),
-            (0, firmware_board::ADC1_CHANNELS.1, s.dc_link),
-            (1, firmware_board::ADC2_CHANNELS.0, s.current_b),
-            (1, firmware_board::ADC2_CHANNELS.1, s.heat_sink),
-        ];
-        for (converter, channel, code) in pins {
-            chip.adc.inputs[converter][usize::from(channel)] = code;
+        let seen = shunts.as_mut().map(|reader| reader.codes(chip));
+        if let Some([one, two]) = seen {
+            // Current a is the first converter's, b the second's.
+            (sample.current_a, sample.current_b, sample.current_c) = (one[0], two[1], one[2]);
         }
+        let undisturbed = *sample;
+        if let Some(disturb) = &mut self.disturb {
+            disturb(sample);
+        }
+        let of = |s: &Sample| [s.current_a, s.current_b, s.current_c];
+        let (now, before) = (of(sample), of(&undisturbed));
+        for (converter, inputs) in chip.adc.inputs.iter_mut().enumerate() {
+            let mut currents = seen.map_or(now, |codes| codes[converter]);
+            for leg in 0..3 {
+                if now[leg] != before[leg] {
+                    // A disturbed sensor is so for both converters.
+                    currents[leg] = now[leg];
+                }
+            }
+            for (channel, code) in channel::CURRENTS.into_iter().zip(currents) {
+                inputs[channel] = code;
+            }
+            inputs[channel::DC_LINK] = sample.dc_link;
+            inputs[channel::HEAT_SINK] = sample.heat_sink;
+        }
+        let s = *sample;
         chip.tim2.set_position(s.encoder);
         chip.compare(s.current_a, s.current_b, s.dc_link);
     }

@@ -1,12 +1,13 @@
 //! Options of a board.
 
-use drive_core::settings::{Line, SETTINGS};
+use anyhow::{Context, Result, anyhow};
+use drive_core::Settings;
+use drive_core::settings::{Line, SETTINGS, find};
 use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
-use crate::chip::TICKS_PER_S;
 use crate::cpu::Counting;
-use crate::periph::tim1::GateLimits;
+use crate::power_stage::{self, CODES, PowerStage, REFERENCE_V, Sensors};
 use induction_drive::board as firmware_board;
 
 /// Options of a board.
@@ -17,56 +18,104 @@ pub struct Options {
     pub seed: u64,
     /// Counting of cycles and instructions.
     pub counting: Counting,
-    /// Limits of the gate signals.
-    pub gates: GateLimits,
+    /// Whether its bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
+    pub confirmed: bool,
+    /// The drive's settings that are saved with the confirmation: by default those that the image starts with.
+    pub saved: Settings,
+    /// The power stage at the pins.
+    pub power_stage: &'static PowerStage,
 }
 
 impl Options {
-    /// The plant that a configuration describes, with the sensors and the dead time of this board.
+    /// The plant that a configuration describes, with the sensors and the dead time of the reference board.
     pub fn plant(config: &Config) -> PlantSettings {
+        Self::plant_on(&power_stage::REFERENCE, config)
+    }
+
+    /// The plant that a configuration describes, with the power stage, its sensors and the dead time of its board.
+    pub fn plant_on(stage: &PowerStage, config: &Config) -> PlantSettings {
         let mut plant = hil_sim::config::plant_settings(config);
-        // The converters have another reference than the source's; their codes cover the range of the sensors.
-        let gain = f64::from(firmware_board::CURRENT_A.gain / Line::CHANNEL_A.gain);
-        let source = MeasurementSettings::default();
-        let range = plant.measurement.range_a / source.range_a;
-        plant.measurement.lsb_a = source.lsb_a * gain * range;
+        let settings = stage.firmware_settings();
+        if stage.sensors == Sensors::InLine {
+            // The converters have another reference than the source's; their codes cover the range of the sensors.
+            let gain = f64::from(settings.scales.current_a.gain / Line::CHANNEL_A.gain);
+            let source = MeasurementSettings::default();
+            let range = plant.measurement.range_a / source.range_a;
+            plant.measurement.lsb_a = source.lsb_a * gain * range;
+        }
+        if let Some(divider) = stage.dc_link_divider {
+            plant.measurement.dc_link_v = divider * REFERENCE_V / CODES;
+        }
+        if let Some((delay_s, drop_v)) = stage.delay_and_drop {
+            plant.inverter.propagation_us = delay_s * 1e6;
+            plant.inverter.residual_v = drop_v;
+        }
         plant.inverter.dead_time_us =
-            f64::from(firmware_board::dead_time(firmware_board::DEAD_TIME_S).1) * 1e6;
+            f64::from(firmware_board::dead_time(settings.inverter.dead_time_s).1) * 1e6;
         plant.inverter.timer_top = firmware_board::PWM_TOP;
         plant
     }
 
-    /// The lines for the console that adapt the image to a configuration: its motor, and scales for its sensors at the
-    /// converters of this board. Empty with the defaults.
+    /// The lines for the console that adapt the image of the reference board to a configuration; see
+    /// [`Options::set_lines_on`]. Empty with the defaults.
     pub fn set_lines(config: &Config) -> Vec<String> {
-        let [image, default] = [firmware_board::settings(), Config::default().drive];
+        Self::set_lines_on(&power_stage::REFERENCE, config)
+    }
+
+    /// The lines for the console that adapt the image of a board to a configuration: its motor, and on the reference board
+    /// scales for its sensors at the converters of this board.
+    pub fn set_lines_on(stage: &PowerStage, config: &Config) -> Vec<String> {
+        let [image, default] = [stage.firmware_settings(), Config::default().drive];
         let mut wanted = config.drive;
         // Timer and converters are the board's.
-        wanted.inverter.top = default.inverter.top;
-        wanted.inverter.dead_time_s = default.inverter.dead_time_s;
-        wanted.scales.full_scale = default.scales.full_scale;
-        let differing = SETTINGS.iter().filter(|entry| entry.get(&wanted) != entry.get(&default));
-        let differing: Vec<_> = differing.collect();
-        let sensors = Self::plant(config).measurement;
-        [wanted.scales.current_a, wanted.scales.current_b] = current_lines(&sensors);
+        wanted.inverter.top = image.inverter.top;
+        wanted.inverter.dead_time_s = image.inverter.dead_time_s;
+        wanted.scales.full_scale = image.scales.full_scale;
+        let in_line = stage.sensors == Sensors::InLine;
+        // The sensors of the reference board are those of the configuration.
+        let may_differ =
+            SETTINGS.iter().filter(|entry| !in_line || entry.get(&wanted) != entry.get(&default));
+        let differing: Vec<_> = may_differ.collect();
+        if in_line {
+            let sensors = Self::plant(config).measurement;
+            [wanted.scales.current_a, wanted.scales.current_b] = current_lines(&sensors);
+        } else {
+            wanted.scales = image.scales;
+        }
         let needed = differing.iter().filter(|entry| entry.get(&wanted) != entry.get(&image));
         needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
     }
 
-    /// A board with the motor of a configuration.
+    /// With the settings for a configuration saved, as if [`Options::set_lines_on`] were typed and saved before.
+    ///
+    /// # Errors
+    /// A line that the image would refuse.
+    pub fn set_up(mut self, config: &Config) -> Result<Self> {
+        for line in Self::set_lines_on(self.power_stage, config) {
+            let (name, value) = line.trim_start_matches("set ").split_once(' ').unwrap_or_default();
+            let entry = find(name).with_context(|| line.clone())?;
+            let value = entry.parse(value).map_err(|why| anyhow!("{line}: {why}"))?;
+            entry.set(&mut self.saved, value);
+        }
+        self.saved.check().map_err(|why| anyhow!("{why}"))?;
+        Ok(self)
+    }
+
+    /// The reference board with the motor of a configuration.
     pub fn new(config: &Config, seed: u64) -> Self {
-        let us = firmware_board::CYCLES_PER_US;
-        let gates = GateLimits {
-            // As the firmware asks for; the timer makes it a little longer.
-            dead_time: (f64::from(firmware_board::DEAD_TIME_S) * TICKS_PER_S as f64).round() as u32,
-            // A microsecond, less the rounding to counts.
-            pulse: us - 2,
-        };
+        Self::on(&power_stage::REFERENCE, config, seed)
+    }
+
+    /// A board with this power stage and the motor of a configuration; [`PowerStage::config`] gives one that suits it.
+    pub fn on(power_stage: &'static PowerStage, config: &Config, seed: u64) -> Self {
+        let plant = Self::plant_on(power_stage, config);
         Self {
-            plant: Self::plant(config),
+            plant,
             seed,
             counting: Counting { cycles: true, every_instruction: false },
-            gates,
+            confirmed: true,
+            saved: power_stage.firmware_settings(),
+            power_stage,
         }
     }
 }

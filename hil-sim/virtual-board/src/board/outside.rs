@@ -3,7 +3,8 @@
 use anyhow::Result;
 
 use super::Board;
-use crate::chip::CONTROL_INTERRUPT;
+use crate::chip::{CONTROL_INTERRUPT, TICKS_PER_S};
+use crate::image::Image;
 use crate::periph::Reset;
 
 impl Board {
@@ -36,8 +37,9 @@ impl Board {
     }
 
     pub(super) fn drain_log(&mut self) -> Result<()> {
-        let lines = self.log.take(&mut self.cpu)?;
-        self.lines.extend(lines);
+        if let Some(log) = &mut self.log {
+            self.lines.extend(log.take(&mut self.cpu)?);
+        }
         Ok(())
     }
 
@@ -47,6 +49,22 @@ impl Board {
         let now = self.chip().now;
         self.chip().flash.cut(now);
         self.reset(Reset::Power);
+    }
+
+    /// A programmer writes another image for some time, ms: it resets the chip and holds the core, so that nothing sets up
+    /// the pins; a reset ends it.
+    ///
+    /// # Errors
+    /// As of [`Board::run_ticks`].
+    pub fn flash(&mut self, image: &Image, ms: f64) -> Result<()> {
+        self.reset(Reset::Pin);
+        self.hang();
+        self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)?;
+        for segment in image.segments() {
+            self.cpu.write(segment.address, &segment.bytes);
+        }
+        self.reset(Reset::Pin);
+        Ok(())
     }
 
     /// Level of the break pin: low trips.
@@ -74,6 +92,7 @@ impl Board {
     /// firmware is damaged on purpose.
     pub fn forgive(&mut self) {
         self.cpu.chip_mut().forgiving = true;
+        self.collect_violations();
     }
 
     /// Returns from [`Board::run_ticks`] before the n-th instruction in the flash from here on.

@@ -4,7 +4,7 @@ use anyhow::{Result, anyhow};
 use hil_sim::plant::Plant;
 
 use super::Board;
-use super::motor::PowerStage;
+use super::motor::Connection;
 use crate::chip::Chip;
 use crate::cpu::CoreState;
 use crate::periph::Reset;
@@ -14,7 +14,7 @@ pub struct Snapshot {
     core: CoreState,
     chip: Chip,
     plant: Plant,
-    stage: PowerStage,
+    connection: Connection,
     sleeping: bool,
     resets: Vec<(u64, Reset)>,
 }
@@ -32,7 +32,7 @@ impl Board {
             core: self.cpu.keep().map_err(|e| anyhow!("emulator: {e:?}"))?,
             chip: self.cpu.chip().clone(),
             plant: self.plant.clone(),
-            stage: self.stage,
+            connection: self.connection.clone(),
             sleeping: self.sleeping,
             resets: self.resets.clone(),
         })
@@ -47,8 +47,9 @@ impl Board {
         let forgiving = self.cpu.chip().forgiving;
         *self.cpu.chip_mut() = to.chip.clone();
         self.cpu.chip_mut().forgiving = forgiving;
+        self.cpu.chip_mut().rules.collecting |= forgiving;
         self.plant = to.plant.clone();
-        self.stage = to.stage;
+        self.connection = to.connection.clone();
         self.sleeping = to.sleeping;
         self.resets = to.resets.clone();
         self.hung = false;
@@ -60,7 +61,9 @@ impl Board {
         self.short_pulses = 0;
         self.periods.clear();
         self.lines.clear();
-        self.log.forget();
+        if let Some(log) = &mut self.log {
+            log.forget();
+        }
         Ok(())
     }
 }

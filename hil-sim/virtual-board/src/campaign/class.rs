@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 
 use super::faults::{current, flip, losing, name, noise, slow_sensor};
-use super::scene::{Regions, Source};
+use super::scene::{Source, Target};
 use crate::board::Board;
 use crate::chip::TICKS_PER_S;
 use crate::cpu::Register;
@@ -12,7 +12,7 @@ use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 
 /// Injects a fault, and describes it.
-pub type Inject = fn(&mut Board, &Regions, &mut dyn Rng) -> String;
+pub type Inject = fn(&mut Board, &Target, &mut dyn Rng) -> String;
 
 /// The procedure of a run.
 #[derive(Clone, Copy)]
@@ -66,8 +66,8 @@ pub const CLASSES: &[Class] = &[
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        run: Run::Regulating(|board, _, rng| {
-            let (which, now) = (rng.random(), board.sample());
+        run: Run::Regulating(|board, target, rng| {
+            let (which, now) = (target.any_current(rng), board.sample());
             let value = *current(which, &mut { now });
             board.disturb = Some(Box::new(move |s| *current(which, s) = value));
             format!("{} at {value}", name(which))
@@ -78,9 +78,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: SILENT_MS,
         why: SILENT,
         sources: BOTH,
-        run: Run::Regulating(|board, _, rng| {
-            let which = rng.random();
-            let line = if which { firmware_board::CURRENT_A } else { firmware_board::CURRENT_B };
+        run: Run::Regulating(|board, target, rng| {
+            let which = target.any_current(rng);
+            let line = target.line(which);
             let zero = (-line.offset / line.gain).round() as u16;
             board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
             name(which).into()
@@ -91,8 +91,8 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "the sample after it, and the step that sees it",
         sources: BOTH,
-        run: Run::Regulating(|board, _, rng| {
-            let (which, high): (bool, bool) = (rng.random(), rng.random());
+        run: Run::Regulating(|board, target, rng| {
+            let (which, high) = (target.any_current(rng), rng.random::<bool>());
             let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
             board.disturb = Some(Box::new(move |s| *current(which, s) = code));
             format!("{} at {code}", name(which))
@@ -103,11 +103,11 @@ pub const CLASSES: &[Class] = &[
         bound_ms: NOISE_MS,
         why: NOISE,
         sources: BOTH,
-        run: Run::Regulating(|board, _, rng| {
-            let which = rng.random();
-            // 5 mA to 2 A rms.
-            let amperes = 0.005 * 400_f64.powf(rng.random::<f64>());
-            let codes = amperes / f64::from(firmware_board::CURRENT_A.gain);
+        run: Run::Regulating(|board, target, rng| {
+            let which = target.any_current(rng);
+            // 5 mA to 2 A rms on the dissertation's motor.
+            let amperes = target.relative_current * 0.005 * 400_f64.powf(rng.random::<f64>());
+            let codes = amperes / f64::from(target.line(which).gain.abs());
             let mut noise = noise(rng, codes);
             board.disturb = Some(Box::new(move |s| noise(current(which, s))));
             format!("{}, {:.1} mA", name(which), 1e3 * amperes)
@@ -132,8 +132,8 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * CARRIER_MS + STEP_MS,
         why: "quantities that are used once in a carrier period show in the next one",
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| {
-            let Region { address: base, size } = regions.state;
+        run: Run::Regulating(|board, target, rng| {
+            let Region { address: base, size } = target.state;
             // A word that holds a plausible number; angles and counts are another class.
             for _ in 0..1000 {
                 let address = base + 4 * rng.random_range(0..size / 4);
@@ -151,8 +151,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: STEP_MS,
         why: "voltage limits: the sample after it, and the step that sees it",
         sources: BOTH,
-        run: Run::Regulating(|board, _, rng| {
-            let volts = rng.random_range(100.0..600.0);
+        run: Run::Regulating(|board, target, rng| {
+            // On a dc link of 311 V.
+            let volts = target.relative_voltage * rng.random_range(100.0..600.0);
             board.plant.set_dc_link(volts).ok();
             format!("to {volts:.0} V")
         }),
@@ -214,39 +215,39 @@ pub const CLASSES: &[Class] = &[
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.coefficients)),
+        run: Run::Regulating(|board, target, rng| flip(board, rng, target.coefficients)),
     },
     Class {
         name: "bit flip in the drive's state",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.state)),
+        run: Run::Regulating(|board, target, rng| flip(board, rng, target.state)),
     },
     Class {
         name: "bit flip in the control's code",
         bound_ms: CHECK_MS,
         why: CHECK,
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.code)),
+        run: Run::Regulating(|board, target, rng| flip(board, rng, target.code)),
     },
     Class {
         name: "bit flip anywhere in the control's data",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| flip(board, rng, regions.control)),
+        run: Run::Regulating(|board, target, rng| flip(board, rng, target.control)),
     },
     Class {
         name: "bit flip in RAM, stack included",
         bound_ms: LOCK_MS,
         why: LOCK,
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| {
+        run: Run::Regulating(|board, target, rng| {
             let area = if rng.random() {
-                regions.data
+                target.data
             } else {
-                Region { address: regions.stack.end() - 1024, size: 1024 }
+                Region { address: target.stack.end() - 1024, size: 1024 }
             };
             flip(board, rng, area)
         }),
@@ -331,9 +332,9 @@ pub const CLASSES: &[Class] = &[
         bound_ms: 2.0 * STEP_MS,
         why: "the next interrupt does not find room for its frame",
         sources: BOTH,
-        run: Run::Regulating(|board, regions, rng| {
+        run: Run::Regulating(|board, target, rng| {
             let room = 8 * rng.random_range(0..13);
-            board.cpu().set(Register::SP, regions.stack.address + room);
+            board.cpu().set(Register::SP, target.stack.address + room);
             format!("room for {room} bytes")
         }),
     },

@@ -6,18 +6,40 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::scene::Target;
 use crate::board::Board;
 use crate::memory::Region;
 use drive_core::Sample;
+use drive_core::settings::{CurrentSensors, Line};
 
-/// The code of a current sensor: a, or b.
-pub fn current(a: bool, sample: &mut Sample) -> &mut u16 {
-    if a { &mut sample.current_a } else { &mut sample.current_b }
+/// The code of the current sensor of phase 0, 1 or 2.
+pub fn current(which: usize, sample: &mut Sample) -> &mut u16 {
+    match which {
+        0 => &mut sample.current_a,
+        1 => &mut sample.current_b,
+        _ => &mut sample.current_c,
+    }
 }
 
 /// The name of a current sensor.
-pub fn name(a: bool) -> &'static str {
-    if a { "sensor a" } else { "sensor b" }
+pub fn name(which: usize) -> &'static str {
+    ["sensor a", "sensor b", "sensor c"][which]
+}
+
+impl Target {
+    /// One of the current sensors.
+    pub fn any_current(&self, rng: &mut dyn Rng) -> usize {
+        match self.settings.scales.sensors {
+            CurrentSensors::InLine => usize::from(!rng.random::<bool>()),
+            CurrentSensors::LowSide => rng.random_range(0..3),
+        }
+    }
+
+    /// The scale of a current sensor.
+    pub fn line(&self, which: usize) -> Line {
+        let scales = &self.settings.scales;
+        [scales.current_a, scales.current_b, scales.current_c][which]
+    }
 }
 
 /// The encoder loses a share of its counts.

@@ -34,13 +34,13 @@ pub struct Outcome {
     pub angle_deg: f64,
 }
 
-/// Watches for `ms` after the fault, or until the outputs are off. The angle counts, or the currents alone.
+/// Watches for `ms` after the fault, or until the outputs are off. The angle counts and the currents, up to `trip_a`, or the
+/// currents alone.
 ///
 /// # Errors
 /// Bad gate signals; another failure of the model.
-pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> {
+pub fn watch(board: &mut Board, trip_a: f64, ms: f64, angle_counts: bool) -> Result<Outcome> {
     let began = board.chip().now;
-    let trip = f64::from(induction_drive::board::settings().trip_a());
     let mut outcome = Outcome::default();
     board.went_off = None;
     let since = |at: u64| at.saturating_sub(began) as f64 * 1e3 / TICKS_PER_S as f64;
@@ -62,7 +62,7 @@ pub fn watch(board: &mut Board, ms: f64, angle_counts: bool) -> Result<Outcome> 
         outcome.angle_deg = outcome.angle_deg.max(error);
         // A not-a-number counts as wrong.
         let straight = error <= ANGLE_DEG || !angle_counts;
-        if !(straight && current < trip) {
+        if !(straight && current < trip_a) {
             outcome.wrong_ms = since(next);
         }
     }

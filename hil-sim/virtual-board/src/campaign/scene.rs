@@ -1,7 +1,7 @@
 //! The beginning of every injection: snapshots of a board that has started.
 
 use anyhow::{Context, Result, ensure};
-use drive_core::State;
+use drive_core::{Settings, State};
 use hil_sim::Config;
 use hil_sim::plant::Load;
 use induction_drive::settings::FirmwareSettings;
@@ -14,16 +14,19 @@ use crate::chip::Chip;
 use crate::image::Image;
 use crate::memory::{BANK_2, Region};
 use crate::pair::Pair;
+use crate::power_stage::PowerStage;
 
-/// Current on the quadrature axis before the injection, A.
-const TORQUE: &str = "torque 1.5";
-/// Held speeds of the shaft with the encoder, rad/s mechanical: 300 and 900 rpm. Without it the shaft is
+/// Current on the quadrature axis before the injection, A on the dissertation's motor.
+const TORQUE_A: f64 = 1.5;
+/// Held speeds of the shaft with the encoder, rad/s mechanical with four poles: 300 and 900 rpm. Without it the shaft is
 /// locked, where the injection alone knows the angle.
 const SPEEDS: [f64; 2] = [31.4, 94.2];
 /// Periods until the torque stands.
 const SETTLING: u64 = 1200;
 /// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
+/// Longest that learning takes, periods: two minutes.
+const LEARNING: u64 = 720_000;
 /// A setting that is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
@@ -38,9 +41,9 @@ pub enum Source {
     FastEncoder,
 }
 
-/// Regions of memory in which bits flip.
+/// The target of the faults: regions of memory in which bits flip, and the sizes of the drive's quantities.
 #[derive(Clone, Copy, Debug)]
-pub struct Regions {
+pub struct Target {
     /// The drive's coefficients.
     pub coefficients: Region,
     /// The drive's state.
@@ -53,10 +56,16 @@ pub struct Regions {
     pub data: Region,
     /// The stack.
     pub stack: Region,
+    /// The drive's settings.
+    pub settings: Settings,
+    /// Currents in proportion to the dissertation's motor.
+    pub relative_current: f64,
+    /// Voltages in proportion to its dc link.
+    pub relative_voltage: f64,
 }
 
-impl Regions {
-    fn new(board: &Board) -> Result<Self> {
+impl Target {
+    fn new(board: &Board, config: &Config, settings: Settings) -> Result<Self> {
         let Addresses { coefficients, state, control, .. } = *board.addresses();
         let between = |first: &str, end: &str| {
             let address = board.image().symbol(first)?.address;
@@ -65,7 +74,17 @@ impl Regions {
         let code = between("__sccm", "__eccm")?;
         let data = between("__sdata", "__euninit")?;
         let stack = between("_stack_end", "_stack_start")?;
-        Ok(Self { coefficients, state, control, code, data, stack })
+        Ok(Self {
+            coefficients,
+            state,
+            control,
+            code,
+            data,
+            stack,
+            settings,
+            relative_current: config.amperes(1.0),
+            relative_voltage: config.inverter.dc_link_v / Config::default().inverter.dc_link_v,
+        })
     }
 }
 
@@ -73,8 +92,8 @@ impl Regions {
 pub struct Scene {
     /// The board.
     pub board: Board,
-    /// Regions of its memory.
-    pub regions: Regions,
+    /// The target of the faults.
+    pub target: Target,
     /// Two sets of settings.
     pub settings: [FirmwareSettings; 2],
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
@@ -85,13 +104,19 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Starts a board, once with each angle source.
+    /// Starts a board with this power stage and a motor that suits it, once with each angle source.
     ///
     /// # Errors
     /// The board does not start.
-    pub fn new(image: Image) -> Result<Self> {
-        let mut pair = Pair::new(image, Options::new(&Config::default(), 1))?;
+    pub fn new(image: Image, stage: &'static PowerStage) -> Result<Self> {
+        let config = stage.config()?;
+        let mut pair = Pair::new(image, Options::on(stage, &config, 1).set_up(&config)?)?;
         pair.order("set wiring_checked yes")?;
+        if config.prepare.learn {
+            pair.order("start learning")?;
+            pair.until_state(State::Learning)?;
+            pair.until("the end of learning", LEARNING, |_, state| state == State::Off)?;
+        }
         // Twice: both pages hold a set.
         for _ in 0..2 {
             pair.order("save")?;
@@ -104,23 +129,25 @@ impl Scene {
         pair.order("save")?;
         pair.order(&format!("set {} {}", CHANGE.0, old.command.timeout_s))?;
         let off = [first, pair.board.keep()?];
-        let injection = started(&mut pair)?;
+        let torque = format!("torque {}", config.amperes(TORQUE_A));
+        let injection = started(&mut pair, &torque)?;
         pair.order("stop")?;
         pair.until_state(State::Off)?;
         pair.order("angle encoder")?;
         let mut with_encoder = |speed| {
             pair.board.plant.set_load(Load::Speed { speed })?;
-            let started = started(&mut pair)?;
+            let started = started(&mut pair, &torque)?;
             pair.order("stop")?;
             pair.until_state(State::Off)?;
             // A start takes a flux that has not decayed for a current that follows no voltage.
             pair.run(DECAYED, |_, _| {})?;
             anyhow::Ok(started)
         };
-        let encoder = [with_encoder(SPEEDS[0])?, with_encoder(SPEEDS[1])?];
+        let encoder = [with_encoder(config.rpm(SPEEDS[0]))?, with_encoder(config.rpm(SPEEDS[1]))?];
+        let settings = pair.shadow.settings();
         let board = pair.board;
-        let regions = Regions::new(&board)?;
-        Ok(Self { board, regions, settings: [old, new], off, injection, encoder })
+        let target = Target::new(&board, &config, settings)?;
+        Ok(Self { board, target, settings: [old, new], off, injection, encoder })
     }
 
     /// Regulating torque.
@@ -145,10 +172,10 @@ impl Scene {
     }
 }
 
-fn started(pair: &mut Pair) -> Result<Snapshot> {
+fn started(pair: &mut Pair, torque: &str) -> Result<Snapshot> {
     pair.order("start torque")?;
     pair.until_state(State::Torque)?;
-    pair.order(TORQUE)?;
+    pair.order(torque)?;
     pair.run(SETTLING, |_, _| {})?;
     // A control interrupt has just ended; half a period later nothing happens for a while.
     pair.board.run_ticks(u64::from(induction_drive::board::PWM_TOP) / 2)?;
@@ -186,7 +213,8 @@ pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
         "settings outside the second bank"
     );
     let mut chip = board.chip().clone();
-    match Saved::load(Bank(&mut chip), &FirmwareSettings::of_the_board()).1 {
+    let defaults = FirmwareSettings::of(chip.gates.stage().board());
+    match Saved::load(Bank(&mut chip), &defaults).1 {
         Loaded::Settings(settings) => Some(settings),
         _ => None,
     }

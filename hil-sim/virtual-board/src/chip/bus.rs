@@ -4,25 +4,31 @@ use std::fmt;
 
 use super::Chip;
 use crate::memory;
+use crate::periph::rcc::On;
 use crate::periph::{Effect, Reset, plain};
 use crate::scs;
 
-const TIM2: u32 = 0x4000_0000;
+pub(super) const TIM2: u32 = 0x4000_0000;
+pub(super) const TIM5: u32 = 0x4000_0c00;
 const IWDG: u32 = 0x4000_3000;
-const PWR: u32 = 0x4000_7000;
-const LPUART1: u32 = 0x4000_8000;
-const SYSCFG: u32 = 0x4001_0000;
+pub(super) const PWR: u32 = 0x4000_7000;
+pub(super) const LPUART1: u32 = 0x4000_8000;
+pub(super) const SYSCFG: u32 = 0x4001_0000;
+const BDTR: u32 = 0x4001_2c44;
 const EXTI: u32 = 0x4001_0400;
-const TIM1: u32 = 0x4001_2c00;
+pub(super) const TIM1: u32 = 0x4001_2c00;
 /// Compare values of the three legs.
 const COMPARES: std::ops::Range<u32> = TIM1 + 0x34..TIM1 + 0x40;
-const RCC: u32 = 0x4002_1000;
-const FLASH_REGISTERS: u32 = 0x4002_2000;
-const GPIO_FIRST: u32 = 0x4800_0000;
-const GPIO_LAST: u32 = 0x4800_1bff;
-const ADC1: u32 = 0x5000_0000;
-const DAC1: u32 = 0x5000_0800;
-const DAC3: u32 = 0x5000_1000;
+const TIM1_SR: u32 = 0x10;
+pub(super) const RCC: u32 = 0x4002_1000;
+pub(super) const FLASH_REGISTERS: u32 = 0x4002_2000;
+pub(super) const GPIO_FIRST: u32 = 0x4800_0000;
+pub(super) const GPIO_LAST: u32 = 0x4800_1bff;
+pub(super) const ADC1: u32 = 0x5000_0000;
+pub(super) const DAC1: u32 = 0x5000_0800;
+pub(super) const DAC3: u32 = 0x5000_1000;
+const GPIO_A: u32 = GPIO_FIRST;
+const GPIO_B: u32 = GPIO_FIRST + 0x400;
 
 /// An access that the model does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +54,7 @@ impl fmt::Display for Unknown {
 impl Chip {
     /// Reads a register, `size` bytes.
     pub fn read(&mut self, address: u32, size: u8) -> u32 {
-        self.accesses += 1;
+        self.begin_access();
         let value = if let Some(word) = bit_band(address) {
             self.peek(word.0).map(|value| value >> word.1 & 1)
         } else {
@@ -64,7 +70,7 @@ impl Chip {
 
     /// Writes a register, `size` bytes.
     pub fn write(&mut self, address: u32, size: u8, value: u32) {
-        self.accesses += 1;
+        self.begin_access();
         let done = if let Some((word, bit)) = bit_band(address) {
             self.peek(word).and_then(|old| {
                 let new = old & !(1 << bit) | (value & 1) << bit;
@@ -85,6 +91,11 @@ impl Chip {
         if done.is_none() {
             self.is_unknown(address, Some(value));
         }
+    }
+
+    fn begin_access(&mut self) {
+        self.accesses += 1;
+        (self.rules.now, self.rules.at) = (self.now, self.at);
     }
 
     fn is_unknown(&mut self, address: u32, written: Option<u32>) -> u32 {
@@ -125,10 +136,20 @@ impl Chip {
             }
             return Some(value);
         }
+        if !self.is_clocked(address) {
+            return self.at_reset(address);
+        }
+        self.read_clocked(address)
+    }
+
+    /// A register of a peripheral that has its clock.
+    pub(super) fn read_clocked(&mut self, address: u32) -> Option<u32> {
+        let (offset, now) = (address & 0x3ff, self.now);
         match address & !0x3ff {
             TIM1 => self.tim1.read(offset, now),
-            ADC1 => self.adc.read(offset),
+            ADC1 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
+            TIM5 => self.tim5.read(offset, now),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH_REGISTERS => self.flash.read(offset, now),
@@ -144,8 +165,8 @@ impl Chip {
             },
             EXTI => self.exti.read(offset),
             GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].read(offset),
-            DAC1 => self.dac.read(0, offset),
-            DAC3 => self.dac.read(1, offset),
+            DAC1 => self.dac.read(0, offset, now),
+            DAC3 => self.dac.read(1, offset, now),
             _ => None,
         }
     }
@@ -164,26 +185,59 @@ impl Chip {
             let effect = self.flash.store(address, value, now)?;
             return self.follow(effect);
         }
+        if !self.is_clocked(address) {
+            return Some(());
+        }
+        let rules = &mut self.rules;
         let effect = match address & !0x3ff {
-            TIM1 => self.tim1.write(offset, value, now)?,
-            ADC1 => self.adc.write(offset, value)?,
+            TIM1 => self.tim1.write(offset, value, now, rules)?,
+            ADC1 => self.adc.write(offset, value, now, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
-            RCC => self.rcc.write(offset, value, now)?,
-            PWR => self.pwr.write(offset, value)?,
-            FLASH_REGISTERS => self.flash.write(offset, value, now)?,
+            TIM5 => self.tim5.write(offset, value, now)?,
+            RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
+            PWR => {
+                self.pwr.write(offset, value, self.syscfg.get(plain::CFGR2) & plain::PVDL != 0)?
+            }
+            FLASH_REGISTERS => self.flash.write(offset, value, now, rules)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
-            IWDG => self.iwdg.write(offset, value, now)?,
+            IWDG => self.iwdg.write(offset, value, now, rules)?,
             SYSCFG => match offset {
-                0x200..0x220 => self.comp.write(offset - 0x200, value)?,
+                0x200..0x220 => self.comp.write(offset - 0x200, value, now)?,
                 _ => self.syscfg.write(offset, value)?,
             },
             EXTI => self.exti.write(offset, value)?,
             GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].write(offset, value)?,
-            DAC1 => self.dac.write(0, offset, value)?,
-            DAC3 => self.dac.write(1, offset, value)?,
+            DAC1 => self.dac.write(0, offset, value, now, rules)?,
+            DAC3 => self.dac.write(1, offset, value, now, rules)?,
             _ => return None,
         };
+        self.check_rules(address, value);
+        if moves_gates(address) {
+            self.look_at_gates();
+        }
         self.follow(effect)
+    }
+
+    /// What a write means for other parts of the chip.
+    fn check_rules(&mut self, address: u32, value: u32) {
+        match address & !0x3ff {
+            TIM1 if address == BDTR && value & 1 << 15 != 0 && self.tim1.main_output() => {
+                self.check_gate_pins();
+            }
+            TIM2 => self.check_encoder_pins(),
+            LPUART1 if address & 0x3ff == 0x28 => self.check_serial_pin(),
+            RCC | FLASH_REGISTERS => {
+                self.adc.kernel_clock = self.rcc.adc_kernel_clock();
+                self.check_clocks();
+            }
+            PWR => {
+                self.check_clocks();
+                self.monitor_supply();
+            }
+            SYSCFG if address & 0x3ff >= 0x200 => self.check_reference(address & 0x3ff),
+            SYSCFG => self.monitor_supply(),
+            _ => {}
+        }
     }
 
     fn follow(&mut self, effect: Effect) -> Option<()> {
@@ -203,6 +257,16 @@ impl Chip {
             }
         }
         Some(())
+    }
+}
+
+/// Whether a write may change the levels at the pins of the gates. Compare values change them at the top of the counter,
+/// where the gates are looked at in any case.
+fn moves_gates(address: u32) -> bool {
+    match address & !0x3ff {
+        TIM1 => !COMPARES.contains(&address) && address & 0x3ff != TIM1_SR,
+        GPIO_A | GPIO_B => true,
+        _ => false,
     }
 }
 

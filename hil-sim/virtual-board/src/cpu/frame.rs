@@ -38,7 +38,8 @@ impl Cpu {
         } else {
             0x20
         };
-        let stacked = self.uc.mem_write(u64::from(sp), &frame[..size]).is_ok();
+        let stacked = !self.denies(sp, size as u32)
+            && self.uc.mem_write(u64::from(sp), &frame[..size]).is_ok();
         let from_handler = xpsr & 0x1ff != 0;
         let exc_return =
             0xffff_ffe1 | if from_handler { 0 } else { 8 } | if float { 0 } else { BASIC_FRAME };

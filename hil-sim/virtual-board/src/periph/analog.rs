@@ -1,28 +1,30 @@
-//! Comparators and their reference voltages (RM0440, sections 22 and 24).
+//! Comparators (RM0440, section 24).
 //!
-//! A comparator is given its input by [`Comparators::inputs`], in codes of a 12-bit converter, and
-//! compares it with the channel of the converter its INMSEL names.
+//! A comparator is given its input and its reference in codes of a 12-bit converter. Its output follows after its
+//! delay, with its hysteresis below the reference.
 
-use super::{Effect, Plain, Store};
+use super::{Effect, NEVER, Plain, Store};
 
-const ALL: u32 = u32::MAX;
+const MASK: u32 = 0x80ff_8171;
 const COMP: &[Plain] = &[
-    (0x00, 0, 0x80ff_ffff),
-    (0x04, 0, 0x80ff_ffff),
-    (0x08, 0, 0x80ff_ffff),
-    (0x0c, 0, 0x80ff_ffff),
-    (0x10, 0, 0x80ff_ffff),
-    (0x14, 0, 0x80ff_ffff),
-    (0x18, 0, 0x80ff_ffff),
+    (0x00, 0, MASK),
+    (0x04, 0, MASK),
+    (0x08, 0, MASK),
+    (0x0c, 0, MASK),
+    (0x10, 0, MASK),
+    (0x14, 0, MASK),
+    (0x18, 0, MASK),
 ];
-const DAC: &[Plain] = &[
-    (0x00, 0, ALL),
-    (0x08, 0, 0xfff),
-    (0x14, 0, 0xfff),
-    (0x34, 0, ALL),
-    (0x38, 0, ALL),
-    (0x3c, 0, ALL),
-];
+const EN: u32 = 1;
+const POL: u32 = 1 << 15;
+const VALUE: u32 = 1 << 30;
+const LOCK: u32 = 1 << 31;
+/// From an input beyond the reference to the output, ticks: 31 ns (datasheet, tD, 50 mV overdrive).
+const DELAY: u64 = 5;
+/// From the enable bit to a valid output, ticks: 5 us (datasheet, tSTART).
+const START: u64 = 5 * 170;
+/// A step of the hysteresis, 10 mV, codes at a reference of 3.3 V.
+const HYSTERESIS: u16 = 12;
 
 /// The comparators 1 to 7.
 #[derive(Clone, Debug)]
@@ -32,77 +34,99 @@ pub struct Comparators {
     pub inputs: [u16; 7],
     /// Codes at their negative inputs.
     pub references: [u16; 7],
+    /// What the inputs say, without polarity, and since when the output does not say so yet.
+    high: [bool; 7],
+    output: [bool; 7],
+    follows_at: [u64; 7],
+    started_at: [u64; 7],
 }
 
 impl Default for Comparators {
     fn default() -> Self {
-        Self { store: Store::new(COMP), inputs: [0; 7], references: [0; 7] }
+        Self {
+            store: Store::new(COMP),
+            inputs: [0; 7],
+            references: [0; 7],
+            high: [false; 7],
+            output: [false; 7],
+            follows_at: [NEVER; 7],
+            started_at: [NEVER; 7],
+        }
     }
 }
 
 impl Comparators {
+    fn control(&self, n: usize) -> u32 {
+        self.store.get(4 * n as u32)
+    }
+
+    /// Whether it is on.
+    pub fn is_on(&self, n: usize) -> bool {
+        self.control(n) & EN != 0
+    }
+
     /// Its INPSEL: the pin at its positive input.
     pub fn input_of(&self, n: usize) -> u32 {
-        self.store.get(4 * n as u32) >> 8 & 1
+        self.control(n) >> 8 & 1
     }
 
     /// Its INMSEL: the source of its negative input.
     pub fn reference_of(&self, n: usize) -> u32 {
-        self.store.get(4 * n as u32) >> 4 & 7
+        self.control(n) >> 4 & 7
+    }
+
+    /// Compares inputs and references as they are now.
+    pub fn look(&mut self, now: u64) {
+        for n in 0..7 {
+            let (input, reference) = (self.inputs[n], self.references[n]);
+            let hysteresis = HYSTERESIS * (self.control(n) >> 16 & 7) as u16;
+            let level = if self.high[n] { reference.saturating_sub(hysteresis) } else { reference };
+            let high = input > level;
+            if high != self.high[n] {
+                self.high[n] = high;
+                self.follows_at[n] = now + DELAY;
+            }
+            if self.follows_at[n] <= now {
+                self.output[n] = self.high[n];
+                self.follows_at[n] = NEVER;
+            }
+            if self.started_at[n] <= now {
+                self.started_at[n] = 0;
+            }
+        }
+    }
+
+    /// When an output changes next.
+    pub fn next_event(&self) -> u64 {
+        let starts = self.started_at.iter().filter(|at| **at > 0);
+        self.follows_at.iter().chain(starts).copied().min().unwrap_or(NEVER)
     }
 
     /// The output of comparator `n`, counted from 0, with its polarity.
     pub fn output(&self, n: usize) -> bool {
-        let control = self.store.get(4 * n as u32);
-        let on = control & 1 != 0;
-        on && (self.inputs[n] > self.references[n]) != (control & 1 << 15 != 0)
+        let control = self.control(n);
+        let valid = control & EN != 0 && self.started_at[n] == 0;
+        valid && self.output[n] != (control & POL != 0)
     }
 
     /// Reads a register.
     pub fn read(&self, offset: u32) -> Option<u32> {
         let value = self.store.read(offset)?;
-        Some(value | u32::from(self.output((offset / 4) as usize)) << 30)
+        Some(value | if self.output((offset / 4) as usize) { VALUE } else { 0 })
     }
 
     /// Writes a register; a locked one stays as it is.
-    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        if self.store.read(offset)? & 1 << 31 == 0 {
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        let before = self.store.read(offset)?;
+        if before & LOCK == 0 {
             self.store.write(offset, value)?;
+            let n = (offset / 4) as usize;
+            match (before & EN, value & EN) {
+                (0, EN) => self.started_at[n] = now + START,
+                (EN, 0) => self.started_at[n] = NEVER,
+                _ => {}
+            }
         }
         Some(Effect::Look)
-    }
-}
-
-/// Two of the digital-to-analog converters: 1 and 3.
-#[derive(Clone, Debug)]
-pub struct Dacs([Store; 2]);
-
-impl Default for Dacs {
-    fn default() -> Self {
-        Self([Store::new(DAC), Store::new(DAC)])
-    }
-}
-
-impl Dacs {
-    /// The code that channel 1 or 2 of a converter puts out.
-    pub fn code(&self, which: usize, channel: usize) -> u16 {
-        let on = self.0[which].get(0) >> (16 * (channel - 1)) & 1 != 0;
-        if on { self.0[which].get([0x08, 0x14][channel - 1]) as u16 } else { 0 }
-    }
-
-    /// Reads a register.
-    pub fn read(&self, which: usize, offset: u32) -> Option<u32> {
-        match offset {
-            0x2c => Some(u32::from(self.code(which, 1))),
-            0x30 => Some(u32::from(self.code(which, 2))),
-            // Ready as soon as they are on.
-            0x34 => Some(self.0[which].get(0x34) | (self.0[which].get(0) & 0x0001_0001) << 11),
-            _ => self.0[which].read(offset),
-        }
-    }
-
-    /// Writes a register.
-    pub fn write(&mut self, which: usize, offset: u32, value: u32) -> Option<Effect> {
-        self.0[which].write(offset, value).map(|_| Effect::Look)
     }
 }

@@ -5,16 +5,16 @@ use super::{Effect, Plain, Store};
 
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (0x00, 0, 0xfff),
-    (0x04, 0, ALL),
-    (0x08, 0, ALL),
-    (0x0c, 0, ALL),
+    (0x00, 0, 0x1bff),
+    (0x04, 0, 0x02f5_fffd),
+    (0x08, 0, 0x0331_ffff),
+    (0x0c, 0, 0x00f0_7fff),
     (0x10, 0, 0),
-    (0x18, 0, ALL),
-    (0x1c, 0, ALL),
-    (0x20, 0, ALL),
+    (0x18, 0, 0x0101_ffff),
+    (0x1c, 0, 0x0101_ffff),
+    (0x20, 0, 0x0033_ffff),
     (0x24, 0, 0),
-    (0x28, 0, ALL),
+    (0x28, 0, 0xffff),
     (0x2c, ALL, ALL),
 ];
 const CR1: u32 = 0x00;
@@ -37,7 +37,8 @@ impl Default for EncoderTimer {
 }
 
 impl EncoderTimer {
-    fn counting(&self) -> bool {
+    /// Whether it counts the encoder.
+    pub fn counting(&self) -> bool {
         self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3
     }
 

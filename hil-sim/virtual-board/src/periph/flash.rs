@@ -8,18 +8,19 @@ use std::ops::Range;
 
 use super::{Effect, Plain, Store};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
+use crate::rules::{Rule, Rules};
 
-const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (ACR, 0x0004_0600, ALL),
-    (0x04, 0, ALL),
+    (ACR, 0x0004_0600, 0x4_7f0f),
+    (0x04, 0, 0),
     (KEYR, 0, 0),
-    (0x0c, 0, ALL),
+    (0x0c, 0, 0),
     (SR, 0, 0),
-    (CR, 0xc000_0000, ALL),
+    // OBL_LAUNCH and OPTSTRT need the option bytes unlocked.
+    (CR, 0xc000_0000, 0xf701_8bff),
     (ECCR, 0, 0),
-    (OPTR, 0xffef_f8aa, 0),
-    (0x24, 0, 0),
+    (OPTR, 0, 0),
+    (0x24, 0xffff_0000, 0),
     (0x2c, 0, 0),
     (0x30, 0, 0),
 ];
@@ -30,6 +31,12 @@ const CR: u32 = 0x14;
 const ECCR: u32 = 0x18;
 const OPTR: u32 = 0x20;
 
+const DCEN: u32 = 1 << 10;
+const DBANK: u32 = 1 << 22;
+/// Option bytes from the factory.
+const OPTIONS: u32 = 0xffef_f8aa;
+/// Supply, V, below which the chip is held in reset, by BOR_LEV (datasheet, typical, falling).
+const BROWN_OUT: [f64; 8] = [1.66, 2.0, 2.26, 2.57, 2.83, 2.83, 2.83, 2.83];
 const PG: u32 = 1;
 const PER: u32 = 1 << 1;
 const BKER: u32 = 1 << 11;
@@ -52,6 +59,8 @@ const ERASE: u64 = 22_000 * 170;
 #[derive(Clone, Debug)]
 pub struct Flash {
     store: Store,
+    /// Option bytes, as FLASH_OPTR shows them.
+    pub options: u32,
     status: u32,
     eccr: u32,
     keys: usize,
@@ -77,6 +86,7 @@ impl Flash {
         let size = (FLASH + FLASH_SIZE - BANK_2) as usize;
         Self {
             store: Store::new(KNOWN),
+            options: OPTIONS,
             status: 0,
             eccr: 0,
             keys: 0,
@@ -93,7 +103,28 @@ impl Flash {
 
     /// The same contents after a reset.
     pub fn after_reset(self) -> Self {
-        Self { bytes: self.bytes, torn: self.torn, operations: self.operations, ..Self::new() }
+        Self {
+            bytes: self.bytes,
+            torn: self.torn,
+            operations: self.operations,
+            options: self.options,
+            ..Self::new()
+        }
+    }
+
+    /// Wait states.
+    pub fn wait_states(&self) -> u32 {
+        self.store.get(ACR) & 15
+    }
+
+    /// Supply, V, below which the chip is held in reset.
+    pub fn brown_out_v(&self) -> f64 {
+        BROWN_OUT[(self.options >> 8 & 7) as usize]
+    }
+
+    /// Makes the flash one bank of pages of 4 KiB, or two banks of pages of 2 KiB.
+    pub fn set_banks(&mut self, two: bool) {
+        self.options = self.options & !DBANK | if two { DBANK } else { 0 };
     }
 
     /// Gives a double word of the second bank a wrong check code.
@@ -189,14 +220,19 @@ impl Flash {
 
     fn erase(&mut self, cr: u32, now: u64) {
         self.busy_until = now + ERASE;
-        let (page, second) = ((cr >> 3 & 0x7f) as usize, cr & BKER != 0);
-        if !second {
-            // That is the code.
-            self.status |= PROGERR;
-            return;
-        }
+        let number = (cr >> 3 & 0x7f) as usize;
+        let (start, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
+            (true, true) => (number * PAGE, PAGE),
+            // One bank: pages twice as long, counted from the beginning of the flash.
+            (false, _) if number >= 64 => ((number - 64) * 2 * PAGE, 2 * PAGE),
+            _ => {
+                // The pages of the code.
+                self.status |= PROGERR;
+                return;
+            }
+        };
         let lost = self.power_goes();
-        let range = page * PAGE..(page + 1) * PAGE;
+        let range = start..start + size;
         self.bytes[range.clone()].fill(0xff);
         self.changing = range.start / 8..range.end / 8;
         self.torn[self.changing.clone()].fill(lost);
@@ -208,12 +244,19 @@ impl Flash {
         Some(match offset {
             SR => self.status | if self.is_busy(now) { BSY } else { 0 },
             ECCR => self.eccr,
+            OPTR => self.options,
             _ => return self.store.read(offset),
         })
     }
 
     /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+    pub fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: u64,
+        rules: &mut Rules,
+    ) -> Option<Effect> {
         let cr = self.store.get(CR);
         match offset {
             KEYR => {
@@ -228,6 +271,11 @@ impl Flash {
             // Locked: only the lock itself may be set again.
             CR if cr & LOCK != 0 => {}
             CR => {
+                let works = value & PG != 0 || value & (STRT | PER) == STRT | PER;
+                let cached = self.store.get(ACR) & DCEN != 0;
+                rules.require(!(works && cached), Rule::DataCache, || {
+                    "FLASH_CR: an erasure or a programming with ACR.DCEN on".into()
+                });
                 self.store.write(CR, value & !STRT);
                 self.half = None;
                 if value & (STRT | PER) == STRT | PER && !self.power_lost {

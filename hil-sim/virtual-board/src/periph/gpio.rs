@@ -5,24 +5,39 @@ use super::{Effect, Plain, Store};
 const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
     (0x00, ALL, ALL),
-    (0x04, 0, ALL),
+    (0x04, 0, 0xffff),
     (0x08, 0, ALL),
     (0x0c, 0, ALL),
     (0x10, 0, 0),
     (0x14, 0, 0xffff),
     (0x18, 0, 0),
-    (0x1c, 0, ALL),
+    (0x1c, 0, 0x1_ffff),
     (0x20, 0, ALL),
     (0x24, 0, ALL),
     (0x28, 0, 0),
 ];
 const MODER: u32 = 0x00;
+const OTYPER: u32 = 0x04;
+const OSPEEDR: u32 = 0x08;
 const PUPDR: u32 = 0x0c;
 const IDR: u32 = 0x10;
 const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
 const AFRL: u32 = 0x20;
 const BRR: u32 = 0x28;
+
+/// What a port does with a pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pad {
+    /// Input.
+    Input,
+    /// Output, with this level.
+    Output(bool),
+    /// The pin belongs to this alternate function.
+    Alternate(u32),
+    /// Analog.
+    Analog,
+}
 
 /// A port.
 #[derive(Clone, Debug)]
@@ -32,13 +47,15 @@ impl Gpio {
     /// Port A is 0.
     pub fn new(port: usize) -> Self {
         let mut store = Store::new(KNOWN);
-        // The debug port's pins.
         match port {
+            // The debug port's pins.
             0 => {
+                store.write(OSPEEDR, 0x0c00_0000);
                 store.write(MODER, 0xabff_ffff);
                 store.write(PUPDR, 0x6400_0000);
             }
             1 => {
+                store.write(OSPEEDR, 0x0000_00c0);
                 store.write(MODER, 0xffff_febf);
                 store.write(PUPDR, 0x0000_0100);
             }
@@ -47,10 +64,27 @@ impl Gpio {
         Self(store)
     }
 
-    /// The alternate function of a pin, if it is set to one.
-    pub fn alternate(&self, pin: u32) -> Option<u32> {
-        let mode = self.0.get(MODER) >> (2 * pin) & 3;
-        (mode == 2).then(|| self.0.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15)
+    /// What the port does with a pin.
+    pub fn pad(&self, pin: u32) -> Pad {
+        match self.0.get(MODER) >> (2 * pin) & 3 {
+            0 => Pad::Input,
+            1 => Pad::Output(self.0.get(ODR) >> pin & 1 != 0),
+            2 => Pad::Alternate(self.0.get(AFRL + 4 * (pin / 8)) >> (4 * (pin % 8)) & 15),
+            _ => Pad::Analog,
+        }
+    }
+
+    /// Whether the pin's output drives low only.
+    pub fn open_drain(&self, pin: u32) -> bool {
+        self.0.get(OTYPER) >> pin & 1 != 0
+    }
+
+    /// The level that the port's own resistor pulls a pin to. It is off in analog mode.
+    pub fn pull(&self, pin: u32) -> Option<bool> {
+        match (self.pad(pin), self.0.get(PUPDR) >> (2 * pin) & 3) {
+            (Pad::Analog, _) | (_, 0 | 3) => None,
+            (_, up) => Some(up == 1),
+        }
     }
 
     /// Levels at the pins.

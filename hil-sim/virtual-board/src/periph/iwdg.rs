@@ -1,11 +1,12 @@
 //! The independent watchdog (RM0440, section 42), with the typical 32 kHz.
 
 use super::{Effect, NEVER};
+use crate::rules::{Rule, Rules};
 
 /// Ticks per cycle of its clock.
 const CLOCK: u64 = 170_000_000 / 32_000;
-/// Clocks until a value written has arrived.
-const ARRIVES: u64 = 5;
+/// Clocks until a value written has arrived, at most.
+const ARRIVES: u64 = 6;
 
 /// The watchdog.
 #[derive(Clone, Debug)]
@@ -14,7 +15,10 @@ pub struct Iwdg {
     reload: u32,
     window: u32,
     unlocked: bool,
-    busy_until: u64,
+    /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
+    pub quick: bool,
+    /// Until when the last values of prescaler, reload and window are on their way.
+    busy_until: [u64; 3],
     expires: u64,
 }
 
@@ -25,7 +29,8 @@ impl Default for Iwdg {
             reload: 0xfff,
             window: 0xfff,
             unlocked: false,
-            busy_until: 0,
+            quick: false,
+            busy_until: [0; 3],
             expires: NEVER,
         }
     }
@@ -43,7 +48,19 @@ impl Iwdg {
     }
 
     fn period(&self) -> u64 {
-        u64::from(self.reload + 1) * (4 << self.prescaler.min(6)) * CLOCK
+        u64::from(self.reload + 1) * self.count()
+    }
+
+    /// Ticks per prescaled clock.
+    fn count(&self) -> u64 {
+        (4 << self.prescaler.min(6)) * CLOCK
+    }
+
+    /// Its clock stood still for some ticks.
+    pub fn delay(&mut self, ticks: u64) {
+        if self.expires != NEVER {
+            self.expires += ticks;
+        }
     }
 
     /// Reads a register.
@@ -52,16 +69,20 @@ impl Iwdg {
             0x00 => 0,
             0x04 => self.prescaler,
             0x08 => self.reload,
-            // Both values on their way.
-            0x0c if now < self.busy_until => 3,
-            0x0c => 0,
+            0x0c => (0..3).fold(0, |w, n| w | u32::from(now < self.busy_until[n]) << n),
             0x10 => self.window,
             _ => return None,
         })
     }
 
     /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+    pub fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: u64,
+        rules: &mut Rules,
+    ) -> Option<Effect> {
         match (offset, value) {
             (0x00, 0x5555) => self.unlocked = true,
             (0x00, 0xaaaa) => {
@@ -75,15 +96,22 @@ impl Iwdg {
                 self.expires = now + self.period();
             }
             (0x00, _) => self.unlocked = false,
-            (0x04 | 0x08, _) if self.unlocked => {
-                if offset == 0x04 {
-                    self.prescaler = value & 7
-                } else {
-                    self.reload = value & 0xfff
+            (0x04 | 0x08 | 0x10, _) if self.unlocked => {
+                let which = [0x04, 0x08, 0x10].iter().position(|known| *known == offset)?;
+                let name = ["PR", "RLR", "WINR"][which];
+                let idle = now >= self.busy_until[which];
+                if !rules.require(idle, Rule::IwdgBusy, || format!("IWDG_{name} while it is busy"))
+                {
+                    return Some(Effect::None);
                 }
-                self.busy_until = now + ARRIVES * CLOCK;
+                let before = self.count();
+                *[&mut self.prescaler, &mut self.reload, &mut self.window][which] =
+                    value & [7, 0xfff, 0xfff][which];
+                // With the longer of the two prescalers: the longest time.
+                let clock = if self.quick { CLOCK } else { before.max(self.count()) };
+                self.busy_until[which] = now + ARRIVES * clock;
             }
-            (0x04 | 0x08, _) => {}
+            (0x04 | 0x08 | 0x10, _) => {}
             _ => return None,
         }
         Some(Effect::Look)

@@ -4,18 +4,17 @@ use std::collections::VecDeque;
 
 use super::{Effect, NEVER, Plain, Store};
 
-const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (CR1, 0, ALL),
-    (0x04, 0, ALL),
-    (CR3, 0, ALL),
+    (CR1, 0, 0xf3ff_7fff),
+    (0x04, 0, 0xff0f_b010),
+    (CR3, 0, 0xfef0_f7c9),
     (BRR, 0, 0xf_ffff),
     (0x18, 0, 0),
     (ISR, 0, 0),
     (ICR, 0, 0),
     (RDR, 0, 0),
     (TDR, 0, 0),
-    (0x2c, 0, ALL),
+    (0x2c, 0, 0xf),
 ];
 const CR1: u32 = 0x00;
 const CR3: u32 = 0x08;

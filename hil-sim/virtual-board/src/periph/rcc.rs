@@ -2,39 +2,51 @@
 //! a crystal that is dead.
 
 use super::{Effect, NEVER, Plain, Reset, Store};
+use induction_drive::board::{CLOCK_HZ, HSE_HZ, HSI_HZ};
 
-const ALL: u32 = u32::MAX;
 const CR: u32 = 0x00;
 const CFGR: u32 = 0x08;
 const CIFR: u32 = 0x1c;
 const CICR: u32 = 0x20;
+const PLLCFGR: u32 = 0x0c;
+const CCIPR: u32 = 0x88;
 const CSR: u32 = 0x94;
+/// Clocks of the peripherals.
+pub const AHB1ENR: u32 = 0x48;
+/// See [`AHB1ENR`].
+pub const AHB2ENR: u32 = 0x4c;
+/// See [`AHB1ENR`].
+pub const APB1ENR1: u32 = 0x58;
+/// See [`AHB1ENR`].
+pub const APB1ENR2: u32 = 0x5c;
+/// See [`AHB1ENR`].
+pub const APB2ENR: u32 = 0x60;
 
 const KNOWN: &[Plain] = &[
-    (CR, 0x100, 0x010d_0b00),
+    (CR, 0x100, 0x010d_0300),
     (0x04, 0x4000_0000, 0x7f00_0000),
     (CFGR, 0x5, 0x7f00_3ff3),
-    (0x0c, 0x1000, ALL),
-    (0x18, 0, ALL),
+    (PLLCFGR, 0x1000, 0xff73_7ff3),
+    (0x18, 0, 0x63b),
     (CIFR, 0, 0),
     (CICR, 0, 0),
-    (0x28, 0, ALL),
-    (0x2c, 0, ALL),
-    (0x30, 0, ALL),
-    (0x38, 0, ALL),
-    (0x3c, 0, ALL),
-    (0x40, 0, ALL),
-    (0x48, 0x100, ALL),
-    (0x4c, 0, ALL),
-    (0x50, 0, ALL),
-    (0x58, 0x400, ALL),
-    (0x5c, 0, ALL),
-    (0x60, 0, ALL),
-    (0x88, 0, ALL),
+    (0x28, 0, 0x111f),
+    (0x2c, 0, 0x050f_607f),
+    (0x30, 0, 0x101),
+    (0x38, 0, 0xd2fe_c13f),
+    (0x3c, 0, 0x103),
+    (0x40, 0, 0x0437_f801),
+    (AHB1ENR, 0x100, 0x111f),
+    (AHB2ENR, 0, 0x050f_607f),
+    (0x50, 0, 0x101),
+    (APB1ENR1, 0x400, 0xd2fe_cd3f),
+    (APB1ENR2, 0, 0x103),
+    (APB2ENR, 0, 0x0437_f801),
+    (CCIPR, 0, u32::MAX),
     (0x90, 0, 0),
     (CSR, 0, 1),
     (0x98, 0, 1),
-    (0x9c, 0, ALL),
+    (0x9c, 0, 0x0030_0003),
 ];
 
 const HSEON: u32 = 1 << 16;
@@ -47,6 +59,15 @@ const BOR: u32 = 1 << 27;
 const IWDG: u32 = 1 << 29;
 const FLAGS: u32 = 0xfe00_0000;
 
+/// When clocks of peripherals were switched on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct On {
+    /// Time, ticks.
+    pub at: u64,
+    /// Accesses to registers until then.
+    pub accesses: u64,
+}
+
 /// The clocks.
 #[derive(Clone, Debug)]
 pub struct Rcc {
@@ -56,6 +77,8 @@ pub struct Rcc {
     /// Whether the crystal oscillates when it is on.
     pub crystal_lives: bool,
     failed: bool,
+    /// The last clocks switched on by each enable register: their bits, and when.
+    on: [(u32, On); 7],
     ticks_per_cycle: u64,
 }
 
@@ -74,6 +97,7 @@ impl Rcc {
             cifr: 0,
             crystal_lives: true,
             failed: false,
+            on: [(0, On::default()); 7],
             ticks_per_cycle: HSI_TICKS,
         }
     }
@@ -92,6 +116,42 @@ impl Rcc {
     #[inline]
     pub fn ticks_per_cycle(&self) -> u64 {
         self.ticks_per_cycle
+    }
+
+    /// The system clock, Hz.
+    pub fn system_hz(&self) -> u64 {
+        let oscillator = |select| if select == 3 { HSE_HZ } else { HSI_HZ };
+        u64::from(match self.store.get(CFGR) & 3 {
+            3 => {
+                let pll = self.store.get(PLLCFGR);
+                let (m, n, r) = ((pll >> 4 & 15) + 1, pll >> 8 & 0x7f, 2 * ((pll >> 25 & 3) + 1));
+                oscillator(pll & 3) / m * n / r
+            }
+            2 => HSE_HZ,
+            _ => HSI_HZ,
+        })
+    }
+
+    /// The clock of the core and its bus, Hz.
+    pub fn bus_hz(&self) -> u64 {
+        // HPRE: 8 is a half; there is no 32nd.
+        const DIVIDERS: [u64; 8] = [2, 4, 8, 16, 64, 128, 256, 512];
+        let divider = self.store.get(CFGR) >> 4 & 15;
+        self.system_hz() / if divider < 8 { 1 } else { DIVIDERS[divider as usize - 8] }
+    }
+
+    /// When the clock of a peripheral was switched on, if it is on; unknown for all but the last of a register.
+    pub fn clock(&self, register: u32, bit: u32) -> Option<Option<On>> {
+        if self.store.get(register) >> bit & 1 == 0 {
+            return None;
+        }
+        let (bits, on) = self.on[place(register)];
+        Some((bits >> bit & 1 != 0).then_some(on))
+    }
+
+    /// Whether the converters 1 and 2 have a clock of their own.
+    pub fn adc_kernel_clock(&self) -> bool {
+        self.store.get(CCIPR) >> 28 & 3 != 0
     }
 
     /// When a failed crystal is found.
@@ -135,7 +195,7 @@ impl Rcc {
     }
 
     /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32, _now: u64) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, on: On) -> Option<Effect> {
         match offset {
             CICR => {
                 self.cifr &= !value;
@@ -144,12 +204,19 @@ impl Rcc {
             CSR if value & 1 << 23 != 0 => self.flags &= !FLAGS,
             _ => {}
         }
+        let before = self.store.read(offset)?;
         self.store.write(offset, value)?;
-        if offset == CFGR {
-            self.ticks_per_cycle = if value & 3 == 3 { 1 } else { HSI_TICKS };
+        if (AHB1ENR..=APB2ENR).contains(&offset) && value & !before != 0 {
+            self.on[place(offset)] = (value & !before, on);
         }
+        self.ticks_per_cycle = u64::from(CLOCK_HZ).div_ceil(self.bus_hz());
         Some(Effect::Look)
     }
+}
+
+/// Place of an enable register.
+fn place(register: u32) -> usize {
+    ((register - AHB1ENR) / 4) as usize
 }
 
 /// A cycle of 16 MHz, in ticks of 170 MHz, rounded.

@@ -3,38 +3,38 @@
 //! The counter is not stepped: where it is follows from time. Events are its two ends and the rising
 //! edge of OC4REF on the way up, which is the trigger output 2 of the converters.
 
-mod gates;
+mod outputs;
 
-pub use gates::{BadGates, GateLimits};
+pub use outputs::{Output, Wave};
 
 use super::{Effect, NEVER, Plain, Store};
+use crate::rules::{Rule, Rules};
 
-const ALL: u32 = u32::MAX;
 const KNOWN: &[Plain] = &[
-    (CR1, 0, 0xbff),
-    (CR2, 0, ALL),
-    (0x08, 0, ALL),
-    (DIER, 0, ALL),
+    (CR1, 0, 0x1bff),
+    (CR2, 0, 0x02f5_fffd),
+    (0x08, 0, 0x0331_ffff),
+    (DIER, 0, 0x00f0_7fff),
     (SR, 0, 0),
     (EGR, 0, 0),
-    (CCMR1, 0, ALL),
-    (CCMR2, 0, ALL),
-    (CCER, 0, ALL),
+    (CCMR1, 0, 0x0101_ffff),
+    (CCMR2, 0, 0x0101_ffff),
+    (CCER, 0, 0x0033_ffff),
     (CNT, 0, 0),
-    (PSC, 0, ALL),
+    (PSC, 0, 0xffff),
     (ARR, 0xffff, 0xf_ffff),
     (RCR, 0, 0xffff),
     (CCR1, 0, 0xf_ffff),
     (0x38, 0, 0xf_ffff),
     (0x3c, 0, 0xf_ffff),
     (CCR4, 0, 0xf_ffff),
-    (BDTR, 0, ALL),
-    (0x48, 0, ALL),
-    (0x4c, 0, ALL),
-    (0x50, 0, ALL),
-    (0x54, 0, ALL),
-    (AF1, 1, ALL),
-    (0x64, 1, ALL),
+    (BDTR, 0, 0x3fff_ffff),
+    (0x48, 0, 0xe00f_ffff),
+    (0x4c, 0, 0xf_ffff),
+    (0x50, 0, 0x0101_fcfc),
+    (0x54, 0, 0x300ff),
+    (AF1, 1, 0x3_ffff),
+    (0x64, 1, 0x7_3fff),
 ];
 const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;
@@ -91,6 +91,10 @@ pub struct Tim1 {
     pub fault_pin_high: bool,
     /// Outputs of the comparators.
     comparators: [bool; 7],
+    /// LOCK of the first write to BDTR.
+    first_lock: Option<u32>,
+    /// A debugger has stopped the counter, at this time.
+    frozen: Option<u64>,
     /// Updates to be left out: compare values are not taken over, no flag is set.
     pub drop_update: u32,
 }
@@ -110,6 +114,8 @@ impl Default for Tim1 {
             trigger_at: NEVER,
             fault_pin_high: true,
             comparators: [false; 7],
+            first_lock: None,
+            frozen: None,
             drop_update: 0,
         }
     }
@@ -125,6 +131,7 @@ impl Tim1 {
         if !self.counting() {
             return (self.held, false);
         }
+        let now = self.frozen.unwrap_or(now);
         let phase = ((now.saturating_sub(self.from)) % u64::from(2 * self.top)) as u32;
         if phase < self.top { (phase, false) } else { (2 * self.top - phase, true) }
     }
@@ -146,7 +153,34 @@ impl Tim1 {
 
     /// Whether the outputs are on.
     pub fn outputs_on(&self) -> bool {
+        self.frozen.is_none() && self.main_output()
+    }
+
+    /// The bit MOE.
+    pub fn main_output(&self) -> bool {
         self.store.get(BDTR) & MOE != 0
+    }
+
+    /// Whether the outputs CH1, CH1N, CH2 to CH3N are enabled, and whether the break pin is.
+    pub fn uses_pins(&self) -> ([bool; 6], bool) {
+        let ccer = self.store.get(CCER);
+        let pin = self.store.get(BDTR) & BKE != 0 && self.store.get(AF1) & 1 != 0;
+        (std::array::from_fn(|n| ccer >> (2 * n) & 1 != 0), pin)
+    }
+
+    /// A debugger halts the core: the counter stops, and the outputs go off as if MOE was reset.
+    pub fn freeze(&mut self, now: u64) {
+        self.frozen.get_or_insert(now);
+    }
+
+    /// The counter goes on.
+    pub fn thaw(&mut self, now: u64) {
+        let Some(since) = self.frozen.take() else { return };
+        let stood = now - since;
+        self.from += stood;
+        for at in [&mut self.next_end, &mut self.trigger_at] {
+            *at = at.saturating_add(stood);
+        }
     }
 
     /// Whether a break has been seen and not cleared.
@@ -156,7 +190,7 @@ impl Tim1 {
 
     /// When the next event is.
     pub fn next_event(&self) -> u64 {
-        self.next_end.min(self.trigger_at)
+        if self.frozen.is_some() { NEVER } else { self.next_end.min(self.trigger_at) }
     }
 
     /// Lets the next event happen.
@@ -185,11 +219,15 @@ impl Tim1 {
 
     /// OC4REF rises on the way up where the counter reaches its compare value.
     fn plan_trigger(&mut self) {
+        self.trigger_at = self.trigger_of(self.from).unwrap_or(NEVER);
+    }
+
+    /// The time of the trigger in the period that begins with the counter at 0 at this time.
+    fn trigger_of(&self, from: u64) -> Option<u64> {
         let mode = self.store.get(CCMR2) >> 12 & 7;
         let rises = mode == 7 && self.active[3] > 0 && self.active[3] <= self.top;
         let is_trigger = self.store.get(CR2) >> 20 & 0xf == 7;
-        self.trigger_at =
-            if rises && is_trigger { self.from + u64::from(self.active[3]) } else { NEVER };
+        (rises && is_trigger).then(|| from + u64::from(self.active[3]))
     }
 
     fn update(&mut self, flag: bool) {
@@ -270,7 +308,13 @@ impl Tim1 {
     }
 
     /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+    pub fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: u64,
+        rules: &mut Rules,
+    ) -> Option<Effect> {
         let old = self.store.read(offset)?;
         match offset {
             SR => {
@@ -292,12 +336,23 @@ impl Tim1 {
                 return Some(Effect::Look);
             }
             BDTR => {
-                self.store.write(BDTR, self.locked(old, value));
+                let lock = value >> 8 & 3;
+                let first = *self.first_lock.get_or_insert(lock);
+                rules.require(lock == first, Rule::LockOnce, || {
+                    format!("TIM1_BDTR: LOCK {lock} after {first} was written first")
+                });
+                self.store.write(BDTR, self.locked(old, value) & !(3 << 8) | first << 8);
                 self.update_break();
                 return Some(Effect::None);
             }
             // Locked with levels 2 and 3.
             AF1 if self.lock() >= 1 => return Some(Effect::None),
+            // OISx and OISxN.
+            CR2 if self.lock() >= 1 => {
+                let idle = 0x0005_ff00;
+                self.store.write(CR2, value & !idle | old & idle);
+                return Some(Effect::Look);
+            }
             CCER if self.lock() >= 2 => {
                 return self.store.write(CCER, value & !0xaaaa | old & 0xaaaa);
             }
@@ -339,7 +394,7 @@ impl Tim1 {
     }
 
     fn locked(&self, old: u32, new: u32) -> u32 {
-        let mut kept = if self.lock() == 0 { 0 } else { 0x0300 };
+        let mut kept = 0;
         if self.lock() >= 1 {
             // Dead time, break enable, polarity and filters, automatic output.
             kept |= 0x0fff_f0ff & !MOE;

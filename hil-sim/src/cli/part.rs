@@ -1,0 +1,76 @@
+//! A part of the runs of a statistical experiment, and runs that are continued.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::say;
+use crate::error::Error;
+use crate::experiments::{self, Context, Experiment};
+use crate::outcome::Outcome;
+use crate::shards::{self, Header, Journal, Shard};
+
+/// Which runs are done, and where they are kept.
+#[derive(Args, Default)]
+pub struct Part {
+    /// Do every Nth run only, from the Ith on, and print them as one JSON object for `merge`
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "csv"])]
+    shard: Option<Shard>,
+    /// Keep every finished run in this file, or in a file of its own in this folder, and do not repeat those that are
+    /// there
+    #[arg(long, value_name = "PATH")]
+    resume: Option<PathBuf>,
+}
+
+impl Part {
+    /// Whether only a part of the runs is done.
+    pub fn is_shard(&self) -> bool {
+        self.shard.is_some()
+    }
+
+    /// Runs the experiment. Prints a shard; otherwise returns the outcome.
+    ///
+    /// # Errors
+    /// Those of the experiment; with options of this part as [`experiments::statistical`], [`Journal::open`] and
+    /// [`shards::runs`].
+    pub fn run(
+        &self,
+        experiment: &Experiment,
+        context: &Context<'_>,
+        quiet: bool,
+    ) -> Result<Option<Outcome>, Error> {
+        if self.shard.is_none() && self.resume.is_none() {
+            return (experiment.run)(context).map(Some);
+        }
+        let statistical = experiments::statistical(experiment.name)?;
+        let shard = self.shard.unwrap_or(Shard::WHOLE);
+        let all = (statistical.runs)(context)?;
+        let header = Header::new(experiment.name, context.config, context.seed, shard, all)?;
+        let journal = match &self.resume {
+            Some(path) => Some(Journal::open(&Journal::place(path, &header), &header)?),
+            None => None,
+        };
+        if let Some(journal) = &journal {
+            note(journal, &header, quiet);
+        }
+        let runs = shards::runs(statistical, context, &header, journal.as_ref())?;
+        if self.is_shard() {
+            say(&format!("{}\n", shards::to_json(header, runs)?))?;
+            return Ok(None);
+        }
+        let records = runs.into_iter().map(|run| run.record).collect();
+        (statistical.outcome)(context, records).map(Some)
+    }
+}
+
+/// What was found in a journal, on standard error. A torn line is named even if little is to be said.
+fn note(journal: &Journal, header: &Header, quiet: bool) {
+    let path = journal.path().display();
+    if let Some(line) = journal.torn() {
+        eprintln!("note: {path}, line {line}, was torn; its run is done again");
+    }
+    let (done, all) = (journal.runs().len(), header.shard.numbers(header.runs).count());
+    if done > 0 && !quiet {
+        eprintln!("note: {done} of {all} runs are in {path}");
+    }
+}

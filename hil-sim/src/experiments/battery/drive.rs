@@ -1,0 +1,92 @@
+//! A drive as the battery sees it, so that it can run another drive than this one.
+
+use drive_core::{Command, Compare, Drive, Mode, Sample, State};
+
+/// What the drive is started for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// To regulate torque.
+    Torque,
+    /// To regulate speed.
+    Speed,
+    /// To learn, with the shaft locked.
+    Learning,
+}
+
+/// What the drive does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// Outputs off.
+    Off,
+    /// On the way to its purpose, or learning.
+    Busy,
+    /// Regulating torque or speed.
+    Regulating,
+    /// Stopped by the fault of this number.
+    Fault(u8),
+}
+
+/// A drive in a state that can be copied: every run begins with a copy of the same one.
+pub trait DriveUnderTest: Clone + Send + Sync {
+    /// One control period.
+    fn step(&mut self, sample: &Sample) -> Compare;
+    /// Starts.
+    ///
+    /// # Errors
+    /// The reason why it does not.
+    fn start(&mut self, purpose: Purpose) -> Result<(), String>;
+    /// Gives a torque current, A peak; the drive may limit it.
+    ///
+    /// # Errors
+    /// The reason why it is refused.
+    fn torque(&mut self, i_q: f32) -> Result<(), String>;
+    /// Gives a speed, mechanical rpm.
+    ///
+    /// # Errors
+    /// The reason why it is refused.
+    fn speed(&mut self, rpm: f32) -> Result<(), String>;
+    /// What it does.
+    fn condition(&self) -> Condition;
+    /// Its estimate of the angle of the rotor flux at the last sample, electrical turns.
+    fn flux_turns(&self) -> f64;
+}
+
+impl DriveUnderTest for Drive {
+    fn step(&mut self, sample: &Sample) -> Compare {
+        Self::step(self, sample)
+    }
+
+    fn start(&mut self, purpose: Purpose) -> Result<(), String> {
+        let mode = match purpose {
+            Purpose::Torque => Mode::Torque,
+            Purpose::Speed => Mode::Speed,
+            Purpose::Learning => Mode::Learning,
+        };
+        command(self, &Command::Start(mode))
+    }
+
+    fn torque(&mut self, i_q: f32) -> Result<(), String> {
+        command(self, &Command::Torque(i_q))
+    }
+
+    fn speed(&mut self, rpm: f32) -> Result<(), String> {
+        command(self, &Command::Speed(rpm))
+    }
+
+    fn condition(&self) -> Condition {
+        match self.state() {
+            State::Off => Condition::Off,
+            State::Torque | State::Speed | State::Position => Condition::Regulating,
+            State::Fault(fault) => Condition::Fault(fault.code()),
+            _ => Condition::Busy,
+        }
+    }
+
+    fn flux_turns(&self) -> f64 {
+        self.telemetry().phi.to_turns().into()
+    }
+}
+
+fn command(drive: &mut Drive, command: &Command) -> Result<(), String> {
+    drive.command(command).map(|_| ()).map_err(|refused| refused.to_string())
+}

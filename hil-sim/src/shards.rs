@@ -1,0 +1,161 @@
+//! Shards: the runs of a statistical experiment shared between processes or machines, kept one by one, and merged.
+//!
+//! Run `k`, counted from 0, belongs to shard `1 + k mod n` of `n`. What a run is depends on its number, the seed and
+//! the settings, not on the shard. A shard is a JSON object with a [`Header`] and the records of its runs; merging
+//! puts the records of all shards in their order and computes the outcome of them, as the whole run does.
+
+mod header;
+mod journal;
+mod merge;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::{Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+pub use header::Header;
+pub use journal::Journal;
+pub use merge::{Merged, merge};
+
+use crate::error::Error;
+use crate::experiments::Context;
+use crate::experiments::statistics::Statistical;
+
+/// One of the parts into which the runs are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// From 1 to `count`.
+    index: u32,
+    /// Number of shards.
+    count: u32,
+}
+
+impl Shard {
+    /// All runs.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+    /// Most shards.
+    pub const MOST: u32 = 100_000;
+
+    /// A shard, if there is one with these numbers.
+    pub fn new(index: u32, count: u32) -> Option<Self> {
+        let exists = (1..=Self::MOST).contains(&count) && (1..=count).contains(&index);
+        exists.then_some(Self { index, count })
+    }
+
+    /// The numbers of its runs.
+    pub fn numbers(self, runs: usize) -> impl Iterator<Item = usize> {
+        (self.index as usize - 1..runs).step_by(self.count as usize)
+    }
+
+    /// Whether a run belongs to it.
+    pub fn has(self, run: usize) -> bool {
+        run % self.count as usize == self.index as usize - 1
+    }
+
+    /// The numbers as part of the name of a file.
+    pub fn file_name(self) -> String {
+        format!("{}-of-{}", self.index, self.count)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/');
+        let shard =
+            numbers.and_then(|(index, count)| Self::new(index.parse().ok()?, count.parse().ok()?));
+        let most = Self::MOST;
+        shard.ok_or_else(|| format!("allowed: I/N with N from 1 to {most} and I from 1 to N"))
+    }
+}
+
+/// A run and what it left.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Its number, from 0.
+    pub run: usize,
+    /// Its record.
+    pub record: Value,
+}
+
+/// The JSON form of a shard.
+#[derive(Serialize, Deserialize)]
+struct ShardFile {
+    #[serde(flatten)]
+    header: Header,
+    records: Vec<Run>,
+}
+
+/// Does the runs of a shard that the journal does not have yet, and returns all of them in their order.
+///
+/// # Errors
+/// Those of the experiment; [`Error::Write`] when the journal cannot be written.
+pub fn runs(
+    statistical: &Statistical,
+    context: &Context<'_>,
+    header: &Header,
+    journal: Option<&Journal>,
+) -> Result<Vec<Run>, Error> {
+    let before = journal.iter().flat_map(|journal| journal.runs().iter().cloned());
+    let done: Mutex<BTreeMap<usize, Value>> =
+        Mutex::new(before.map(|run| (run.run, run.record)).collect());
+    let missing: Vec<usize> = {
+        let done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        header.shard.numbers(header.runs).filter(|run| !done.contains_key(run)).collect()
+    };
+    (statistical.some)(context, &missing, &|run, record| {
+        let run = Run { run, record };
+        journal.map_or(Ok(()), |journal| journal.append(&run))?;
+        done.lock().unwrap_or_else(PoisonError::into_inner).insert(run.run, run.record);
+        Ok(())
+    })?;
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(done.into_iter().map(|(run, record)| Run { run, record }).collect())
+}
+
+/// The JSON object of a shard.
+///
+/// # Errors
+/// [`Error::Internal`] when JSON cannot be made.
+pub fn to_json(header: Header, records: Vec<Run>) -> Result<String, Error> {
+    serde_json::to_string(&ShardFile { header, records })
+        .map_err(|e| Error::Internal(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shards_of_any_number_are_all_runs_once() {
+        for (runs, count) in [(48, 1), (48, 5), (7, 8), (0, 3), (1, 1)] {
+            let shards = (1..=count).map(|index| Shard::new(index, count).unwrap());
+            let mut all: Vec<usize> =
+                shards.clone().flat_map(|shard| shard.numbers(runs)).collect();
+            assert!(shards.clone().all(|shard| shard.numbers(runs).all(|run| shard.has(run))));
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..runs), "{runs} runs in {count}");
+        }
+    }
+
+    #[test]
+    fn a_shard_is_read_as_it_is_shown() {
+        assert_eq!("3/8".parse(), Ok(Shard { index: 3, count: 8 }));
+        assert_eq!(Shard::new(3, 8).unwrap().to_string(), "3/8");
+        for wrong in ["0/3", "4/3", "1/0", "3", "a/b", "1/100001", "-1/2", "1/2/3", ""] {
+            let error = wrong.parse::<Shard>().unwrap_err();
+            assert_eq!(error, "allowed: I/N with N from 1 to 100000 and I from 1 to N", "{wrong}");
+        }
+    }
+}

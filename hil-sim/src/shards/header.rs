@@ -1,0 +1,173 @@
+//! What runs must have in common to belong together.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+
+use super::Shard;
+use crate::config::{Config, Key, Value};
+use crate::error::Error;
+use crate::outcome::{Origin, SCHEMA_VERSION};
+
+/// Origin of the records of a shard.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of the JSON form.
+    pub schema_version: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Number of the sources of the program.
+    pub sources: String,
+    /// The experiment.
+    pub experiment: String,
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// The settings that were changed.
+    pub settings: BTreeMap<String, Json>,
+    /// The shard.
+    pub shard: Shard,
+    /// Number of runs of all shards.
+    pub runs: usize,
+}
+
+impl Header {
+    /// That of a shard of an experiment with `runs` runs in all.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the settings do not give the configuration again.
+    pub fn new(
+        experiment: &str,
+        config: &Config,
+        seed: u64,
+        shard: Shard,
+        runs: usize,
+    ) -> Result<Self, Error> {
+        let header = Self {
+            schema_version: SCHEMA_VERSION,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            sources: env!("HIL_SIM_SOURCES").to_owned(),
+            experiment: experiment.to_owned(),
+            seed,
+            settings: Origin::new(seed, &config.changes()).typed_settings().collect(),
+            shard,
+            runs,
+        };
+        if header.config()? != *config {
+            let settings = config.changes().join(", ");
+            return Err(Error::Internal(format!("the configuration is more than {settings}")));
+        }
+        Ok(header)
+    }
+
+    /// The configuration that the settings describe.
+    ///
+    /// # Errors
+    /// As [`Config::set`].
+    pub fn config(&self) -> Result<Config, Error> {
+        let mut config = Config::default();
+        // A key of the bench may set one of the drive, which comes later in the list.
+        let listed: Vec<String> = Key::all().map(Key::assigned_name).collect();
+        let place = |name: &String| listed.iter().position(|known| known == name);
+        let mut settings: Vec<_> = self.settings.iter().collect();
+        settings.sort_by_key(|(name, _)| place(name));
+        for (name, value) in settings {
+            config.set(name, &setting(value))?;
+        }
+        Ok(config)
+    }
+
+    /// The first difference between runs of two headers that do not belong together, `NAME is ..., there ...`.
+    pub fn difference(&self, there: &Self) -> Option<String> {
+        let fields = [
+            ("schema_version", self.schema_version.to_string(), there.schema_version.to_string()),
+            ("version", self.version.clone(), there.version.clone()),
+            ("sources", self.sources.clone(), there.sources.clone()),
+            ("experiment", self.experiment.clone(), there.experiment.clone()),
+            ("seed", self.seed.to_string(), there.seed.to_string()),
+        ];
+        let keys = self.settings.keys().chain(there.settings.keys());
+        let text = |header: &Self, key: &String| match header.settings.get(key) {
+            Some(value) => setting(value).to_string(),
+            None => "not set".to_owned(),
+        };
+        let settings = keys.map(|key| (key.as_str(), text(self, key), text(there, key)));
+        let rest = [
+            ("the number of runs", self.runs.to_string(), there.runs.to_string()),
+            ("the number of shards", self.shard.count.to_string(), there.shard.count.to_string()),
+        ];
+        let mut all = fields.into_iter().chain(settings).chain(rest);
+        all.find(|(_, here, there)| here != there)
+            .map(|(name, here, there)| format!("{name} is {here}, there {there}"))
+    }
+}
+
+/// A setting as a configuration takes it.
+fn setting(value: &Json) -> Value {
+    match value {
+        Json::Number(number) => number.as_f64().map_or(Value::Unset, Value::Number),
+        Json::Bool(on) => Value::Switch(*on),
+        Json::String(text) => Value::from_text(text),
+        other => Value::Word(other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header(assignments: &[&str], seed: u64) -> Header {
+        let assignments: Vec<String> = assignments.iter().map(|&a| a.to_owned()).collect();
+        let config = Config::load(None, None, &assignments).unwrap();
+        Header::new("monte-carlo", &config, seed, Shard::WHOLE, 8).unwrap()
+    }
+
+    /// `drive.motor.r_s` sorts before `motor.r_s`, which sets both, and `measurement.*` sets the scales of the drive.
+    #[test]
+    fn settings_give_the_configuration_again_in_any_order() {
+        let set = [
+            "motor.r_s=6.1",
+            "drive.motor.r_s=0.1",
+            "measurement.range_a=10",
+            "scales.current_a.gain=0.003",
+            "runs=8",
+            "prepare.learn=yes",
+            "load.mode=speed",
+            "motor.l_ls=1.25e-6",
+        ];
+        let text = serde_json::to_string(&header(&set, 1)).unwrap();
+        let back: Header = serde_json::from_str(&text).unwrap();
+        let set: Vec<String> = set.iter().map(|&a| a.to_owned()).collect();
+        assert_eq!(back.config().unwrap(), Config::load(None, None, &set).unwrap(), "{text}");
+        let motors = crate::config::motors::Motor::all().into_iter();
+        for name in motors.map(|motor| motor.name) {
+            let config = Config::of_motor(Some(&name)).unwrap();
+            Header::new("machines", &config, 1, Shard::WHOLE, 8).unwrap();
+        }
+    }
+
+    #[test]
+    fn differences_are_named() {
+        let one = header(&["motor.r_s=6"], 1);
+        assert_eq!(one.difference(&one), None);
+        let other = |change: fn(&mut Header)| {
+            let mut other = one.clone();
+            change(&mut other);
+            one.difference(&other).unwrap()
+        };
+        assert_eq!(other(|h| h.seed = 2), "seed is 1, there 2");
+        assert_eq!(
+            other(|h| h.experiment = "machines".into()),
+            "experiment is monte-carlo, there machines"
+        );
+        assert_eq!(other(|h| h.runs = 9), "the number of runs is 8, there 9");
+        assert!(other(|h| h.sources = "0".into()).starts_with("sources is "));
+        assert!(other(|h| h.version = "0.0.1".into()).starts_with("version is "));
+        assert_eq!(
+            one.difference(&header(&["motor.r_s=7"], 1)),
+            Some("motor.r_s is 6, there 7".into())
+        );
+        let set = header(&["motor.r_s=6", "spread.motor=0.1"], 1);
+        assert_eq!(one.difference(&set), Some("spread.motor is not set, there 0.1".into()));
+    }
+}

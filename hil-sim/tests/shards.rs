@@ -1,0 +1,264 @@
+//! Statistics on many machines: shards that merge to the whole, byte for byte; runs that are continued; what is refused.
+
+mod cli_common;
+
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
+use std::process::Command;
+
+use cli_common::{files, folder, hil_sim, object, text};
+
+/// Every statistical experiment, with options that make it small.
+const SMALL: [(&str, &[&str]); 6] = [
+    ("speed-torque-sweep", &["--seconds", "0.2"]),
+    (
+        "monte-carlo",
+        &[
+            "--set",
+            "runs=7",
+            "--seconds",
+            "0.2",
+            "--set",
+            "spread.motor=0.1",
+            "--set",
+            "drive.motor.r_s=5",
+        ],
+    ),
+    ("machines", &["--set", "runs=2", "--set", "spread.machine=1.5", "--seconds", "0.2"]),
+    ("battery", &["--set", "runs=14"]),
+    ("lock-monitor", &["--set", "runs=1"]),
+    ("saliency-check", &["--set", "runs=2"]),
+];
+
+/// A small run whose outcome depends on every record.
+const MONTE_CARLO: &[&str] = &["run", "monte-carlo", "--set", "runs=6", "--seconds", "0.1", "-q"];
+
+fn run(folder: &Path, name: &str, options: &[&str], more: &[&str]) -> Vec<u8> {
+    let output = hil_sim(folder, &[&["run", name, "-q"], options, more].concat());
+    assert!(output.stderr.is_empty(), "{name}: {}", text(&output.stderr));
+    output.stdout
+}
+
+/// Writes the shards of a run and returns their names.
+fn shards(folder: &Path, arguments: &[&str], count: usize) -> Vec<String> {
+    let one = |index: usize| {
+        let (name, shard) = (format!("{index}.json"), format!("{index}/{count}"));
+        let output = hil_sim(folder, &[arguments, &["--shard", &shard]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        std::fs::write(folder.join(&name), output.stdout).unwrap();
+        name
+    };
+    (1..=count).map(one).collect()
+}
+
+fn merge(folder: &Path, names: &[&str]) -> std::process::Output {
+    hil_sim(folder, &[&["merge"], names].concat())
+}
+
+#[test]
+fn every_statistical_experiment_is_in_the_list() {
+    let known = hil_sim::experiments::STATISTICAL.iter().map(|known| known.experiment.name);
+    assert!(known.eq(SMALL.map(|(name, _)| name)));
+    // All that take a number of runs can be shared.
+    for experiment in hil_sim::experiments::EXPERIMENTS {
+        let takes_runs = experiment.uses.concat().contains(&"runs");
+        let is_shared = SMALL.iter().any(|(name, _)| *name == experiment.name);
+        assert!(!takes_runs || is_shared, "{}", experiment.name);
+    }
+}
+
+/// Three shards, merged in another order, against one run: percentiles, tables, figures and all.
+#[test]
+fn merged_shards_are_the_whole_run_byte_for_byte() {
+    for (name, options) in SMALL {
+        let folder = folder(&format!("shards-{name}"));
+        let whole = run(&folder, name, options, &["--json", "--seed", "5"]);
+        let arguments = [&["run", name, "-q", "--seed", "5"], options].concat();
+        shards(&folder, &arguments, 3);
+        let merged = merge(&folder, &["3.json", "1.json", "2.json"]);
+        assert_eq!(text(&merged.stdout), text(&whole), "{name}");
+        let one = shards(&folder, &arguments, 1);
+        assert_eq!(merge(&folder, &[&one[0]]).stdout, whole, "{name}");
+    }
+}
+
+#[test]
+fn the_shards_of_a_run_have_its_runs_and_their_seeds() {
+    let folder = folder("shards-seeds");
+    shards(&folder, MONTE_CARLO, 4);
+    let seeds = |name: &str| {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        let shard: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let records = shard["records"].as_array().unwrap().clone();
+        let pair = |run: &serde_json::Value| {
+            (run["run"].as_u64().unwrap(), run["record"]["case"]["seed"].as_u64().unwrap())
+        };
+        records.iter().map(pair).collect::<Vec<_>>()
+    };
+    assert_eq!(seeds("1.json"), [(0, 1_000_003), (4, 1_000_007)]);
+    assert_eq!(seeds("4.json"), [(3, 1_000_006)]);
+}
+
+#[test]
+fn shards_that_do_not_belong_together_are_refused_by_name() {
+    let folder = folder("shards-refused");
+    shards(&folder, MONTE_CARLO, 3);
+    let write = |name: &str, change: &dyn Fn(String) -> String| {
+        let text = std::fs::read_to_string(folder.join("2.json")).unwrap();
+        std::fs::write(folder.join(name), change(text)).unwrap();
+    };
+    let other = |name: &str, arguments: &[&str]| {
+        let output = hil_sim(&folder, &[MONTE_CARLO, &["--shard", "2/3"], arguments].concat());
+        std::fs::write(folder.join(name), output.stdout).unwrap();
+    };
+    other("seed.json", &["--seed", "2"]);
+    other("setting.json", &["--set", "motor.r_s=6"]);
+    other("runs.json", &["--set", "runs=7"]);
+    let machines = ["run", "machines", "-q", "--seconds", "0.1", "--shard", "1/3"];
+    std::fs::write(folder.join("machines.json"), hil_sim(&folder, &machines).stdout).unwrap();
+    let version = format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    write("version.json", &|text| text.replace(&version, "\"version\":\"0.0.7\""));
+    write("sources.json", &|text| text.replace("\"sources\":\"", "\"sources\":\"0"));
+    write("torn.json", &|text| text[..text.len() / 2].to_owned());
+    write("less.json", &|text| {
+        let mut shard: serde_json::Value = serde_json::from_str(&text).unwrap();
+        shard["records"].as_array_mut().unwrap().remove(0);
+        shard.to_string()
+    });
+    write("more.json", &|text| text.replace("\"run\":4", "\"run\":5"));
+    let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat());
+    std::fs::write(folder.join("whole.json"), whole.stdout).unwrap();
+    let cases: [(&[&str], &[&str]); 14] = [
+        (&["1.json", "3.json"], &["1 of 3 shards are missing: 2/3"]),
+        (&["1.json"], &["2 of 3 shards are missing: 2/3, 3/3"]),
+        (&["1.json", "2.json", "1.json"], &["1.json", "shard 1/3 is in 1.json already"]),
+        (&["1.json", "seed.json", "3.json"], &["seed.json", "as 1.json", "seed is 2, there 1"]),
+        (&["1.json", "setting.json"], &["setting.json", "motor.r_s is 6, there not set"]),
+        (&["1.json", "runs.json"], &["runs.json", "runs is 7, there 6"]),
+        (&["1.json", "machines.json"], &["experiment is machines, there monte-carlo"]),
+        (&["1.json", "version.json"], &["version.json", "version is 0.0.7"]),
+        (&["version.json"], &["not made by this program", "version is 0.0.7"]),
+        (&["1.json", "sources.json"], &["sources.json", "sources is 0"]),
+        (&["1.json", "torn.json"], &["torn.json", "torn"]),
+        (&["1.json", "less.json"], &["less.json", "shard 2/3 has not its runs 1"]),
+        (&["1.json", "more.json"], &["more.json", "shard 2/3 has not its runs 4"]),
+        (&["whole.json"], &["whole.json", "not a shard"]),
+    ];
+    for (names, parts) in cases {
+        let output = merge(&folder, names);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{names:?}: {message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{names:?}: {message}");
+        assert!(output.stdout.is_empty(), "{names:?}");
+    }
+    let output = merge(&folder, &["3.json", "2.json", "1.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}
+
+#[test]
+fn options_of_a_part_are_refused_where_they_mean_nothing() {
+    let folder = folder("shards-options");
+    let cases: [(&[&str], &str); 6] = [
+        (
+            &["run", "torque-steps", "--shard", "1/2"],
+            "torque-steps does not consist of independent runs; those that do: ",
+        ),
+        (
+            &["run", "speed-profile", "--resume", "x"],
+            "speed-torque-sweep, monte-carlo, machines, battery",
+        ),
+        (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
+        (
+            &["run", "monte-carlo", "--shard", "3/2"],
+            "allowed: I/N with N from 1 to 100000 and I from 1 to N",
+        ),
+        (
+            &["run", "monte-carlo", "--shard", "1/2", "--out", "page"],
+            "'--shard <I/N>' cannot be used with '--out <DIR>'",
+        ),
+        (&["merge"], "<FILES>..."),
+    ];
+    for (arguments, part) in cases {
+        let output = hil_sim(&folder, arguments);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(part), "{arguments:?}: {message}");
+    }
+    assert!(files(&folder).is_empty(), "{:?}", files(&folder));
+}
+
+/// The records of the file count: a changed one shows in the outcome, so its run was not done again; a torn one is.
+#[test]
+fn finished_runs_are_not_done_again_and_a_torn_line_is() {
+    let folder = folder("shards-resume");
+    let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
+    let resumed = || hil_sim(&folder, &[MONTE_CARLO, &["--json", "--resume", "runs/"]].concat());
+    let first = resumed();
+    assert_eq!((text(&first.stdout), text(&first.stderr)), (text(&whole), ""));
+    let path = folder.join("runs/monte-carlo-seed-1-1-of-1.jsonl");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(kept.lines().count(), 7, "a head and six runs");
+
+    let marked = kept.replacen("\"lost\":false", "\"lost\":true", 1);
+    std::fs::write(&path, &marked).unwrap();
+    let output = resumed();
+    assert_eq!(object(&output)["metrics"]["lost_runs"], 1.0);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), marked);
+
+    std::fs::write(&path, &kept[..kept.len() - 30]).unwrap();
+    let output = resumed();
+    assert_eq!(text(&output.stdout), text(&whole));
+    let note = "runs/monte-carlo-seed-1-1-of-1.jsonl, line 7, was torn; its run is done again";
+    assert!(text(&output.stderr).contains(note), "{}", text(&output.stderr));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), kept);
+
+    let other = ["--json", "--resume", "runs/monte-carlo-seed-1-1-of-1.jsonl", "--seed", "2"];
+    let output = hil_sim(&folder, &[MONTE_CARLO, &other].concat());
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("here seed is 2, there 1") && output.status.code() == Some(2),
+        "{message}"
+    );
+}
+
+/// The recipe of the documentation, with GNU parallel where it is installed and with xargs.
+#[test]
+fn the_recipe_for_many_machines_gives_the_whole_run() {
+    let folder = folder("shards-recipe");
+    let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shards.sh");
+    // Two machines behind a secure shell that notes the machine and stays here.
+    let shell = folder.join("ssh");
+    let text_of_shell =
+        "#!/bin/sh\necho $1 >> hosts; shift; [ $1 = -- ] && shift; exec sh -c \"$*\"\n";
+    std::fs::write(&shell, text_of_shell).unwrap();
+    std::fs::set_permissions(&shell, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let recipe = |path: Option<&Path>, place: &str| {
+        let mut command = Command::new("/bin/sh");
+        command.current_dir(&folder).env("SIM", env!("CARGO_BIN_EXE_hil-sim"));
+        command.env("HOSTS", "1/alpha,1/beta").env("PARALLEL_SSH", &shell);
+        path.map(|path| command.env("PATH", path));
+        command.arg(&script).args(["3", place]).args(&MONTE_CARLO[1..6]);
+        let output = command.output().expect("a shell");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        std::fs::read(folder.join(place).join("whole.json")).unwrap()
+    };
+    let has_parallel = Command::new("parallel").arg("--version").output().is_ok();
+    if has_parallel {
+        assert_eq!(recipe(None, "with-parallel"), whole);
+        let hosts = std::fs::read_to_string(folder.join("hosts")).unwrap();
+        assert!(hosts.contains("alpha") && hosts.contains("beta"), "{hosts}");
+        // Again: all runs are there.
+        assert_eq!(recipe(None, "with-parallel"), whole);
+    }
+    // A path with all that the script needs, but without GNU parallel.
+    let tools = folder.join("tools");
+    std::fs::create_dir_all(&tools).unwrap();
+    let all = std::env::var_os("PATH").unwrap_or_default();
+    for tool in ["sh", "mkdir", "seq", "xargs"] {
+        let place =
+            std::env::split_paths(&all).map(|dir| dir.join(tool)).find(|path| path.is_file());
+        std::os::unix::fs::symlink(place.expect(tool), tools.join(tool)).unwrap();
+    }
+    assert_eq!(recipe(Some(&tools), "with-xargs"), whole);
+}

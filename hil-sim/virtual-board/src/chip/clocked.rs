@@ -1,0 +1,91 @@
+//! The clocks of the peripherals, and the rules between clock tree, supply and flash.
+
+use super::Chip;
+use super::bus::{
+    ADC1, DAC1, DAC3, FLASH_REGISTERS, GPIO_FIRST, GPIO_LAST, LPUART1, PWR, SYSCFG, TIM1, TIM2,
+    TIM5,
+};
+use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR};
+use crate::rules::Rule;
+
+/// Cycles from the store that switches a clock on to the first store that arrives: two whole cycles lie between.
+const ENABLE_CYCLES: u64 = 3;
+/// Cycles that an access to a register takes beyond one.
+const BUS_CYCLES: u64 = 2;
+/// A step to more than this, Hz, needs half the bus clock for a while.
+const STEP_HZ: u64 = 80_000_000;
+/// That while, ticks: a microsecond.
+const STEP_TICKS: u64 = 170;
+
+/// Name, enable register and bit of the clock behind an address; `None` has none of its own.
+pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
+    const PORTS: [&str; 7] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
+    Some(match address & !0x3ff {
+        TIM1 => ("TIM1", APB2ENR, 11),
+        ADC1 => ("ADC12", AHB2ENR, 13),
+        TIM2 => ("TIM2", APB1ENR1, 0),
+        TIM5 => ("TIM5", APB1ENR1, 3),
+        GPIO_FIRST..=GPIO_LAST => {
+            let port = (address - GPIO_FIRST) >> 10;
+            (PORTS[port as usize], AHB2ENR, port)
+        }
+        PWR => ("PWR", APB1ENR1, 28),
+        LPUART1 => ("LPUART1", APB1ENR2, 0),
+        SYSCFG => ("SYSCFG", APB2ENR, 0),
+        DAC1 => ("DAC1", AHB2ENR, 16),
+        DAC3 => ("DAC3", AHB2ENR, 18),
+        FLASH_REGISTERS => ("FLASH", AHB1ENR, 8),
+        _ => return None,
+    })
+}
+
+impl Chip {
+    /// Whether an access reaches its peripheral.
+    pub(super) fn is_clocked(&mut self, address: u32) -> bool {
+        let Some((name, register, bit)) = clock_of(address) else { return true };
+        let Some(on) = self.rcc.clock(register, bit) else {
+            self.rules
+                .note(Rule::ClockGate, format!("{name} at {address:#010x} without its clock"));
+            return false;
+        };
+        let Some(on) = on.filter(|_| self.rules.exact) else { return true };
+        let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle();
+        // This access itself is counted.
+        let accesses = self.accesses.saturating_sub(on.accesses + 1);
+        self.rules.require(
+            cycles + BUS_CYCLES * accesses >= ENABLE_CYCLES,
+            Rule::EnableDelay,
+            || format!("{name} at {address:#010x} {cycles} cycles after its clock was switched on"),
+        )
+    }
+
+    /// The value of a register after a reset, of a peripheral that has no clock.
+    pub(super) fn at_reset(&self, address: u32) -> Option<u32> {
+        let mut fresh = Self::new();
+        fresh.read_clocked(address)
+    }
+
+    /// Checks clock tree, voltage range and wait states against each other, after one of them was written.
+    pub(super) fn check_clocks(&mut self) {
+        let (system, bus) = (self.rcc.system_hz(), self.rcc.bus_hz());
+        let range = self.pwr.range();
+        let limit = range.limit_hz();
+        self.rules.require(system <= limit, Rule::VoltageRange, || {
+            format!("a system clock of {system} Hz in {range:?}, at most {limit}")
+        });
+        let (have, need) = (self.flash.wait_states(), range.wait_states(bus));
+        self.rules.require(have >= need, Rule::Latency, || {
+            format!("{have} wait states at {bus} Hz in {range:?}, at least {need}")
+        });
+        let (old_system, old_bus) = (self.system_hz, std::mem::replace(&mut self.bus_hz, bus));
+        if system > STEP_HZ && old_system <= STEP_HZ {
+            self.system_rose = self.now;
+        }
+        let whole = bus == system && bus > STEP_HZ && bus > old_bus;
+        let halved_long = old_system > STEP_HZ && self.system_rose + STEP_TICKS <= self.now;
+        self.rules.require(!whole || halved_long, Rule::ClockStep, || {
+            format!("the bus clock from {old_bus} to {bus} Hz, at half of it for less than 1 us")
+        });
+        self.system_hz = system;
+    }
+}

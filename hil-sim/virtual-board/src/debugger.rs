@@ -1,0 +1,117 @@
+//! A debugger at the debug port: it halts the core and lets it go, and sets and clears bits of DBGMCU.
+
+use anyhow::Result;
+
+use crate::board::Board;
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
+use crate::rules::Rule;
+
+/// DBGMCU: clocks go on in sleep, stop and standby.
+const LOW_POWER: u32 = 7;
+/// DBGMCU: clock of the core goes on while it sleeps.
+const SLEEP: u32 = 1;
+/// DBGMCU: the watchdog stops while the core is halted.
+const IWDG_STOP: u32 = 1 << 12;
+/// DBGMCU: TIM1 stops while the core is halted.
+const TIM1_STOP: u32 = 1 << 11;
+
+/// The program may take this long to switch off outputs that come back as the core goes on, ticks: two periods.
+const NOTICED: u64 = 2 * TICKS_PER_PERIOD;
+
+/// A halt that lasts.
+#[derive(Clone, Copy, Debug)]
+pub struct Halt {
+    since: u64,
+    /// Whether the outputs were on.
+    outputs: bool,
+}
+
+impl Chip {
+    /// Halts the core. What DBGMCU says stops with it.
+    pub fn halt(&mut self) {
+        if self.halt.is_some() {
+            return;
+        }
+        self.halt = Some(Halt { since: self.now, outputs: self.tim1.outputs_on() });
+        self.frozen_watchdog = self.debug.get(DBG_APB1_FZ) & IWDG_STOP != 0;
+        if self.debug.get(DBG_APB2_FZ) & TIM1_STOP != 0 {
+            self.tim1.freeze(self.now);
+            self.look_at_gates();
+        }
+        self.attention = true;
+    }
+
+    /// Lets the core go on.
+    pub fn resume(&mut self) {
+        let Some(halt) = self.halt.take() else { return };
+        let stood = self.now - halt.since;
+        self.tim1.thaw(self.now);
+        self.look_at_gates();
+        if std::mem::take(&mut self.frozen_watchdog) {
+            self.iwdg.delay(stood);
+        }
+        // The cycle counter does not count in debug state.
+        self.scs.stand_still(stood);
+        let back = halt.outputs && self.tim1.outputs_on();
+        self.back_on = back.then_some(self.now + NOTICED);
+        self.attention = true;
+    }
+
+    /// Looks at outputs that came back with the core.
+    pub(crate) fn check_outputs_back(&mut self) {
+        if !self.tim1.outputs_on() {
+            self.back_on = None;
+        }
+        if self.back_on.is_some_and(|at| at <= self.now) {
+            self.back_on = None;
+            self.rules.note(
+                Rule::ResumedOutputs,
+                "TIM1's outputs are on two periods after a debugger halted the core and let it go",
+            );
+        }
+    }
+
+    /// Whether the core is halted.
+    pub fn is_halted(&self) -> bool {
+        self.halt.is_some()
+    }
+
+    /// Time passes while the core sleeps.
+    pub fn sleep(&mut self, ticks: u64) {
+        if self.debug.get(DBG_CR) & SLEEP == 0 {
+            self.scs.stand_still(ticks);
+        }
+    }
+}
+
+impl Board {
+    /// A debugger attaches: it keeps the debug port alive in low-power modes.
+    pub fn attach(&mut self) {
+        let debug = &mut self.chip().debug;
+        let cr = debug.get(DBG_CR);
+        debug.write(DBG_CR, cr | LOW_POWER);
+    }
+
+    /// It detaches, and clears what it has set.
+    pub fn detach(&mut self) {
+        self.resume();
+        let debug = &mut self.chip().debug;
+        let cr = debug.get(DBG_CR);
+        debug.write(DBG_CR, cr & !LOW_POWER);
+    }
+
+    /// It halts the core for some time, ms; [`Board::resume`] lets it go on.
+    ///
+    /// # Errors
+    /// As of [`Board::run_ticks`].
+    pub fn halt(&mut self, ms: f64) -> Result<()> {
+        self.chip().halt();
+        self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)
+    }
+
+    /// It lets the core go on.
+    pub fn resume(&mut self) {
+        self.chip().resume();
+    }
+}

@@ -1,0 +1,346 @@
+//! One converter.
+
+use super::{
+    CFGR, CR, DR, IER, ISR, Inputs, JDR1, JSQR, KNOWN, NEVER, Named, SMPR1, SQR1, Store, TR1,
+};
+use crate::rules::Rule;
+
+const ADRDY: u32 = 1;
+const EOC: u32 = 1 << 2;
+const EOS: u32 = 1 << 3;
+const JEOC: u32 = 1 << 5;
+/// End of an injected sequence.
+pub(super) const JEOS: u32 = 1 << 6;
+/// Analog watchdog 1.
+pub(super) const AWD1: u32 = 1 << 7;
+const ADEN: u32 = 1;
+const ADDIS: u32 = 1 << 1;
+const ADSTART: u32 = 1 << 2;
+const JADSTART: u32 = 1 << 3;
+const ADSTP: u32 = 1 << 4;
+const JADSTP: u32 = 1 << 5;
+const VREGEN: u32 = 1 << 28;
+const DEEPPWD: u32 = 1 << 29;
+const ADCALDIF: u32 = 1 << 30;
+const ADCAL: u32 = 1 << 31;
+const JQDIS: u32 = 1 << 31;
+const CONT: u32 = 1 << 13;
+
+/// Sampling times, halves of a converter clock.
+const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
+/// A conversion after it, halves of a converter clock.
+const CONVERSION: u64 = 25;
+/// Start-up of the regulator, ticks: 20 us (datasheet).
+const REGULATOR: u64 = 20 * 170;
+/// A calibration, and the wait behind it, converter clocks (datasheet, tCAL; RM0440, ADCAL).
+const CALIBRATION: u64 = 116;
+const AFTER_CALIBRATION: u64 = 4;
+/// Start-up, converter clocks: a conversion (datasheet, tSTAB).
+const START_UP: u64 = 15;
+
+/// Kind of a sequence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sequence {
+    /// `SQR1` to `SQR4`.
+    Regular,
+    /// `JSQR`.
+    Injected,
+}
+
+/// A sequence that runs: its rank, and when that is converted.
+#[derive(Clone, Copy, Debug)]
+struct Running {
+    rank: u32,
+    done_at: u64,
+}
+
+const IDLE: Running = Running { rank: 0, done_at: NEVER };
+
+/// A converter.
+#[derive(Clone, Debug)]
+pub(super) struct Converter {
+    store: Store,
+    /// ISR.
+    pub status: u32,
+    control: u32,
+    running: [Running; 2],
+    /// Injected data.
+    pub data: [u16; 4],
+    regular: u16,
+    /// Since when the regulator is on.
+    regulator_from: u64,
+    /// End of the last calibration, and of the start-up.
+    calibrated_at: u64,
+    ready_at: u64,
+    ready: bool,
+}
+
+impl Default for Converter {
+    fn default() -> Self {
+        Self {
+            store: Store::new(KNOWN),
+            status: 0,
+            control: DEEPPWD,
+            running: [IDLE; 2],
+            data: [0; 4],
+            regular: 0,
+            regulator_from: NEVER,
+            calibrated_at: 0,
+            ready_at: NEVER,
+            ready: false,
+        }
+    }
+}
+
+impl Converter {
+    /// Whether any enabled event asks for the interrupt.
+    pub fn requests(&self) -> bool {
+        self.status & self.store.get(IER) != 0
+    }
+
+    /// Whether a rising edge of `TIM1_TRGO2` starts the injected sequence.
+    pub fn waits_for_tim1(&self) -> bool {
+        let idle = self.running[Sequence::Injected as usize].done_at == NEVER;
+        self.control & JADSTART != 0 && idle && self.store.get(JSQR) >> 2 & 0x7f == 1 << 5 | 8
+    }
+
+    /// Starts a sequence.
+    pub fn begin(&mut self, sequence: Sequence, at: u64, clock: u64) {
+        let done_at = at + self.conversion(sequence, 0) * clock / 2;
+        self.running[sequence as usize] = Running { rank: 0, done_at };
+    }
+
+    /// When the injected conversions sample: channel and time. Of the sequence in progress, else of that which a
+    /// trigger at this time would start.
+    pub fn samplings(&self, trigger: Option<u64>, clock: u64) -> Vec<(u32, u64)> {
+        let sequence = Sequence::Injected;
+        let lasts = |rank| self.conversion(sequence, rank) * clock / 2;
+        let running = self.running[sequence as usize];
+        let (first, mut ends) = match (running.done_at, trigger) {
+            (NEVER, None) => return Vec::new(),
+            (NEVER, Some(at)) => (0, at + lasts(0)),
+            (done_at, _) => (running.rank, done_at),
+        };
+        let mut samplings = Vec::new();
+        for rank in first..=self.last(sequence) {
+            if rank > first {
+                ends += lasts(rank);
+            }
+            samplings.push((self.channel(sequence, rank), ends - CONVERSION * clock / 2));
+        }
+        samplings
+    }
+
+    /// When the next conversion ends, or the start-up does.
+    pub fn next_event(&self) -> u64 {
+        self.running[0].done_at.min(self.running[1].done_at).min(self.ready_at)
+    }
+
+    fn channel(&self, sequence: Sequence, rank: u32) -> u32 {
+        match sequence {
+            // JSQ1 begins at bit 9, the others follow, six bits apart.
+            Sequence::Injected => self.store.get(JSQR) >> (9 + 6 * rank) & 0x1f,
+            // SQ1 begins at bit 6 of SQR1; five to a register.
+            Sequence::Regular => {
+                let place = rank + 1;
+                self.store.get(SQR1 + 4 * (place / 5)) >> (6 * (place % 5)) & 0x1f
+            }
+        }
+    }
+
+    /// The last rank of a sequence.
+    fn last(&self, sequence: Sequence) -> u32 {
+        match sequence {
+            Sequence::Injected => self.store.get(JSQR) & 3,
+            Sequence::Regular => self.store.get(SQR1) & 15,
+        }
+    }
+
+    /// Sampling and conversion of a rank, halves of a clock.
+    fn conversion(&self, sequence: Sequence, rank: u32) -> u64 {
+        let channel = self.channel(sequence, rank);
+        let register = self.store.get(SMPR1 + 4 * (channel / 10).min(1));
+        SAMPLING[(register >> (3 * (channel % 10)) & 7) as usize] + CONVERSION
+    }
+
+    /// Ends what is due; the channels converted, as bits.
+    pub fn happen(&mut self, now: u64, clock: u64, inputs: &Inputs) -> u32 {
+        if self.ready_at <= now {
+            self.ready_at = NEVER;
+            self.ready = true;
+            self.status |= ADRDY;
+        }
+        let mut converted = 0;
+        for sequence in [Sequence::Regular, Sequence::Injected] {
+            while self.running[sequence as usize].done_at <= now {
+                let Running { rank, done_at } = self.running[sequence as usize];
+                let channel = self.channel(sequence, rank);
+                converted |= 1 << channel;
+                let code = inputs.get(channel as usize).copied().unwrap_or(0);
+                self.take(sequence, rank, channel, code);
+                self.running[sequence as usize] = if rank == self.last(sequence) {
+                    self.end(sequence, done_at)
+                } else {
+                    let rank = rank + 1;
+                    let lasts = self.conversion(sequence, rank) * clock / 2;
+                    Running { rank, done_at: done_at + lasts }
+                };
+            }
+        }
+        converted
+    }
+
+    fn take(&mut self, sequence: Sequence, rank: u32, channel: u32, code: u16) {
+        match sequence {
+            Sequence::Injected => {
+                self.data[rank as usize & 3] = code;
+                self.status |= JEOC;
+                self.watch(channel, code);
+            }
+            Sequence::Regular => {
+                self.regular = code;
+                self.status |= EOC;
+            }
+        }
+    }
+
+    /// A sequence has ended: what runs now.
+    fn end(&mut self, sequence: Sequence, at: u64) -> Running {
+        match sequence {
+            Sequence::Injected => {
+                self.status |= JEOS;
+                // Without a trigger it has run once.
+                if self.store.get(JSQR) >> 7 & 3 == 0 {
+                    self.control &= !JADSTART;
+                }
+                IDLE
+            }
+            Sequence::Regular => {
+                self.status |= EOS;
+                if self.store.get(CFGR) & CONT != 0 {
+                    let lasts = self.conversion(sequence, 0);
+                    return Running { rank: 0, done_at: at + lasts };
+                }
+                self.control &= !ADSTART;
+                IDLE
+            }
+        }
+    }
+
+    fn watch(&mut self, channel: u32, code: u16) {
+        let cfgr = self.store.get(CFGR);
+        let (single, injected) = (cfgr >> 22 & 1 != 0, cfgr >> 24 & 1 != 0);
+        let watched = injected && (!single || cfgr >> 26 & 0x1f == channel);
+        let window = self.store.get(TR1);
+        let code = u32::from(code);
+        if watched && (code < window & 0xfff || code > window >> 16 & 0xfff) {
+            self.status |= AWD1;
+        }
+    }
+
+    /// Reads a register.
+    pub fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        Some(match offset {
+            ISR => self.status,
+            CR => self.control | if now < self.calibrated_at { ADCAL } else { 0 },
+            DR => {
+                self.status &= !EOC;
+                u32::from(self.regular)
+            }
+            JDR1 | 0x84 | 0x88 | 0x8c => u32::from(self.data[(offset - JDR1) as usize / 4]),
+            _ => return self.store.read(offset),
+        })
+    }
+
+    /// Writes a register, with `clock` ticks per converter clock if there is one.
+    pub fn write(
+        &mut self,
+        offset: u32,
+        value: u32,
+        now: u64,
+        clock: Option<u64>,
+        rules: &mut Named,
+    ) -> Option<()> {
+        match offset {
+            ISR => self.status &= !value,
+            CR => self.order(value, now, clock, rules),
+            JSQR => {
+                let queue = self.store.get(CFGR) & JQDIS == 0;
+                let free = queue || self.control & JADSTART == 0;
+                if rules.require(free, Rule::JsqrStarted, "JSQR while JADSTART is set, JQDIS = 1") {
+                    self.store.write(JSQR, value)?;
+                }
+            }
+            _ => {
+                self.store.write(offset, value)?;
+            }
+        }
+        Some(())
+    }
+
+    fn order(&mut self, value: u32, now: u64, clock: Option<u64>, rules: &mut Named) {
+        let config = DEEPPWD | VREGEN | ADCALDIF;
+        let before = self.control;
+        self.control = self.control & !config | value & config;
+        if self.control & VREGEN == 0 || self.control & DEEPPWD != 0 {
+            self.regulator_from = NEVER;
+            self.control &= !(ADEN | ADSTART | JADSTART);
+            self.ready = false;
+        } else if before & (VREGEN | DEEPPWD) != VREGEN {
+            self.regulator_from = now;
+        }
+        let powered = self.regulator_from.saturating_add(REGULATOR) <= now;
+        let calibrating = now < self.calibrated_at;
+        if value & ADCAL != 0 && !calibrating {
+            let off = self.control & ADEN == 0;
+            let allowed = rules.require(
+                powered && off,
+                Rule::AdcEarly,
+                "ADCAL before its regulator is up for 20 us, or while ADEN is set",
+            );
+            let has_clock = rules.require(clock.is_some(), Rule::AdcClock, "ADCAL without a clock");
+            if allowed {
+                // Without a clock it never ends.
+                let lasts = if has_clock { CALIBRATION * clock.unwrap_or(1) } else { NEVER };
+                self.calibrated_at = now.saturating_add(lasts);
+            }
+        }
+        if value & ADEN != 0 && self.control & ADEN == 0 {
+            let settled = self.calibrated_at.saturating_add(AFTER_CALIBRATION * clock.unwrap_or(1));
+            let allowed = rules.require(powered && settled <= now, Rule::AdcEarly, "ADEN before its regulator is up for 20 us, or less than 4 clocks after the calibration");
+            let has_clock = rules.require(clock.is_some(), Rule::AdcClock, "ADEN without a clock");
+            if allowed && has_clock {
+                self.control |= ADEN;
+                self.ready_at = now + START_UP * clock.unwrap_or(1);
+            }
+        }
+        if value & ADDIS != 0 {
+            self.control &= !(ADEN | ADSTART | JADSTART);
+            self.ready = false;
+            self.ready_at = NEVER;
+        }
+        for (bit, sequence) in [(ADSTART, Sequence::Regular), (JADSTART, Sequence::Injected)] {
+            if value & bit == 0 || self.control & bit != 0 {
+                continue;
+            }
+            if rules.require(self.ready, Rule::AdcEarly, "a conversion started before ADRDY") {
+                self.control |= bit;
+                let triggered = match sequence {
+                    Sequence::Regular => self.store.get(CFGR) >> 10 & 3 != 0,
+                    Sequence::Injected => self.store.get(JSQR) >> 7 & 3 != 0,
+                };
+                if !triggered {
+                    self.begin(sequence, now, clock.unwrap_or(1));
+                }
+            }
+        }
+        for (stop, bit, sequence) in
+            [(ADSTP, ADSTART, Sequence::Regular), (JADSTP, JADSTART, Sequence::Injected)]
+        {
+            if value & stop != 0 {
+                self.control &= !bit;
+                self.running[sequence as usize] = IDLE;
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Two of the converters to analog (RM0440, section 22), 12 bits right-aligned, without triggers: 1 and 3.
+
+use super::{Effect, NEVER, Plain, Store};
+use crate::rules::{Rule, Rules};
+
+const KNOWN: &[Plain] = &[
+    (CR, 0, 0x7fff_7fff),
+    (DHR[0], 0, 0x0fff_0fff),
+    (DHR[1], 0, 0x0fff_0fff),
+    (DOR[0], 0, 0),
+    (DOR[1], 0, 0),
+    (SR, 0, 0),
+    (0x38, 0, 0x1f_001f),
+    (MCR, 0, 0x0307_c307),
+];
+const CR: u32 = 0x00;
+const DHR: [u32; 2] = [0x08, 0x14];
+const DOR: [u32; 2] = [0x2c, 0x30];
+const SR: u32 = 0x34;
+const MCR: u32 = 0x3c;
+/// DACxRDY of channel 1; the bits of channel 2 are 16 places higher.
+const RDY: u32 = 1 << 11;
+/// From the enable bit to a valid output without buffer, ticks: 8 us (datasheet, tWAKEUP).
+const WAKE_UP: u64 = 8 * 170;
+/// From one code to another, ticks: 3 us (datasheet, tSETTLING).
+const SETTLING: u64 = 3 * 170;
+
+/// A channel.
+#[derive(Clone, Copy, Debug)]
+struct Channel {
+    ready_at: u64,
+    settled_at: u64,
+    /// The code that the output had settled to before.
+    before: u16,
+    code: u16,
+    has_data: bool,
+    seen_ready: bool,
+}
+
+const OFF: Channel = Channel {
+    ready_at: NEVER,
+    settled_at: NEVER,
+    before: 0,
+    code: 0,
+    has_data: false,
+    seen_ready: false,
+};
+
+impl Channel {
+    fn output(&self, now: u64) -> u16 {
+        if now >= self.settled_at { self.code } else { self.before }
+    }
+
+    fn go_to(&mut self, code: u16, now: u64, lasts: u64) {
+        self.before = self.output(now);
+        self.code = code;
+        self.settled_at = (now + lasts).max(if self.ready_at == NEVER { 0 } else { self.ready_at });
+    }
+}
+
+/// The code in a data register; that for double data mode lies above it.
+fn data(register: u32) -> u16 {
+    (register & 0xfff) as u16
+}
+
+/// One converter.
+#[derive(Clone, Debug)]
+struct Dac {
+    store: Store,
+    channels: [Channel; 2],
+}
+
+/// Both.
+#[derive(Clone, Debug)]
+pub struct Dacs([Dac; 2]);
+
+impl Default for Dacs {
+    fn default() -> Self {
+        Self([0, 1].map(|_| Dac { store: Store::new(KNOWN), channels: [OFF; 2] }))
+    }
+}
+
+impl Dacs {
+    /// The code that channel 1 or 2 of a converter puts out.
+    pub fn code(&self, which: usize, channel: usize, now: u64) -> u16 {
+        self.0[which].channels[channel - 1].output(now)
+    }
+
+    /// Whether a channel was read as ready.
+    pub fn seen_ready(&self, which: usize, channel: usize) -> bool {
+        self.0[which].channels[channel - 1].seen_ready
+    }
+
+    /// When an output has settled next.
+    pub fn next_event(&self, now: u64) -> u64 {
+        let all = self.0.iter().flat_map(|dac| dac.channels.iter().map(|c| c.settled_at));
+        all.filter(|at| *at > now).min().unwrap_or(NEVER)
+    }
+
+    /// Reads a register.
+    pub fn read(&mut self, which: usize, offset: u32, now: u64) -> Option<u32> {
+        let Dac { store, channels } = &mut self.0[which];
+        let value = store.read(offset)?;
+        if let Some(n) = DOR.iter().position(|known| *known == offset) {
+            return Some(u32::from(channels[n].code));
+        }
+        if offset != SR {
+            return Some(value);
+        }
+        Some((0..2).fold(0, |word, n| {
+            let ready = channels[n].ready_at <= now;
+            channels[n].seen_ready |= ready;
+            word | if ready { RDY << (16 * n) } else { 0 }
+        }))
+    }
+
+    /// Writes a register.
+    pub fn write(
+        &mut self,
+        which: usize,
+        offset: u32,
+        value: u32,
+        now: u64,
+        rules: &mut Rules,
+    ) -> Option<Effect> {
+        let Dac { store, channels } = &mut self.0[which];
+        let on = |store: &Store, n: usize| store.get(CR) >> (16 * n) & 1 != 0;
+        let was = [on(store, 0), on(store, 1)];
+        let name = ["DAC1", "DAC3"][which];
+        if offset == MCR {
+            for n in 0..2 {
+                let mode = |value: u32| value >> (16 * n) & 7;
+                if mode(value) == mode(store.get(MCR)) {
+                    continue;
+                }
+                rules.require(!was[n], Rule::DacMode, || format!("{name}_MCR while it is on"));
+                rules.require(channels[n].has_data, Rule::DacMode, || {
+                    format!("{name}_MCR before the first data of channel {}", n + 1)
+                });
+            }
+            if was.contains(&true) {
+                return Some(Effect::None);
+            }
+        }
+        store.write(offset, value)?;
+        for n in 0..2 {
+            let channel = &mut channels[n];
+            if offset == DHR[n] {
+                channel.has_data = true;
+                if was[n] {
+                    channel.go_to(data(store.get(offset)), now, SETTLING);
+                }
+            } else if on(store, n) && !was[n] {
+                channel.ready_at = now + WAKE_UP;
+                channel.go_to(data(store.get(DHR[n])), now, WAKE_UP);
+            } else if was[n] && !on(store, n) {
+                *channel = Channel { has_data: channel.has_data, ..OFF };
+            }
+        }
+        Some(Effect::Look)
+    }
+}

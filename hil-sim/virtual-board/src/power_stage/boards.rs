@@ -1,0 +1,103 @@
+//! The boards, each with its sources. "Assumed" is a value that no source gives.
+
+use super::driver::{Driver, Input, Pull};
+use super::shunts::Shunts;
+use super::{GateLimits, PowerStage, Sensors};
+
+/// All of them.
+pub const ALL: [&PowerStage; 3] = [&REFERENCE, &IHM08M1, &IHM023V3];
+
+/// TTL levels: below 0.8 V is low, above 2.0 V high.
+const TTL: (f64, f64) = (0.8, 2.0);
+/// L6398 (data sheet, electrical characteristics: V_il 0.8 V at most, V_ih 1.9 V at least), and L6390 alike.
+const L639X: (f64, f64) = (0.8, 1.9);
+
+/// HIN of L6398 and L6390: active high; its pull-down draws 260 uA at most from 15 V (L6390 data sheet, p. 11), typically
+/// 175 uA.
+const HIN: Input = Input {
+    on_at_high: true,
+    pull: Some(Pull { volts: 0.0, ohm: 15.0 / 175e-6 }),
+    thresholds: L639X,
+};
+/// LIN of L6398 and L6390: active low; it draws 3 to 20 uA at logic 0, next to nothing at logic 1 (L6398 data sheet,
+/// p. 8): a pull-up. Its voltage is assumed to be 5 V, its current 6 uA.
+const LIN: Input = Input {
+    on_at_high: false,
+    pull: Some(Pull { volts: 5.0, ohm: 5.0 / 6e-6 }),
+    thresholds: L639X,
+};
+
+/// The inverter of the dissertation, with sensors in the lines a and b. The dissertation does not describe its drivers:
+/// inputs active high with external pull-downs of 10 kOhm, as the documentation asks for, without interlock.
+pub const REFERENCE: PowerStage = PowerStage {
+    name: "reference",
+    driver: {
+        let input =
+            Input { on_at_high: true, pull: Some(Pull { volts: 0.0, ohm: 10e3 }), thresholds: TTL };
+        Driver { high: input, low: input, interlock: false, dead_time_s: 0.0 }
+    },
+    // 2.2 us (section 3.9). A microsecond, less the rounding to counts.
+    limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
+    sensors: Sensors::InLine,
+    dc_link_divider: None,
+    delay_and_drop: None,
+    motor: None,
+    supply_v: None,
+};
+
+/// X-NUCLEO-IHM08M1 at 48 V: L6398 with STL220N6F7.
+///
+/// Pins, dividers and shunts: UM1996 and UM2505 as tabulated by okhsunrog/oxifoc, docs/hw/nucleo-g474re-ihm08m1.md
+/// (9e87244), which calculated gain and offset. The sign is that of a shunt between switch and ground at a non-inverting
+/// amplifier, and of ST's library (r3_2_g4xx_pwm_curr_fdbk.c: current = offset - code).
+const IHM08M1: PowerStage = PowerStage {
+    name: "nucleo-g474re-ihm08m1",
+    // Truth table with interlock, and 320 ns of its own: L6398 data sheet.
+    driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 320e-9 },
+    // Assumed: the MOSFETs switch in less than 100 ns, so the driver's own dead time is enough.
+    limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
+    sensors: Sensors::LowSide(Shunts {
+        volts_per_a: -0.010 * 5.18,
+        zero_v: 1.71,
+        // TSV994: rail to rail, 10 mV from its supply (assumed).
+        rails_v: (0.010, 3.29),
+        // Assumed: filter and slew of the amplifier.
+        settling_s: 0.4e-6,
+        // Resistors of 1 % (assumed); one of each sign, the third right.
+        gain_error: [0.004, -0.004, 0.0],
+        // Offset of the amplifiers through the gain (assumed), V.
+        offset_v: [2e-3, -2e-3, 1e-3],
+        // One code, rms (assumed).
+        noise_v: 0.0008,
+    }),
+    // 169 and 9.31 kOhm.
+    dc_link_divider: Some(19.15),
+    // 125 ns (L6398 data sheet). A switch drops little; assumed.
+    delay_and_drop: Some((125e-9, 0.1)),
+    motor: Some("rewound-48v"),
+    supply_v: Some(48.0),
+};
+
+/// STEVAL-IHM023V3 behind X-NUCLEO-IHM09M1 at 320 V: L6390 with STGP10H60DF. Its sources are thin: shunts, gain, bias and
+/// divider from third parties that name UM1823 and ST's templates.
+const IHM023V3: PowerStage = PowerStage {
+    name: "nucleo-g474re-ihm023v3",
+    // Interlock: L6390 data sheet, truth table. Its dead time is set by a resistor: the shortest is assumed.
+    driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 180e-9 },
+    // Assumed: an IGBT is off within 0.5 us.
+    limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
+    sensors: Sensors::LowSide(Shunts {
+        volts_per_a: -0.15 * 1.7,
+        zero_v: 1.7,
+        rails_v: (0.010, 3.29),
+        settling_s: 0.4e-6,
+        gain_error: [0.004, -0.004, 0.0],
+        offset_v: [2e-3, -2e-3, 1e-3],
+        noise_v: 0.0008,
+    }),
+    dc_link_divider: Some(1.0 / 0.0075),
+    // 125 ns (L6390 data sheet); drop of an IGBT, assumed.
+    delay_and_drop: Some((125e-9, 1.5)),
+    motor: None,
+    supply_v: Some(320.0),
+};

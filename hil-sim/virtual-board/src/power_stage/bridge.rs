@@ -1,0 +1,302 @@
+//! The gates of the six switches over a PWM period, behind the drivers.
+
+use std::fmt;
+
+use drive_core::Compare;
+
+use super::PowerStage;
+use super::driver::{Driver, Request};
+use crate::chip::TICKS_PER_S;
+use crate::periph::gpio::Gpio;
+use crate::periph::tim1::{Tim1, Wave};
+
+/// Names of the switches of a leg.
+const SIDES: [&str; 2] = ["high", "low"];
+const LEGS: [&str; 3] = ["a", "b", "c"];
+
+/// A violation at the gates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BadGates {
+    /// A switch is on, or may be, while the timer's outputs are off.
+    OnWhileOff {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Switch, 0 is the high side.
+        side: usize,
+        /// The level at the driver's input is not defined.
+        undefined: bool,
+    },
+    /// The level at a driver's input is not defined while the outputs are on.
+    Undefined {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Switch, 0 is the high side.
+        side: usize,
+    },
+    /// Both switches of a leg are on together.
+    Together {
+        /// Leg, 0 is a.
+        leg: usize,
+    },
+    /// Both inputs of a leg ask for on; the driver's interlock keeps both switches off.
+    Interlocked {
+        /// Leg, 0 is a.
+        leg: usize,
+    },
+    /// The switches of a leg follow each other too soon.
+    Short {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Time in which both are off, ticks.
+        dead_time: u32,
+    },
+    /// A switch of a leg is on for too short a time.
+    Pulse {
+        /// Leg, 0 is a.
+        leg: usize,
+        /// Ticks.
+        ticks: u32,
+    },
+}
+
+impl fmt::Display for BadGates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let us = |ticks: u32| f64::from(ticks) * 1e6 / TICKS_PER_S as f64;
+        match *self {
+            Self::OnWhileOff { leg, side, undefined } => {
+                let is = if undefined { "may be" } else { "is" };
+                write!(f, "{} side {} {is} on while the outputs are off", SIDES[side], LEGS[leg])
+            }
+            Self::Undefined { leg, side } => {
+                write!(f, "the input of {} side {} has no defined level", SIDES[side], LEGS[leg])
+            }
+            Self::Together { leg } => write!(f, "both switches of leg {} are on", LEGS[leg]),
+            Self::Interlocked { leg } => {
+                write!(f, "both inputs of leg {} ask for on, and the driver blocks", LEGS[leg])
+            }
+            Self::Short { leg, dead_time } => {
+                write!(f, "leg {} has a dead time of {:.2} us", LEGS[leg], us(dead_time))
+            }
+            Self::Pulse { leg, ticks } => {
+                write!(f, "leg {} has a pulse of {:.2} us", LEGS[leg], us(ticks))
+            }
+        }
+    }
+}
+
+/// A time in which neither switch of a leg changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// Its beginning after the top of the counter, ticks.
+    pub from: u32,
+    /// Its length, ticks.
+    pub ticks: u32,
+    /// The switches that are on: high side, low side.
+    pub on: [bool; 2],
+}
+
+/// The gates of a leg.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Leg {
+    /// The pieces of a period, in order.
+    pub pieces: Vec<Piece>,
+    /// Inputs whose level is not defined: high side, low side.
+    undefined: [bool; 2],
+    /// Whether the interlock works.
+    interlocked: bool,
+    /// The compare value of a leg whose switches alternate; none of one whose switches do not.
+    compare: Option<u16>,
+}
+
+/// The gates of all legs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bridge {
+    /// The legs a, b, c.
+    pub legs: [Leg; 3],
+    /// Whether the timer's outputs are on.
+    pub outputs_on: bool,
+    /// Time in which both switches of a leg are off at a change, ticks.
+    pub dead_time: u32,
+}
+
+impl Bridge {
+    /// The gates that a power stage makes of the pins.
+    pub fn new(stage: &PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
+        let own = ticks(stage.driver.dead_time_s);
+        Self {
+            legs: [0, 1, 2].map(|leg| Leg::new(&stage.driver, own, leg, gpio, tim1)),
+            outputs_on: tim1.outputs_on(),
+            dead_time: own.max(tim1.dead_time()),
+        }
+    }
+
+    /// The compare values that the motor sees. A motor has no model for a bridge of which only some legs are driven: as
+    /// long as one leg's switches do not alternate, all are off.
+    pub fn compare(&self) -> Compare {
+        match [0, 1, 2].map(|leg| self.legs[leg].compare) {
+            [Some(a), Some(b), Some(c)] => Compare::on([a, b, c]),
+            _ => Compare::OFF,
+        }
+    }
+
+    /// Whether any switch is on at any time, or may be.
+    pub fn any_on(&self) -> bool {
+        self.legs.iter().any(|leg| leg.undefined != [false; 2] || leg.is_on(0) || leg.is_on(1))
+    }
+
+    /// Checks for switches that are on while they must not be. Pulses are not looked at.
+    ///
+    /// # Errors
+    /// The first violation.
+    pub fn check(&self, stage: &PowerStage) -> Result<(), BadGates> {
+        let shortest = ticks(stage.limits.dead_time_s);
+        self.legs
+            .iter()
+            .enumerate()
+            .try_for_each(|(n, leg)| leg.check(n, self.outputs_on, shortest))
+    }
+
+    /// Checks the lengths of the pulses.
+    ///
+    /// # Errors
+    /// The first one that is too short.
+    pub fn check_pulses(&self, stage: &PowerStage) -> Result<(), BadGates> {
+        let shortest = ticks(stage.limits.pulse_s);
+        for (leg, gates) in self.legs.iter().enumerate() {
+            let too_short =
+                |side| gates.times(side).map(|(_, ticks)| ticks).find(|t| *t < shortest);
+            if let Some(ticks) = too_short(0).or_else(|| too_short(1)) {
+                return Err(BadGates::Pulse { leg, ticks });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn ticks(seconds: f64) -> u32 {
+    (seconds * TICKS_PER_S as f64).round() as u32
+}
+
+impl Leg {
+    fn new(driver: &Driver, own: u32, leg: usize, gpio: &[Gpio], tim1: &Tim1) -> Self {
+        let period = tim1.period();
+        let requests = driver.requests(leg, gpio, tim1, true);
+        let undefined = requests.map(|request| request == Request::Undefined);
+        let [high, low] = requests.map(|request| request.at_worst(period));
+        let (pieces, interlocked) = pieces(high, low, driver.interlock);
+        let ideal = driver.requests(leg, gpio, tim1, false);
+        let compare = match ideal {
+            [Request::Known(high), Request::Known(low)] if low == high.inverted() => {
+                Some((high.high() / 2) as u16)
+            }
+            _ => None,
+        };
+        Self { pieces: with_dead_time(pieces, own), undefined, interlocked, compare }
+    }
+
+    fn is_on(&self, side: usize) -> bool {
+        self.pieces.iter().any(|piece| piece.on[side])
+    }
+
+    /// When a switch goes on, and for how long, ticks; none of one that is on or off throughout.
+    fn times(&self, side: usize) -> impl Iterator<Item = (u32, u32)> {
+        let count = self.pieces.len();
+        let is_on = move |n: usize| self.pieces[n % count].on[side];
+        let begins = (0..count).filter(move |n| is_on(*n) && !is_on(n + count - 1));
+        begins.map(move |n| {
+            let pieces = (n..n + count).take_while(|n| is_on(*n));
+            (self.pieces[n].from, pieces.map(|n| self.pieces[n % count].ticks).sum())
+        })
+    }
+
+    /// Ticks from the end of the other switch's last pulse to each beginning of this one's.
+    fn gaps(&self, side: usize) -> impl Iterator<Item = u32> {
+        let period: u32 = self.pieces.iter().map(|piece| piece.ticks).sum();
+        let gap = move |begin: u32| {
+            let ends = self.times(1 - side).map(|(from, ticks)| from + ticks);
+            ends.map(|end| (begin + 2 * period - end) % period).min()
+        };
+        self.times(side).filter_map(move |(begin, _)| gap(begin))
+    }
+
+    fn check(&self, leg: usize, outputs_on: bool, shortest: u32) -> Result<(), BadGates> {
+        for side in [0, 1] {
+            let undefined = self.undefined[side];
+            if !outputs_on && (undefined || self.is_on(side)) {
+                return Err(BadGates::OnWhileOff { leg, side, undefined });
+            }
+            if undefined {
+                return Err(BadGates::Undefined { leg, side });
+            }
+        }
+        if self.pieces.iter().any(|piece| piece.on == [true; 2]) {
+            return Err(BadGates::Together { leg });
+        }
+        if self.interlocked {
+            return Err(BadGates::Interlocked { leg });
+        }
+        match self.gaps(0).chain(self.gaps(1)).min() {
+            Some(dead_time) if dead_time < shortest => Err(BadGates::Short { leg, dead_time }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The pieces of a period, and whether the interlock works.
+fn pieces(high: Wave, low: Wave, interlock: bool) -> (Vec<Piece>, bool) {
+    let mut instants: Vec<u32> = high.edges().chain(low.edges()).chain([0]).collect();
+    instants.sort_unstable();
+    instants.dedup();
+    let ends = instants.iter().skip(1).chain([&high.period]);
+    let mut interlocked = false;
+    let pieces = instants.iter().zip(ends).map(|(&from, &end)| {
+        let mut on = [high.at(from), low.at(from)];
+        if interlock && on == [true; 2] {
+            interlocked = true;
+            on = [false; 2];
+        }
+        Piece { from, ticks: end - from, on }
+    });
+    (pieces.collect(), interlocked)
+}
+
+/// With the dead time that the driver adds where the inputs leave less.
+fn with_dead_time(mut pieces: Vec<Piece>, own: u32) -> Vec<Piece> {
+    if own == 0 {
+        return pieces;
+    }
+    let count = pieces.len();
+    for side in [0, 1] {
+        // Ticks at the end of the period since the other switch was on last.
+        let mut since = own;
+        let mut later = 0;
+        for piece in pieces.iter().rev() {
+            if piece.on[1 - side] {
+                since = later;
+                break;
+            }
+            later += piece.ticks;
+        }
+        let mut made = Vec::with_capacity(count + 2);
+        for piece in pieces {
+            if piece.on[1 - side] {
+                since = 0;
+                made.push(piece);
+                continue;
+            }
+            let wait = if piece.on[side] { own.saturating_sub(since).min(piece.ticks) } else { 0 };
+            if wait > 0 {
+                let mut off = piece;
+                off.ticks = wait;
+                off.on[side] = false;
+                made.push(off);
+            }
+            if wait < piece.ticks {
+                made.push(Piece { from: piece.from + wait, ticks: piece.ticks - wait, ..piece });
+            }
+            since += piece.ticks;
+        }
+        pieces = made;
+    }
+    pieces
+}

@@ -1,0 +1,147 @@
+//! The gate drivers: levels at their inputs, and whether those ask for on.
+
+use super::{GATE_FUNCTION, GATE_PINS};
+use crate::periph::gpio::{Gpio, Pad};
+use crate::periph::tim1::{Output, Tim1, Wave};
+
+/// The chip's own resistors, ohm (datasheet: 25 to 55 kOhm), and its supply, V.
+const CHIP_PULL_OHM: f64 = 40e3;
+const CHIP_V: f64 = 3.3;
+
+/// A resistor to a voltage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pull {
+    /// V.
+    pub volts: f64,
+    /// Ohm.
+    pub ohm: f64,
+}
+
+/// An input of a driver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Whether the switch is on at a high level, or at a low one.
+    pub on_at_high: bool,
+    /// What pulls the input, inside the driver or on the board; none floats.
+    pub pull: Option<Pull>,
+    /// Below the first voltage a level is low, above the second it is high, V.
+    pub thresholds: (f64, f64),
+}
+
+/// A half-bridge driver: one for each leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Driver {
+    /// Input of the high side.
+    pub high: Input,
+    /// Input of the low side.
+    pub low: Input,
+    /// Whether both switches are off when both inputs ask for on.
+    pub interlock: bool,
+    /// Time in which it keeps a switch off after the other one went off, s.
+    pub dead_time_s: f64,
+}
+
+/// What an input asks for over a PWM period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// On where high.
+    Known(Wave),
+    /// The level is not defined: on or off.
+    Undefined,
+}
+
+impl Request {
+    /// The request, for a careful reader: on where it is not defined.
+    pub fn at_worst(self, period: u32) -> Wave {
+        match self {
+            Self::Known(wave) => wave,
+            Self::Undefined => Wave::constant(period, true),
+        }
+    }
+}
+
+impl Input {
+    /// The level of a pin that nothing drives, beside the chip's own resistor.
+    pub fn level(&self, chip_pull: Option<bool>) -> Option<bool> {
+        let chip =
+            chip_pull.map(|up| Pull { volts: if up { CHIP_V } else { 0.0 }, ohm: CHIP_PULL_OHM });
+        let pulls = || self.pull.into_iter().chain(chip);
+        let conductance: f64 = pulls().map(|pull| 1.0 / pull.ohm).sum();
+        let volts = pulls().map(|pull| pull.volts / pull.ohm).sum::<f64>() / conductance;
+        // Without any resistor not a number, which is neither.
+        match self.thresholds {
+            (low, _) if volts < low => Some(false),
+            (_, high) if volts > high => Some(true),
+            _ => None,
+        }
+    }
+
+    fn request(&self, pin: (usize, u32), output: Output, gpio: &[Gpio], period: u32) -> Request {
+        let (port, number) = pin;
+        let port = &gpio[port];
+        let asks = |wave: Wave| if self.on_at_high { wave } else { wave.inverted() };
+        let driven = match port.pad(number) {
+            Pad::Output(level) => Output::Driven(Wave::constant(period, level)),
+            Pad::Alternate(GATE_FUNCTION) => output,
+            // Another peripheral's: nobody knows.
+            Pad::Alternate(_) => Output::Unknown,
+            Pad::Input | Pad::Analog => Output::Released,
+        };
+        let level = self.level(port.pull(number));
+        match driven {
+            Output::Driven(wave) if port.open_drain(number) => match level {
+                Some(true) => Request::Known(asks(wave)),
+                // The high level is not driven, and nothing else makes it.
+                Some(false) => Request::Known(asks(Wave::constant(period, false))),
+                None => Request::Undefined,
+            },
+            Output::Driven(wave) => Request::Known(asks(wave)),
+            Output::Unknown => Request::Undefined,
+            Output::Released => level.map_or(Request::Undefined, |level| {
+                Request::Known(asks(Wave::constant(period, level)))
+            }),
+        }
+    }
+}
+
+impl Driver {
+    /// What high and low side of a leg ask for, with the timer's dead time or as if it made none.
+    pub fn requests(
+        &self,
+        leg: usize,
+        gpio: &[Gpio],
+        tim1: &Tim1,
+        dead_time: bool,
+    ) -> [Request; 2] {
+        let outputs = tim1.outputs(leg, dead_time);
+        let [high, low] = GATE_PINS[leg];
+        [
+            self.high.request(high, outputs[0], gpio, tim1.period()),
+            self.low.request(low, outputs[1], gpio, tim1.period()),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ALL, REFERENCE};
+    use super::*;
+
+    #[test]
+    fn a_released_pin_is_off_on_every_board_and_a_pull_against_it_is_not() {
+        for stage in ALL {
+            for input in [stage.driver.high, stage.driver.low] {
+                assert_eq!(input.level(None), Some(!input.on_at_high), "{}", stage.name);
+                // A resistor of the chip in the same direction changes nothing.
+                assert_eq!(input.level(Some(!input.on_at_high)), Some(!input.on_at_high));
+            }
+        }
+        // The chip's resistor wins against the weak ones in the driver, not against 10 kOhm.
+        let [_, ihm08m1, _] = ALL;
+        assert_eq!(ihm08m1.driver.low.level(Some(false)), Some(false));
+        assert_eq!(ihm08m1.driver.high.level(Some(true)), Some(true));
+        assert_eq!(REFERENCE.driver.high.level(Some(true)), Some(false));
+        let floating = Input { pull: None, ..REFERENCE.driver.high };
+        assert_eq!(floating.level(None), None);
+    }
+}

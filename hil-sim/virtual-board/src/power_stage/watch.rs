@@ -1,0 +1,55 @@
+//! The watch at the gates: it looks whenever anything changes that the gates depend on.
+
+use super::PowerStage;
+use super::bridge::{BadGates, Bridge};
+use crate::periph::gpio::Gpio;
+use crate::periph::tim1::Tim1;
+
+/// A violation, and where and when it was seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seen {
+    /// The violation.
+    pub what: BadGates,
+    /// Last known place of the core.
+    pub at: u32,
+    /// Time, ticks.
+    pub time: u64,
+}
+
+/// The power stage of a chip, with the present state of its gates.
+#[derive(Clone, Debug)]
+pub struct GateWatch {
+    stage: &'static PowerStage,
+    bridge: Bridge,
+    seen: Option<Seen>,
+}
+
+impl GateWatch {
+    /// Of a chip whose pins are released.
+    pub fn new(stage: &'static PowerStage, gpio: &[Gpio], tim1: &Tim1) -> Self {
+        Self { stage, bridge: Bridge::new(stage, gpio, tim1), seen: None }
+    }
+
+    /// The power stage.
+    pub fn stage(&self) -> &'static PowerStage {
+        self.stage
+    }
+
+    /// The gates as they are.
+    pub fn bridge(&self) -> &Bridge {
+        &self.bridge
+    }
+
+    /// The first violation since the last call.
+    pub fn take(&mut self) -> Option<Seen> {
+        self.seen.take()
+    }
+
+    /// Looks at the gates at the core's place `at` and at a time.
+    pub fn look(&mut self, gpio: &[Gpio], tim1: &Tim1, at: u32, time: u64) {
+        self.bridge = Bridge::new(self.stage, gpio, tim1);
+        if let Err(what) = self.bridge.check(self.stage) {
+            self.seen.get_or_insert(Seen { what, at, time });
+        }
+    }
+}

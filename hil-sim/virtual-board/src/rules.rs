@@ -1,0 +1,177 @@
+//! The rules of the chip that a program can break without an access fault: what the silicon would silently drop,
+//! delay or do wrong. A broken rule is recorded with its place and time, and fails the run of a
+//! [`Board`](crate::Board).
+
+use std::fmt;
+
+/// A rule, and in [`Rule::source`] where it is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rule {
+    /// A register of a peripheral whose clock is off in RCC: writes are lost, reads give the value after reset.
+    ClockGate,
+    /// The first access to a peripheral less than two cycles after its clock was switched on. It is counted only where
+    /// the core stops at every instruction ([`Counting::every_instruction`](crate::Counting)).
+    EnableDelay,
+    /// A system clock above the limit of the core's voltage range.
+    VoltageRange,
+    /// Too few wait states of the flash for the clock.
+    Latency,
+    /// The bus clock rises from 80 MHz or less to more in one step, without a microsecond at half of it.
+    ClockStep,
+    /// `TIM1_BDTR` is written with another `LOCK` than the first time: it keeps the first.
+    LockOnce,
+    /// The flash is erased or programmed with its data cache on.
+    DataCache,
+    /// A converter is started without a clock: `CKMODE` 0 and nothing in `CCIPR.ADC12SEL`.
+    AdcClock,
+    /// A converter is used before its regulator, its calibration or its start-up allows it.
+    AdcEarly,
+    /// `ADC_JSQR` is written while injected conversions run, with the queue off: the write is lost.
+    JsqrStarted,
+    /// A register of the watchdog is written while its last value is still on its way: the write is lost.
+    IwdgBusy,
+    /// A pin is not in the mode, or not at the alternate function, that its use needs.
+    PinMode,
+    /// After a halt by a debugger that stopped TIM1, the outputs came back without the program, and it let them.
+    ResumedOutputs,
+    /// The supply monitor is locked while it is off, so that it cannot be switched on any more.
+    SupplyMonitor,
+    /// The mode of a converter to analog is written before its first data, or while it is on.
+    DacMode,
+    /// A comparator looks at a level whose converter was never seen ready.
+    DacReady,
+}
+
+impl Rule {
+    /// Every rule.
+    pub const ALL: [Self; 16] = [
+        Self::ClockGate,
+        Self::EnableDelay,
+        Self::VoltageRange,
+        Self::Latency,
+        Self::ClockStep,
+        Self::LockOnce,
+        Self::DataCache,
+        Self::AdcClock,
+        Self::AdcEarly,
+        Self::JsqrStarted,
+        Self::IwdgBusy,
+        Self::PinMode,
+        Self::ResumedOutputs,
+        Self::SupplyMonitor,
+        Self::DacMode,
+        Self::DacReady,
+    ];
+
+    /// Where it is written.
+    pub fn source(self) -> &'static str {
+        match self {
+            Self::ClockGate => "RM0440, RCC, peripheral clock enable registers",
+            Self::EnableDelay => {
+                "RM0440, RCC, delay after a clock enable; ST's LL_AHB2_GRP1_EnableClock reads back"
+            }
+            Self::VoltageRange => "RM0440, PWR, dynamic voltage scaling; stm32g4xx_hal_pwr_ex.c",
+            Self::Latency => "RM0440, FLASH, wait states by clock and voltage range",
+            Self::ClockStep => "RM0440, RCC, system clock selection: AHB/2 for 1 us above 80 MHz",
+            Self::LockOnce => "RM0440, TIMx_BDTR.LOCK; stm32g4xx_ll_tim.h: once after the reset",
+            Self::DataCache => "stm32g4xx_hal_flash.c and _flash_ex.c switch DCEN off first",
+            Self::AdcClock => "RM0440, ADC clocks: CKMODE 0 takes the clock of CCIPR.ADC12SEL",
+            Self::AdcEarly => {
+                "RM0440, ADC regulator, calibration, on-off control; DS12288, tADCVREG_STUP"
+            }
+            Self::JsqrStarted => "RM0440, ADC_JSQR and queue of context, JQDIS = 1",
+            Self::IwdgBusy => "RM0440, IWDG_SR; stm32g4xx_hal_iwdg.c: six prescaled clocks",
+            Self::PinMode => "DS12288, pins and alternate functions; RM0440, GPIOx_MODER",
+            Self::ResumedOutputs => {
+                "RM0440, TIM1 debug mode: outputs off as if MOE was reset, MOE unchanged"
+            }
+            Self::SupplyMonitor => "RM0440, SYSCFG_CFGR2.PVDL locks PVDE and PVDLS",
+            Self::DacMode => "RM0440, DAC_MCR.MODE; errata of sibling chips: a data register first",
+            Self::DacReady => "RM0440, DAC_SR.DAC1RDY; DS12288, tWAKEUP",
+        }
+    }
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self:?}")
+    }
+}
+
+/// A rule that was broken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// The rule.
+    pub rule: Rule,
+    /// Register, value and limit.
+    pub text: String,
+    /// Program counter: the instruction, or the first of its block.
+    pub at: u32,
+    /// When, ticks.
+    pub now: u64,
+    /// How often; place and time are those of the first.
+    pub count: u64,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ms = self.now as f64 / 170e3;
+        let Self { rule, text, at, .. } = self;
+        write!(f, "{rule}: {text} ({}) at {at:#010x}, {ms:.3} ms", rule.source())
+    }
+}
+
+/// The violations so far.
+#[derive(Clone, Debug, Default)]
+pub struct Rules {
+    violations: Vec<Violation>,
+    reported: usize,
+    /// Where the core was last seen.
+    pub at: u32,
+    /// Time, ticks.
+    pub now: u64,
+    /// Whether time is known at every instruction.
+    pub exact: bool,
+    /// Whether violations are only recorded and do not end a run.
+    pub collecting: bool,
+}
+
+impl Rules {
+    /// No violation yet; time is known at every instruction.
+    pub fn new() -> Self {
+        Self { exact: true, ..Self::default() }
+    }
+
+    /// Records a violation; one with the same text is counted.
+    pub fn note(&mut self, rule: Rule, text: impl Into<String>) {
+        let (text, at, now) = (text.into(), self.at, self.now);
+        let known = self.violations.iter_mut().find(|v| v.rule == rule && v.text == text);
+        match known {
+            Some(violation) => violation.count += 1,
+            None => self.violations.push(Violation { rule, text, at, now, count: 1 }),
+        }
+    }
+
+    /// Records a violation unless `kept`.
+    pub fn require(&mut self, kept: bool, rule: Rule, text: impl FnOnce() -> String) -> bool {
+        if !kept {
+            self.note(rule, text());
+        }
+        kept
+    }
+
+    /// All violations, in order.
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
+    }
+
+    /// The first violation that was not reported yet, unless they are only recorded.
+    pub fn fatal(&mut self) -> Option<&Violation> {
+        if self.collecting {
+            return None;
+        }
+        let first = self.violations.get(self.reported)?;
+        self.reported = self.violations.len();
+        Some(first)
+    }
+}

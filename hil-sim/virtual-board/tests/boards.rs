@@ -1,0 +1,266 @@
+//! Every board with the image that is built for it: the drivers are off unless the drive is on, and the drive works.
+
+mod common;
+
+use std::f64::consts::TAU;
+
+use anyhow::{Context, Result};
+use drive_core::State;
+use hil_sim::config::LoadMode;
+use hil_sim::plant::Load;
+use induction_drive::boards::{self, Currents, Level};
+use virtual_board::periph::Reset;
+use virtual_board::power_stage::{ALL, CODES, REFERENCE, REFERENCE_V, Sensors, channel};
+use virtual_board::{Board, Image, Options, Pair, PowerStage};
+
+/// Something that ends a run.
+type End<'a> = &'a dyn Fn(&mut Board) -> Result<()>;
+
+/// Periods from a reset to the greeting, at most.
+const START: u64 = 30_000;
+/// Periods between two reports of the control to the console.
+const REPORT: u64 = 601;
+
+/// A board set up for the motor that suits it, with the encoder.
+fn pair(stage: &'static PowerStage, load: LoadMode) -> Result<Pair> {
+    let mut config = stage.config()?;
+    config.load.mode = load;
+    let options = Options::on(stage, &config, 1).set_up(&config)?;
+    let mut pair = Pair::new(Image::built_for(stage.name)?, options)?;
+    pair.order("angle encoder")?;
+    Ok(pair)
+}
+
+fn start(pair: &mut Pair) -> Result<()> {
+    pair.order("start torque")?;
+    pair.until_state(State::Torque)?;
+    assert!(pair.board.gates().any_on());
+    Ok(())
+}
+
+/// Goes on for some periods, in which every gate is off, whatever the chip does.
+fn off_for(board: &mut Board, periods: u64) -> Result<()> {
+    for _ in 0..periods {
+        assert!(!board.gates().any_on(), "{:.3} s", board.time());
+        board.run_periods(1)?;
+        while board.next_period().is_some() {}
+    }
+    Ok(())
+}
+
+/// The firmware's file of a board and the model of its hardware say the same, each from its own sources.
+#[test]
+fn the_firmware_and_the_power_stage_agree() {
+    assert_eq!(ALL.map(|stage| stage.name), boards::NAMES);
+    for stage in ALL {
+        let board = stage.board();
+        let (name, settings) = (stage.name, stage.firmware_settings());
+        assert_eq!(board.name, name);
+        let inputs = [
+            (board.high.on_at.value, stage.driver.high),
+            (board.low.on_at.value, stage.driver.low),
+        ];
+        for (on_at, input) in inputs {
+            assert_eq!(on_at == Level::High, input.on_at_high, "{name}");
+        }
+        // The timer's dead time; single precision has seven digits.
+        let dead_time = f64::from(board.dead_time_s.value);
+        assert!(dead_time > (1.0 - 1e-6) * stage.limits.dead_time_s, "{name}: {dead_time} s");
+        // Pins.
+        let sensors = board.currents.a_and_b().into_iter().chain(board.currents.c());
+        for (sensor, channel) in sensors.zip(channel::CURRENTS) {
+            assert_eq!(sensor.pin.adc1().map(usize::from), Some(channel), "{name}");
+        }
+        assert_eq!(board.dc_link.pin.adc1().map(usize::from), Some(channel::DC_LINK));
+        assert_eq!(board.heat_sink.adc2().map(usize::from), Some(channel::HEAT_SINK));
+        // Dc link, 1 %.
+        if let Some(divider) = stage.dc_link_divider {
+            let volts = 2000.0 / CODES * REFERENCE_V * divider;
+            let seen = f64::from(settings.scales.dc_link.at(2000));
+            assert!((seen / volts - 1.0).abs() < 0.01, "{name}: {seen} V of {volts} V");
+        }
+        // Currents: gains to 1 %, zero to 0.3 % of the range, both signs.
+        match (stage.sensors, board.currents) {
+            (Sensors::InLine, Currents::InLine(_)) => {}
+            (Sensors::LowSide(shunts), Currents::LowSide { settle_s, .. }) => {
+                let scales = &settings.scales;
+                for line in [scales.current_a, scales.current_b, scales.current_c] {
+                    for code in [200, 1000, 3000, 4000] {
+                        let volts = f64::from(code) / CODES * REFERENCE_V;
+                        let amperes = (volts - shunts.zero_v) / shunts.volts_per_a;
+                        let seen = f64::from(line.at(code));
+                        let allowed = 0.01 * amperes.abs() + 0.003 * 1.6 / shunts.volts_per_a.abs();
+                        assert!(
+                            (seen - amperes).abs() < allowed,
+                            "{name}: {seen} A of {amperes} A"
+                        );
+                    }
+                }
+                // Less than 1 % of a step is left.
+                assert!(f64::from(settle_s.value) > 4.6 * shunts.settling_s, "{name}");
+            }
+            _ => panic!("{name}: sensors of different kinds"),
+        }
+    }
+}
+
+/// From power-on to the greeting and behind it, a board whose bench steps were not confirmed refuses to start, and its
+/// drivers are off.
+#[test]
+fn a_fresh_board_is_off_and_does_not_start() -> Result<()> {
+    for stage in ALL {
+        let mut options = Options::on(stage, &stage.config()?, 2);
+        options.confirmed = false;
+        let mut board = Board::new(Image::built_for(stage.name)?, options)?;
+        let mut heard = String::new();
+        while !heard.contains("last run: ") {
+            off_for(&mut board, 100)?;
+            heard += &board.take_console();
+            assert!(board.time() < START as f64 / 6000.0, "{heard}");
+        }
+        board.run_periods(600)?;
+        board.take_console();
+        board.type_line("start torque");
+        off_for(&mut board, 1200)?;
+        let heard = board.take_console();
+        assert!(heard.contains("error: ") && heard.contains("confirm board"), "{heard}");
+        assert!(board.resets.is_empty() && board.violations().is_empty());
+    }
+    Ok(())
+}
+
+/// Off by an order, by the fault input, by a probe that halts and lets go, by the watchdog, by a supply that fails, by the
+/// reset pin and while another image is written: every gate is off then, and stays off.
+#[test]
+fn every_end_leaves_every_gate_off() -> Result<()> {
+    for stage in ALL {
+        let mut pair = pair(stage, LoadMode::Locked)?;
+        start(&mut pair)?;
+        pair.order("stop")?;
+        pair.until_state(State::Off)?;
+        off_for(&mut pair.board, 0)?;
+        let running = {
+            pair.order("start torque")?;
+            pair.until_state(State::Torque)?;
+            pair.run(600, |_, _| {})?;
+            pair.board.run_ticks(7000)?;
+            pair.board.keep()?
+        };
+        let image = Image::built_for(stage.name)?;
+        let ends: [(&str, End); 6] = [
+            ("fault input", &|board| {
+                board.set_fault_pin(false);
+                board.run_ticks(100)
+            }),
+            ("halt", &|board| {
+                board.attach();
+                board.halt(1.0)?;
+                assert!(!board.gates().any_on());
+                board.halt(20.0)?;
+                board.resume();
+                // The watchdog goes on while the core is halted, or the first interrupt notices.
+                board.run_periods(3)
+            }),
+            ("watchdog", &|board| {
+                board.hang();
+                while board.resets.is_empty() {
+                    board.run_ticks(2000)?;
+                }
+                assert_eq!(board.resets[0].1, Reset::Watchdog);
+                Ok(())
+            }),
+            ("supply", &|board| {
+                board.chip().set_supply(2.5);
+                board.run_ticks(200)?;
+                assert!(!board.gates().any_on());
+                board.chip().set_supply(1.0);
+                off_for(board, 60)?;
+                board.chip().set_supply(3.3);
+                Ok(())
+            }),
+            ("reset pin", &|board| {
+                board.reset(Reset::Pin);
+                Ok(())
+            }),
+            ("flashing", &|board| board.flash(&image, 50.0)),
+        ];
+        for (what, end) in ends {
+            pair.board.go_back(&running)?;
+            assert!(pair.board.gates().any_on(), "{what}");
+            let ended = end(&mut pair.board).and_then(|()| off_for(&mut pair.board, 1200));
+            ended.with_context(|| format!("{}: {what}", stage.name))?;
+            assert!(pair.board.violations().is_empty(), "{what}: {:?}", pair.board.violations());
+            pair.board.set_fault_pin(true);
+        }
+    }
+    Ok(())
+}
+
+/// The image of the reference board, whose outputs are all active high, on boards whose low sides go on at a low level:
+/// caught as soon as its pins are the timer's.
+#[test]
+fn the_image_of_another_board_is_caught() -> Result<()> {
+    for stage in ALL.into_iter().filter(|stage| **stage != REFERENCE) {
+        let mut board = Board::new(Image::built()?, Options::on(stage, &stage.config()?, 3))?;
+        let why = board.run_periods(START).expect_err("nothing was noticed").to_string();
+        println!("{}: {}", stage.name, why.lines().next().unwrap_or_default());
+        assert!(
+            why.contains("low side") && why.contains("is on while the outputs are off"),
+            "{why}"
+        );
+    }
+    Ok(())
+}
+
+/// The check of the wiring, and steps of the torque with the encoder at 300 rpm: the motor's true torque is what the drive
+/// was asked for.
+#[test]
+fn torque_steps_with_the_encoder() -> Result<()> {
+    for stage in ALL {
+        let config = stage.config()?;
+        let mut pair = pair(stage, LoadMode::Locked)?;
+        pair.board.take_log()?;
+        start(&mut pair)?;
+        let log = pair.board.take_log()?;
+        assert!(log.iter().any(|line| line.contains("checking the wiring")), "{log:#?}");
+        pair.board.plant.set_load(Load::Speed { speed: config.rpm(300.0) * TAU / 60.0 })?;
+        let settings = pair.shadow.settings();
+        let per_ampere = f64::from(settings.motor.torque_per_ampere(settings.i_d()));
+        for share in [1.0, 2.0, -1.5] {
+            let i_q = config.amperes(share);
+            pair.order(&format!("torque {i_q}"))?;
+            pair.run(1800, |_, _| {})?;
+            let (mut sum, mut count) = (0.0, 0.0);
+            pair.run(1800, |pair, _| {
+                sum += pair.board.plant.torque();
+                count += 1.0;
+            })?;
+            let (torque, wanted) = (sum / count, per_ampere * i_q);
+            println!("{}: {i_q:.2} A: {torque:.4} Nm of {wanted:.4} Nm", stage.name);
+            assert!((torque / wanted - 1.0).abs() < 0.05, "{}", stage.name);
+        }
+        pair.order("stop")?;
+        pair.until_state(State::Off)?;
+        off_for(&mut pair.board, REPORT)?;
+    }
+    Ok(())
+}
+
+/// A turn with the encoder and a free shaft.
+#[test]
+fn position_step() -> Result<()> {
+    for stage in ALL {
+        let mut pair = pair(stage, LoadMode::Free)?;
+        pair.order("start position")?;
+        pair.until_state(State::Position)?;
+        let from = pair.board.plant.mechanical_angle();
+        pair.order("position 1")?;
+        let mut largest: f64 = 0.0;
+        let turns = |pair: &Pair| (pair.board.plant.mechanical_angle() - from) / TAU;
+        pair.run(18_000, |pair, _| largest = largest.max(turns(pair)))?;
+        let end = turns(&pair);
+        println!("{}: {end:.5} turns, overshoot {:.5}", stage.name, largest - 1.0);
+        assert!((end - 1.0).abs() < 0.003 && largest < 1.01, "{}: {end}, {largest}", stage.name);
+    }
+    Ok(())
+}

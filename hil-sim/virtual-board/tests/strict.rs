@@ -1,0 +1,196 @@
+//! Images on the stricter board: ours breaks no rule of the chip, a halted core ends with the outputs off, and an old
+//! image with known faults is caught.
+
+mod common;
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use hil_sim::Config;
+use virtual_board::periph::Reset;
+use virtual_board::rules::{Rule, Violation};
+use virtual_board::{Board, Counting, Image, Options};
+
+/// Periods that an image needs from reset to its greeting, at most.
+const START: u64 = 15_000;
+/// Names the image that [`the_old_image_is_caught`] runs.
+const OLD: &str = "INDUCTION_DRIVE_OLD_ELF";
+
+/// A board that stops at every instruction, so that the distance of two accesses is known.
+fn exact(image: Image) -> Result<Board> {
+    let mut options = Options::new(&Config::default(), 1);
+    options.counting = Counting { cycles: true, every_instruction: true };
+    let mut board = Board::new(image, options)?;
+    board.collect_violations();
+    Ok(board)
+}
+
+fn text(violations: &[Violation]) -> String {
+    violations.iter().map(|violation| format!("{violation}, {} times\n", violation.count)).collect()
+}
+
+/// The outputs on.
+fn started(board: &mut Board) -> Result<()> {
+    board.type_line("start");
+    for _ in 0..600 {
+        board.run_periods(10)?;
+        if board.chip().tim1.outputs_on() {
+            return Ok(());
+        }
+    }
+    anyhow::bail!("it does not switch on: {}", board.take_console())
+}
+
+/// From reset to its greeting, a `save`, and outputs on.
+#[test]
+fn our_image_breaks_no_rule() -> Result<()> {
+    let mut board = exact(Image::built()?)?;
+    board.run_periods(START)?;
+    board.type_line("confirm board");
+    // Changed and changed back: there is something to save.
+    for line in ["set limits.current_a 5", "save", "defaults", "save"] {
+        board.type_line(line);
+        board.run_periods(1200)?;
+    }
+    assert!(board.chip().flash.operations > 0, "{}", board.take_console());
+    started(&mut board)?;
+    board.run_periods(600)?;
+    assert!(board.violations().is_empty(), "{}", text(board.violations()));
+    assert!(board.resets.is_empty(), "{:?}", board.resets);
+    Ok(())
+}
+
+/// A probe halts the core, for two periods or longer, and lets it go: the outputs are off then, and stay off.
+#[test]
+fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
+    for ms in [0.35, 10.0, 1000.0] {
+        let mut board = common::regulating(11)?.board;
+        board.attach();
+        board.halt(ms)?;
+        board.resume();
+        // For a period at most, if the watchdog has not reset the chip in the meantime.
+        let mut on = 0;
+        for _ in 0..1200 {
+            board.run_ticks(2000)?;
+            on += u32::from(board.chip().tim1.outputs_on());
+        }
+        println!("halt of {ms} ms: on for {} us", 2000 * on / 170);
+        assert!(on <= if ms < 5.0 { 15 } else { 0 }, "on {on} times after a halt of {ms} ms");
+        assert!(board.violations().is_empty(), "{}", text(board.violations()));
+    }
+    Ok(())
+}
+
+/// A probe that detaches clears `DBG_SLEEP`: the time base goes on.
+#[test]
+fn a_detached_probe_changes_nothing() -> Result<()> {
+    let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 12))?;
+    board.attach();
+    board.run_periods(START)?;
+    board.detach();
+    board.run_periods(START)?;
+    assert!(board.resets.is_empty(), "{:?}", board.resets);
+    Ok(())
+}
+
+/// Code from the flash takes three cycles an instruction, as with wait states and missed caches: it starts, and the
+/// watchdog is fed. Prints the time of the start.
+#[test]
+fn it_starts_with_slow_flash() -> Result<()> {
+    for cycles in [1, 3] {
+        let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 13))?;
+        board.chip().flash_cycles = cycles;
+        let mut heard = String::new();
+        while !heard.contains("last run") {
+            board.run_periods(100)?;
+            heard += &board.take_console();
+            assert!(board.time() < 12.0 && board.resets.is_empty(), "{:?}", board.resets);
+        }
+        println!("{cycles} cycles an instruction: greeting after {:.2} s", board.time());
+        board.run_periods(6000)?;
+        assert!(board.resets.is_empty(), "{:?}", board.resets);
+    }
+    Ok(())
+}
+
+/// Below the level of the supply monitor the outputs go off in hardware; a brown-out resets the chip.
+#[test]
+fn a_sagging_supply_switches_off() -> Result<()> {
+    let mut board = common::regulating(14)?.board;
+    board.chip().set_supply(2.9);
+    board.run_periods(2)?;
+    assert!(board.chip().tim1.outputs_on());
+    board.chip().set_supply(2.7);
+    assert!(!board.chip().tim1.outputs_on());
+    board.chip().set_supply(1.5);
+    board.run_periods(60)?;
+    assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Power));
+    board.chip().set_supply(3.3);
+    board.run_periods(START)?;
+    assert!(board.take_console().contains("last run: reset by power-on"));
+    Ok(())
+}
+
+/// The image of commit 1abee12, in which a review found faults F1 to F7, is caught for each:
+///
+/// ```text
+/// git worktree add ../old 1abee12 && cd ../old && cargo xtask firmware && cd -
+/// INDUCTION_DRIVE_OLD_ELF=../old/target/.../firmware/induction-drive \
+///     cargo test --release -p virtual-board --test strict -- --ignored --nocapture
+/// ```
+#[test]
+#[ignore = "needs the image of another commit"]
+fn the_old_image_is_caught() -> Result<()> {
+    let path = std::env::var_os(OLD).with_context(|| format!("{OLD} names no image"))?;
+    let image = || Image::open(Path::new(&path));
+    let broken = |board: &Board, rule| board.violations().iter().any(|v| v.rule == rule);
+    let mut board = exact(image()?)?;
+    board.run_periods(START)?;
+    println!("{}", text(board.violations()));
+    let power = [Rule::ClockGate, Rule::VoltageRange, Rule::Latency, Rule::SupplyMonitor];
+    let level = [Rule::DacMode, Rule::DacReady];
+    for (finding, rules) in [
+        ("F1", &power[..]),
+        ("F4", &[Rule::LockOnce]),
+        ("F6", &[Rule::EnableDelay, Rule::AdcClock]),
+        ("F7", &level),
+    ] {
+        for rule in rules {
+            assert!(broken(&board, *rule), "{finding}: {rule}");
+        }
+    }
+    // Without the distance of two accesses its converters start, and the rest can be seen.
+    let running = || -> Result<Board> {
+        let mut board = Board::new(image()?, Options::new(&Config::default(), 1))?;
+        board.collect_violations();
+        board.attach();
+        board.run_periods(START)?;
+        Ok(board)
+    };
+    // The watchdog's registers are busy for longer than it waits: reset while it saves, unless they are quick.
+    let mut board = running()?;
+    board.type_line("save");
+    board.run_periods(1200)?;
+    println!("F13: {:?}", board.resets);
+    assert_eq!(board.resets.last().map(|reset| reset.1), Some(Reset::Watchdog), "F13");
+    let mut board = running()?;
+    board.chip().iwdg.quick = true;
+    board.type_line("save");
+    board.run_periods(1200)?;
+    println!("F5: {:?}", board.take_console());
+    assert!(broken(&board, Rule::DataCache), "F5");
+    started(&mut board)?;
+    board.halt(10_000.0)?;
+    assert!(!board.chip().tim1.outputs_on());
+    board.resume();
+    board.run_periods(3)?;
+    println!("F2: outputs on after the halt: {}", board.chip().tim1.outputs_on());
+    assert!(broken(&board, Rule::ResumedOutputs), "F2");
+    let mut board = running()?;
+    let resets = board.resets.len();
+    board.detach();
+    board.run_periods(START)?;
+    println!("F3: resets after the probe has detached: {:?}", board.resets);
+    assert!(board.resets.len() > resets, "F3");
+    Ok(())
+}

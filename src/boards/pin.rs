@@ -1,0 +1,124 @@
+//! Pins of the STM32G474RE, and what the peripherals used here reach (datasheet, alternate functions and pin description;
+//! the same as in the tables of `stm32g4xx-hal` 0.1.0).
+
+/// A port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// GPIOA.
+    A,
+    /// GPIOB.
+    B,
+    /// GPIOC.
+    C,
+}
+
+/// A pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pin {
+    /// Its port.
+    pub port: Port,
+    /// Its number in the port.
+    pub number: u8,
+}
+
+/// Pin `number` of port A.
+pub const fn pa(number: u8) -> Pin {
+    Pin { port: Port::A, number }
+}
+
+/// Pin `number` of port B.
+pub const fn pb(number: u8) -> Pin {
+    Pin { port: Port::B, number }
+}
+
+/// Pin `number` of port C.
+pub const fn pc(number: u8) -> Pin {
+    Pin { port: Port::C, number }
+}
+
+/// A pin and the number of the alternate function that connects it.
+pub type Reach = (Pin, u8);
+
+/// Output of channel 1 of TIM1.
+pub const TIM1_CH1: [Reach; 2] = [(pa(8), 6), (pc(0), 2)];
+/// Output of channel 2.
+pub const TIM1_CH2: [Reach; 2] = [(pa(9), 6), (pc(1), 2)];
+/// Output of channel 3.
+pub const TIM1_CH3: [Reach; 2] = [(pa(10), 6), (pc(2), 2)];
+/// Complementary output of channel 1.
+pub const TIM1_CH1N: [Reach; 4] = [(pa(7), 6), (pa(11), 6), (pb(13), 6), (pc(13), 4)];
+/// Complementary output of channel 2.
+pub const TIM1_CH2N: [Reach; 3] = [(pa(12), 6), (pb(0), 6), (pb(14), 6)];
+/// Complementary output of channel 3.
+pub const TIM1_CH3N: [Reach; 3] = [(pb(1), 6), (pb(9), 12), (pb(15), 4)];
+/// Break input of TIM1.
+pub const TIM1_BKIN: [Reach; 6] =
+    [(pa(6), 6), (pa(14), 6), (pb(8), 12), (pb(10), 12), (pb(12), 6), (pc(13), 2)];
+/// Positive input of comparator 1.
+pub const COMP1_INPUT: Pin = pa(1);
+
+/// Channels of ADC1 and ADC2 that reach the same pin: `(pin, channel)`. All are among channels 1 to 9.
+const ADC12: [(Pin, u8); 6] =
+    [(pa(0), 1), (pa(1), 2), (pc(0), 6), (pc(1), 7), (pc(2), 8), (pc(3), 9)];
+/// Channels of ADC1 alone.
+const ADC1: [(Pin, u8); 2] = [(pa(2), 3), (pa(3), 4)];
+/// Channels of ADC2 alone.
+const ADC2: [(Pin, u8); 3] = [(pa(6), 3), (pa(7), 4), (pa(5), 13)];
+
+const fn look_up(table: &[(Pin, u8)], pin: Pin) -> Option<u8> {
+    let mut i = 0;
+    while i < table.len() {
+        if table[i].0.equals(pin) {
+            return Some(table[i].1);
+        }
+        i += 1;
+    }
+    None
+}
+
+impl Pin {
+    /// Equality, when compiling.
+    pub const fn equals(self, other: Self) -> bool {
+        self.port as u8 == other.port as u8 && self.number == other.number
+    }
+
+    /// Whether the peripheral signal reaches this pin.
+    pub const fn is(self, signal: &[Reach]) -> bool {
+        look_up(signal, self).is_some()
+    }
+
+    /// The alternate function that connects this pin with the signal; 0 if none does.
+    pub const fn function(self, signal: &[Reach]) -> u8 {
+        match look_up(signal, self) {
+            Some(function) => function,
+            None => 0,
+        }
+    }
+
+    /// Its channel of ADC1.
+    pub const fn adc1(self) -> Option<u8> {
+        match look_up(&ADC12, self) {
+            Some(channel) => Some(channel),
+            None => look_up(&ADC1, self),
+        }
+    }
+
+    /// Its channel of ADC2.
+    pub const fn adc2(self) -> Option<u8> {
+        match look_up(&ADC12, self) {
+            Some(channel) => Some(channel),
+            None => look_up(&ADC2, self),
+        }
+    }
+}
+
+impl core::fmt::Display for Pin {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let port = match self.port {
+            Port::A => 'A',
+            Port::B => 'B',
+            Port::C => 'C',
+        };
+        write!(f, "P{port}{}", self.number)
+    }
+}
