@@ -79,7 +79,7 @@ fn short(name: &str) -> Config {
 }
 
 /// Settings beside which a key has an effect that has none beside the defaults.
-const BESIDE: [&[&str]; 9] = [
+const BESIDE: [&[&str]; 10] = [
     &[],
     &["load.mode=free"],
     &["load.mode=speed", "load.speed_rpm=60"],
@@ -89,10 +89,11 @@ const BESIDE: [&[&str]; 9] = [
     &["injection.demodulator=rms-impedance"],
     &["spread.machine=1.5"],
     &["current_plant=motor"],
+    &["plant=r"],
 ];
 
 /// Keys that are used although a short undisturbed run does not show it.
-const QUIET: [(&[&str], &str); 8] = [
+const QUIET: [(&[&str], &str); 9] = [
     (&["nameplate."], "the plate of the motor, whole; the rules take some of its numbers"),
     (&["limits."], "protections: without effect until they act"),
     (&["scales.ntc."], "the simulated thermistor and the drive's are the same"),
@@ -119,6 +120,10 @@ const QUIET: [(&[&str], &str); 8] = [
         "of other demodulators than the default",
     ),
     (&["sequence.stop_a_per_s"], "acts at a stop"),
+    (
+        &["plant", "flux_level", "iron.", "warming.", "dc_link.", "shaft.", "inverter.open_phase"],
+        "of the other machine model, or with an effect beside another key only",
+    ),
 ];
 
 /// Experiments that count successes: few keys change a count in few runs.

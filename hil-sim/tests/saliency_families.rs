@@ -154,3 +154,50 @@ fn the_flux_level_is_a_key() {
     // Rated flux: 400 V sqrt(2/3)/(2 pi 50 Hz) = 1.040 Wb, over 70.45 mH.
     close(large, 14.76, 0.01, "18.5 kW");
 }
+
+#[test]
+fn the_axis_of_the_teeth_can_be_turned() {
+    // Teeth alone: q = a sin(2 (e + turn)) is zero where the frame is turned as far.
+    let teeth = [("plant", "linear"), ("iron.teeth", "-0.035")];
+    let zero = |more: &[(&str, &str)], i_q: f64| {
+        let probe = probe(&[&teeth, more].concat());
+        let (mut low, mut high) = (-0.8, 0.8);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            let q = probe.q(1.5, i_q, middle).expect("a flux");
+            if q > 0.0 { low = middle } else { high = middle }
+        }
+        low.to_degrees()
+    };
+    let rotor = ("iron.teeth_gap", "0");
+    close(zero(&[rotor], 0.0), 0.0, 0.01, "rotor flux");
+    close(zero(&[rotor, ("iron.teeth_turn_deg", "10")], 0.0), -10.0, 0.05, "turned by 10°");
+    // 5 degrees per ampere of the current across the flux, which is that of the turned frame.
+    let turned = zero(&[rotor, ("iron.teeth_turn_deg_per_a", "5")], 1.0).to_radians();
+    let across = 1.0 * turned.cos() - 1.5 * turned.sin();
+    close(turned.to_degrees(), -5.0 * across, 0.05, "turned by load");
+    // From the rotor flux to the air-gap flux, which leads it by atan(L' i_q/(L_m i_d)).
+    let lead = |gap: &str| -zero(&[("iron.teeth_gap", gap)], 1.0);
+    let (half, whole) = (lead("0.5"), lead("0.999999"));
+    let e = -whole.to_radians();
+    let (i_d, i_q) = (1.5 * e.cos() + e.sin(), e.cos() - 1.5 * e.sin());
+    let expected = (0.0276 * 0.1771 / 0.2047 * i_q / (0.1771 * i_d)).atan().to_degrees();
+    close(whole, expected, 0.05, "air-gap flux");
+    assert!(half > 0.45 * whole && half < 0.55 * whole, "{half} of {whole}");
+}
+
+#[test]
+fn keys_that_do_nothing_are_refused() {
+    for (set, named) in [
+        ([("plant", "a"), ("iron.slots", "0.01")], "iron.slots = 0.01"),
+        ([("plant", "g"), ("saliency.a_psi", "-0.01")], "saliency.a_psi = -0.01"),
+        ([("plant", "a"), ("flux_level", "high")], "flux_level = high"),
+    ] {
+        let mut config = Config::default();
+        for (key, value) in set {
+            config.set(key, &Value::from_text(value)).expect(key);
+        }
+        let text = Probe::new(&config).err().expect("refused").to_string();
+        assert!(text.starts_with(named) && text.contains("does not use it"), "{text}");
+    }
+}

@@ -32,6 +32,7 @@ mod inverter;
 mod machine;
 mod mechanics;
 mod model;
+mod motor;
 mod open_phase;
 mod period;
 mod sensors;
@@ -40,11 +41,13 @@ mod warming;
 
 use dc_link::DcLink;
 use drive_core::{Compare, Hardware, Sample};
+use motor::{Motor, whichever};
 use open_phase::OpenPhase;
 use period::Around;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
+use warming::Warming;
 
 pub use complex::{Complex, clarke, phases};
 pub use dc_link::DcLinkSettings;
@@ -103,33 +106,6 @@ impl Default for PlantSettings {
     }
 }
 
-/// The motor, one variant a machine model. A call of the plant chooses once a period.
-#[derive(Clone, Debug)]
-enum Motor {
-    A(MotorModel<Machine>),
-    Energy(Box<MotorModel<EnergyMachine>>),
-}
-
-/// `$body` with `$motor` bound to the [`MotorModel`] of whichever machine model.
-macro_rules! whichever {
-    ($which:expr, $motor:ident => $body:expr) => {
-        match $which {
-            Motor::A($motor) => $body,
-            Motor::Energy($motor) => $body,
-        }
-    };
-}
-
-/// Resistances that follow time.
-#[derive(Clone, Copy, Debug)]
-struct Warming {
-    law: WarmingSettings,
-    cold: (f64, f64),
-}
-
-/// Periods between two changes of the resistances by warming.
-const WARMING_PERIODS: u64 = 64;
-
 /// The plant.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -155,7 +131,6 @@ impl Plant {
     /// [`PlantError`] with the setting that is refused.
     pub fn new(settings: &PlantSettings, seed: u64) -> Result<Self, PlantError> {
         error::check("substeps", f64::from(settings.substeps), 1.0..=1000.0, "")?;
-        settings.warming.check()?;
         let mechanics = Mechanics::new(&settings.mechanics)?;
         let motor = match &settings.iron {
             None => {
@@ -176,13 +151,10 @@ impl Plant {
                 open: None,
             },
             dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
-            warming: settings.warming.factors(1.0).map(|_| Warming {
-                law: settings.warming,
-                cold: (settings.machine.rs, settings.machine.rr),
-            }),
+            warming: Warming::new(&settings.warming, &settings.machine)?,
             periods: 0,
             moves: settings.dc_link.moves()
-                || settings.warming.factors(1.0).is_some()
+                || settings.warming.acts()
                 || settings.measurement.dc_lag_us > 0.0,
             encoder: Encoder::new(&settings.encoder)?,
             rng: Xoshiro256PlusPlus::seed_from_u64(seed),
@@ -231,12 +203,9 @@ impl Plant {
         }
         around.sensors.follow_dc_link(around.inverter.vdc, period_s);
         self.periods += 1;
-        if let Some(Warming { law, cold }) = self.warming
-            && self.periods.is_multiple_of(WARMING_PERIODS)
-            && let Some((rs, rr)) = law.factors(self.periods as f64 * period_s)
-        {
-            // Within the ranges of the settings at every time, which `new` has checked at both ends.
-            let _ = self.set_resistances(cold.0 * rs, cold.1 * rr);
+        if let Some((rs, rr)) = self.warming.and_then(|w| w.resistances(self.periods, period_s)) {
+            // Within their ranges: half to three times those that `new` has accepted.
+            let _ = self.set_resistances(rs, rr);
         }
     }
 

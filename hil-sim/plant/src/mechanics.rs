@@ -208,7 +208,7 @@ impl Mechanics {
             coupling.torque
         });
         // A shaft that has come to rest, or passed it, stays where friction can hold it.
-        let rests = extras.speed * speed <= 0.0;
+        let rests = speed == 0.0 || extras.speed * speed < 0.0;
         let driven = torque - against;
         extras.speed = speed;
         self.mobility = 1.0 / self.inertia;

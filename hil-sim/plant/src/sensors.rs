@@ -194,6 +194,15 @@ impl CurrentChannel {
     }
 }
 
+/// Pole, and weights of old and new input, of a first-order lag over a step of `x` time constants in which
+/// the input is straight.
+fn coefficients(x: f64) -> [f64; 3] {
+    let pole = (-x).exp();
+    // Mean of the impulse response over the step.
+    let mean = -(-x).exp_m1() / x;
+    [pole, mean - pole, 1.0 - mean]
+}
+
 /// The two current sensors with their filters and converters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
@@ -204,7 +213,8 @@ pub struct Sensors {
     /// Channel B behind its own lag, if it has one.
     lagged_b: f64,
     lag_b: f64,
-    pole_b: f64,
+    before_b: f64,
+    lagging_b: [f64; 3],
     /// Shares of the other phase.
     cross_talk: [f64; 2],
     /// What the channels see in the middle of the period, if that is converted too.
@@ -261,7 +271,8 @@ impl Sensors {
             filtered: Complex::ZERO,
             lagged_b: 0.0,
             lag_b: s.lag_b_us * 1e-6,
-            pole_b: 0.0,
+            before_b: 0.0,
+            lagging_b: [0.0; 3],
             cross_talk: [s.cross_talk_a, s.cross_talk_b],
             both: s.both_zero_vectors,
             middle: [0.0; 2],
@@ -290,7 +301,9 @@ impl Sensors {
         self.time += h;
         if self.lag_b > 0.0 {
             let b = phases(self.filtered)[1];
-            self.lagged_b = b + (self.lagged_b - b) * self.pole_b;
+            let [pole, from_old, from_new] = self.lagging_b;
+            self.lagged_b = self.lagged_b * pole + self.before_b * from_old + b * from_new;
+            self.before_b = b;
         }
     }
 
@@ -313,16 +326,12 @@ impl Sensors {
     #[cold]
     fn prepare(&mut self, h: f64) {
         self.step = h;
-        self.pole_b = (-h / self.lag_b).exp();
-        let x = self.corner * h;
-        if x == 0.0 {
-            return;
+        if self.lag_b > 0.0 {
+            self.lagging_b = coefficients(h / self.lag_b);
         }
-        self.pole = (-x).exp();
-        // Mean of the impulse response over the step.
-        let mean = -(-x).exp_m1() / x;
-        self.from_old = mean - self.pole;
-        self.from_new = 1.0 - mean;
+        if self.corner > 0.0 {
+            [self.pole, self.from_old, self.from_new] = coefficients(self.corner * h);
+        }
     }
 
     /// Sets the fault of a channel.
@@ -338,7 +347,7 @@ impl Sensors {
             return now;
         }
         let middle = self.converted(self.middle, rng);
-        [0, 1].map(|k| (now[k] + middle[k]).div_ceil(2))
+        [0, 1].map(|k| (u32::from(now[k]) + u32::from(middle[k])).div_ceil(2) as u16)
     }
 
     #[inline]

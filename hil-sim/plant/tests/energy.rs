@@ -205,7 +205,8 @@ fn two_steps_a_period_are_enough() {
 
 #[test]
 fn refusals_name_the_setting() {
-    let cases: [(&str, fn(&mut IronSettings)); 6] = [
+    type Case = (&'static str, fn(&mut IronSettings));
+    let cases: [Case; 6] = [
         ("iron.saturation", |s| s.saturation = 0.9),
         ("iron.exponent", |s| s.exponent = 0),
         ("iron.teeth", |s| s.teeth = 0.3),

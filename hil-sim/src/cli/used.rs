@@ -21,6 +21,7 @@ pub fn check(name: &str, experiments: &[&Experiment], input: &Input) -> Result<(
         names.push(assigned(assignment)?.0);
     }
     names.extend(input.seconds.map(|_| "seconds"));
+    names.extend(input.plant.as_ref().map(|_| "plant"));
     for key in names {
         if !is_used(key)? {
             let uses = match experiments {

@@ -22,6 +22,8 @@ use crate::complex::{Complex, square};
 /// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
 /// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
 const CLOSE: f64 = 1e-3;
+/// The same where a slope is left out: that of the axis of the teeth by the current that turns it.
+const CLOSE_WITHOUT_SLOPE: f64 = 1e-10;
 /// Most iterations; two are usual, some ten after a jump of the flux.
 const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
@@ -204,13 +206,15 @@ impl Magnetics {
     #[inline]
     pub(crate) fn solve(&self, fluxes: [Complex; 3], theta: f64, found: &mut Solution) {
         found.slots = self.slot_vector(theta);
+        let turns = self.teeth.is_some_and(|teeth| teeth.turn_per_a != 0.0);
+        let close = if turns { CLOSE_WITHOUT_SLOPE } else { CLOSE };
         for _ in 0..LIMIT {
             let residual = self.evaluate(fluxes, found);
             let step = -found.slopes.by_residual.times(residual);
             found.m += step;
             // Not a number ends the iteration too.
-            let size = CLOSE * CLOSE * (CLOSE * CLOSE + square(found.i));
-            if !(square(residual) > size) {
+            let size = close * close * (CLOSE * CLOSE + square(found.i));
+            if square(residual) <= size || residual.re.is_nan() {
                 let slopes = &found.slopes;
                 found.i += slopes.stator_m.times(step) - slopes.stator_x.times(step);
                 found.i_r -= slopes.rotor.times(step);
