@@ -65,9 +65,9 @@ fn copy_of_hal(folder: &Path) -> Result<PathBuf> {
     let metadata = run::output("cargo", &["metadata", "--format-version", "1"]);
     let metadata = metadata.context("cargo metadata")?;
     // The path of its manifest, without a parser for the whole.
-    let source = metadata.split('"').find(|text| {
-        text.ends_with("Cargo.toml") && text.contains("/stm32g4xx-hal-")
-    });
+    let source = metadata
+        .split('"')
+        .find(|text| text.ends_with("Cargo.toml") && text.contains("/stm32g4xx-hal-"));
     let source = Path::new(source.context("no stm32g4xx-hal")?).parent().context("no folder")?;
     let copy = folder.join("stm32g4xx-hal");
     if copy.exists() {

@@ -6,7 +6,7 @@
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
-use crate::model::{ElectricalState as _, MachineModel};
+use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel};
 use crate::open_phase::OpenPhase;
 
 /// Current, A, beyond which the sign of a phase current counts fully.
@@ -83,7 +83,7 @@ impl Averaged {
             };
             let x = &motor.state.electrical;
             let first = rates(x, machine.pole_pairs() * motor.state.speed);
-            let part = match until_kink(x.current(), first.0.current(), rest) {
+            let part = match until_kink(x.current(), first.0.current_rate(), rest) {
                 None => rest,
                 Some(time) => time.max(SHORTEST * h).min(rest),
             };

@@ -3,7 +3,7 @@
 use crate::complex::Complex;
 use crate::machine::Machine;
 use crate::mechanics::Mechanics;
-use crate::model::{ElectricalState, MachineModel};
+use crate::model::{ElectricalState as _, MachineModel, Rate};
 
 /// State of a machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -31,7 +31,7 @@ impl<M: MachineModel> MotorModel<M> {
     /// At rest, without current and flux; turning already where the load holds a speed.
     pub fn new(machine: M, mechanics: Mechanics) -> Self {
         let mut motor = Self { machine, mechanics, state: MotorState::default() };
-        motor.state.electrical = machine.settled(motor.state.electrical);
+        machine.settle(&mut motor.state.electrical);
         motor.hold_speed();
         motor
     }
@@ -53,8 +53,10 @@ impl<M: MachineModel> MotorModel<M> {
     /// Fixes the torques on the shaft for an integration step.
     #[inline]
     pub(crate) fn begin_step(&mut self) {
-        let torque = self.machine.torque(&self.state.electrical);
-        self.state.speed = self.mechanics.begin(self.state.angle, self.state.speed, torque);
+        if self.mechanics.has_extras() {
+            let torque = self.machine.torque(&self.state.electrical);
+            self.state.speed = self.mechanics.begin(self.state.angle, self.state.speed, torque);
+        }
     }
 
     /// Ends an integration step of `h` seconds.
@@ -69,7 +71,7 @@ impl<M: MachineModel> MotorModel<M> {
     pub(crate) fn stepped(
         &self,
         h: f64,
-        rates: impl Fn(&M::State, f64) -> (M::State, Complex),
+        rates: impl Fn(&M::State, f64) -> (Rate<M>, Complex),
     ) -> (MotorState<M::State>, Complex) {
         let w = self.machine.pole_pairs() * self.state.speed;
         self.stepped_from(rates(&self.state.electrical, w), h, rates)
@@ -79,9 +81,9 @@ impl<M: MachineModel> MotorModel<M> {
     #[inline]
     pub(crate) fn stepped_from(
         &self,
-        first: (M::State, Complex),
+        first: (Rate<M>, Complex),
         h: f64,
-        rates: impl Fn(&M::State, f64) -> (M::State, Complex),
+        rates: impl Fn(&M::State, f64) -> (Rate<M>, Complex),
     ) -> (MotorState<M::State>, Complex) {
         let (m, p) = (&self.machine, self.machine.pole_pairs());
         let (x0, n0) = (self.state.electrical, self.state.speed);
@@ -90,20 +92,28 @@ impl<M: MachineModel> MotorModel<M> {
         let (k1, v1) = first;
         let a1 = accelerate(&x0, n0);
         let half = 0.5 * h;
-        let (x, n1) = (m.settled(x0.moved(&k1, half)), n0 + a1 * half);
+        let (mut x, n1) = (x0, n0 + a1 * half);
+        x.set_moved(&x0, &k1, half);
+        m.settle(&mut x);
         let (k2, v2) = rates(&x, p * n1);
         let a2 = accelerate(&x, n1);
-        let (x, n2) = (m.settled(x0.moved(&k2, half)), n0 + a2 * half);
+        let n2 = n0 + a2 * half;
+        x.set_moved(&x0, &k2, half);
+        m.settle(&mut x);
         let (k3, v3) = rates(&x, p * n2);
         let a3 = accelerate(&x, n2);
-        let (x, n3) = (m.settled(x0.moved(&k3, h)), n0 + a3 * h);
+        let n3 = n0 + a3 * h;
+        x.set_moved(&x0, &k3, h);
+        m.settle(&mut x);
         let (k4, v4) = rates(&x, p * n3);
         let a4 = accelerate(&x, n3);
 
         let sixth = h * (1.0 / 6.0);
         let mean_f = |a: f64, b: f64, c: f64, d: f64| (a + d + (b + c) * 2.0) * sixth;
+        x.set_advanced(&x0, [&k1, &k2, &k3, &k4], h);
+        m.settle(&mut x);
         let state = MotorState {
-            electrical: m.settled(x0.advanced([&k1, &k2, &k3, &k4], h)),
+            electrical: x,
             speed: n0 + mean_f(a1, a2, a3, a4),
             angle: self.state.angle + mean_f(n0, n1, n2, n3),
         };

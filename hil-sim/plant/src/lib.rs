@@ -49,13 +49,13 @@ use serde::{Deserialize, Serialize};
 pub use complex::{Complex, clarke, phases};
 pub use dc_link::DcLinkSettings;
 pub use encoder::{Encoder, EncoderFault, EncoderSettings};
-pub use energy::{EnergyMachine, EnergyState, FAMILIES, Family, IronSettings};
+pub use energy::{EnergyMachine, EnergyRate, EnergyState, FAMILIES, Family, IronSettings};
 pub use error::PlantError;
 pub use integrate::{MotorModel, MotorState};
 pub use inverter::{Inverter, InverterSettings};
 pub use machine::{Machine, MachineSettings, MachineState, SaliencySettings};
 pub use mechanics::{Load, Mechanics, MechanicsSettings};
-pub use model::{ElectricalState, MachineModel};
+pub use model::{ElectricalRate, ElectricalState, MachineModel, Rate};
 pub use sensors::{CalibrationLine, Channel, CurrentFault, MeasurementSettings, Sensors};
 pub use warming::WarmingSettings;
 
@@ -328,14 +328,11 @@ impl Plant {
 
     /// Slopes of the phase currents while the terminals are shorted, A/s.
     pub fn shorted_slopes(&self) -> [f64; 3] {
-        /// Seconds: short against every time constant of a motor, long against the rounding.
-        const STEP: f64 = 1e-7;
-        let slope = whichever!(&self.motor, motor => {
-            let (machine, x) = (&motor.machine, &motor.state.electrical);
-            let rate = machine.derivative(x, Complex::ZERO, machine.pole_pairs() * motor.state.speed);
-            (machine.settled(x.moved(&rate, STEP)).current() - x.current()) / STEP
-        });
-        phases(slope)
+        phases(whichever!(&self.motor, motor => {
+            let speed = motor.machine.pole_pairs() * motor.state.speed;
+            let rate = motor.machine.derivative(&motor.state.electrical, Complex::ZERO, speed);
+            rate.current_rate()
+        }))
     }
 
     /// Changes the dead time, us.

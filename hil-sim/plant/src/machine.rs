@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complex::{Complex, dot, square};
 use crate::error::{PlantError, check};
-use crate::model::{ElectricalState, MachineModel, increment};
+use crate::model::{ElectricalRate, ElectricalState, MachineModel, increment};
 
 /// Largest length of the saliency vector that settings may reach.
 const SALIENCY_LIMIT: f64 = 0.5;
@@ -111,7 +111,16 @@ pub struct MachineState {
     pub i_lp: Complex,
 }
 
+impl ElectricalRate for MachineState {
+    #[inline]
+    fn current_rate(&self) -> Complex {
+        self.i
+    }
+}
+
 impl ElectricalState for MachineState {
+    type Rate = Self;
+
     #[inline]
     fn current(&self) -> Complex {
         self.i
@@ -123,18 +132,18 @@ impl ElectricalState for MachineState {
     }
 
     #[inline]
-    fn moved(&self, k: &Self, h: f64) -> Self {
-        Self { i: self.i + k.i * h, psi: self.psi + k.psi * h, i_lp: self.i_lp + k.i_lp * h }
+    fn set_moved(&mut self, x: &Self, k: &Self, h: f64) {
+        *self = Self { i: x.i + k.i * h, psi: x.psi + k.psi * h, i_lp: x.i_lp + k.i_lp * h };
     }
 
     #[inline]
-    fn advanced(&self, k: [&Self; 4], h: f64) -> Self {
+    fn set_advanced(&mut self, x: &Self, k: [&Self; 4], h: f64) {
         let sixth = h * (1.0 / 6.0);
-        Self {
-            i: self.i + increment(k.map(|k| k.i), sixth),
-            psi: self.psi + increment(k.map(|k| k.psi), sixth),
-            i_lp: self.i_lp + increment(k.map(|k| k.i_lp), sixth),
-        }
+        *self = Self {
+            i: x.i + increment(k.map(|k| k.i), sixth),
+            psi: x.psi + increment(k.map(|k| k.psi), sixth),
+            i_lp: x.i_lp + increment(k.map(|k| k.i_lp), sixth),
+        };
     }
 }
 

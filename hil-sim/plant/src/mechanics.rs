@@ -188,6 +188,12 @@ impl Mechanics {
         self.extras?.coupling.map(|coupling| coupling.speed)
     }
 
+    /// Whether anything but inertia, viscous friction and a constant load acts.
+    #[inline]
+    pub(crate) fn has_extras(&self) -> bool {
+        self.extras.is_some()
+    }
+
     /// Fixes the torques of an integration step that begins at this rotor angle, speed and electromagnetic torque.
     /// Returns the speed, zero where friction holds the shaft.
     #[inline]

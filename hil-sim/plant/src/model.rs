@@ -15,7 +15,7 @@ pub trait MachineModel: Copy {
     fn torque(&self, x: &Self::State) -> f64;
 
     /// Time derivative of the state at the terminal voltage `v`, V.
-    fn derivative(&self, x: &Self::State, v: Complex, w: f64) -> Self::State;
+    fn derivative(&self, x: &Self::State, v: Complex, w: f64) -> Rate<Self>;
 
     /// As [`Self::derivative`] while the current is confined to the line through zero along the unit
     /// vector `axis`, where the terminal voltage has the component `v_axis`. Also returns the
@@ -26,11 +26,11 @@ pub trait MachineModel: Copy {
         v_axis: f64,
         axis: Complex,
         w: f64,
-    ) -> (Self::State, Complex);
+    ) -> (Rate<Self>, Complex);
 
     /// As [`Self::derivative`] with open terminals, where the current is zero. Also returns the
     /// terminal voltage.
-    fn derivative_open(&self, x: &Self::State, w: f64) -> (Self::State, Complex);
+    fn derivative_open(&self, x: &Self::State, w: f64) -> (Rate<Self>, Complex);
 
     /// The state with the stator current `i`, A, and the same rotor flux.
     fn with_current(&self, x: &Self::State, i: Complex) -> Self::State;
@@ -38,28 +38,36 @@ pub trait MachineModel: Copy {
     /// The state with its rotor flux turned by `turn`, a unit vector.
     fn with_turned_flux(&self, x: &Self::State, turn: Complex) -> Self::State;
 
-    /// The state with its dependent quantities made to match the integrated ones.
+    /// Makes the dependent quantities of a state match the integrated ones.
     #[inline]
-    fn settled(&self, x: Self::State) -> Self::State {
-        x
-    }
+    fn settle(&self, _: &mut Self::State) {}
 }
 
-/// The state of a machine, a vector space for the integration.
+/// Time derivative of the state of a model.
+pub type Rate<M> = <<M as MachineModel>::State as ElectricalState>::Rate;
+
+/// The state of a machine, as the integration needs it.
 pub trait ElectricalState: Copy + Default {
+    /// Its time derivative.
+    type Rate: Copy + ElectricalRate;
+
     /// Stator current, A.
     fn current(&self) -> Complex;
 
     /// Rotor flux linkage, Wb.
     fn rotor_flux(&self) -> Complex;
 
-    /// `self + rate h`
-    #[must_use]
-    fn moved(&self, rate: &Self, h: f64) -> Self;
+    /// Becomes `from + rate h`. (In place: a state may be large.)
+    fn set_moved(&mut self, from: &Self, rate: &Self::Rate, h: f64);
 
-    /// `self + (k0 + 2 k1 + 2 k2 + k3) h/6`
-    #[must_use]
-    fn advanced(&self, k: [&Self; 4], h: f64) -> Self;
+    /// Becomes `from + (k0 + 2 k1 + 2 k2 + k3) h/6`.
+    fn set_advanced(&mut self, from: &Self, k: [&Self::Rate; 4], h: f64);
+}
+
+/// The time derivative of a state.
+pub trait ElectricalRate {
+    /// Rate of the stator current, A/s.
+    fn current_rate(&self) -> Complex;
 }
 
 /// `(k0 + 2 k1 + 2 k2 + k3) sixth`, the increment of the Runge-Kutta rule.

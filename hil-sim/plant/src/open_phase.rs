@@ -2,7 +2,7 @@
 
 use crate::complex::{Complex, dot};
 use crate::integrate::MotorModel;
-use crate::model::{ElectricalState as _, MachineModel};
+use crate::model::{ElectricalState as _, MachineModel, Rate};
 
 /// Unit vectors along which the current lies while phase a, b or c is without current.
 pub(crate) const LINES: [Complex; 3] = [
@@ -24,7 +24,7 @@ impl OpenPhase {
         x: &M::State,
         v: Complex,
         w: f64,
-    ) -> (M::State, Complex) {
+    ) -> (Rate<M>, Complex) {
         // Along this axis the leg of the open phase has no part.
         let axis = LINES[self.0];
         machine.derivative_on_line(x, dot(v, axis), axis, w)

@@ -207,7 +207,7 @@ keys! {
         /// Unsaturated magnetising inductance over the chord inductance at psi_n.
         saturation: Option<f64> = None, [1 .. 10], "";
         /// Exponent of the main-flux curve.
-        exponent: Option<u32> = None, [1 .. 12], "";
+        exponent: Option<u32> = None, [2 .. 12], "";
         /// Whether motor.l_m is the chord inductance at psi_n; otherwise it is the unsaturated one.
         chord: bool = true, [switch], "";
         /// Saliency by saturated teeth at psi_n.

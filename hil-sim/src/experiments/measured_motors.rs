@@ -82,7 +82,8 @@ impl Supplied {
     fn state(&self, w: f64) -> Result<EnergyState, Error> {
         // The stator flux of an ideal winding, and as much in the rotor.
         let flux = Complex::new(0.0, -0.97 * self.v / self.w_s);
-        let start = self.machine.settled(EnergyState::of_fluxes([flux; 4]));
+        let mut start = EnergyState::of_fluxes([flux; 4]);
+        self.machine.settle(&mut start);
         at_voltage(&self.machine, self.v.into(), (self.w_s, w), &start)
     }
 

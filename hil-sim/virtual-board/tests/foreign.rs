@@ -41,7 +41,8 @@ fn run(program: &Program) -> Result<String> {
     let mut board = board(program.name)?;
     let outcome = board.run_periods(program.periods);
     let mut broken: Vec<_> = board.violations().iter().map(|violation| violation.rule).collect();
-    let text: String = board.violations().iter().map(|v| format!("    {v}, {} times\n", v.count)).collect();
+    let text: String =
+        board.violations().iter().map(|v| format!("    {v}, {} times\n", v.count)).collect();
     broken.sort_unstable();
     broken.dedup();
     let mut known: Vec<_> = program.breaks.iter().map(|known| known.0).collect();

@@ -24,7 +24,7 @@ mod state;
 
 pub use family::{FAMILIES, Family};
 pub use settings::IronSettings;
-pub use state::EnergyState;
+pub use state::{EnergyRate, EnergyState};
 
 use magnetics::{Leakage, Magnetics, MainFlux, Teeth};
 
@@ -161,19 +161,19 @@ impl EnergyMachine {
     }
 
     /// Currents of top and bottom of the bars, A.
-    #[inline]
+    #[inline(always)]
     fn bar_currents(&self, x: &EnergyState) -> (Complex, Complex) {
         let bottom = (x.psi_deep - x.psi_r) * self.inverse_bar;
         (x.solution.i_r - bottom, bottom)
     }
 
     /// As `derivative`, without the rates of the dependent quantities.
-    #[inline]
-    fn flux_rates(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyState {
+    #[inline(always)]
+    fn flux_rates(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyRate {
         let (top, bottom) = self.bar_currents(x);
         let turning = |psi: Complex| Complex::new(-w * psi.im, w * psi.re);
         let deep = self.inverse_bar != 0.0;
-        EnergyState {
+        EnergyRate {
             psi_s: v - x.solution.i * self.rs,
             psi_r: turning(x.psi_r) - top * (self.rr * self.top),
             psi_deep: if deep {
@@ -183,15 +183,15 @@ impl EnergyMachine {
             },
             psi_iron: (x.solution.m - x.psi_iron) * self.eddy_rate,
             theta: w,
-            ..EnergyState::default()
+            ..EnergyRate::default()
         }
     }
 
     /// Adds the rates of main flux and current to those of the fluxes.
-    #[inline]
-    fn completed(&self, x: &EnergyState, mut k: EnergyState) -> EnergyState {
+    #[inline(always)]
+    fn completed(&self, x: &EnergyState, mut k: EnergyRate) -> EnergyRate {
         let rates = [k.psi_s, k.psi_r, k.psi_iron];
-        (k.solution.m, k.solution.i) = self.magnetics.rates(&x.solution.slopes, rates);
+        (k.m, k.i) = self.magnetics.rates(&x.solution.slopes, rates);
         k
     }
 
@@ -229,12 +229,12 @@ impl MachineModel for EnergyMachine {
             return 1.5 * torque;
         }
         let y = x.psi_s - x.solution.m;
-        let slots = self.magnetics.slot_vector(x.theta) * y.conj() * y.conj();
+        let slots = x.solution.slots * y.conj() * y.conj();
         1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots.im)
     }
 
-    #[inline]
-    fn derivative(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyState {
+    #[inline(always)]
+    fn derivative(&self, x: &EnergyState, v: Complex, w: f64) -> EnergyRate {
         self.completed(x, self.flux_rates(x, v, w))
     }
 
@@ -244,18 +244,18 @@ impl MachineModel for EnergyMachine {
         v_axis: f64,
         axis: Complex,
         w: f64,
-    ) -> (EnergyState, Complex) {
+    ) -> (EnergyRate, Complex) {
         let normal = axis * Complex::i();
         let k = self.derivative(x, axis * v_axis, w);
         let by_normal = self.current_by_flux(x, normal);
-        let v_normal = -dot(k.solution.i, normal) / dot(by_normal, normal);
+        let v_normal = -dot(k.i, normal) / dot(by_normal, normal);
         let v = axis * v_axis + normal * v_normal;
         (self.derivative(x, v, w), v)
     }
 
-    fn derivative_open(&self, x: &EnergyState, w: f64) -> (EnergyState, Complex) {
+    fn derivative_open(&self, x: &EnergyState, w: f64) -> (EnergyRate, Complex) {
         let k = self.derivative(x, Complex::ZERO, w);
-        let v = self.flux_for_current(x, -k.solution.i);
+        let v = self.flux_for_current(x, -k.i);
         (self.derivative(x, v, w), v)
     }
 
@@ -267,7 +267,7 @@ impl MachineModel for EnergyMachine {
                 break;
             }
             x.psi_s += self.flux_for_current(&x, missing);
-            x = self.settled(x);
+            self.settle(&mut x);
         }
         // To the last digit: no current is none.
         x.solution.i = i;
@@ -275,13 +275,13 @@ impl MachineModel for EnergyMachine {
     }
 
     fn with_turned_flux(&self, x: &EnergyState, turn: Complex) -> EnergyState {
-        let turned = EnergyState { psi_r: x.psi_r * turn, psi_deep: x.psi_deep * turn, ..*x };
-        self.with_current(&self.settled(turned), x.solution.i)
+        let mut turned = EnergyState { psi_r: x.psi_r * turn, psi_deep: x.psi_deep * turn, ..*x };
+        self.settle(&mut turned);
+        self.with_current(&turned, x.solution.i)
     }
 
     #[inline]
-    fn settled(&self, mut x: EnergyState) -> EnergyState {
-        x.solution = self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], x.theta, x.solution);
-        x
+    fn settle(&self, x: &mut EnergyState) {
+        self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], x.theta, &mut x.solution);
     }
 }

@@ -79,7 +79,7 @@ impl IronSettings {
     pub(crate) fn check(&self, m: &MachineSettings) -> Result<(), PlantError> {
         check("iron.psi_n", self.psi_n, 1e-4..=100.0, "Wb")?;
         check("iron.saturation", self.saturation, 1.0..=10.0, "")?;
-        check("iron.exponent", f64::from(self.exponent), 1.0..=12.0, "")?;
+        check("iron.exponent", f64::from(self.exponent), 2.0..=12.0, "")?;
         check("iron.teeth", self.teeth, -0.25..=0.25, "")?;
         check("iron.teeth_gap", self.teeth_gap, 0.0..=1.0, "")?;
         check("iron.teeth_turn_deg", self.teeth_turn_deg, -90.0..=90.0, "deg")?;

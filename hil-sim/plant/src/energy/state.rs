@@ -2,7 +2,7 @@
 
 use super::magnetics::Solution;
 use crate::complex::Complex;
-use crate::model::{ElectricalState, increment};
+use crate::model::{ElectricalRate, ElectricalState, increment};
 
 /// Electrical state of the energy model. Fluxes are integrated; currents follow from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +37,34 @@ impl EnergyState {
     }
 }
 
+/// Time derivative of an [`EnergyState`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyRate {
+    /// Of the stator flux, V.
+    pub psi_s: Complex,
+    /// Of the rotor flux, V.
+    pub psi_r: Complex,
+    /// Of the flux of the bottom of the bars, V.
+    pub psi_deep: Complex,
+    /// Of the flux of the eddy currents, V.
+    pub psi_iron: Complex,
+    /// Electrical speed, rad/s.
+    pub theta: f64,
+    /// Of main flux and stator current: a first guess at the next state.
+    pub(super) m: Complex,
+    pub(super) i: Complex,
+}
+
+impl ElectricalRate for EnergyRate {
+    #[inline]
+    fn current_rate(&self) -> Complex {
+        self.i
+    }
+}
+
 impl ElectricalState for EnergyState {
+    type Rate = EnergyRate;
+
     #[inline]
     fn current(&self) -> Complex {
         self.solution.i
@@ -48,39 +75,27 @@ impl ElectricalState for EnergyState {
         self.psi_r
     }
 
-    // Main flux and current go along as a first guess of the solution.
-    #[inline]
-    fn moved(&self, k: &Self, h: f64) -> Self {
-        let guess = &self.solution;
-        Self {
-            psi_s: self.psi_s + k.psi_s * h,
-            psi_r: self.psi_r + k.psi_r * h,
-            psi_deep: self.psi_deep + k.psi_deep * h,
-            psi_iron: self.psi_iron + k.psi_iron * h,
-            theta: self.theta + k.theta * h,
-            solution: Solution {
-                m: guess.m + k.solution.m * h,
-                i: guess.i + k.solution.i * h,
-                ..*guess
-            },
-        }
+    #[inline(always)]
+    fn set_moved(&mut self, x: &Self, k: &EnergyRate, h: f64) {
+        self.psi_s = x.psi_s + k.psi_s * h;
+        self.psi_r = x.psi_r + k.psi_r * h;
+        self.psi_deep = x.psi_deep + k.psi_deep * h;
+        self.psi_iron = x.psi_iron + k.psi_iron * h;
+        self.theta = x.theta + k.theta * h;
+        // First guesses; slopes are left to the solution.
+        self.solution.m = x.solution.m + k.m * h;
+        self.solution.i = x.solution.i + k.i * h;
     }
 
-    #[inline]
-    fn advanced(&self, k: [&Self; 4], h: f64) -> Self {
+    #[inline(always)]
+    fn set_advanced(&mut self, x: &Self, k: [&EnergyRate; 4], h: f64) {
         let sixth = h * (1.0 / 6.0);
-        let guess = &self.solution;
-        Self {
-            psi_s: self.psi_s + increment(k.map(|k| k.psi_s), sixth),
-            psi_r: self.psi_r + increment(k.map(|k| k.psi_r), sixth),
-            psi_deep: self.psi_deep + increment(k.map(|k| k.psi_deep), sixth),
-            psi_iron: self.psi_iron + increment(k.map(|k| k.psi_iron), sixth),
-            theta: self.theta + (k[0].theta + k[3].theta + (k[1].theta + k[2].theta) * 2.0) * sixth,
-            solution: Solution {
-                m: guess.m + increment(k.map(|k| k.solution.m), sixth),
-                i: guess.i + increment(k.map(|k| k.solution.i), sixth),
-                ..*guess
-            },
-        }
+        self.psi_s = x.psi_s + increment(k.map(|k| k.psi_s), sixth);
+        self.psi_r = x.psi_r + increment(k.map(|k| k.psi_r), sixth);
+        self.psi_deep = x.psi_deep + increment(k.map(|k| k.psi_deep), sixth);
+        self.psi_iron = x.psi_iron + increment(k.map(|k| k.psi_iron), sixth);
+        self.theta = x.theta + (k[0].theta + k[3].theta + (k[1].theta + k[2].theta) * 2.0) * sixth;
+        self.solution.m = x.solution.m + increment(k.map(|k| k.m), sixth);
+        self.solution.i = x.solution.i + increment(k.map(|k| k.i), sixth);
     }
 }

@@ -3,7 +3,9 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::error::Error;
-use crate::plant::{EnergyMachine, EnergyState, Machine, MachineModel, MachineState};
+use crate::plant::{
+    EnergyMachine, EnergyRate, EnergyState, Machine, MachineModel, MachineState, Rate,
+};
 
 /// Step of the numeric derivatives, relative to the size of a state.
 const STEP: f64 = 1e-6;
@@ -13,6 +15,8 @@ const ITERATIONS: usize = 60;
 pub(crate) trait Listed: MachineModel {
     /// The integrated vectors, in an order that stays.
     fn list(&self, x: &Self::State) -> Vec<Complex<f64>>;
+    /// Their rates, in the same order.
+    fn rates(&self, k: &Rate<Self>) -> Vec<Complex<f64>>;
     /// The state with these vectors.
     fn state(&self, list: &[Complex<f64>]) -> Self::State;
 }
@@ -22,6 +26,10 @@ impl Listed for Machine {
         vec![x.i, x.psi, x.i_lp]
     }
 
+    fn rates(&self, k: &MachineState) -> Vec<Complex<f64>> {
+        self.list(k)
+    }
+
     fn state(&self, list: &[Complex<f64>]) -> MachineState {
         MachineState { i: list[0], psi: list[1], i_lp: list[2] }
     }
@@ -29,10 +37,11 @@ impl Listed for Machine {
 
 impl Listed for EnergyMachine {
     fn list(&self, x: &EnergyState) -> Vec<Complex<f64>> {
-        let mut list = vec![x.psi_s, x.psi_r];
-        list.extend(self.has_skin_effect().then_some(x.psi_deep));
-        list.extend(self.has_iron_loss().then_some(x.psi_iron));
-        list
+        integrated(self, [x.psi_s, x.psi_r, x.psi_deep, x.psi_iron])
+    }
+
+    fn rates(&self, k: &EnergyRate) -> Vec<Complex<f64>> {
+        integrated(self, [k.psi_s, k.psi_r, k.psi_deep, k.psi_iron])
     }
 
     fn state(&self, list: &[Complex<f64>]) -> EnergyState {
@@ -41,8 +50,16 @@ impl Listed for EnergyMachine {
         let psi_deep = next(self.has_skin_effect()).unwrap_or_default();
         let psi_iron = next(self.has_iron_loss()).unwrap_or_default();
         let (psi_s, psi_r) = (list[0], list[1]);
-        self.settled(EnergyState::of_fluxes([psi_s, psi_r, psi_deep, psi_iron]))
+        let mut x = EnergyState::of_fluxes([psi_s, psi_r, psi_deep, psi_iron]);
+        self.settle(&mut x);
+        x
     }
+}
+
+/// Those of stator, rotor, bottom of the bars and iron that the machine integrates.
+fn integrated(machine: &EnergyMachine, all: [Complex<f64>; 4]) -> Vec<Complex<f64>> {
+    let there = [true, true, machine.has_skin_effect(), machine.has_iron_loss()];
+    all.into_iter().zip(there).filter(|(_, there)| *there).map(|(z, _)| z).collect()
 }
 
 /// Real and imaginary parts behind each other.
@@ -122,7 +139,7 @@ pub(crate) fn at_current<M: Listed>(
         let list = listed(&y[..n]);
         let x = machine.state(&list);
         let (v, slip) = (Complex::new(y[n], y[n + 1]), y[n + 2]);
-        let rates = machine.list(&machine.derivative(&x, v, 0.0));
+        let rates = machine.rates(&machine.derivative(&x, v, 0.0));
         let turning = list.iter().map(|z| Complex::new(0.0, slip) * z);
         let mut residual: Vec<Complex<f64>> =
             rates.iter().zip(turning).map(|(a, b)| a - b).collect();
@@ -150,7 +167,7 @@ pub(crate) fn at_voltage<M: Listed>(
     let sizes = vec![v.norm() / w_s.abs(); y.len()];
     let residual = |y: &[f64]| {
         let list = listed(y);
-        let rates = machine.list(&machine.derivative(&machine.state(&list), v, w));
+        let rates = machine.rates(&machine.derivative(&machine.state(&list), v, w));
         let turning = list.iter().map(|z| Complex::new(0.0, w_s) * z);
         flat(&rates.iter().zip(turning).map(|(a, b)| a - b).collect::<Vec<_>>())
     };
@@ -169,7 +186,7 @@ pub(crate) fn admittance<M: Listed>(
     let y = flat(&machine.list(x));
     let sizes = vec![flux; y.len()];
     let rates = |y: &[f64], v: Complex<f64>| {
-        flat(&machine.list(&machine.derivative(&machine.state(&listed(y)), v, 0.0)))
+        flat(&machine.rates(&machine.derivative(&machine.state(&listed(y)), v, 0.0)))
     };
     let a = jacobian(|y| rates(y, Complex::default()), &y, &sizes);
     let c = jacobian(|y| flat(&[machine.state(&listed(y)).current()]), &y, &sizes);
