@@ -147,18 +147,8 @@ pub const ADC_REGULATOR_START_US: u32 = 20;
 /// 10.
 pub const ADC_TIMEOUT_US: u32 = 1000;
 
-/// Reference of the converters, V: VREF+ of the Nucleo board is its 3.3 V supply.
-pub const ADC_REFERENCE_V: f32 = 3.3;
 /// Largest code of a conversion: 12 bits.
 pub const ADC_FULL_SCALE: u16 = 4095;
-/// Reference of the converter with which the sensors were calibrated, V (Eq. 3.4).
-const CALIBRATION_REFERENCE_V: f32 = 3.0;
-
-/// The calibration line of a sensor of the dissertation with the reference of this board, [`ADC_REFERENCE_V`].
-pub const fn on_this_board(line: Line) -> Line {
-    // The same voltage gives a smaller code with a higher reference; code 0 stays 0 V.
-    Line { gain: line.gain * (ADC_REFERENCE_V / CALIBRATION_REFERENCE_V), ..line }
-}
 
 /// The analog watchdogs trip at this multiple of the software's limit, which acts first at slow currents.
 const ANALOG_TRIP_SHARE: f32 = 1.02;

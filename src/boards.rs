@@ -5,6 +5,7 @@
 //! the bench steps for them were done and confirmed at the console.
 
 mod confirm;
+pub mod converter;
 #[cfg(test)]
 mod manual;
 pub mod pin;

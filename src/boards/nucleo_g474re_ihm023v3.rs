@@ -5,9 +5,9 @@
 
 use drive_core::settings::{Line, Ntc};
 
+use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
 use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
-use crate::board::ADC_REFERENCE_V;
 
 /// Shunt, ohm, and gain of its amplifier: 0.255 V/A. A current into the motor lowers the output.
 const V_PER_A: f32 = -0.15 * 1.7;
@@ -18,7 +18,7 @@ const fn shunt(pin: super::Pin) -> Analog {
     Analog {
         pin,
         line: assumed(
-            Line::of_sensor(V_PER_A, ZERO_V, ADC_REFERENCE_V, 4096),
+            Line::of_sensor(V_PER_A, ZERO_V, REFERENCE_V, CODES),
             "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
         ),
     }
@@ -60,7 +60,7 @@ pub const BOARD: Board = Board {
         pin: pa(1),
         line: assumed(
             // 0.0075 V/V.
-            Line { gain: ADC_REFERENCE_V / 4096.0 / 0.0075, offset: 0.0 },
+            Line { gain: REFERENCE_V / CODES as f32 / 0.0075, offset: 0.0 },
             "10 V at the dc link: `status` must show them within 3 %",
         ),
     },

@@ -6,9 +6,9 @@
 
 use drive_core::settings::{Line, Ntc};
 
+use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
 use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
-use crate::board::ADC_REFERENCE_V;
 
 /// Shunt, ohm, and gain of its amplifier: 51.8 mV/A. A current into the motor lowers the output.
 const V_PER_A: f32 = -0.010 * 5.18;
@@ -19,7 +19,7 @@ const fn shunt(pin: super::Pin) -> Analog {
     Analog {
         pin,
         line: assumed(
-            Line::of_sensor(V_PER_A, ZERO_V, ADC_REFERENCE_V, 4096),
+            Line::of_sensor(V_PER_A, ZERO_V, REFERENCE_V, CODES),
             "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
         ),
     }
@@ -63,7 +63,7 @@ pub const BOARD: Board = Board {
         pin: pa(1),
         // A divider of 169 and 9.31 kOhm.
         line: assumed(
-            Line { gain: 19.15 * ADC_REFERENCE_V / 4096.0, offset: 0.0 },
+            Line { gain: 19.15 * REFERENCE_V / CODES as f32, offset: 0.0 },
             "10 V at the dc link: `status` must show them within 3 %",
         ),
     },

@@ -2,9 +2,9 @@
 
 use drive_core::settings::{Line, Ntc};
 
+use super::converter::calibrated;
 use super::pin::{pa, pb, pc};
 use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
-use crate::board::on_this_board;
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -35,11 +35,11 @@ pub const BOARD: Board = Board {
     currents: Currents::InLine([
         Analog {
             pin: pa(0),
-            line: read(on_this_board(Line::CHANNEL_A), "dissertation, Eq. 3.5 and 3.4"),
+            line: read(calibrated(Line::CHANNEL_A), "dissertation, Eq. 3.5 and 3.4"),
         },
         Analog {
             pin: pc(1),
-            line: read(on_this_board(Line::CHANNEL_B), "dissertation, Eq. 3.5 and 3.4"),
+            line: read(calibrated(Line::CHANNEL_B), "dissertation, Eq. 3.5 and 3.4"),
         },
     ]),
     current_delay_s: read(30e-6, "dissertation, Figure 16: a filter of 5305 Hz"),

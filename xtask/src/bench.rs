@@ -88,7 +88,7 @@ mod tests {
             mask: u32::MAX,
         };
         assert_eq!(bdtr(), expected);
-        for line in ["", "TIM1_BDTR", "TIM1_BDTR 40012c44 00043f9e", "A B C D"] {
+        for line in ["", "TIM1_BDTR", "TIM1_BDTR 40012c44 00043f9e", "A B C X"] {
             assert!(register(line).is_err(), "{line}");
         }
     }

@@ -2,6 +2,7 @@
 
 pub mod confirmed;
 mod control;
+mod debugger;
 mod exceptions;
 mod motor;
 mod options;

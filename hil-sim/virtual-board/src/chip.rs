@@ -5,6 +5,7 @@
 
 mod bus;
 mod clocked;
+pub mod debugger;
 mod execution;
 pub mod pins;
 mod supply;
@@ -14,7 +15,6 @@ pub use clocked::clock_of;
 pub use execution::Watched;
 
 use crate::cost::Block;
-use crate::debugger::Halt;
 use crate::periph::adc::Adc;
 use crate::periph::analog::Comparators;
 use crate::periph::dac::Dacs;
@@ -31,11 +31,9 @@ use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
+pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
+use debugger::Halt;
 
-/// Ticks per second.
-pub const TICKS_PER_S: u64 = 170_000_000;
-/// Ticks of a PWM period, from one top of the counter to the next.
-pub const TICKS_PER_PERIOD: u64 = 2 * induction_drive::board::PWM_TOP as u64;
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 

@@ -16,7 +16,7 @@
 //! * Oscillators and PLL are ready at once; converters, references and comparators take their time.
 //! * What the chip would drop or do wrong in silence is recorded and fails the run ([`rules`]): clocks of peripherals,
 //!   voltage range, wait states, locks, order and times of converters, busy registers, pins. A debugger can halt the core
-//!   ([`debugger`]); the supply can sag ([`chip::Chip::set_supply`]).
+//!   ([`chip::debugger`]); the supply can sag ([`chip::Chip::set_supply`]).
 //! * The gates are those behind the drivers of a [`power_stage`]: levels follow from pins, timer and resistors, and are
 //!   judged whenever one of them may change. Transients within a dead time are not modelled.
 //! * The motor moves between the tops of the PWM counter; outputs that go off between two of them
@@ -32,7 +32,6 @@ pub mod chip;
 pub mod cost;
 pub mod cpu;
 pub mod cycles;
-pub mod debugger;
 pub mod dump;
 pub mod image;
 pub mod interactive;
@@ -44,6 +43,7 @@ pub mod power_stage;
 pub mod rules;
 pub mod scs;
 pub mod shadow;
+pub mod time;
 
 pub use board::{Board, Options, Period};
 pub use cpu::Counting;

@@ -1,14 +1,11 @@
 //! A debugger at the debug port: it halts the core and lets it go, and sets and clears bits of DBGMCU.
 
-use anyhow::Result;
-
-use crate::board::Board;
-use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use super::{Chip, TICKS_PER_PERIOD};
 use crate::periph::plain::{DBG_APB1_FZ, DBG_APB2_FZ, DBG_CR};
 use crate::rules::Rule;
 
 /// DBGMCU: clocks go on in sleep, stop and standby.
-const LOW_POWER: u32 = 7;
+pub const LOW_POWER: u32 = 7;
 /// DBGMCU: clock of the core goes on while it sleeps.
 const SLEEP: u32 = 1;
 /// DBGMCU: the watchdog stops while the core is halted.
@@ -82,36 +79,5 @@ impl Chip {
         if self.debug.get(DBG_CR) & SLEEP == 0 {
             self.scs.stand_still(ticks);
         }
-    }
-}
-
-impl Board {
-    /// A debugger attaches: it keeps the debug port alive in low-power modes.
-    pub fn attach(&mut self) {
-        let debug = &mut self.chip().debug;
-        let cr = debug.get(DBG_CR);
-        debug.write(DBG_CR, cr | LOW_POWER);
-    }
-
-    /// It detaches, and clears what it has set.
-    pub fn detach(&mut self) {
-        self.resume();
-        let debug = &mut self.chip().debug;
-        let cr = debug.get(DBG_CR);
-        debug.write(DBG_CR, cr & !LOW_POWER);
-    }
-
-    /// It halts the core for some time, ms; [`Board::resume`] lets it go on.
-    ///
-    /// # Errors
-    /// As of [`Board::run_ticks`].
-    pub fn halt(&mut self, ms: f64) -> Result<()> {
-        self.chip().halt();
-        self.run_ticks((ms * 1e-3 * TICKS_PER_S as f64) as u64)
-    }
-
-    /// It lets the core go on.
-    pub fn resume(&mut self) {
-        self.chip().resume();
     }
 }
