@@ -96,6 +96,15 @@ pub fn output(program: &str, arguments: &[&str]) -> Option<String> {
     output.status.success().then(|| text.trim().to_owned())
 }
 
+/// Fails if probe-rs is not there.
+pub fn probe_rs() -> Result<()> {
+    let probe = command("probe-rs").arg("--version").output();
+    if probe.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound) {
+        bail!("probe-rs is missing. Type:\n    cargo install probe-rs-tools --locked");
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,13 +121,4 @@ mod tests {
         let error = step("nothing", Command::new("false").env("A", "b")).unwrap_err();
         assert!(error.to_string().ends_with("\n    A=\"b\" \"false\""), "{error}");
     }
-}
-
-/// Fails if probe-rs is not there.
-pub fn probe_rs() -> Result<()> {
-    let probe = command("probe-rs").arg("--version").output();
-    if probe.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound) {
-        bail!("probe-rs is missing. Type:\n    cargo install probe-rs-tools --locked");
-    }
-    Ok(())
 }
