@@ -63,6 +63,7 @@ impl<M: MachineModel> MotorModel<M> {
     #[inline]
     pub(crate) fn end_step(&mut self, h: f64) {
         self.mechanics.end(self.state.angle, self.state.speed, h);
+        self.machine.after_step(&self.state.electrical, h);
     }
 
     /// The state after `h` seconds, and the mean terminal voltage. `rates` gives the derivative of

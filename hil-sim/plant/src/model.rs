@@ -38,6 +38,10 @@ pub trait MachineModel: Copy {
     /// The state with its rotor flux turned by `turn`, a unit vector.
     fn with_turned_flux(&self, x: &Self::State, turn: Complex) -> Self::State;
 
+    /// What changes slowly with the state, after a step of `h` seconds.
+    #[inline]
+    fn after_step(&mut self, _: &Self::State, _h: f64) {}
+
     /// Makes the dependent quantities of a state match the integrated ones.
     #[inline]
     fn settle(&self, _: &mut Self::State) {}

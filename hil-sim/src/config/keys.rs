@@ -216,7 +216,7 @@ keys! {
         teeth_gap: Option<f64> = None, [0 .. 1], "";
         /// Constant turn of the axis of the teeth ahead of that flux.
         teeth_turn_deg: f64 = 0.0, [-90 .. 90], "deg";
-        /// Turn of the axis of the teeth by load, per torque current.
+        /// Turn of the axis of the teeth by load, per torque current behind a lag of 20 Hz.
         teeth_turn_deg_per_a: f64 = 0.0, [-90 .. 90], "deg/A";
         /// Relative loss of stator leakage inductance by current.
         leakage_saturation: Option<f64> = None, [0 .. 50], "1/A";

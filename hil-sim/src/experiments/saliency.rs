@@ -123,7 +123,7 @@ impl Probe {
             ProbeModel::A(machine) => {
                 self.of(machine, i, |i, psi, _| MachineState { i, psi: psi.into(), i_lp: i })
             }
-            ProbeModel::Energy(machine) => self.of(machine, i, |i, psi, main| {
+            ProbeModel::Energy(machine) => self.of(&machine.with_load(i.im), i, |i, psi, main| {
                 let psi_s = main + i * self.settings.lls;
                 EnergyState::of_fluxes([psi_s, psi.into(), psi.into(), main])
             }),

@@ -22,8 +22,6 @@ use crate::complex::{Complex, square};
 /// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
 /// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
 const CLOSE: f64 = 1e-3;
-/// The same where a slope is left out: that of the axis of the teeth by the current that turns it.
-const CLOSE_WITHOUT_SLOPE: f64 = 1e-10;
 /// Most iterations; two are usual, some ten after a jump of the flux.
 const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
@@ -143,9 +141,10 @@ pub(crate) struct Teeth {
     pub knee_squared: f64,
     /// Way from rotor flux to main flux, 0 to 1.
     pub gap: f64,
-    /// Turn of the axis: constant, rad, and per ampere.
+    /// Turn of the axis: constant, rad, per ampere, and the load that it goes with, A.
     pub turn: f64,
     pub turn_per_a: f64,
+    pub load: f64,
     /// Whether it is a gradient: it follows the main flux.
     pub conservative: bool,
 }
@@ -153,12 +152,11 @@ pub(crate) struct Teeth {
 impl Teeth {
     /// Unit vector by which the axis is turned.
     #[inline]
-    fn turned(&self, i: Complex, r: Complex) -> Complex {
+    fn turned(&self) -> Complex {
         if self.turn == 0.0 && self.turn_per_a == 0.0 {
             return Complex::new(1.0, 0.0);
         }
-        let across = (r.conj() * i).im / square(r).sqrt().max(NO_FLUX);
-        Complex::cis(self.turn + self.turn_per_a * across)
+        Complex::cis(self.turn + self.turn_per_a * self.load)
     }
 }
 
@@ -206,14 +204,12 @@ impl Magnetics {
     #[inline]
     pub(crate) fn solve(&self, fluxes: [Complex; 3], theta: f64, found: &mut Solution) {
         found.slots = self.slot_vector(theta);
-        let turns = self.teeth.is_some_and(|teeth| teeth.turn_per_a != 0.0);
-        let close = if turns { CLOSE_WITHOUT_SLOPE } else { CLOSE };
         for _ in 0..LIMIT {
             let residual = self.evaluate(fluxes, found);
             let step = -found.slopes.by_residual.times(residual);
             found.m += step;
             // Not a number ends the iteration too.
-            let size = close * close * (CLOSE * CLOSE + square(found.i));
+            let size = CLOSE * CLOSE * (CLOSE * CLOSE + square(found.i));
             if square(residual) <= size || residual.re.is_nan() {
                 let slopes = &found.slopes;
                 found.i += slopes.stator_m.times(step) - slopes.stator_x.times(step);
@@ -239,7 +235,7 @@ impl Magnetics {
         let mut residual_s = Slope::default();
         let mut residual_m = main.plus(rotor);
         if let Some(t) = &self.teeth {
-            let turn = t.turned(found.i, r);
+            let turn = t.turned();
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
             let (ff, z, length) = (f * f, f.conj() * x, square(f));
             let d = 1.0 / (t.knee_squared + length);

@@ -35,6 +35,8 @@ use crate::model::MachineModel;
 
 /// Time constant of the eddy currents, s.
 const EDDY_LAG: f64 = 100e-6;
+/// Corner of the lag behind which a load turns the axis of the teeth, rad/s: far below a carrier.
+const LOAD_CORNER: f64 = std::f64::consts::TAU * 20.0;
 /// Corrections that set a current; each squares the error.
 const CURRENT_STEPS: u32 = 8;
 
@@ -90,6 +92,7 @@ impl EnergyMachine {
                     gap: iron.teeth_gap,
                     turn: iron.teeth_turn_deg.to_radians(),
                     turn_per_a: iron.teeth_turn_deg_per_a.to_radians(),
+                    load: 0.0,
                     conservative: iron.conservative(),
                 }),
                 fixed: Complex::cis(2.0 * iron.stator_fixed_deg.to_radians())
@@ -119,6 +122,15 @@ impl EnergyMachine {
         check("machine.rr", rr, 1e-4..=1000.0, "ohm")?;
         (self.rs, self.rr) = (rs, rr);
         Ok(())
+    }
+
+    /// The machine with this current across the rotor flux, A, as the load that turns the axis of its teeth.
+    #[must_use]
+    pub fn with_load(mut self, across: f64) -> Self {
+        if let Some(teeth) = &mut self.magnetics.teeth {
+            teeth.load = across;
+        }
+        self
     }
 
     /// Whether the bars have a bottom of their own.
@@ -257,6 +269,15 @@ impl MachineModel for EnergyMachine {
         let k = self.derivative(x, Complex::ZERO, w);
         let v = self.flux_for_current(x, -k.i);
         (self.derivative(x, v, w), v)
+    }
+
+    #[inline]
+    fn after_step(&mut self, x: &EnergyState, h: f64) {
+        if let Some(teeth) = self.magnetics.teeth.as_mut().filter(|t| t.turn_per_a != 0.0) {
+            let flux = square(x.psi_r).sqrt().max(1e-9);
+            let across = (x.psi_r.conj() * x.solution.i).im / flux;
+            teeth.load += (across - teeth.load) * (LOAD_CORNER * h).min(1.0);
+        }
     }
 
     fn with_current(&self, x: &EnergyState, i: Complex) -> EnergyState {
