@@ -6,7 +6,7 @@
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
-use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel};
+use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel, Rate};
 use crate::open_phase::OpenPhase;
 
 /// Current, A, beyond which the sign of a phase current counts fully.
@@ -47,17 +47,32 @@ fn swung(y: f64) -> f64 {
 
 impl Averaged {
     /// Line-to-neutral voltage at the stator current `i`.
-    #[inline]
+    #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
+        if self.inverse_knee != 0.0 || self.on_resistance != 0.0 {
+            return self.voltage_of_real_switches(i);
+        }
+        let currents = phases(i);
+        let error = |k: usize| {
+            let sign = smooth_sign(currents[k]);
+            sign * if sign > 0.0 { self.lost[k] } else { self.gained[k] }
+        };
+        self.v - clarke([error(0), error(1), error(2)])
+    }
+
+    /// The same with capacitance at the nodes and resistance of the switches.
+    #[inline(never)]
+    fn voltage_of_real_switches(&self, i: Complex) -> Complex {
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
             let size = if sign > 0.0 { self.lost[k] } else { self.gained[k] };
-            if self.inverse_knee == 0.0 {
-                return sign * size;
-            }
-            let dead = swung(currents[k] * self.inverse_knee) * (size - self.residual);
-            dead + sign * self.residual
+            let share = if self.inverse_knee == 0.0 {
+                sign
+            } else {
+                swung(currents[k] * self.inverse_knee)
+            };
+            share * (size - self.residual) + sign * self.residual
         };
         self.v - clarke([error(0), error(1), error(2)]) - i * self.on_resistance
     }
@@ -70,28 +85,40 @@ impl Averaged {
         open: Option<OpenPhase>,
         h: f64,
     ) -> Complex {
+        let p = motor.machine.pole_pairs();
+        let Some(open) = open else {
+            return self.cut(motor, h, p, |machine, x, w| {
+                let v = self.voltage(x.current());
+                (machine.derivative(x, v, w), v)
+            });
+        };
+        let volt_seconds = self
+            .cut(motor, h, p, |machine, x, w| open.rates(machine, x, self.voltage(x.current()), w));
+        open.confine(motor);
+        volt_seconds
+    }
+
+    /// Integrates in parts between the kinks.
+    #[inline]
+    fn cut<M: MachineModel>(
+        &self,
+        motor: &mut MotorModel<M>,
+        h: f64,
+        p: f64,
+        rates: impl Fn(&M, &M::State, f64) -> (Rate<M>, Complex),
+    ) -> Complex {
         let mut rest = h;
         let mut volt_seconds = Complex::ZERO;
         loop {
-            let machine = &motor.machine;
-            let rates = |x: &M::State, w| {
-                let v = self.voltage(x.current());
-                match open {
-                    None => (machine.derivative(x, v, w), v),
-                    Some(open) => open.rates(machine, x, v, w),
-                }
-            };
+            let rates = |x: &M::State, w| rates(&motor.machine, x, w);
             let x = &motor.state.electrical;
-            let first = rates(x, machine.pole_pairs() * motor.state.speed);
+            let first = rates(x, p * motor.state.speed);
             let part = match until_kink(x.current(), first.0.current_rate(), rest) {
                 None => rest,
                 Some(time) => time.max(SHORTEST * h).min(rest),
             };
             let (state, v) = motor.stepped_from(first, part, rates);
             motor.state = state;
-            if let Some(open) = open {
-                open.confine(motor);
-            }
             volt_seconds += v * part;
             if part >= rest {
                 return volt_seconds;

@@ -62,7 +62,9 @@ impl<M: MachineModel> MotorModel<M> {
     /// Ends an integration step of `h` seconds.
     #[inline]
     pub(crate) fn end_step(&mut self, h: f64) {
-        self.mechanics.end(self.state.angle, self.state.speed, h);
+        if self.mechanics.has_extras() {
+            self.mechanics.end(self.state.angle, self.state.speed, h);
+        }
         self.machine.after_step(&self.state.electrical, h);
     }
 

@@ -196,7 +196,7 @@ impl Mechanics {
 
     /// Fixes the torques of an integration step that begins at this rotor angle, speed and electromagnetic torque.
     /// Returns the speed, zero where friction holds the shaft.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn begin(&mut self, angle: f64, speed: f64, torque: f64) -> f64 {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
@@ -226,7 +226,7 @@ impl Mechanics {
     }
 
     /// Ends an integration step of `h` seconds: the inertia behind the coupling follows.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn end(&mut self, angle: f64, speed: f64, h: f64) {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return;

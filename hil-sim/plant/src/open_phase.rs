@@ -17,7 +17,7 @@ pub(crate) struct OpenPhase(pub usize);
 
 impl OpenPhase {
     /// Derivative of the state and terminal voltage, where the inverter gives `v` to the phases that are left.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn rates<M: MachineModel>(
         self,
         machine: &M,
@@ -31,7 +31,7 @@ impl OpenPhase {
     }
 
     /// Takes what current the phase has; at the interruption its energy goes into the arc.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn confine<M: MachineModel>(self, motor: &mut MotorModel<M>) {
         let (axis, x) = (LINES[self.0], &motor.state.electrical);
         motor.state.electrical = motor.machine.with_current(x, axis * dot(x.current(), axis));
