@@ -1,5 +1,7 @@
 //! A drive as the battery sees it, so that it can run another drive than this one.
 
+use std::fmt;
+
 use drive_core::{Command, Compare, Drive, Mode, Sample, State};
 
 /// What the drive is started for.
@@ -24,6 +26,17 @@ pub enum Condition {
     Regulating,
     /// Stopped by the fault of this number.
     Fault(u8),
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => f.write_str("off"),
+            Self::Busy => f.write_str("busy"),
+            Self::Regulating => f.write_str("regulating"),
+            Self::Fault(code) => write!(f, "stopped by fault {code}"),
+        }
+    }
 }
 
 /// A drive in a state that can be copied: every run begins with a copy of the same one.

@@ -238,7 +238,7 @@ pub fn learned<D: DriveUnderTest>(
         Condition::Off => Ok(Ok(bench.drive)),
         Condition::Fault(code) => Ok(Err(code)),
         other => Err(Error::Internal(format!(
-            "after {LONGEST_LEARNING_S} s of learning the drive is {other:?}"
+            "after {LONGEST_LEARNING_S} s of learning the drive is {other}"
         ))),
     }
 }
@@ -267,7 +267,7 @@ pub fn trial<D: DriveUnderTest>(
     match bench.wait(LONGEST_START_S) {
         Condition::Regulating => {}
         Condition::Fault(code) => return Ok(Trial { refused: Some(code), ..trial }),
-        other => return Err(Error::Internal(format!("after a start the drive is {other:?}"))),
+        other => return Err(Error::Internal(format!("after a start the drive is {other}"))),
     }
     let still = bring_up(&mut bench, kind.shaft(), config, &mut trial)?
         && follow(&mut bench, purpose, config, &parts, &mut trial)?;
