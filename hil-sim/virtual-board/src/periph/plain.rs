@@ -2,7 +2,7 @@
 
 use super::Plain;
 
-/// Debug support (RM0440, section 47); [`crate::debugger`] acts on it.
+/// Debug support (RM0440, section 47); [`crate::chip::debugger`] acts on it.
 pub const DEBUG: &[Plain] = &[
     (0x00, 0x2019_6469, 0),
     (DBG_CR, 0, 0xe7),
