@@ -29,11 +29,12 @@ const ANALOG: u32 = 0b11;
 pub fn alternate(pin: Pin, function: u8, pull: Option<Level>) {
     let port = registers(pin.port);
     let (shift, bits) = (4 * u32::from(pin.number % 8), u32::from(function));
-    // SAFETY: four bits of one pin; `boards::pin` holds existing functions.
     let set = |old: u32| old & !(0xf << shift) | bits << shift;
     if pin.number < 8 {
+        // SAFETY: four bits of one pin; `boards::pin` holds existing functions.
         port.afrl().modify(|r, w| unsafe { w.bits(set(r.bits())) });
     } else {
+        // SAFETY: as above.
         port.afrh().modify(|r, w| unsafe { w.bits(set(r.bits())) });
     }
     resistor(pin, pull);
