@@ -242,6 +242,9 @@ impl Cpu {
         }
         match result {
             Ok(()) if self.trapped.get() => Stop::Fault(Fault::Instruction),
+            // A jump to where no memory is, for example by a return address from the modelled page of the guard, which the
+            // emulator does not report.
+            Ok(()) if self.word(pc & !3).is_none() => Stop::Fault(Fault::Instruction),
             Ok(()) if self.chip().wants_attention() => Stop::Asked,
             Ok(()) => Stop::Wait,
             Err(_) => Stop::Fault(self.faulted.get().map_or(Fault::Instruction, Fault::Access)),
