@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-/// What a result of an experiment depends on, beside the packages of `Cargo.lock`. A published package has no
+/// Sources that a result of an experiment depends on, beside the packages of `Cargo.lock`. A published package has no
 /// neighbours: the versions of these are fixed then.
 const SOURCES: [&str; 4] = ["src", "plant/src", "../drive-core/src", "../motors"];
 

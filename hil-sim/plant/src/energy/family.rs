@@ -1,6 +1,6 @@
 //! Named families of iron, fixed: what a motor's saliency may come from.
 //!
-//! What measurements leave open is chosen here, once, and frozen: no drive is tuned by changing it.
+//! Values that measurements leave open are chosen here, once, and frozen: no drive is tuned by changing them.
 
 use super::IronSettings;
 
@@ -10,7 +10,7 @@ use super::IronSettings;
 pub struct Family {
     /// Name.
     pub name: &'static str,
-    /// What the saliency comes from.
+    /// Source of the saliency.
     pub about: &'static str,
     /// The iron.
     pub iron: IronSettings,
