@@ -1,6 +1,6 @@
 //! Assumptions of a board, and the number that confirms them.
 
-use super::{Board, Source, Stated};
+use super::{Board, Source};
 use crate::hash;
 
 impl Board {
@@ -55,13 +55,6 @@ impl Board {
             );
         // A number of the console has 24 bits.
         (hash::of(bytes) >> 8).max(1)
-    }
-}
-
-impl<T> Stated<T> {
-    /// Whether it is assumed.
-    pub const fn is_assumed(&self) -> bool {
-        matches!(self.source, Source::Assumed(_))
     }
 }
 

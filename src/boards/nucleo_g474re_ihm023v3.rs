@@ -7,22 +7,12 @@ use drive_core::settings::{Line, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
-use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
+use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read, shunt};
 
 /// Shunt, ohm, and gain of its amplifier: 0.255 V/A. A current into the motor lowers the output.
 const V_PER_A: f32 = -0.15 * 1.7;
 /// Output of the amplifiers without current, V.
 const ZERO_V: f32 = 1.7;
-
-const fn shunt(pin: super::Pin) -> Analog {
-    Analog {
-        pin,
-        line: assumed(
-            Line::of_sensor(V_PER_A, ZERO_V, REFERENCE_V, CODES),
-            "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
-        ),
-    }
-}
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -46,7 +36,11 @@ pub const BOARD: Board = Board {
     ),
     dead_time_range_s: (1.5e-6, 6e-6),
     currents: Currents::LowSide {
-        shunts: [shunt(pa(0)), shunt(pc(1)), shunt(pc(0))],
+        shunts: [
+            shunt(pa(0), V_PER_A, ZERO_V),
+            shunt(pc(1), V_PER_A, ZERO_V),
+            shunt(pc(0), V_PER_A, ZERO_V),
+        ],
         settle_s: assumed(
             2e-6,
             "oscilloscope at PA0 beside the gate of low side a: settled within this time",

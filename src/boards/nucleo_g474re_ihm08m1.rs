@@ -8,22 +8,12 @@ use drive_core::settings::{Line, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{pa, pb, pc};
-use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
+use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read, shunt};
 
 /// Shunt, ohm, and gain of its amplifier: 51.8 mV/A. A current into the motor lowers the output.
 const V_PER_A: f32 = -0.010 * 5.18;
 /// Output of the amplifiers without current, V.
 const ZERO_V: f32 = 1.71;
-
-const fn shunt(pin: super::Pin) -> Analog {
-    Analog {
-        pin,
-        line: assumed(
-            Line::of_sensor(V_PER_A, ZERO_V, REFERENCE_V, CODES),
-            "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
-        ),
-    }
-}
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -49,7 +39,11 @@ pub const BOARD: Board = Board {
     ),
     dead_time_range_s: (0.5e-6, 3e-6),
     currents: Currents::LowSide {
-        shunts: [shunt(pa(0)), shunt(pc(1)), shunt(pc(0))],
+        shunts: [
+            shunt(pa(0), V_PER_A, ZERO_V),
+            shunt(pc(1), V_PER_A, ZERO_V),
+            shunt(pc(0), V_PER_A, ZERO_V),
+        ],
         settle_s: assumed(
             2e-6,
             "oscilloscope at PA0 beside the gate of low side a: settled within this time",
