@@ -227,10 +227,10 @@ fn the_recipe_for_many_machines_gives_the_whole_run() {
     let folder = folder("shards-recipe");
     let whole = hil_sim(&folder, &[MONTE_CARLO, &["--json"]].concat()).stdout;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/shards.sh");
-    // Two machines behind a secure shell that notes the machine and stays here.
+    // Two machines behind a secure shell that notes the machine and stays here. As `sshd` does, it sets SHELL, without which
+    // the command that parallel sends does nothing and says that all is well.
     let shell = folder.join("ssh");
-    let text_of_shell =
-        "#!/bin/sh\necho $1 >> hosts; shift; [ $1 = -- ] && shift; exec sh -c \"$*\"\n";
+    let text_of_shell = "#!/bin/sh\necho $1 >> hosts; shift; [ $1 = -- ] && shift; export SHELL=/bin/sh; exec sh -c \"$*\"\n";
     std::fs::write(&shell, text_of_shell).unwrap();
     std::fs::set_permissions(&shell, std::fs::Permissions::from_mode(0o755)).unwrap();
     let recipe = |path: Option<&Path>, place: &str| {
