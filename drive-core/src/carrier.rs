@@ -1,5 +1,6 @@
 //! The injected carrier: generation of its voltage and demodulation of its current.
 
+pub mod asymmetry;
 pub mod demodulator;
 pub mod injection;
 mod kind;

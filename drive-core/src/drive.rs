@@ -87,8 +87,11 @@ struct References {
     turns: f32,
     /// Added to the voltage of the current loop, V.
     test_voltage: Dq,
-    /// Injection axis seen from the flux.
+    /// Injection axis seen from the frame.
     injection_axis: UnitVector,
+    /// Lead of the flux before the frame, rad, and as a unit vector: 0 but while the drive learns.
+    lead: f32,
+    lead_axis: UnitVector,
 }
 
 impl Default for References {
@@ -99,6 +102,8 @@ impl Default for References {
             turns: 0.0,
             test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
+            lead: 0.0,
+            lead_axis: UnitVector { cos: 1.0, sin: 0.0 },
         }
     }
 }
@@ -205,9 +210,10 @@ impl Drive {
 
         // Flux angle at the sample.
         let flux = if counts {
-            // While it learns, the shaft is locked.
+            // While it learns, the shaft is locked, and the flux may lead the frame.
             let count = if self.mode == Mode::Learning { 0 } else { sample.encoder };
-            c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?
+            let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
+            flux.less(s.references.lead)
         } else {
             s.estimator.flux()
         };
@@ -261,8 +267,9 @@ impl Drive {
             let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
             c.estimator.observe(&mut s.estimator, &sample, flux.freq);
         }
+        let flux_current = if counts { current.seen_from(s.references.lead_axis) } else { reference };
         let rotor_freq = if counts {
-            c.indirect.slip(&mut s.indirect, current.q);
+            c.indirect.slip(&mut s.indirect, flux_current.q);
             s.indirect.rotor_freq
         } else {
             // By the reference: the measured current would feed the angle error back.
@@ -286,7 +293,7 @@ impl Drive {
         let results = StepResults {
             sample,
             measured: &measured,
-            flux_current: if counts { current } else { reference },
+            flux_current,
             i_q: reference.q,
             voltage,
             carrier_axis,

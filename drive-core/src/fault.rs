@@ -248,6 +248,19 @@ faults! {
             "scales.shunt_settle_s too short for the amplifiers",
         ],
         "disconnect the motor and measure its insulation, then compare the three currents in status";
+    FluxNotAsPredicted = 41, "the voltage of the flux is not that of the tracked angle and flux",
+        &[
+            "the tracked angle is wrong, or the flux is gone",
+            "motor.l_m, motor.r_s or motor.pole_pairs wrong",
+            "inverter.dead_time_s wrong",
+        ],
+        "as for fault 26: learn on this motor; correct motor.*, or use the encoder";
+    SlopeTooSmall = 42, "the saliency changes too little with the angle to be tracked",
+        &[
+            "too little flux: sequence.i_d",
+            "a motor without enough saliency, or one whose sign changes with the load",
+        ],
+        "`learned` shows the slope and what is needed; raise sequence.i_d and learn again, or use the encoder";
 }
 
 impl Fault {

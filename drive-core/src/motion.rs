@@ -118,6 +118,11 @@ impl Motion {
         }
     }
 
+    /// Lowers the largest current to `limit`, A, where it is larger.
+    pub fn limit_current(&mut self, limit: f32) {
+        self.i_q_limit = limited(self.i_q_limit, limit);
+    }
+
     /// Resets `state` to zero current at the position `count`, which becomes the origin.
     pub fn start(&self, state: &mut MotionState, count: u32) {
         *state = MotionState { origin: count, ..MotionState::default() };

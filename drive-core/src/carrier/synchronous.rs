@@ -32,6 +32,9 @@ use crate::carrier::{CarrierCurrent, CarrierSample, Saliency};
 /// be called: the reference current then has the same delay as the other signals.
 pub const REFERENCE_AT: usize = 5;
 
+/// Lag of the averages where they are evaluated, one sample after the last one that they contain, samples.
+pub const AVERAGES_LAG: f32 = 20.0;
+
 /// Mixed current: real and imaginary part along the axis, real and imaginary part across it.
 type Mixed = [f32; 4];
 

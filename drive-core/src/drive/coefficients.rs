@@ -6,6 +6,7 @@ mod tests;
 use core::f32::consts::TAU;
 
 use crate::carrier::DemodulatorKind;
+use crate::carrier::asymmetry::Asymmetry;
 use crate::carrier::injection::{CARRIER_SAMPLES, Injection};
 use crate::current::dead_time::DeadTime;
 use crate::current::inverter_drop::InverterDrop;
@@ -38,6 +39,12 @@ const BPF_GROUP_DELAY: f32 = 8.83;
 const VERIFY_S: f32 = 0.3;
 /// Electrical speed up to which the shaft counts as standing when the lock is verified, turns/s: 30 rpm of four poles.
 const STANDING_HZ: f32 = 1.0;
+/// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
+/// dissertation's motor.
+const UNEXPLAINED_MEAN: f32 = 0.5;
+/// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
+/// 18 A/s.
+const MOVED_A: f32 = 0.03;
 /// Largest accepted offset of a current sensor with the dissertation's sensors, A.
 const LARGEST_OFFSET_A: f32 = 0.2;
 /// Largest mean sum of three phase currents with the dissertation's sensors, A: 7 % of the range.
@@ -95,6 +102,8 @@ pub struct Coefficients {
     pub(crate) largest_test_v: f32,
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
+    /// Whether a start without encoder is refused until the drive has learned.
+    pub(crate) unlearned: bool,
     /// Result of the design of the current controllers, d and q.
     pub designs: [CurrentLoopDesign; 2],
     /// Result of the design of the speed and the position loop.
@@ -140,6 +149,8 @@ pub(crate) struct Protection {
     pub rotor_freq: f32,
     /// Square of the largest regulated current, A^2.
     pub current_squared: f32,
+    /// Largest torque current, A.
+    pub i_q: f32,
 }
 
 /// The sequence in control periods.
@@ -196,6 +207,7 @@ impl Settings {
         let inj = &self.injection;
         let motion_design = self.motion_design()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
+        let synchronous = inj.demodulator == DemodulatorKind::Synchronous;
         let carrier_v = self.carrier_v();
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let (injection_turn, injection_axis) = match inj.demodulator {
@@ -207,7 +219,8 @@ impl Settings {
             LockMonitor::new(
                 &self.carrier(),
                 &LockMonitorSettings {
-                    flux_saliency: t.flux_saliency,
+                    slope: self.slope(),
+                    moved_a: self.share_of_rated(MOVED_A),
                     smoothing_s: t.loss_s,
                     allowed: t.allowed_loss,
                     carrier_a: injection.current_amplitude,
@@ -273,8 +286,12 @@ impl Settings {
                 DeadTime::NONE
             },
             inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit),
-            learning: Learning::new(m, i_d, current_limit),
-            prediction: Prediction::new(m, motor_plant, self.unexplained_v()),
+            learning: Learning::new(m, i_d, current_limit, synchronous),
+            unlearned: self.tracks_synchronously() && !t.allow_unlearned,
+            prediction: {
+                let allowed_v = self.unexplained_v();
+                Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
+            },
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),
             protection: Protection {
@@ -283,6 +300,7 @@ impl Settings {
                 dc_under: self.dc_under_v(),
                 rotor_freq: self.freq_of_rpm(highest_rpm),
                 current_squared: current_limit * current_limit,
+                i_q: current_limit,
             },
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
@@ -352,11 +370,12 @@ impl Settings {
             DemodulatorKind::Synchronous => AngleLoop::Pll {
                 schedule: GainSchedule::new(
                     &self.reference(),
-                    t.flux_saliency,
+                    &self.slope(),
                     self.current_saliency(),
                     self.i_d(),
                 ),
                 pll: Pll::new(t.bandwidth_hz),
+                asymmetry: Asymmetry::default(),
             },
             _ => AngleLoop::Pii {
                 reference: match p.learned {

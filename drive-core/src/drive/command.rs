@@ -65,6 +65,8 @@ pub enum Refused {
     NeedsEncoder,
     /// The injection is needed as angle source; to learn, with a demodulation that tracks.
     NeedsInjection,
+    /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
+    NotLearned,
     /// The settings do not want the rotor time constant tracked.
     RotorNotTracked,
     /// A fault is latched; clear it first.
@@ -86,6 +88,9 @@ impl core::fmt::Display for Refused {
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::NeedsInjection => {
                 write!(f, "this needs the injection, demodulated by a way that tracks")
+            }
+            Self::NotLearned => {
+                write!(f, "nothing is learned of this motor with these settings: lock the shaft and `learn` first")
             }
             Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),

@@ -51,7 +51,7 @@ impl Drive {
                 self.takes_references(Mode::Torque, i_q)?;
                 let i_d = self.control.references.current.d;
                 let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
-                let taken = limited(i_q, largest);
+                let taken = limited(limited(i_q, largest), self.c.protection.i_q);
                 self.control.references.current.q = taken;
                 Ok(accepted(i_q, taken))
             }
@@ -69,6 +69,10 @@ impl Drive {
             }
             Command::Magnetising(i_d) => {
                 self.takes_references(self.mode, i_d)?;
+                // Tables and monitor are those of one direct current.
+                if self.c.lock_monitor.is_some() {
+                    return Err(Refused::NeedsEncoder);
+                }
                 let i_q = self.control.references.current.q;
                 let min = 0.2 * self.c.sequence.i_d;
                 let max = libm::sqrtf(self.c.protection.current_squared - i_q * i_q);
@@ -132,6 +136,8 @@ impl Drive {
             (State::Off, Mode::Learning) if !self.can_learn() => {
                 return Err(Refused::NeedsInjection);
             }
+            (State::Off, Mode::Learning) => {}
+            (State::Off, _) if self.c.unlearned => return Err(Refused::NotLearned),
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
         }

@@ -6,8 +6,10 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::estimator::AngleLoop;
-use crate::identify::learning::{Learned, LearningAction, LearningSample};
+use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
 use crate::math::angle::Angle;
+use crate::math::limited;
+use crate::settings::AngleSource;
 
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.
@@ -26,7 +28,7 @@ impl Drive {
         self.c.inject && self.c.demodulate && !literal
     }
 
-    /// The torque current to regulate while learning, A. At the end an accepted result replaces the
+    /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted result replaces the
     /// settings, and the drive stops.
     pub(super) fn learn(&mut self) -> Result<f32, Fault> {
         let (c, s) = (&self.c, &mut self.control);
@@ -42,14 +44,29 @@ impl Drive {
             voltage: t.voltage,
         };
         match c.learning.step(&mut s.learning, &sample) {
-            LearningAction::Current(i_q) => self.control.references.current.q = i_q,
+            LearningAction::Operate(Operate { i_q, lead }) => {
+                let r = &mut self.control.references;
+                if i_q != r.current.q || lead != r.lead {
+                    r.current.q = i_q;
+                    (r.lead, r.lead_axis) = (lead, Angle::from_radians(lead).unit_vector());
+                }
+            }
             LearningAction::Moved | LearningAction::Stuck => return Err(Fault::ShaftNotLocked),
             LearningAction::Done => {
-                let flux = c.saliency_check.map_or(0.0, |check| check.seen(&s.saliency_check));
-                let learned = c.learning.result(&s.learning, normalised, flux, s.lock.baseline);
+                let check = c.saliency_check;
+                let start = Start {
+                    looked: check.map(|check| check.mean(&s.saliency_check)),
+                    per_looked: check.map_or(0.0, |check| check.per_mean()),
+                    baseline: s.lock.baseline,
+                };
+                let learned = c.learning.result(&s.learning, &start);
                 self.learned = Some(learned);
-                if !learned.accepted {
-                    return Err(Fault::NothingLearned);
+                match learned.verdict {
+                    verdict if verdict.is_accepted() => {}
+                    Verdict::SlopeTooSmall | Verdict::LimitTooLow => {
+                        return Err(Fault::SlopeTooSmall);
+                    }
+                    _ => return Err(Fault::NothingLearned),
                 }
                 self.c.take(&learned);
                 self.changes = self.changes.wrapping_add(1);
@@ -63,16 +80,24 @@ impl Drive {
 impl Coefficients {
     /// Replaces settings by an accepted result of a learning.
     pub fn take(&mut self, learned: &Learned) {
-        if !learned.accepted {
+        if !learned.verdict.is_accepted() {
             return;
         }
-        let b = learned.current_saliency;
-        self.estimator.set_reference(&learned.reference, b.accepted.then_some(b.value));
-        if let (Some(monitor), Some(carrier)) = (&mut self.lock_monitor, &learned.carrier) {
-            monitor.set_carrier_table(carrier);
+        self.estimator.take(learned);
+        if let Some(monitor) = &mut self.lock_monitor {
+            monitor.take(learned);
         }
         if learned.gain_mismatch.accepted {
             self.sensing.correct_mismatch(learned.gain_mismatch.value);
+        }
+        if learned.slope.is_some() {
+            self.saliency_check = self.saliency_check.and_then(|check| check.of_learned(learned));
+            self.unlearned = false;
+            // With the encoder no slope is needed.
+            if self.source == AngleSource::Injection {
+                self.protection.i_q = limited(self.protection.i_q, learned.limit_a);
+                self.motion.limit_current(learned.limit_a);
+            }
         }
     }
 }

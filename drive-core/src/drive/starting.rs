@@ -98,12 +98,15 @@ impl Drive {
                 return Ok(Dq::ZERO);
             }
             SaliencyCheckAction::Restore => {
-                s.lock.share = s.saliency_check.share;
                 r.injection_axis = self.c.injection_axis;
             }
             SaliencyCheckAction::Passed => {
                 let watched = self.c.lock_monitor.is_some() && self.mode != Mode::Learning;
                 self.enter(if watched { State::Verifying } else { State::of_mode(self.mode) });
+            }
+            // A drive that learns judges the slope.
+            SaliencyCheckAction::Failed if self.mode == Mode::Learning => {
+                r.injection_axis = self.c.injection_axis;
             }
             SaliencyCheckAction::Failed => return Err(Fault::NoSaliency),
         }

@@ -5,12 +5,14 @@
 //! with learned reference, scheduled gain and slip feed-forward.
 
 use crate::carrier::demodulator::{Demodulate, Demodulator};
-use crate::carrier::synchronous::SynchronousState;
+use crate::carrier::asymmetry::Asymmetry;
+use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
+use crate::identify::learning::Learned;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
-use crate::math::angle::Angle;
+use crate::math::angle::{Angle, UnitVector};
 use crate::settings::table::ReferenceTable;
 
 /// Reference `ref_delta_i` over i_q (section 3.3): odd, linear up to the current `from`, constant beyond.
@@ -72,6 +74,8 @@ pub enum AngleLoop {
         schedule: GainSchedule,
         /// Controller of the injection axis.
         pll: Pll,
+        /// Learned asymmetry of sensors and stator.
+        asymmetry: Asymmetry,
     },
 }
 
@@ -160,13 +164,15 @@ impl Estimator {
         (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
     }
 
-    /// Replaces the reference by a `learned` one and, if learned, the saliency per ampere of stator
-    /// current, 1/A.
-    pub fn set_reference(&mut self, learned: &ReferenceTable, current_saliency: Option<f32>) {
+    /// Takes an accepted result of a learning.
+    pub fn take(&mut self, learned: &Learned) {
         match &mut self.angle_loop {
-            AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(*learned),
-            AngleLoop::Pll { schedule, .. } => {
-                *schedule = schedule.with_learned(learned, current_saliency);
+            AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
+            AngleLoop::Pll { schedule, asymmetry, .. } => {
+                let b = learned.current_saliency;
+                let b = b.accepted.then_some(b.value);
+                *schedule = schedule.with_learned(&learned.reference, learned.slope.as_ref(), b);
+                *asymmetry = learned.asymmetry;
             }
         }
     }
@@ -181,17 +187,21 @@ impl Estimator {
     }
 
     /// Computes the saliency of the previous carrier period, where the synchronous demodulation tracks;
-    /// called once per carrier period.
-    pub fn update_saliency(&self, state: &mut EstimatorState) {
-        if let AngleLoop::Pll { .. } = self.angle_loop {
-            state.synchronous.update_saliency();
+    /// called once per carrier period, after its last sample. `axis` is the injection axis of the present sample, delayed
+    /// by [`lag`](Self::lag), `flux_freq` its frequency, electrical turns per period.
+    pub fn update_saliency(&self, state: &mut EstimatorState, axis: UnitVector, flux_freq: f32) {
+        if let AngleLoop::Pll { asymmetry, .. } = &self.angle_loop {
+            let synchronous = &mut state.synchronous;
+            synchronous.update_saliency();
+            let seen = axis.turned_slightly(-flux_freq * AVERAGES_LAG);
+            asymmetry.take_out(&mut synchronous.saliency, seen);
         }
     }
 
     /// Computes the correction from the saliency of the previous carrier period; called once per carrier
     /// period. `acceleration` is the rotor's acceleration reference, electrical turns per period squared.
     pub fn update_correction(&self, state: &mut EstimatorState, acceleration: f32) {
-        if let AngleLoop::Pll { schedule, pll } = &self.angle_loop {
+        if let AngleLoop::Pll { schedule, pll, .. } = &self.angle_loop {
             let (error, share) = schedule.angle_error(state.saliency());
             state.correction = pll.correction(error, share, acceleration);
         }

@@ -76,6 +76,13 @@ pub struct FluxAngle {
     pub freq: f32,
 }
 
+impl FluxAngle {
+    /// The angle less `lead`, rad: that of a frame that the flux leads.
+    pub fn less(self, lead: f32) -> Self {
+        Self { phi: self.phi - Angle::from_radians(lead), ..self }
+    }
+}
+
 /// The encoder moved, or stood still, in a way the rotor cannot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImplausibleEncoder;

@@ -1,72 +1,101 @@
 //! Reference of the saliency and loop gain of the synchronous demodulation over the torque current.
 //!
 //! At the true angle the saliency `q` is not zero but depends on i_q, because part of the saliency
-//! follows the stator current. The reference is an odd table over i_q, learned with the shaft locked.
-//! The loop gain depends on i_q as well: an angle error rotates the real current and with it the
-//! current-dependent part of the saliency, so fast errors see a slope of 2 (|a| + b |i| |cos 2g|)
-//! instead of 2 |a|. The gain schedule compensates this.
+//! follows the stator current. With the angle error e, flux less estimate,
+//!
+//! ```text
+//! q = q_ref(i_q) + k(i_q) e          e = (q - q_ref(i_q)) / k(i_q)
+//! ```
+//!
+//! The reference is an odd table over i_q and the slope k an even one, of either sign; both are learned with the shaft
+//! locked. The slope is the slow one: current and flux have settled. An angle error that is faster than the current loop
+//! rotates the current with the frame and with it the current-dependent part b of the saliency, so such errors see the slope
+//! k + 2 b |i| cos 2g, with cos 2g = (i_d^2 - i_q^2)/|i|^2. The proportional part of the loop is reduced where that is
+//! steeper.
 
 use crate::carrier::Saliency;
-use crate::settings::table::{POINTS, ReferenceTable, between, odd};
+use crate::settings::table::{POINTS, ReferenceTable, SlopeTable, between, odd};
 
 /// Minimum share of the proportional gain. Only errors faster than the current loop see the steep slope in
 /// full; full compensation leaves the tracking loop too little damping at large currents. (3.5 Hz, rotor
 /// resistance 30 % above the setting, 3 A to -3 A, worst of 72 runs: 19.8° with 0.3, 17.4° with 0.8, 16.5°
 /// with 1; 1.54°, 1.63° and 1.69° rms at constant current.)
 const LEAST_SHARE: f32 = 0.8;
+/// Largest gain relative to that without torque current.
+const MOST_GAIN: f32 = 2.0;
 
-/// Reference of the saliency and share of the proportional gain over i_q.
+/// Reference of the saliency, inverse slope, and share of the proportional gain over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSchedule {
     table: ReferenceTable,
+    /// Angle error per deviation of the saliency, rad.
+    per_saliency: [f32; POINTS],
     share: [f32; POINTS],
     /// Arguments of `new`, for `with_learned`.
-    flux_saliency: f32,
+    slope: SlopeTable,
     current_saliency: f32,
     i_d: f32,
-    /// Angle error, rad, per difference between reference and saliency.
+}
+
+/// The schedule at a torque current.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SchedulePoint {
+    /// Reference of the saliency.
+    pub reference: f32,
+    /// Angle error per deviation of the saliency, rad.
     pub per_saliency: f32,
+    /// Share of the proportional gain.
+    pub share: f32,
 }
 
 impl GainSchedule {
-    /// Schedule for the flux-fixed saliency `a` at nominal flux (negative), the saliency `b` per ampere of
-    /// stator current, 1/A, and the direct current `i_d`, A.
-    pub fn new(table: &ReferenceTable, a: f32, b: f32, i_d: f32) -> Self {
-        let share = core::array::from_fn(|n| {
-            let i_q = table.grid().current(n);
+    /// Schedule for a reference and a slope on the same grid, the saliency `b` per ampere of stator current, 1/A, and the
+    /// direct current `i_d`, A.
+    pub fn new(table: &ReferenceTable, slope: &SlopeTable, b: f32, i_d: f32) -> Self {
+        let mut share = *slope.points();
+        for (n, share) in share.iter_mut().enumerate() {
+            let i_q = slope.grid().current(n);
             let length = libm::sqrtf(i_d * i_d + i_q * i_q);
-            // b |i| cos 2 gamma, where it adds to the slope
-            let current_part = b * (i_q * i_q - i_d * i_d) / length;
-            let by_slope =
-                a.abs() / (a.abs() + if current_part > 0.0 { current_part } else { 0.0 });
-            LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope
-        });
+            let ratio = 1.0 + 2.0 * b * (i_d * i_d - i_q * i_q) / length / *share;
+            let by_slope = if ratio > 1.0 { 1.0 / ratio } else { 1.0 };
+            *share = LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope;
+        }
         Self {
             table: *table,
+            per_saliency: slope.inverses(MOST_GAIN),
             share,
-            flux_saliency: a,
+            slope: *slope,
             current_saliency: b,
             i_d,
-            per_saliency: -0.5 / a,
         }
     }
 
-    /// Schedule for the same motor with a learned reference and, if learned, another saliency `b` per
+    /// Schedule for the same motor with a learned reference and, if learned, another slope and another saliency `b` per
     /// ampere, 1/A.
-    pub fn with_learned(&self, table: &ReferenceTable, b: Option<f32>) -> Self {
-        Self::new(table, self.flux_saliency, b.unwrap_or(self.current_saliency), self.i_d)
+    pub fn with_learned(
+        &self,
+        table: &ReferenceTable,
+        slope: Option<&SlopeTable>,
+        b: Option<f32>,
+    ) -> Self {
+        let b = b.unwrap_or(self.current_saliency);
+        Self::new(table, slope.unwrap_or(&self.slope), b, self.i_d)
     }
 
     /// Angle error, rad, derived from a measured saliency, and share of the proportional gain.
     pub fn angle_error(&self, saliency: &Saliency) -> (f32, f32) {
-        let (reference, share) = self.at(saliency.i_q);
-        (self.per_saliency * (reference - saliency.q), share)
+        let point = self.at(saliency.i_q);
+        (point.per_saliency * (saliency.q - point.reference), point.share)
     }
 
-    /// Reference of `q` and share of the proportional gain at a quadrature current `i_q`, A.
-    pub fn at(&self, i_q: f32) -> (f32, f32) {
+    /// The schedule at a quadrature current `i_q`, A.
+    pub fn at(&self, i_q: f32) -> SchedulePoint {
         let place = self.table.grid().place(i_q);
-        (odd(i_q, between(self.table.points(), place)), between(&self.share, place))
+        SchedulePoint {
+            reference: odd(i_q, between(self.table.points(), place)),
+            per_saliency: between(&self.per_saliency, place),
+            share: between(&self.share, place),
+        }
     }
 }
 

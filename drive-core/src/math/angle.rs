@@ -146,6 +146,13 @@ pub struct UnitVector {
     pub sin: f32,
 }
 
+impl Default for UnitVector {
+    /// The vector of the angle 0.
+    fn default() -> Self {
+        Self { cos: 1.0, sin: 0.0 }
+    }
+}
+
 impl UnitVector {
     /// The vector rotated by a small angle in turns, with the series `1 - x^2/2` and `x - x^3/6` instead of
     /// a table.

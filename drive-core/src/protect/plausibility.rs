@@ -4,7 +4,8 @@
 //!   along their axis. It detects an open or stuck channel.
 //! * [`Prediction`]: the current must follow the applied voltage. The voltage unexplained by a first-order
 //!   model of the motor and the back-emf of its rotor flux is filtered and must stay small. It detects a
-//!   faulty sensor, an open phase, and a wrong angle or speed at speeds with a noticeable back-emf.
+//!   faulty sensor, an open phase, and a wrong angle or speed at speeds with a noticeable back-emf. Its mean in the frame
+//!   of the flux detects a flux that is gone or elsewhere, from a back-emf of some 10 V on.
 
 use core::f32::consts::TAU;
 
@@ -84,6 +85,8 @@ pub struct Prediction {
     emf: f32,
     /// Allowed unexplained voltage at standstill, V peak.
     allowed: f32,
+    /// Allowed mean of it in the frame of the flux, V peak.
+    allowed_mean: f32,
 }
 
 /// Rotor flux in a sample. Frequencies in electrical turns per period.
@@ -114,6 +117,10 @@ pub struct PredictionState {
     rotor: AlphaBeta,
     /// Filtered unexplained voltage, V.
     unexplained: AlphaBeta,
+    /// Axis of the flux in the middle of the samples, and its back-emf, V.
+    flux: (UnitVector, f32),
+    /// Mean unexplained voltage in the frame of the flux, V.
+    mean: Dq,
 }
 
 /// Samples between two comparisons: half a carrier period. Over a whole one the carrier would average to
@@ -125,11 +132,15 @@ const SMOOTHING: f32 = 0.276;
 /// Tolerated error of the expected back-emf as a share of it. 15° of angle error at 2 A make the flux 1.7
 /// times the estimated one.
 const EMF_SHARE: f32 = 1.0;
+/// Share of the newest value in the mean in the frame of the flux: 50 ms.
+const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
+/// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.
+const MEAN_EMF_SHARE: f32 = 0.5;
 
 impl Prediction {
     /// Comparison for a motor with the current response `plant`, A/V, and an allowed unexplained voltage at
-    /// standstill of `allowed_v`, V peak.
-    pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32) -> Self {
+    /// standstill of `allowed_v`, V peak, and of `allowed_mean_v` in the mean of 50 ms.
+    pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32, allowed_mean_v: f32) -> Self {
         let coupled = motor.coupled_inductance();
         Self {
             per_ampere: (1.0 / plant.k) as f32,
@@ -137,6 +148,7 @@ impl Prediction {
             decay: coupled / motor.tau_r(),
             emf: coupled * TAU / PERIOD_S,
             allowed: allowed_v,
+            allowed_mean: allowed_mean_v,
         }
     }
 
@@ -149,14 +161,18 @@ impl Prediction {
         };
         // Distance from here back to the middle of the samples.
         const MIDDLE: f32 = 0.5 * JUDGED_EVERY as f32 - 1.0;
-        state.rotor = rotor.to_alpha_beta(flux.axis.turned_slightly(-MIDDLE * flux.flux_freq));
+        let axis = flux.axis.turned_slightly(-MIDDLE * flux.flux_freq);
+        state.rotor = rotor.to_alpha_beta(axis);
+        state.flux = (axis, self.emf * flux.magnetising * flux.flux_freq);
     }
 
     /// Compares the `current`, A, after it was [collected](PredictionState::collect); called in every fifth
     /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five.
     ///
     /// # Errors
-    /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit.
+    /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit, [`Fault::FluxNotAsPredicted`]
+    /// when its mean in the frame of the flux does: the flux is not where, or not as large as, it is believed to be. At rest
+    /// and without slip no voltage shows that.
     pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
@@ -168,7 +184,14 @@ impl Prediction {
             self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * state.rotor.length_squared();
         // NaN fails the comparison.
         let explained = state.unexplained.length_squared() <= allowed;
-        if explained { Ok(()) } else { Err(Fault::CurrentNotAsPredicted) }
+        if !explained {
+            return Err(Fault::CurrentNotAsPredicted);
+        }
+        let (axis, emf) = state.flux;
+        state.mean += (unexplained.to_dq(axis) - state.mean) * MEAN_SMOOTHING;
+        let allowed = self.allowed_mean + MEAN_EMF_SHARE * emf.abs();
+        let explained = state.mean.length_squared() <= allowed * allowed;
+        if explained { Ok(()) } else { Err(Fault::FluxNotAsPredicted) }
     }
 }
 

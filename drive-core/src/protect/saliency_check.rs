@@ -8,6 +8,7 @@
 //! stage has the direction of the carrier. At 45° a drop of 1.6 V per phase looks like a saliency of
 //! 0.0135.) Then the flux is built up again.
 
+use crate::identify::learning::Learned;
 use crate::io::periods;
 use crate::math::angle::UnitVector;
 use crate::math::frames::SQRT_3;
@@ -25,8 +26,6 @@ pub struct SaliencyCheck {
     least: f32,
     /// Mean saliency over the decaying flux at 60°, relative to the saliency at nominal flux.
     seen_share: f32,
-    /// 1 / expected mean saliency.
-    per_expected: f32,
     /// 1 / number of averaged samples.
     per_average: f32,
 }
@@ -35,8 +34,6 @@ pub struct SaliencyCheck {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SaliencyCheckState {
     sum: f32,
-    /// Measured saliency of the motor relative to the setting; result of the last check.
-    pub share: f32,
 }
 
 /// Action of the drive in a control period of the check.
@@ -62,6 +59,8 @@ const AVERAGE_S: (f32, f32) = (0.03, 0.4);
 /// Threshold relative to the mean that the saliency of the settings gives: midway between a tenth and half of it. With
 /// 3.5 % of the dissertation's motor both are more than four standard deviations away, by noise of 5 mA.
 const LEAST_SHARE: f32 = 0.3;
+/// Least flux-fixed saliency relative to the slope, which is twice the effective one, for a check of a learned motor.
+const LEAST_SEEN: f32 = 0.375;
 /// Time to build the flux up again, in rotor time constants; it returns to within 5 %.
 const RESTORE_T: f32 = 2.4;
 
@@ -87,14 +86,27 @@ impl SaliencyCheck {
             restore: periods(RESTORE_T * tau_r),
             least: LEAST_SHARE * seen_share * flux_saliency,
             seen_share,
-            per_expected: 1.0 / (seen_share * flux_saliency),
             per_average: 1.0 / average as f32,
         }
     }
 
-    /// Flux-fixed saliency at nominal flux measured by a finished check.
-    pub fn seen(&self, state: &SaliencyCheckState) -> f32 {
-        state.sum / (self.seen_share * self.average as f32)
+    /// The check of a motor that was learned. It expects what the check saw then. None where that is less than 3/8 of the
+    /// slope or of the other sign: a saliency that falls with a power of the flux is gone before it is averaged, and one of
+    /// the current is not seen. The verification of the lock does the work alone then.
+    pub fn of_learned(&self, learned: &Learned) -> Option<Self> {
+        let (seen, slope) = (learned.flux_saliency, learned.slope_at_rest);
+        let suits = seen * slope > 0.0 && seen.abs() >= LEAST_SEEN * slope.abs();
+        suits.then_some(Self { least: LEAST_SHARE * self.seen_share * seen, ..*self })
+    }
+
+    /// Mean saliency that a finished check has seen.
+    pub fn mean(&self, state: &SaliencyCheckState) -> f32 {
+        state.sum * self.per_average
+    }
+
+    /// Flux-fixed saliency at nominal flux per mean saliency.
+    pub fn per_mean(&self) -> f32 {
+        1.0 / self.seen_share
     }
 
     /// Injection axis in the flux frame during [`SaliencyCheckAction::Look`]: 60° ahead of the flux.
@@ -115,10 +127,9 @@ impl SaliencyCheck {
             state.sum += q;
             SaliencyCheckAction::Look
         } else if elapsed < looked + self.restore {
-            let mean = state.sum * self.per_average;
+            let mean = self.mean(state);
             // The mean must exceed the threshold with the same sign; NaN fails.
             let enough = if self.least < 0.0 { mean <= self.least } else { mean >= self.least };
-            state.share = mean * self.per_expected;
             if enough { SaliencyCheckAction::Restore } else { SaliencyCheckAction::Failed }
         } else {
             SaliencyCheckAction::Passed

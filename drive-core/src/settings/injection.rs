@@ -43,13 +43,16 @@ impl Default for PrintedChain {
 pub struct SynchronousTracking {
     /// Natural frequency of the tracking loop, Hz.
     pub bandwidth_hz: f32,
-    /// Saliency fixed to the flux at the nominal magnetising current. Negative: the inductance along
-    /// the flux is the larger one.
+    /// Saliency fixed to the flux at the nominal magnetising current, until the slope is learned. Negative: the
+    /// inductance along the flux is the larger one.
     pub flux_saliency: f32,
     /// Saliency per ampere of stator current, 1/A, for the gain schedule; unset: by rule.
     pub current_saliency: Option<f32>,
     /// Reference of the saliency over the torque current, learned with the shaft locked; unset: guessed.
     pub reference: Option<ReferenceTable>,
+    /// Whether a drive that has not learned its motor starts without an encoder: for motors whose saliency is known from
+    /// elsewhere, as that of a model.
+    pub allow_unlearned: bool,
     /// Whether a start checks the saliency of the motor (see [`crate::protect::saliency_check`]). Without
     /// the check a start assumes it, and a shaft at standstill.
     pub check: bool,
@@ -72,11 +75,12 @@ impl Default for SynchronousTracking {
             flux_saliency: -0.035,
             current_saliency: None,
             reference: None,
+            allow_unlearned: false,
             check: true,
             monitor: true,
             carrier: None,
             allowed_loss: 0.55,
-            loss_s: 0.08,
+            loss_s: 0.12,
             tracked_rpm: None,
         }
     }

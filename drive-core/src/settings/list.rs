@@ -68,8 +68,9 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     number!("injection.z_s", injection.printed.z_s, "", "its zero").from_to(0.0, 1.0),
     whole!("injection.rms_samples", injection.printed.rms_samples: u8, "length of the filters of rms-impedance").from_to(MIN_RMS_SAMPLES as f32, MAX_RMS_SAMPLES as f32).learned(),
     number!("injection.bandwidth_hz", injection.synchronous.bandwidth_hz, "Hz", "natural frequency of the tracking loop").from_to(0.1, 30.0),
-    // Near zero the loop would have no gain. With a positive value the current-dependent part would oppose it.
-    number!("injection.flux_saliency", injection.synchronous.flux_saliency, "", "saliency fixed to the flux").from_to(-0.3, -0.001),
+    // Near zero the loop would have no gain.
+    number!("injection.flux_saliency", injection.synchronous.flux_saliency, "", "saliency fixed to the flux, until its slope is learned").beside(saliency_range),
+    word!("injection.allow_unlearned", injection.synchronous.allow_unlearned: bool, "whether a drive that has not learned starts without an encoder"),
     auto!("injection.current_saliency", injection.synchronous.current_saliency, Settings::current_saliency, "1/A", "saliency per ampere of stator current").from_to(-30.0, 30.0).learned(),
     word!("injection.check", injection.synchronous.check: bool, "whether a start checks the saliency of the motor"),
     word!("injection.monitor", injection.synchronous.monitor: bool, "whether the lock is verified and watched"),
@@ -108,6 +109,12 @@ pub fn find(name: &str) -> Option<&'static Entry<Settings>> {
 /// A gain has either sign, but is not zero.
 fn gain_range(line: Line) -> (f32, f32) {
     if line.gain < 0.0 { (-1.0, -1e-6) } else { (1e-6, 1.0) }
+}
+
+/// A saliency has either sign, but is not zero.
+fn saliency_range(s: &Settings) -> (f32, f32) {
+    let negative = s.injection.synchronous.flux_saliency < 0.0;
+    if negative { (-0.3, -0.001) } else { (0.001, 0.3) }
 }
 
 /// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.

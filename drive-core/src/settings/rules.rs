@@ -26,7 +26,7 @@
 use core::f32::consts::{SQRT_2, TAU};
 
 use super::Settings;
-use super::table::{CarrierTable, ReferenceTable};
+use super::table::{CarrierTable, ReferenceTable, SlopeTable};
 use super::{CurrentSensors, IdentifiedPlant, Line, Motor, Nameplate};
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
@@ -193,6 +193,12 @@ impl Settings {
     pub fn reference(&self) -> ReferenceTable {
         let guess = || ReferenceTable::guessed(self.current_limit_a());
         self.injection.synchronous.reference.unwrap_or_else(guess)
+    }
+
+    /// Slope of the saliency until it is learned: that of a saliency fixed to the flux alone.
+    pub fn slope(&self) -> SlopeTable {
+        let grid = self.reference().grid();
+        SlopeTable::of_flux_saliency(grid, self.injection.synchronous.flux_saliency)
     }
 
     /// Carrier current over the torque current.

@@ -1,4 +1,4 @@
-//! Tables over the torque current: reference of the saliency, and carrier current.
+//! Tables over the torque current: reference of the saliency, its slope over the angle, and carrier current.
 
 use core::fmt;
 
@@ -234,6 +234,58 @@ impl CarrierTable {
     }
 }
 
+/// Accepted magnitude of the slope, 1/rad.
+const SLOPE: (f32, f32) = (0.001, 0.6);
+
+/// Slope dq/de of the saliency over the angle error over i_q, 1/rad: even, of one sign.
+///
+/// The error e is the angle of the flux less that of the estimated frame, and the slope the slow one: current and flux have
+/// settled at every e. A saliency `a` that is fixed to the flux and to nothing else has the slope 2a; it is negative where
+/// the inductance along the flux is the larger one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlopeTable {
+    grid: Grid,
+    k: [f32; POINTS],
+}
+
+impl SlopeTable {
+    /// Table from its values at the points of `grid`; `None` when one is outside ±(0.001 to 0.6) or has not the sign of
+    /// the first.
+    pub fn from_points(grid: Grid, k: [f32; POINTS]) -> Option<Self> {
+        let believable = |k_n: &f32| (SLOPE.0..=SLOPE.1).contains(&k_n.abs()) && k_n * k[0] > 0.0;
+        k.iter().all(believable).then_some(Self { grid, k })
+    }
+
+    /// The slope of a saliency `a` that is fixed to the flux.
+    pub fn of_flux_saliency(grid: Grid, a: f32) -> Self {
+        Self { grid, k: [2.0 * a; POINTS] }
+    }
+
+    /// The torque currents of the points.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The values at the points, 1/rad.
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.k
+    }
+
+    /// The slope without torque current, 1/rad.
+    pub fn at_rest(&self) -> f32 {
+        self.k[0]
+    }
+
+    /// The inverses, rad, at most `most` times that without torque current.
+    pub(crate) fn inverses(&self, most: f32) -> [f32; POINTS] {
+        let [first, ..] = self.k;
+        self.k.map(|k| {
+            let ratio = first / k;
+            (if ratio < most { ratio } else { most }) / first
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -262,6 +314,20 @@ mod tests {
         for wrong in [0.49, 2.1, f32::NAN] {
             ratio[15] = wrong;
             assert_eq!(CarrierTable::from_points(Grid::REFERENCE, ratio), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn slopes_have_one_sign_and_bounded_inverses() {
+        let mut k = [-0.04; POINTS];
+        (k[3], k[4]) = (-0.025, -0.01);
+        let inverses = SlopeTable::from_points(Grid::REFERENCE, k).unwrap().inverses(2.0);
+        for (n, inverse) in [(0, -25.0), (3, -40.0), (4, -50.0)] {
+            assert!((inverses[n] - inverse).abs() < 1e-3, "{n}: {inverses:?}");
+        }
+        for wrong in [0.01, 0.0, -0.0009, -0.61, f32::NAN] {
+            k[7] = wrong;
+            assert_eq!(SlopeTable::from_points(Grid::REFERENCE, k), None, "{wrong}");
         }
     }
 

@@ -30,12 +30,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         .collect();
     let mut table = Table::new(
         "Over the torque current",
-        &["iq (A)", "reference", "carrier ratio"],
+        &["iq (A)", "reference", "slope (1/rad)", "carrier ratio"],
     )
     .note("What the carrier shows at the right angle, odd in iq; the carrier current, as a ratio to that at 0 A, even.");
     for (n, &(i_q, q)) in points.iter().enumerate() {
         let ratio = learned.carrier.map_or(f64::NAN, |table| f64::from(table.points()[n]));
-        table.row([Cell::fixed(i_q, 2), Cell::fixed(q, 5), Cell::fixed(ratio, 5)]);
+        let slope = learned.slope.map_or(f64::NAN, |table| f64::from(table.points()[n]));
+        table.row([
+            Cell::fixed(i_q, 2),
+            Cell::fixed(q, 5),
+            Cell::fixed(slope, 5),
+            Cell::fixed(ratio, 5),
+        ]);
     }
     outcome.tables.push(table);
 
@@ -62,7 +68,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.tables.push(table);
 
     let m = &mut outcome.metrics;
-    m.set("asymmetry_max", learned.asymmetry.into());
+    m.set("spread", learned.spread.into());
+    m.set("asymmetry", learned.asymmetry.size().into());
+    m.set("slope_at_rest_per_rad", learned.slope_at_rest.into());
+    m.set("limit_a", learned.limit_a.into());
     m.set("gain_mismatch", learned.gain_mismatch.value.into());
     m.set("gain_mismatch_misfit", learned.gain_mismatch.misfit.into());
     m.set("current_saliency_per_a", learned.current_saliency.value.into());

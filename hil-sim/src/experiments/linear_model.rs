@@ -87,12 +87,13 @@ impl LinearModel {
         let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
         let schedule = GainSchedule::new(
             &settings.reference(),
-            settings.injection.synchronous.flux_saliency,
+            &settings.slope(),
             settings.current_saliency(),
             settings.i_d(),
         );
         // Over half the distance of the table's points to either side.
         let half = 0.5 * settings.reference().grid().step_a();
+        let here = schedule.at(i_q as f32);
         let (before, after) = (schedule.at(i_q as f32 - half), schedule.at(i_q as f32 + half));
         let l_r = machine.llr + machine.lm;
         let pole_pairs = f64::from(machine.pole_pairs);
@@ -107,8 +108,8 @@ impl LinearModel {
             current: built.designs[1],
             speed: built.motion_design,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
-            share: schedule.at(i_q as f32).1.into(),
-            apparent_angle: f64::from(schedule.per_saliency * (after.0 - before.0)) / 0.25,
+            share: here.share.into(),
+            apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference)) / 0.25,
         })
     }
 

@@ -1,0 +1,120 @@
+//! Asymmetry of sensors and stator: the part of the carrier current that turns against the injection.
+//!
+//! With the voltage injected along `e^(j theta)`, a motor or sensors that are not symmetric in the stator frame add to the
+//! carrier current `n e^(-j theta)`, `n` a complex number: a gain mismatch, cross-talk from one channel to the other, and a
+//! saliency fixed to the stator alike. The first two also turn the whole current by a constant angle. Along and across the
+//! injection axis, relative to the carrier current,
+//!
+//! ```text
+//! q_n = constant + sin sin 2 theta + cos cos 2 theta              |C| = 1 + sin cos 2 theta - cos sin 2 theta
+//! ```
+//!
+//! with `sin = Re n` and `cos = -Im n`. The three numbers are [learned](crate::identify::learning) and taken out. (Products
+//! with the saliency of the flux are of second order and left.)
+
+use crate::carrier::Saliency;
+use crate::math::angle::UnitVector;
+
+/// The learned numbers, dimensionless; 0 without an asymmetry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Asymmetry {
+    /// Part of q that does not change with the angle.
+    pub constant: f32,
+    /// Part of q in phase with sin 2 theta.
+    pub sin: f32,
+    /// Part of q in phase with cos 2 theta.
+    pub cos: f32,
+}
+
+impl Asymmetry {
+    /// What a gain of sensor a higher by `mismatch`/2, and of b lower by as much, causes.
+    pub fn of_gain_mismatch(mismatch: f32) -> Self {
+        let d = 0.5 * mismatch;
+        Self { constant: -d / SQRT_3, sin: d, cos: -d / SQRT_3 }
+    }
+
+    /// The gain mismatch that explains most of these numbers, by least squares.
+    pub fn gain_mismatch(&self) -> f32 {
+        1.2 * (self.sin - (self.cos + self.constant) / SQRT_3)
+    }
+
+    /// Sum of both.
+    pub fn plus(&self, other: &Self, share: f32) -> Self {
+        Self {
+            constant: self.constant + share * other.constant,
+            sin: self.sin + share * other.sin,
+            cos: self.cos + share * other.cos,
+        }
+    }
+
+    /// Root of the sum of the squares.
+    pub fn size(&self) -> f32 {
+        let Self { constant, sin, cos } = self;
+        libm::sqrtf(constant * constant + sin * sin + cos * cos)
+    }
+
+    /// Takes the asymmetry out of a saliency that was seen with the injection along `axis`.
+    pub fn take_out(&self, saliency: &mut Saliency, axis: UnitVector) {
+        let twice = axis.turned_by(axis);
+        saliency.q -= self.constant + self.sin * twice.sin + self.cos * twice.cos;
+        let along = self.sin * twice.cos - self.cos * twice.sin;
+        saliency.carrier_squared *= 1.0 - 2.0 * along;
+    }
+}
+
+const SQRT_3: f32 = crate::math::frames::SQRT_3;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use crate::math::angle::Angle;
+
+    /// Carrier current along the axis and saliency across it, relative to the ideal one, for a current `e^(j theta)`
+    /// that both sensors and the stator distort: `i_a` becomes `a i_a + x i_b`, `i_b` becomes `b i_b`.
+    fn seen(theta: f64, a: f64, b: f64, x: f64) -> (f64, f64) {
+        let (i_a, i_b) = (theta.cos(), (theta - core::f64::consts::TAU / 3.0).cos());
+        let (m_a, m_b) = (a * i_a + x * i_b, b * i_b);
+        let (alpha, beta) = (m_a, (m_a + 2.0 * m_b) / 3.0_f64.sqrt());
+        (
+            alpha * theta.cos() + beta * theta.sin(),
+            -(beta * theta.cos() - alpha * theta.sin()),
+        )
+    }
+
+    #[test]
+    fn sensors_that_differ_are_taken_out_at_every_angle() {
+        // The numbers of each error by the mean over a turn, an independent way.
+        for (a, b, x) in [(1.01, 0.99, 0.0), (1.0, 1.0, 0.01), (0.997, 1.004, -0.02)] {
+            let mut found = [0.0_f64; 3];
+            let angles = (0..720).map(|n| f64::from(n) * core::f64::consts::TAU / 720.0);
+            for theta in angles.clone() {
+                let (_, q) = seen(theta, a, b, x);
+                let parts = [1.0, 2.0 * (2.0 * theta).sin(), 2.0 * (2.0 * theta).cos()];
+                found.iter_mut().zip(parts).for_each(|(sum, part)| *sum += q * part / 720.0);
+            }
+            let [constant, sin, cos] = found.map(|x| x as f32);
+            let asymmetry = Asymmetry { constant, sin, cos };
+            if x == 0.0 {
+                assert!((asymmetry.gain_mismatch() - (a - b) as f32).abs() < 1e-4);
+                let rest = asymmetry.plus(&Asymmetry::of_gain_mismatch(0.02), -1.0);
+                assert!(rest.size() < 1e-4, "{rest:?}");
+            }
+            // Without asymmetry the carrier is constant; its mean over the angles is common to both sensors.
+            let mean = angles.clone().map(|theta| seen(theta, a, b, x).0).sum::<f64>() / 720.0;
+            for theta in angles {
+                let (along, q) = seen(theta, a, b, x);
+                let mut saliency = Saliency {
+                    q: q as f32,
+                    carrier_squared: (along * along / (mean * mean)) as f32,
+                    i_q: 0.0,
+                };
+                let axis = Angle::from_turns((theta / core::f64::consts::TAU) as f32);
+                asymmetry.take_out(&mut saliency, axis.unit_vector());
+                // Left is the second order: the square of 2 %.
+                assert!(saliency.q.abs() < 2e-5, "{a} {b} {x} {theta}: {saliency:?}");
+                assert!((saliency.carrier_squared - 1.0).abs() < 2e-3, "{theta}: {saliency:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! From the sums of a learning to its result.
+
+use super::result::{
+    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, SPREAD, Verdict,
+};
+use super::{Fitted, Learned, Learning, LearningState};
+use crate::carrier::Saliency;
+use crate::carrier::asymmetry::Asymmetry;
+use crate::math::angle::UnitVector;
+use crate::protect::saliency_check::SaliencyCheck;
+use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
+
+/// Limit of the asymmetry that a gain mismatch does not explain, for a mismatch to be corrected as one: absolute part, and
+/// share of the mismatch.
+const UNEXPLAINED: (f32, f32) = (0.001, 0.25);
+/// Least slope up to the torque limit: share of that without torque current, and magnitude, 1/rad.
+const LEAST_SLOPE_UNDER_LOAD: (f32, f32) = (0.3, 0.016);
+
+/// What the drive saw while it magnetised, before the learning.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    /// Mean saliency that the saliency check saw along its axis; none without the check.
+    pub looked: Option<f32>,
+    /// Flux-fixed saliency per mean saliency that it sees.
+    pub per_looked: f32,
+    /// Squared carrier current without torque current, A^2.
+    pub baseline: f32,
+}
+
+/// The slope over the torque current, that without it, and the largest current that it allows, A.
+struct Slope {
+    table: Option<SlopeTable>,
+    at_rest: f32,
+    limit_a: f32,
+}
+
+impl Learning {
+    /// Evaluates all points. `start` is what the drive saw before.
+    pub fn result(&self, state: &LearningState, start: &Start) -> Learned {
+        let (asymmetry, gain_mismatch, spread) = self.asymmetry(state);
+        let (reference, current_saliency) = self.reference(state);
+        let slope = self.slope(state);
+        let limit_a = slope.limit_a;
+        let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
+            Verdict::OutOfRange
+        } else if !(spread <= SPREAD && self.points > 0) {
+            Verdict::Uneven
+        } else if !self.normalised {
+            Verdict::Sound
+        } else if !Verdict::of_slope(slope.at_rest).is_accepted() {
+            Verdict::SlopeTooSmall
+        } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.table.is_none() {
+            Verdict::LimitTooLow
+        } else {
+            Verdict::of_slope(slope.at_rest)
+        };
+        // The check and the baseline were taken with the asymmetry, with the flux along phase a.
+        let all = match gain_mismatch.accepted {
+            true => asymmetry.plus(&Asymmetry::of_gain_mismatch(gain_mismatch.value), 1.0),
+            false => asymmetry,
+        };
+        let seen = |q: f32, carrier_squared: f32, axis| {
+            let mut saliency = Saliency { q, carrier_squared, i_q: 0.0 };
+            all.take_out(&mut saliency, axis);
+            saliency
+        };
+        let across = UnitVector { cos: 0.0, sin: 1.0 };
+        let baseline = seen(0.0, start.baseline, across).carrier_squared;
+        let looked = start.looked.map_or(0.0, |q| seen(q, 0.0, SaliencyCheck::LOOK_AXIS).q);
+        Learned {
+            reference: reference.unwrap_or_default(),
+            slope: slope.table.filter(|_| verdict.is_accepted()),
+            slope_at_rest: slope.at_rest,
+            limit_a,
+            carrier: self.carrier(state, baseline),
+            points: self.points,
+            spread,
+            gain_mismatch,
+            asymmetry,
+            current_saliency,
+            flux_saliency: start.per_looked * looked,
+            verdict,
+        }
+    }
+
+    /// The asymmetry beyond the gain mismatch, the gain mismatch, and the spread of the even part.
+    fn asymmetry(&self, state: &LearningState) -> (Asymmetry, Fitted, f32) {
+        let per_point = 1.0 / self.points().max(1) as f32;
+        let (sum, least, largest) = state.even;
+        let constant = 2.0 * per_point * sum;
+        let (above, below) = (largest - constant, constant - least);
+        let spread = if above > below { above } else { below };
+        let found = Asymmetry {
+            constant,
+            sin: per_point * state.sin,
+            cos: per_point * state.cos,
+        };
+        let value = found.gain_mismatch();
+        let rest = found.plus(&Asymmetry::of_gain_mismatch(value), -1.0);
+        let misfit = rest.size();
+        let accepted = self.normalised
+            && value.abs() <= LARGEST_MISMATCH
+            && misfit <= UNEXPLAINED.0 + UNEXPLAINED.1 * value.abs();
+        let asymmetry = match (self.normalised, accepted) {
+            (true, true) => rest,
+            (true, false) => found,
+            (false, _) => Asymmetry::default(),
+        };
+        (asymmetry, Fitted { value, misfit, accepted }, spread)
+    }
+
+    /// The reference, and the saliency per ampere of stator current that fits it.
+    fn reference(&self, state: &LearningState) -> (Option<ReferenceTable>, Fitted) {
+        let [odd, ..] = &state.odd;
+        let q = Self::held_beyond(odd, self.points);
+        let (mut xx, mut xq, mut qq) = (0.0_f32, 0.0_f32, 0.0_f32);
+        for (n, q) in q.iter().enumerate().take(self.points + 1) {
+            let i_q = self.grid.current(n);
+            let x = 2.0 * self.i_d * i_q / libm::sqrtf(self.i_d * self.i_d + i_q * i_q);
+            xx += x * x;
+            xq += x * q;
+            qq += q * q;
+        }
+        let value = xq / xx;
+        let rest = qq - value * xq;
+        let misfit = libm::sqrtf(if rest > 0.0 { rest / qq } else { 0.0 });
+        let accepted = self.normalised
+            && value.abs() * self.grid.step_a() <= CURRENT_SALIENCY.0
+            && misfit <= CURRENT_SALIENCY.1;
+        (ReferenceTable::from_points(self.grid, q), Fitted { value, misfit, accepted })
+    }
+
+    /// The slope, and how far it goes.
+    fn slope(&self, state: &LearningState) -> Slope {
+        if !self.normalised {
+            return Slope { table: None, at_rest: 0.0, limit_a: self.grid.current(self.points) };
+        }
+        let [without, ahead, behind] = &state.odd;
+        let per_lead = 1.0 / self.lead;
+        // Without torque current the other lead is the mirrored one.
+        let at_rest = ahead[0] * per_lead;
+        let mut k = [at_rest; POINTS];
+        let mut last = 0;
+        for n in 1..=self.points {
+            let sides = [ahead[n] - without[n], without[n] - behind[n]].map(|q| q * per_lead);
+            let enough = |side: f32| {
+                side / at_rest >= LEAST_SLOPE_UNDER_LOAD.0 && side.abs() >= LEAST_SLOPE_UNDER_LOAD.1
+            };
+            if !(enough(sides[0]) && enough(sides[1])) {
+                break;
+            }
+            k[n] = 0.5 * (sides[0] + sides[1]);
+            last = n;
+        }
+        let table = SlopeTable::from_points(self.grid, Self::held_beyond(&k, last));
+        Slope { table, at_rest, limit_a: self.grid.current(last) }
+    }
+
+    /// The carrier current over the torque current.
+    fn carrier(&self, state: &LearningState, baseline: f32) -> Option<CarrierTable> {
+        let mut ratio = state.carrier.map(|square| libm::sqrtf(square / baseline));
+        ratio[0] = 1.0;
+        CarrierTable::from_points(self.grid, Self::held_beyond(&ratio, self.points))
+    }
+
+    /// Values at the points, held beyond the point `last`.
+    fn held_beyond(values: &[f32; POINTS], last: usize) -> [f32; POINTS] {
+        core::array::from_fn(|n| values[n.min(last)])
+    }
+}

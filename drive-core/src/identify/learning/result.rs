@@ -1,0 +1,143 @@
+//! The result of a learning.
+
+use crate::carrier::asymmetry::Asymmetry;
+use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
+
+/// Largest accepted spread of the even part of the reference. Noise gives 0.001.
+pub(super) const SPREAD: f32 = 0.005;
+/// Largest accepted gain mismatch.
+pub(super) const LARGEST_MISMATCH: f32 = 0.1;
+/// Largest accepted asymmetry: a gain mismatch of 10 % has 0.083.
+pub(super) const LARGEST_ASYMMETRY: f32 = 0.1;
+/// Largest accepted current-dependent saliency at a current of one step of the table, and rms misfit of its law
+/// relative to the rms of the reference.
+pub(super) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
+/// Least magnitude of the slope without torque current, 1/rad, with negative and with positive sign: at 5 mA of sensor noise
+/// 5° rms.
+pub const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
+/// Up to this multiple of it the tracking is weak.
+const WEAK: f32 = 1.5;
+/// Least torque limit, in steps of the table: 1 A of 3.5 A.
+pub(super) const LEAST_LIMIT: usize = 4;
+
+/// A fitted value with its misfit and acceptance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fitted {
+    /// The value.
+    pub value: f32,
+    /// Unexplained part of the measurement; defined with each value.
+    pub misfit: f32,
+    /// Whether value and misfit are within their bounds. Otherwise the previous value stays in use.
+    pub accepted: bool,
+}
+
+/// Whether, and how well, the motor can be tracked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Accepted.
+    Sound,
+    /// Accepted, but the slope is less than 1.5 times the least one: expect errors above 5° rms and false stops.
+    Weak,
+    /// Refused: the slope without torque current is too small.
+    SlopeTooSmall,
+    /// Refused: the slope falls off below the least torque limit.
+    LimitTooLow,
+    /// Refused: the even part of the reference spreads; shaft not quite locked, or a load that pulses.
+    Uneven,
+    /// Refused: a value is not finite or out of its range.
+    OutOfRange,
+}
+
+impl Verdict {
+    /// Whether the result is used.
+    pub const fn is_accepted(self) -> bool {
+        matches!(self, Self::Sound | Self::Weak)
+    }
+
+    /// The verdict on a slope without torque current, 1/rad.
+    pub fn of_slope(at_rest: f32) -> Self {
+        let [negative, positive] = LEAST_SLOPE;
+        let least = if at_rest < 0.0 { negative } else { positive };
+        if at_rest.abs() >= WEAK * least {
+            Self::Sound
+        } else if at_rest.abs() >= least {
+            Self::Weak
+        } else {
+            Self::SlopeTooSmall
+        }
+    }
+}
+
+/// Result of a learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learned {
+    /// Reference over the torque current: of the saliency, or of the current difference in A.
+    pub reference: ReferenceTable,
+    /// Slope of the saliency over the torque current; none of a current difference.
+    pub slope: Option<SlopeTable>,
+    /// Slope without torque current, 1/rad, also where it is refused; 0 for a current difference.
+    pub slope_at_rest: f32,
+    /// Largest torque current, A, that the slope allows: up to it the slope on both sides is at least 0.3 of that without
+    /// torque current, and 0.016 /rad.
+    pub limit_a: f32,
+    /// Carrier current over the torque current, if plausible.
+    pub carrier: Option<CarrierTable>,
+    /// Number of measured points, without zero; the tables are constant beyond.
+    pub points: usize,
+    /// Largest deviation of the even part of the reference from its mean. Beyond 0.005 the whole result is refused.
+    pub spread: f32,
+    /// (gain of current sensor a) / (gain of b) - 1, within ±0.1. Misfit: the asymmetry that a gain mismatch does
+    /// not explain. Synchronous demodulation only.
+    pub gain_mismatch: Fitted,
+    /// Asymmetry that is taken out of the demodulated signals: what the gain mismatch, where it is accepted, leaves.
+    pub asymmetry: Asymmetry,
+    /// Saliency per ampere of stator current, 1/A, within ±0.075 at one step of the table: least squares of the reference on
+    /// 2 i_d i_q/|i|. Misfit: rms of the residual relative to that of the reference, at most 0.35.
+    pub current_saliency: Fitted,
+    /// Flux-fixed saliency at nominal flux measured by the check at the start (±5 % by noise); 0 without
+    /// the check. A later start expects it.
+    pub flux_saliency: f32,
+    /// Whether the result is used, and why not.
+    pub verdict: Verdict,
+}
+
+impl Learned {
+    /// Whether a stored result is plausible, i.e. could come from an accepted learning. The tables check
+    /// their own values.
+    pub fn is_believable(&self) -> bool {
+        let within = |fitted: &Fitted, largest: f32| {
+            fitted.misfit.is_finite() && (!fitted.accepted || fitted.value.abs() <= largest)
+        };
+        let step = self.reference.grid().step_a();
+        let slope = self.slope.map_or(0.0, |slope| slope.at_rest());
+        self.verdict.is_accepted()
+            && self.spread <= SPREAD
+            && (1..POINTS).contains(&self.points)
+            && self.asymmetry.size() <= LARGEST_ASYMMETRY
+            && self.slope_at_rest == slope
+            && (LEAST_LIMIT as f32 * step * 0.999..=POINTS as f32 * step).contains(&self.limit_a)
+            && within(&self.gain_mismatch, LARGEST_MISMATCH)
+            && within(&self.current_saliency, CURRENT_SALIENCY.0 / step)
+            && self.flux_saliency.is_finite()
+    }
+
+    /// Combines this result with the result `before` that was in use during the learning. Values not
+    /// accepted keep their previous state; gain mismatch and asymmetry add to those already corrected.
+    pub fn on_top_of(&self, before: Option<&Self>) -> Self {
+        let mut learned = *self;
+        if let Some(before) = before {
+            let gains = before.gain_mismatch;
+            if !self.gain_mismatch.accepted {
+                learned.gain_mismatch = gains;
+            } else if gains.accepted {
+                learned.gain_mismatch.value += gains.value;
+            }
+            learned.asymmetry = before.asymmetry.plus(&self.asymmetry, 1.0);
+            if !self.current_saliency.accepted {
+                learned.current_saliency = before.current_saliency;
+            }
+            learned.carrier = self.carrier.or(before.carrier);
+        }
+        learned
+    }
+}
