@@ -267,7 +267,8 @@ impl Drive {
             let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
             c.estimator.observe(&mut s.estimator, &sample, flux.freq);
         }
-        let flux_current = if counts { current.seen_from(s.references.lead_axis) } else { reference };
+        let flux_current =
+            if counts { current.seen_from(s.references.lead_axis) } else { reference };
         let rotor_freq = if counts {
             c.indirect.slip(&mut s.indirect, flux_current.q);
             s.indirect.rotor_freq

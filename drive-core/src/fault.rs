@@ -260,7 +260,7 @@ faults! {
             "too little flux: sequence.i_d",
             "a motor without enough saliency, or one whose sign changes with the load",
         ],
-        "`learned` shows the slope and what is needed; raise sequence.i_d and learn again, or use the encoder";
+        "learned shows the slope and what is needed; raise sequence.i_d and learn again, or use the encoder";
 }
 
 impl Fault {

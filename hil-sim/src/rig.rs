@@ -126,8 +126,9 @@ impl Rig {
             self.run(1.0, |_| {});
             match (self.drive.state(), self.drive.learned()) {
                 (State::Off, Some(learned)) => return Ok(*learned),
-                (State::Fault(fault), _) => {
-                    return Err(Error::Refused(format!("the drive does not learn: {fault}")));
+                (State::Fault(fault), learned) => {
+                    let found = learned.map_or(String::new(), |learned| format!(": {learned}"));
+                    return Err(Error::Refused(format!("the drive does not learn: {fault}{found}")));
                 }
                 _ => {}
             }

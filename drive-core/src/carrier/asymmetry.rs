@@ -76,10 +76,7 @@ mod tests {
         let (i_a, i_b) = (theta.cos(), (theta - core::f64::consts::TAU / 3.0).cos());
         let (m_a, m_b) = (a * i_a + x * i_b, b * i_b);
         let (alpha, beta) = (m_a, (m_a + 2.0 * m_b) / 3.0_f64.sqrt());
-        (
-            alpha * theta.cos() + beta * theta.sin(),
-            -(beta * theta.cos() - alpha * theta.sin()),
-        )
+        (alpha * theta.cos() + beta * theta.sin(), -(beta * theta.cos() - alpha * theta.sin()))
     }
 
     #[test]

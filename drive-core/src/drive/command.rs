@@ -90,7 +90,10 @@ impl core::fmt::Display for Refused {
                 write!(f, "this needs the injection, demodulated by a way that tracks")
             }
             Self::NotLearned => {
-                write!(f, "nothing is learned of this motor with these settings: lock the shaft and `learn` first")
+                write!(
+                    f,
+                    "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
+                )
             }
             Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),

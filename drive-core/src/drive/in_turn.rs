@@ -66,11 +66,7 @@ impl Coefficients {
     ) -> Result<(), Fault> {
         match index {
             0 => {
-                self.estimator.update_saliency(
-                    &mut s.estimator,
-                    step.carrier_axis,
-                    step.flux_freq,
-                );
+                self.estimator.update_saliency(&mut s.estimator, step.carrier_axis, step.flux_freq);
                 self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
                 if self.source == AngleSource::Injection {
                     s.seen.rotor_count = s.count_by_flux();

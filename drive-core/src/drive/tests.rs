@@ -57,6 +57,8 @@ fn settings() -> Settings {
     let mut settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
     // The load has no dead time.
     settings.inverter.compensate = false;
+    // Its saliency is that of the settings.
+    settings.injection.synchronous.allow_unlearned = true;
     settings
 }
 

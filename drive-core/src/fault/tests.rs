@@ -44,6 +44,8 @@ fn codes_never_change() {
         (38, Fault::SensorSaturatedC),
         (39, Fault::OffsetC),
         (40, Fault::CurrentSum),
+        (41, Fault::FluxNotAsPredicted),
+        (42, Fault::SlopeTooSmall),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

@@ -4,14 +4,14 @@
 //! (reference of the current difference and PII controller) or, for the synchronous demodulation, a loop
 //! with learned reference, scheduled gain and slip feed-forward.
 
-use crate::carrier::demodulator::{Demodulate, Demodulator};
 use crate::carrier::asymmetry::Asymmetry;
+use crate::carrier::demodulator::{Demodulate, Demodulator};
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
-use crate::identify::learning::Learned;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
+use crate::identify::learning::Learned;
 use crate::math::angle::{Angle, UnitVector};
 use crate::settings::table::ReferenceTable;
 

@@ -104,53 +104,72 @@ mod tests {
     use super::*;
     use crate::settings::table::Grid;
 
+    /// Slope of a saliency that is fixed to the flux alone.
+    fn fixed(a: f32) -> SlopeTable {
+        SlopeTable::of_flux_saliency(Grid::REFERENCE, a)
+    }
+
     #[test]
     fn lookup_is_odd_linear_and_held() {
         let table =
             ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (1.0, 0.04), (3.0, 0.05)]).unwrap();
-        let schedule = GainSchedule::new(&table, -0.035, 0.034, 0.7);
+        let schedule = GainSchedule::new(&table, &fixed(-0.035), 0.034, 0.7);
+        let reference = |i_q| schedule.at(i_q).reference;
         for (i_q, q) in
             [(0.0, 0.0), (0.5, 0.02), (1.0, 0.04), (2.0, 0.045), (3.5, 0.05), (99.0, 0.05)]
         {
-            assert!((schedule.at(i_q).0 - q).abs() < 1e-6, "{i_q}");
-            assert!((schedule.at(-i_q).0 + q).abs() < 1e-6, "-{i_q}");
+            assert!((reference(i_q) - q).abs() < 1e-6, "{i_q}");
+            assert!((reference(-i_q) + q).abs() < 1e-6, "-{i_q}");
         }
-        assert!(schedule.at(f32::NAN).0.abs() < 0.3, "not-a-number is found elsewhere");
+        assert!(reference(f32::NAN).abs() < 0.3, "not-a-number is found elsewhere");
     }
 
     #[test]
-    fn the_gain_falls_as_the_slope_rises() {
+    fn the_gain_falls_as_the_fast_slope_rises() {
         // Of an independent study, which leaves no least share.
-        let schedule = GainSchedule::new(&ReferenceTable::default(), -0.035, 0.0338, 0.7);
+        let schedule = GainSchedule::new(&ReferenceTable::default(), &fixed(-0.035), 0.0338, 0.7);
         for (n, share) in [1.0, 1.0, 0.71, 0.49, 0.38, 0.32, 0.27].into_iter().enumerate() {
-            let found = (schedule.at(0.5 * n as f32).1 - LEAST_SHARE) / (1.0 - LEAST_SHARE);
+            let found = (schedule.at(0.5 * n as f32).share - LEAST_SHARE) / (1.0 - LEAST_SHARE);
             assert!((found - share).abs() < 0.011, "{n}: {found}");
         }
+        // With a positive slope the part of the current adds to it below i_d, and takes from it above.
+        let schedule = GainSchedule::new(&ReferenceTable::default(), &fixed(0.035), 0.0338, 0.7);
+        assert!(schedule.at(0.0).share < 0.93 && schedule.at(2.0).share == 1.0);
     }
 
     #[test]
     fn the_saliency_tells_the_angle() {
-        // q = 2 a x for a small angle error x of the flux-fixed saliency a, beside the reference.
         let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (2.0, 0.04)]).unwrap();
-        for a in [-0.035, 0.05] {
-            let schedule = GainSchedule::new(&table, a, 0.034, 0.7);
-            for (i_q, x) in [(0.0, 0.1), (1.0, -0.2), (-1.0, 0.05)] {
-                let q = 0.02 * i_q + 2.0 * a * x;
+        for k in [-0.07_f32, 0.1] {
+            // Beyond 1 A the slope is 0.7 of that without current, beyond 2 A a fifth: the gain is held to twice.
+            let points = core::array::from_fn(|n| {
+                k * [1.0, 0.7, 0.2][n.div_ceil(4).min(3).saturating_sub(1)]
+            });
+            let slope = SlopeTable::from_points(Grid::REFERENCE, points).unwrap();
+            let schedule = GainSchedule::new(&table, &slope, 0.034, 0.7);
+            for (i_q, x, seen) in
+                [(0.0, 0.1, 0.1), (2.0, -0.2, -0.2), (-1.75, 0.05, 0.05), (3.0, 0.1, 0.04)]
+            {
+                let q = table.at(i_q) + slope.points()[(4.0 * i_q.abs()) as usize] * x;
                 let (error, share) =
                     schedule.angle_error(&Saliency { q, carrier_squared: 0.0, i_q });
-                assert!((error - x).abs() < 1e-5, "{error} for {x}");
-                assert_eq!(share, schedule.at(i_q).1);
+                assert!((error - seen).abs() < 1e-5, "{error} for {x} at {i_q} A");
+                assert_eq!(share, schedule.at(i_q).share);
             }
         }
-        // Another reference; another saliency per ampere only where there is one.
-        let schedule = GainSchedule::new(&ReferenceTable::default(), -0.035, 0.034, 0.7);
+    }
+
+    #[test]
+    fn what_was_not_learned_stays() {
+        let table = ReferenceTable::new(Grid::REFERENCE, &[(0.0, 0.0), (2.0, 0.04)]).unwrap();
+        let schedule = GainSchedule::new(&ReferenceTable::default(), &fixed(-0.035), 0.034, 0.7);
         assert_eq!(
-            schedule.with_learned(&table, None),
-            GainSchedule::new(&table, -0.035, 0.034, 0.7)
+            schedule.with_learned(&table, None, None),
+            GainSchedule::new(&table, &fixed(-0.035), 0.034, 0.7)
         );
         assert_eq!(
-            schedule.with_learned(&table, Some(0.02)),
-            GainSchedule::new(&table, -0.035, 0.02, 0.7)
+            schedule.with_learned(&table, Some(&fixed(0.02)), Some(0.02)),
+            GainSchedule::new(&table, &fixed(0.02), 0.02, 0.7)
         );
     }
 }

@@ -53,6 +53,10 @@ const MOVED_RAD_PER_S: f32 = 4.66;
 const JUDGED_RAD_PER_S: f32 = 9.32;
 /// Least tangent of the lead of the flux: 8.5°.
 const LEAST_TAN_LEAD: f32 = 0.15;
+/// Largest tangent that half a step may give, 15°, and the tangent where it gives more: a small direct current, with which
+/// the flux slips at every lead below half a step.
+const MOST_TAN_LEAD: f32 = 0.27;
+const LONE_TAN_LEAD: f32 = 0.2;
 
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,17 +181,23 @@ impl Learning {
         let grid = Grid::for_current(largest_a);
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
-        // The least torque current that turns the flux is half a step: a half turn in pi i_d tau_r / i_q.
-        let half_turn_s = PI * i_d * motor.tau_r() / (0.5 * grid.step_a());
         let half_step = 0.5 * grid.step_a() / i_d;
-        let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
+        // The flux makes a half turn in pi tau_r i_d / i_q.
+        let least_slip = if half_step > MOST_TAN_LEAD { LONE_TAN_LEAD } else { half_step };
+        let half_turn_s = PI * motor.tau_r() / least_slip;
+        let tan_lead = if half_step > MOST_TAN_LEAD {
+            LONE_TAN_LEAD
+        } else {
+            let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
+            half_step * if odd > 1.0 { odd } else { 1.0 }
+        };
         Self {
             settle: periods(SETTLE_T * motor.tau_r()),
             average: (periods(AVERAGE_S), periods(LONGEST_S).max(periods(3.0 * half_turn_s))),
             grid,
             points: (most as usize).min(POINTS - 1),
             normalised,
-            lead: libm::atanf(half_step * if odd > 1.0 { odd } else { 1.0 }),
+            lead: libm::atanf(tan_lead),
             i_d,
             leakage: motor.l_ls + motor.l_m - coupled,
             coupled,

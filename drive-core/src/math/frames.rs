@@ -192,10 +192,7 @@ impl Mul<f32> for UnitVector {
 impl Dq {
     /// The same vector in a frame that is ahead by `lead`.
     pub fn seen_from(self, lead: UnitVector) -> Self {
-        Self {
-            d: self.d * lead.cos + self.q * lead.sin,
-            q: self.q * lead.cos - self.d * lead.sin,
-        }
+        Self { d: self.d * lead.cos + self.q * lead.sin, q: self.q * lead.cos - self.d * lead.sin }
     }
 
     /// Inverse Park transformation from the frame whose d axis lies along `axis`.

@@ -205,6 +205,7 @@ impl LockMonitor {
             state.baseline += self.baseline_smoothing * (carrier - state.baseline);
             *state = LockMonitorState {
                 baseline: state.baseline,
+                weak: state.weak,
                 i_q: saliency.i_q,
                 rested: REST,
                 allowance: ALLOWANCE.2,
@@ -250,19 +251,24 @@ impl LockMonitor {
 mod tests {
     use super::*;
 
-    /// Nominal 0.26 A of carrier, 80 ms.
-    fn monitor() -> LockMonitor {
+    /// Nominal 0.26 A of carrier, 120 ms, with the slope of a saliency `a` that is fixed to the flux.
+    fn monitor_of(a: f32) -> LockMonitor {
         LockMonitor::new(
             &CarrierTable::default(),
             &LockMonitorSettings {
-                flux_saliency: -0.035,
-                smoothing_s: 0.08,
+                slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, a),
+                smoothing_s: 0.12,
                 allowed: 0.55,
                 carrier_a: 0.26,
+                moved_a: 0.03,
                 standing_freq: 1e-4,
                 period_s: 1.0 / 600.0,
             },
         )
+    }
+
+    fn monitor() -> LockMonitor {
+        monitor_of(-0.035)
     }
 
     fn seen(carrier_a: f32, i_q: f32) -> Saliency {
@@ -300,21 +306,57 @@ mod tests {
                 assert_eq!(right, Ok(()));
             }
             assert!(state.loss.abs() < 0.02, "{i_q}: {}", state.loss);
-            // Without flux: 80 ms ln(1 / 0.45) = 64 ms.
+            // Without flux: 120 ms ln(1 / 0.45) = 96 ms.
             let gone = seen(0.27 * ratio * (1.0 - 0.035), i_q);
             let (n, fault) = until(&monitor, &mut state, gone);
             assert_eq!(fault, Fault::LostLock);
-            assert!((36..=42).contains(&n), "{i_q}: {n} carrier periods");
+            assert!((55..=61).contains(&n), "{i_q}: {n} carrier periods");
         }
     }
 
     #[test]
-    fn the_unit_is_the_saliency_that_the_motor_has() {
+    fn too_much_flux_is_wrong_as_well_and_the_limit_depends_on_the_sign() {
+        // Loss that lasts, the saliency, and after how many carrier periods of 1/600 s with 120 ms: 72 ln(1 / (1 - limit/loss)).
+        for (a, loss, periods) in [
+            (-0.035, -1.0, Some(66.0)),
+            (-0.035, -0.55, None),
+            (0.035, -1.0, Some(31.0)),
+            (0.035, -0.45, Some(108.0)),
+            (0.035, 1.0, Some(57.5)),
+            (0.035, 0.5, None),
+        ] {
+            let monitor = monitor_of(a);
+            let mut state = ready(&monitor);
+            let wrong = seen(0.27 * (1.0 - 2.0 * -a * loss).sqrt(), 0.0);
+            let tripped =
+                (1..=6000).find(|_| monitor.step(&mut state, &wrong, 1.0, false).is_err());
+            match (tripped, periods) {
+                (None, None) => {}
+                (Some(n), Some(expected)) => {
+                    assert!((f64::from(n) - expected).abs() < 3.0, "{a} {loss}: {n}");
+                }
+                other => panic!("{a} {loss}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn it_rests_while_the_current_moves_but_not_for_long() {
         let monitor = monitor();
+        // Without flux from a step of 1 A on: 12 carrier periods later than at rest.
         let mut state = ready(&monitor);
-        state.share = 0.5;
-        let (n, _) = until(&monitor, &mut state, seen(0.27 * (1.0 - 0.0175), 0.0));
-        assert!((36..=42).contains(&n), "{n} carrier periods");
+        let gone = |i_q| seen(0.27 * (1.0 - 0.035) * if i_q == 0.0 { 1.0 } else { 1.04167 }, i_q);
+        let (n, _) = until(&monitor, &mut state, gone(1.0));
+        assert!((67..=73).contains(&n), "{n} carrier periods");
+        // A command that never rests: judged 60 % of the time at least.
+        let mut state = ready(&monitor);
+        let n = (0..6000_u16)
+            .find(|n| {
+                let i_q = f32::from(n % 2);
+                monitor.step(&mut state, &gone(i_q), 1.0, false).is_err()
+            })
+            .unwrap();
+        assert!((92..=130).contains(&n), "{n} carrier periods");
     }
 
     #[test]

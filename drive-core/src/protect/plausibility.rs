@@ -276,11 +276,26 @@ mod tests {
     /// `believed` of the speed of the rotor.
     fn unexplained(more: f32, believed: f32) -> (AlphaBeta, Option<u32>) {
         let motor = Motor::default();
-        let prediction = Prediction::new(&motor, PLANT, 15.0);
+        // The mean in the frame of the flux is not judged.
+        let prediction = Prediction::new(&motor, PLANT, 15.0, 1e3);
+        let (rest, fault) = run(&prediction, more, believed, 1.0);
+        assert!(fault.is_none_or(|(_, fault)| fault == Fault::CurrentNotAsPredicted));
+        (rest, fault.map(|(n, _)| n))
+    }
+
+    /// As [`unexplained`], with the fault; the motor has the share `flux` of the rotor flux that is believed.
+    fn run(
+        prediction: &Prediction,
+        more: f32,
+        believed: f32,
+        flux: f32,
+    ) -> (AlphaBeta, Option<(u32, Fault)>) {
+        let motor = Motor::default();
         let (mut state, mut current) = (PredictionState::default(), AlphaBeta::ZERO);
         let (k_g, pole) = (PLANT.k as f32, PLANT.p as f32);
         let (mut acting, mut pending) = (AlphaBeta::ZERO, AlphaBeta::ZERO);
         let coupled = motor.coupled_inductance();
+        let coupled = coupled * flux;
         let of_flux =
             Dq { d: coupled * 0.7 / motor.tau_r(), q: -coupled * 0.7 * ROTOR * TAU / PERIOD_S };
         for n in 0..3000_u32 {
@@ -297,8 +312,10 @@ mod tests {
                         flux_freq: FLUX,
                     },
                 ),
-                3 | 8 if prediction.judge(&mut state, current).is_err() => {
-                    return (state.unexplained, Some(n));
+                3 | 8 => {
+                    if let Err(fault) = prediction.judge(&mut state, current) {
+                        return (state.unexplained, Some((n, fault)));
+                    }
                 }
                 _ => {}
             }
@@ -323,6 +340,23 @@ mod tests {
         assert!(rest.length_squared() < 0.1 * 0.1, "{rest:?} of {}", emf());
         let (rest, fault) = unexplained(3.0, 1.0);
         assert!(fault.is_none() && (rest - AlphaBeta::new(3.0, 0.0)).length_squared() < 0.01);
+    }
+
+    #[test]
+    fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
+        // The dissertation's motor: 12 V, and 6 V in the mean beside half of the back-emf of 13 V.
+        let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, 6.0);
+        for (flux, seen) in [(1.0, false), (0.5, false), (0.0, true), (-1.0, true), (2.2, true)] {
+            let (_, fault) = run(&prediction, 0.0, 1.0, flux);
+            assert_eq!(fault.is_some(), seen, "{flux}: {fault:?} of {}", emf());
+        }
+        // 50 ms ln(1 / (1 - share)) with what is allowed as a share of the back-emf.
+        let (_, fault) = run(&prediction, 0.0, 1.0, -0.2);
+        let (n, fault) = fault.unwrap();
+        assert_eq!(fault, Fault::FluxNotAsPredicted);
+        let share = (6.0 + 0.5 * emf() * FLUX / ROTOR) / (1.2 * emf());
+        let expected = -0.050 * 6000.0 * (1.0 - share).ln();
+        assert!((n as f32 / expected - 1.0).abs() < 0.2, "{n} for {expected}");
     }
 
     #[test]

@@ -90,11 +90,7 @@ impl Learning {
         let constant = 2.0 * per_point * sum;
         let (above, below) = (largest - constant, constant - least);
         let spread = if above > below { above } else { below };
-        let found = Asymmetry {
-            constant,
-            sin: per_point * state.sin,
-            cos: per_point * state.cos,
-        };
+        let found = Asymmetry { constant, sin: per_point * state.sin, cos: per_point * state.cos };
         let value = found.gain_mismatch();
         let rest = found.plus(&Asymmetry::of_gain_mismatch(value), -1.0);
         let misfit = rest.size();

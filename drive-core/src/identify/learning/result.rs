@@ -1,5 +1,7 @@
 //! The result of a learning.
 
+use core::fmt;
+
 use crate::carrier::asymmetry::Asymmetry;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
@@ -54,10 +56,15 @@ impl Verdict {
         matches!(self, Self::Sound | Self::Weak)
     }
 
+    /// Least magnitude of a slope of this sign, 1/rad.
+    fn least(at_rest: f32) -> f32 {
+        let [negative, positive] = LEAST_SLOPE;
+        if at_rest < 0.0 { negative } else { positive }
+    }
+
     /// The verdict on a slope without torque current, 1/rad.
     pub fn of_slope(at_rest: f32) -> Self {
-        let [negative, positive] = LEAST_SLOPE;
-        let least = if at_rest < 0.0 { negative } else { positive };
+        let least = Self::least(at_rest);
         if at_rest.abs() >= WEAK * least {
             Self::Sound
         } else if at_rest.abs() >= least {
@@ -101,7 +108,47 @@ pub struct Learned {
     pub verdict: Verdict,
 }
 
+impl fmt::Display for Learned {
+    /// The verdict in words, with the numbers that it rests on.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (slope, least) = (self.slope_at_rest, Verdict::least(self.slope_at_rest));
+        match self.verdict {
+            Verdict::Sound => {
+                write!(f, "slope {slope:.4} /rad, torque current up to {:.2} A", self.limit_a)
+            }
+            Verdict::Weak => write!(
+                f,
+                "weak: slope {slope:.4} /rad is less than {WEAK} times the least, {least}; torque current up to {:.2} A",
+                self.limit_a
+            ),
+            Verdict::SlopeTooSmall => {
+                write!(
+                    f,
+                    "slope {slope:.4} /rad, which must be {least} at least; nothing was changed"
+                )
+            }
+            Verdict::LimitTooLow => write!(
+                f,
+                "slope {slope:.4} /rad is lost above {:.2} A of torque current, less than {:.2} A; nothing was changed",
+                self.limit_a,
+                self.least_limit_a()
+            ),
+            Verdict::Uneven => write!(
+                f,
+                "even part of the reference spreads by {:.5}, more than {SPREAD}; nothing was changed",
+                self.spread
+            ),
+            Verdict::OutOfRange => f.write_str("a value is out of its range; nothing was changed"),
+        }
+    }
+}
+
 impl Learned {
+    /// Least accepted torque limit, A.
+    fn least_limit_a(&self) -> f32 {
+        self.reference.grid().current(LEAST_LIMIT)
+    }
+
     /// Whether a stored result is plausible, i.e. could come from an accepted learning. The tables check
     /// their own values.
     pub fn is_believable(&self) -> bool {
@@ -115,7 +162,7 @@ impl Learned {
             && (1..POINTS).contains(&self.points)
             && self.asymmetry.size() <= LARGEST_ASYMMETRY
             && self.slope_at_rest == slope
-            && (LEAST_LIMIT as f32 * step * 0.999..=POINTS as f32 * step).contains(&self.limit_a)
+            && (self.least_limit_a()..=POINTS as f32 * step).contains(&self.limit_a)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)
             && within(&self.current_saliency, CURRENT_SALIENCY.0 / step)
             && self.flux_saliency.is_finite()
