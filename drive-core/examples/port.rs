@@ -138,7 +138,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 
     // Whenever a learning has ended.
-    if let Some(learned) = interrupt.drive.learned().filter(|learned| learned.accepted) {
+    if let Some(learned) = interrupt.drive.learned().filter(|learned| learned.verdict.is_accepted())
+    {
         write_learned(learned);
     }
     Ok(())

@@ -32,7 +32,6 @@ pub struct GainSchedule {
     per_saliency: [f32; POINTS],
     share: [f32; POINTS],
     /// Arguments of `new`, for `with_learned`.
-    slope: SlopeTable,
     current_saliency: f32,
     i_d: f32,
 }
@@ -64,22 +63,23 @@ impl GainSchedule {
             table: *table,
             per_saliency: slope.inverses(MOST_GAIN),
             share,
-            slope: *slope,
             current_saliency: b,
             i_d,
         }
     }
 
-    /// Schedule for the same motor with a learned reference and, if learned, another slope and another saliency `b` per
-    /// ampere, 1/A.
+    /// Schedule for the same motor with a learned reference and, if learned, another slope, with another saliency `b` per
+    /// ampere, 1/A, if that was learned, too.
     pub fn with_learned(
         &self,
         table: &ReferenceTable,
         slope: Option<&SlopeTable>,
         b: Option<f32>,
     ) -> Self {
-        let b = b.unwrap_or(self.current_saliency);
-        Self::new(table, slope.unwrap_or(&self.slope), b, self.i_d)
+        match slope {
+            Some(slope) => Self::new(table, slope, b.unwrap_or(self.current_saliency), self.i_d),
+            None => Self { table: *table, ..*self },
+        }
     }
 
     /// Angle error, rad, derived from a measured saliency, and share of the proportional gain.
