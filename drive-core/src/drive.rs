@@ -50,9 +50,12 @@ pub use state::{Mode, State};
 /// The drive: coefficients, state, and the references it was given.
 ///
 /// ```
-/// use drive_core::{Command, Drive, Mode, Sample, State, settings::Settings};
+/// use drive_core::settings::{AngleSource, Settings};
+/// use drive_core::{Command, Drive, Mode, Sample, State};
 ///
-/// let mut drive = Drive::new(Settings::default().build()?);
+/// // Without an encoder it would have to learn its motor first.
+/// let settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
+/// let mut drive = Drive::new(settings.build()?);
 /// drive.command(&Command::Start(Mode::Torque))?;
 /// // Codes of zero current and 311 V.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };

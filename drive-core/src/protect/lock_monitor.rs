@@ -327,7 +327,7 @@ mod tests {
         ] {
             let monitor = monitor_of(a);
             let mut state = ready(&monitor);
-            let wrong = seen(0.27 * (1.0 - 2.0 * -a * loss).sqrt(), 0.0);
+            let wrong = seen(0.27 * libm::sqrtf(1.0 - 2.0 * -a * loss), 0.0);
             let tripped =
                 (1..=6000).find(|_| monitor.step(&mut state, &wrong, 1.0, false).is_err());
             match (tripped, periods) {
