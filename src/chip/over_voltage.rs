@@ -25,7 +25,7 @@ pub enum SelfTestError {
     DoesNotTrip,
     /// It trips, but the timer sees no break.
     NoBreak,
-    /// It trips at its own level: the dc link is above it, or its wire is off.
+    /// It trips at its own level: the dc link is above it, its wire is off, or DAC3 gives no level.
     AlwaysTrips,
 }
 
@@ -76,6 +76,8 @@ pub fn watch(
 
     // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it.
     pins::pulled_input(SELECTED.dc_link.pin, Level::High);
+    // An earlier break, of the fault input for example, does not count.
+    pwm.take_break();
     set(0);
     let (trips, broken) = (comparators.c1csr().read().value().bit(), pwm.take_break());
     pins::analog(SELECTED.dc_link.pin);

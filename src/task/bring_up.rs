@@ -87,7 +87,7 @@ impl StartError {
                 "self-test: the over-voltage comparator does not reach the break of TIM1"
             }
             Self::OverVoltage(Protection::AlwaysTrips) => {
-                "self-test: the dc link is above the over-voltage level, or its wire is off"
+                "self-test: the over-voltage comparator trips at its own level: dc link too high, its wire off, or no level"
             }
             Self::Settings => "the design rules refuse the settings",
             Self::Converter(Converter::NoClock) => "the converters have no clock",
