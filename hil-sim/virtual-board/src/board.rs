@@ -86,7 +86,7 @@ impl Board {
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
         let mut cpu =
-            Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
+            Cpu::new(Chip::default(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
             let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;

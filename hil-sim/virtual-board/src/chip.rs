@@ -146,9 +146,9 @@ pub struct Chip {
     pub gates: GateWatch,
 }
 
-impl Chip {
-    /// A chip after power-on, whose flash is erased.
-    pub fn new() -> Self {
+/// A chip after power-on, whose flash is erased.
+impl Default for Chip {
+    fn default() -> Self {
         let (gpio, tim1) = (std::array::from_fn(Gpio::new), Tim1::default());
         let gates = GateWatch::new(&power_stage::REFERENCE, &gpio, &tim1);
         Self {
@@ -179,10 +179,10 @@ impl Chip {
             system_rose: 0,
             analog: [0; 3],
             last_block: None,
-            scs: Scs::new(),
+            scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
             pwr: Pwr::default(),
-            flash: Flash::new(),
+            flash: Flash::default(),
             gpio,
             syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
@@ -198,11 +198,12 @@ impl Chip {
             gates,
         }
     }
+}
 
+impl Chip {
     /// After a reset: registers at their values, flash contents and the world outside as before.
     pub fn reset(&mut self, cause: Reset) {
-        let fresh = Self::new();
-        let old = std::mem::replace(self, fresh);
+        let old = std::mem::take(self);
         self.now = old.now;
         self.accesses = old.accesses;
         self.instructions = old.instructions;
@@ -363,11 +364,5 @@ impl Chip {
         }
         self.update_lines();
         None
-    }
-}
-
-impl Default for Chip {
-    fn default() -> Self {
-        Self::new()
     }
 }

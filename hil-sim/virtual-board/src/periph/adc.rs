@@ -151,13 +151,8 @@ impl Adc {
     }
 
     /// Writes one.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         self.happen(now);
         match offset {
             CCR => self.common = value & 0x01ff_ef1f,

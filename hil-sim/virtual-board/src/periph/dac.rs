@@ -120,9 +120,9 @@ impl Dacs {
         which: usize,
         offset: u32,
         value: u32,
-        now: u64,
         rules: &mut Rules,
     ) -> Option<Effect> {
+        let now = rules.now;
         let Dac { store, channels } = &mut self.0[which];
         let on = |store: &Store, n: usize| store.get(CR) >> (16 * n) & 1 != 0;
         let was = [on(store, 0), on(store, 1)];

@@ -80,9 +80,9 @@ pub struct Flash {
     pub power_lost: bool,
 }
 
-impl Flash {
-    /// Erased.
-    pub fn new() -> Self {
+/// Erased.
+impl Default for Flash {
+    fn default() -> Self {
         let size = (FLASH + FLASH_SIZE - BANK_2) as usize;
         Self {
             store: Store::new(KNOWN),
@@ -100,7 +100,9 @@ impl Flash {
             power_lost: false,
         }
     }
+}
 
+impl Flash {
     /// The same contents after a reset.
     pub fn after_reset(self) -> Self {
         Self {
@@ -108,7 +110,7 @@ impl Flash {
             torn: self.torn,
             operations: self.operations,
             options: self.options,
-            ..Self::new()
+            ..Self::default()
         }
     }
 
@@ -250,13 +252,8 @@ impl Flash {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         let cr = self.store.get(CR);
         match offset {
             KEYR => {
@@ -285,11 +282,5 @@ impl Flash {
             _ => return self.store.write(offset, value),
         }
         Some(if self.power_lost { Effect::Look } else { Effect::None })
-    }
-}
-
-impl Default for Flash {
-    fn default() -> Self {
-        Self::new()
     }
 }

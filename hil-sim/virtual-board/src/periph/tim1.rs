@@ -294,13 +294,8 @@ impl Tim1 {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         let old = self.store.read(offset)?;
         match offset {
             SR => {
