@@ -158,8 +158,8 @@ impl Board {
     }
 
     /// Addresses of the firmware's data; all zero of an image without the table.
-    pub fn addresses(&self) -> &Addresses {
-        self.addresses.as_ref().unwrap_or(&Addresses::NONE)
+    pub fn addresses(&self) -> Addresses {
+        self.addresses.unwrap_or_default()
     }
 
     /// The rules of the chip that the program has broken since power-on, in order.

@@ -32,7 +32,8 @@ const ECCR: u32 = 0x18;
 const OPTR: u32 = 0x20;
 
 const DCEN: u32 = 1 << 10;
-const DBANK: u32 = 1 << 22;
+/// Option: two banks of pages of 2 KiB, or one bank of pages of 4 KiB.
+pub const DBANK: u32 = 1 << 22;
 /// Option bytes from the factory.
 const OPTIONS: u32 = 0xffef_f8aa;
 /// Supply, V, below which the chip is held in reset, by BOR_LEV (datasheet, typical, falling).
@@ -122,11 +123,6 @@ impl Flash {
     /// Supply, V, below which the chip is held in reset.
     pub fn brown_out_v(&self) -> f64 {
         BROWN_OUT[(self.options >> 8 & 7) as usize]
-    }
-
-    /// Makes the flash one bank of pages of 4 KiB, or two banks of pages of 2 KiB.
-    pub fn set_banks(&mut self, two: bool) {
-        self.options = self.options & !DBANK | if two { DBANK } else { 0 };
     }
 
     /// Gives a double word of the second bank a wrong check code.

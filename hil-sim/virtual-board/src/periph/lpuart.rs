@@ -144,11 +144,8 @@ impl Lpuart {
     /// Reads a register, with its side effects.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
-            ISR => Some(
-                self.status
-                    | self.store.get(CR1) << 18 & 1 << 22
-                    | self.store.get(CR1) << 18 & 1 << 21,
-            ),
+            // REACK and TEACK follow RE and TE.
+            ISR => Some(self.status | self.store.get(CR1) << 18 & 3 << 21),
             RDR => {
                 self.status &= !RXNE;
                 Some(u32::from(self.received))
