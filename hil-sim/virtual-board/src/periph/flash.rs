@@ -6,30 +6,24 @@
 
 use std::ops::Range;
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
 use crate::rules::{Rule, Rules};
 
-const KNOWN: &[Plain] = &[
-    (ACR, 0x0004_0600, 0x4_7f0f),
-    (0x04, 0, 0),
-    (KEYR, 0, 0),
-    (0x0c, 0, 0),
-    (SR, 0, 0),
+registers! {
+    ACR = 0x00, 0x0004_0600, 0x4_7f0f;
+    _ = 0x04, 0, 0;
+    KEYR = 0x08, 0, 0;
+    _ = 0x0c, 0, 0;
+    SR = 0x10, 0, 0;
     // OBL_LAUNCH and OPTSTRT need the option bytes unlocked.
-    (CR, 0xc000_0000, 0xf701_8bff),
-    (ECCR, 0, 0),
-    (OPTR, 0, 0),
-    (0x24, 0xffff_0000, 0),
-    (0x2c, 0, 0),
-    (0x30, 0, 0),
-];
-const ACR: u32 = 0x00;
-const KEYR: u32 = 0x08;
-const SR: u32 = 0x10;
-const CR: u32 = 0x14;
-const ECCR: u32 = 0x18;
-const OPTR: u32 = 0x20;
+    CR = 0x14, 0xc000_0000, 0xf701_8bff;
+    ECCR = 0x18, 0, 0;
+    OPTR = 0x20, 0, 0;
+    _ = 0x24, 0xffff_0000, 0;
+    _ = 0x2c, 0, 0;
+    _ = 0x30, 0, 0;
+}
 
 const DCEN: u32 = 1 << 10;
 /// Option: two banks of pages of 2 KiB, or one bank of pages of 4 KiB.
