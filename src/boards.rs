@@ -6,9 +6,10 @@
 
 mod confirm;
 pub mod converter;
-#[cfg(test)]
-mod manual;
+mod morpho;
 pub mod pin;
+#[cfg(test)]
+mod tests;
 
 mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
@@ -83,18 +84,6 @@ pub const fn read<T: Copy>(value: T, document: &'static str) -> Stated<T> {
 /// An assumed value, with the bench step that shows whether it holds.
 pub const fn assumed<T: Copy>(value: T, bench_step: &'static str) -> Stated<T> {
     Stated { value, source: Source::Assumed(bench_step) }
-}
-
-/// A shunt below a low side, with an amplifier that gives `zero_v` without current and `v_per_a` more for each ampere into
-/// the motor, V: assumed.
-const fn shunt(pin: Pin, v_per_a: f32, zero_v: f32) -> Analog {
-    Analog {
-        pin,
-        line: assumed(
-            Line::of_sensor(v_per_a, zero_v, converter::REFERENCE_V, converter::CODES),
-            "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
-        ),
-    }
 }
 
 /// A logic level.

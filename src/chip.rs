@@ -13,3 +13,6 @@ pub mod sleep;
 pub mod stop;
 pub mod time;
 pub mod watchdog;
+
+/// Reason why the drive is not started, in words: for the log and the console.
+pub type StartError = &'static str;

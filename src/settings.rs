@@ -2,9 +2,9 @@
 //! motor. [`keys`] lists them by name.
 
 pub mod keys;
-#[cfg(test)]
-mod manual;
 pub mod staging;
+#[cfg(test)]
+mod tests;
 
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;

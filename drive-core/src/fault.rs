@@ -169,9 +169,7 @@ faults! {
     ConverterOverrun = 23, "a conversion was lost",
         &["a trigger was lost, or a converter stopped"],
         "clear and start again; if it repeats, suspect the chip or its supply";
-    ClockFailure = 24, "the clock failed",
-        &["crystal stopped or disturbed"],
-        "check crystal and supply";
+    // 24 was a failure of the clock, which resets the chip.
     NoSaliency = 25, "too little saliency, or the shaft turns",
         &[
             "the shaft still turned",

@@ -58,8 +58,6 @@ bitflags! {
         const DEADLINE_MISS = 1 << 2;
         /// A conversion was overwritten before it was read, or did not take place.
         const CONVERTER_OVERRUN = 1 << 3;
-        /// The clock has failed over.
-        const CLOCK_FAILURE = 1 << 4;
     }
 }
 

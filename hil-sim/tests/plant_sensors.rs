@@ -209,8 +209,8 @@ fn the_other_channels() {
     assert_eq!((plant.sample().dc_link, plant.sample().heat_sink), (4095, 77));
     assert!(plant.set_dc_link(f64::NAN).is_err() && plant.dc_link() == 500.0);
     plant.report(Hardware::BREAK);
-    plant.report(Hardware::CLOCK_FAILURE);
-    assert_eq!(plant.sample().hardware, Hardware::BREAK.union(Hardware::CLOCK_FAILURE));
+    plant.report(Hardware::DEADLINE_MISS);
+    assert_eq!(plant.sample().hardware, Hardware::BREAK.union(Hardware::DEADLINE_MISS));
     assert_eq!(plant.sample().hardware, Hardware::empty(), "reported once");
 }
 

@@ -1,58 +1,51 @@
 //! The inverter of the dissertation on ST's morpho motor-control pins.
 
-use drive_core::settings::{Line, Ntc};
+use drive_core::settings::Line;
 
 use super::converter::calibrated;
-use super::pin::{pa, pb, pc};
-use super::{Analog, Board, Currents, FaultInput, Gates, Level, assumed, read};
+use super::{Analog, Board, Currents, Gates, Level, assumed, morpho, read};
 
 /// The board.
 pub const BOARD: Board = Board {
     name: "reference",
     title: "NUCLEO-G474RE with the inverter and the current sensors of the dissertation",
     high: Gates {
-        pins: [pa(8), pa(9), pa(10)],
+        pins: morpho::HIGH,
         on_at: assumed(
             Level::High,
             "power stage off: pull each high-side input up; its gate must go on",
         ),
     },
     low: Gates {
-        pins: [pa(7), pb(0), pb(1)],
+        pins: morpho::LOW,
         on_at: assumed(
             Level::High,
             "power stage off: pull each low-side input up; its gate must go on",
         ),
     },
-    fault: FaultInput {
-        pin: pa(6),
-        trips_at: assumed(Level::Low, "ground the fault input: `status` must show the break"),
-    },
+    fault: morpho::fault("ground the fault input: `status` must show the break"),
     // Both switches of a leg are off for this long at every change.
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
     // The needs of fast and slow power modules.
     dead_time_range_s: (0.5e-6, 6e-6),
     currents: Currents::InLine([
         Analog {
-            pin: pa(0),
+            pin: morpho::CURRENTS[0],
             line: read(calibrated(Line::CHANNEL_A), "dissertation, Eq. 3.5 and 3.4"),
         },
         Analog {
-            pin: pc(1),
+            pin: morpho::CURRENTS[1],
             line: read(calibrated(Line::CHANNEL_B), "dissertation, Eq. 3.5 and 3.4"),
         },
     ]),
     current_delay_s: read(30e-6, "dissertation, Figure 16: a filter of 5305 Hz"),
-    dc_link: Analog {
-        pin: pa(1),
-        // A divider by 136.5, so that 450 V are full scale. The dissertation does not describe its own.
-        line: assumed(
-            Line { gain: 0.11, offset: 0.0 },
-            "10 V at the dc link: `status` must show them within 3 %; otherwise set scales.dc_link.gain",
-        ),
-    },
-    heat_sink: pc(2),
-    ntc: assumed(Ntc::DEFAULT, "room temperature: `status` must show it within 5 degC"),
+    // A divider by 136.5, so that 450 V are full scale. The dissertation does not describe its own.
+    dc_link: morpho::dc_link(
+        0.11,
+        "10 V at the dc link: `status` must show them within 3 %; otherwise set scales.dc_link.gain",
+    ),
+    heat_sink: morpho::HEAT_SINK,
+    ntc: morpho::NTC,
     dc_link_v: 311.0,
     highest_dc_link_v: assumed(450.0, "the voltage of the capacitors and of the switches"),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",

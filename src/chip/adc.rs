@@ -7,20 +7,9 @@ use stm32g4xx_hal::pac::adc1::RegisterBlock;
 use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
-use super::pins;
+use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
-
-/// A step that a converter did not finish in time, or could not begin.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum AdcError {
-    /// It has no clock, or not the one that was chosen.
-    NoClock,
-    /// Its calibration.
-    Calibration,
-    /// Its start.
-    Enabling,
-}
 
 /// Codes of one period.
 #[derive(Clone, Copy)]
@@ -65,7 +54,7 @@ impl Adc {
         common: &pac::ADC12_COMMON,
         rcc: &mut Rcc,
         protection: &board::Protection,
-    ) -> Result<Self, AdcError> {
+    ) -> Result<Self, StartError> {
         let [a, b] = SELECTED.currents.a_and_b();
         let c = SELECTED.currents.c();
         let (dc_link, heat_sink) = (SELECTED.dc_link.pin, SELECTED.heat_sink);
@@ -74,12 +63,12 @@ impl Adc {
         }
 
         if !clock_on!(rcc.ahb2enr(), adc12en) {
-            return Err(AdcError::NoClock);
+            return Err("the converters have no clock");
         }
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4());
         if !common.ccr().read().ckmode().is_sync_div4() {
-            return Err(AdcError::NoClock);
+            return Err("the converters have no clock");
         }
         // `boards` has checked that each pin reaches its converter. Channel 0 is not one of them.
         let channels = |first: Option<u8>, slow: Option<u8>| {
@@ -137,13 +126,13 @@ fn prepare(
     adc: &RegisterBlock,
     [current, third, slow]: [u8; 3],
     (low, high): (u16, u16),
-) -> Result<(), AdcError> {
+) -> Result<(), StartError> {
     adc.cr().modify(|_, w| w.deeppwd().disabled());
     adc.cr().modify(|_, w| w.advregen().enabled());
     asm::delay(board::ADC_REGULATOR_START_US * board::CYCLES_PER_US);
 
     adc.cr().modify(|_, w| w.adcaldif().single_ended().adcal().start_calibration());
-    wait_for(|| !adc.cr().read().adcal().bit()).ok_or(AdcError::Calibration)?;
+    wait_for(|| !adc.cr().read().adcal().bit()).ok_or("a converter does not calibrate")?;
     // At least four converter clocks between the calibration and the next step.
     asm::delay(8 * board::ADC_CLOCK_DIVIDER);
 
@@ -153,7 +142,7 @@ fn prepare(
         adc.cr().modify(|_, w| w.aden().enabled());
         adc.isr().read().adrdy().bit()
     })
-    .ok_or(AdcError::Enabling)?;
+    .ok_or("a converter does not start")?;
 
     let times = [
         (current, board::CURRENT_SAMPLING),
@@ -168,7 +157,7 @@ fn prepare(
     // SAFETY: five bits, an existing channel; a sequence of one.
     adc.sqr1().write(|w| unsafe { w.sq1().bits(current) });
     adc.cr().modify(|_, w| w.adstart().start_conversion());
-    wait_for(|| adc.isr().read().eoc().bit()).ok_or(AdcError::Enabling)?;
+    wait_for(|| adc.isr().read().eoc().bit()).ok_or("a converter does not start")?;
     adc.isr().write(|w| w.eosmp().clear().eoc().clear().eos().clear());
 
     // The analog watchdog interrupts at the first code outside the window.

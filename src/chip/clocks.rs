@@ -8,6 +8,7 @@ use stm32g4xx_hal::rcc::{
 };
 use stm32g4xx_hal::time::RateExtU32;
 
+use super::StartError;
 use induction_drive::board;
 
 /// Source of the core's clock.
@@ -44,25 +45,12 @@ macro_rules! clock_on {
 }
 pub(crate) use clock_on;
 
-/// A condition of the supply or of the clock that does not read back as it was set.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum ClockError {
-    /// The power controller has no clock: its registers do not take what is written.
-    PowerController,
-    /// The core voltage is not boosted, which more than 150 MHz need (RM0440, dynamic voltage scaling).
-    Boost,
-    /// The supply monitor is off, or at another level.
-    SupplyMonitor,
-    /// The flash has fewer wait states than 170 MHz need.
-    WaitStates,
-}
-
 /// Brings core, buses and timers to [`board::CLOCK_HZ`], and reads back the conditions for it.
 pub fn start(
     rcc: pac::RCC,
     pwr: pac::PWR,
     flash: &pac::FLASH,
-) -> (Rcc, Source, Result<(), ClockError>) {
+) -> (Rcc, Source, Result<(), StartError>) {
     let rcc = rcc.constrain();
     // Off after reset, and the HAL leaves it off: without it no write below has an effect.
     let powered = clock_on!(rcc.apb1enr1(), pwren);
@@ -92,24 +80,25 @@ pub fn start(
         // A crystal that stops raises the NMI, and TIM1's break with it.
         rcc.cr().modify(|_, w| w.csson().on());
     }
-    let checked = if powered { read_back(flash) } else { Err(ClockError::PowerController) };
+    let checked =
+        if powered { read_back(flash) } else { Err("the power controller takes no writes") };
     (rcc, source, checked)
 }
 
 /// Reads back the conditions under which the core may run at [`board::CLOCK_HZ`].
-fn read_back(flash: &pac::FLASH) -> Result<(), ClockError> {
+fn read_back(flash: &pac::FLASH) -> Result<(), StartError> {
     // SAFETY: only reads; the HAL has taken the owner of the registers.
     let pwr = unsafe { &*pac::PWR::ptr() };
     // R1MODE clear means boosted; VOSF is set while the voltage is still changing.
     if pwr.cr5().read().r1mode().bit() || pwr.sr2().read().vosf().bit() {
-        return Err(ClockError::Boost);
+        return Err("the core voltage is not boosted, which 170 MHz need");
     }
     let monitor = pwr.cr2().read();
     if !monitor.pvde().bit() || monitor.pvdls().bits() != board::SUPPLY_LEVEL {
-        return Err(ClockError::SupplyMonitor);
+        return Err("the supply monitor does not read back");
     }
     if flash.acr().read().latency().bits() < board::WAIT_STATES {
-        return Err(ClockError::WaitStates);
+        return Err("too few wait states of the flash");
     }
     Ok(())
 }

@@ -9,25 +9,10 @@ use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
-use super::pins;
 use super::pwm::Pwm;
+use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::{Level, SELECTED};
-
-/// Reason why the protection is not trusted.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum SelfTestError {
-    /// DAC3 or the comparator has no clock.
-    NoClock,
-    /// DAC3 is not ready.
-    LevelNotReady,
-    /// The comparator does not trip at the level zero.
-    DoesNotTrip,
-    /// It trips, but the timer sees no break.
-    NoBreak,
-    /// It trips at its own level: the dc link is above it, or its wire is off.
-    AlwaysTrips,
-}
 
 /// Starts the comparator, proves that it pulls the break of the timer at the level zero and does not at the converter
 /// code `level`, and locks it there until the next reset. The outputs are off.
@@ -40,10 +25,10 @@ pub fn watch(
     rcc: &mut Rcc,
     pwm: &mut Pwm,
     level: u16,
-) -> Result<(), SelfTestError> {
+) -> Result<(), StartError> {
     let clocked = clock_on!(rcc.ahb2enr(), dac3en) && clock_on!(rcc.apb2enr(), syscfgen);
     if !clocked {
-        return Err(SelfTestError::NoClock);
+        return Err("self-test: DAC3 or COMP1 has no clock");
     }
     let set = |code: u16| {
         dac.dhr12r1().write(|w| w.daccdhr().set(code));
@@ -60,7 +45,7 @@ pub fn watch(
     dac.cr().modify(|_, w| w.en1().set_bit());
     asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
     if !dac.sr().read().dac1rdy().bit() {
-        return Err(SelfTestError::LevelNotReady);
+        return Err("self-test: DAC3 is not ready");
     }
 
     comparators.c1csr().write(|w| {
@@ -76,6 +61,8 @@ pub fn watch(
 
     // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it.
     pins::pulled_input(SELECTED.dc_link.pin, Level::High);
+    // An earlier break, of the fault input for example, does not count.
+    pwm.take_break();
     set(0);
     let (trips, broken) = (comparators.c1csr().read().value().bit(), pwm.take_break());
     pins::analog(SELECTED.dc_link.pin);
@@ -85,11 +72,13 @@ pub fn watch(
     let trips_again = comparators.c1csr().read().value().bit();
     comparators.c1csr().modify(|_, w| w.lock().set_bit());
     if !trips {
-        Err(SelfTestError::DoesNotTrip)
+        Err("self-test: the over-voltage comparator does not trip at the level zero")
     } else if !broken {
-        Err(SelfTestError::NoBreak)
+        Err("self-test: the over-voltage comparator does not reach the break of TIM1")
     } else if trips_again {
-        Err(SelfTestError::AlwaysTrips)
+        Err(
+            "self-test: the over-voltage comparator trips at its own level: dc link too high, its wire off, or no level",
+        )
     } else {
         Ok(())
     }

@@ -11,25 +11,12 @@ use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
-use super::pins;
+use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::{Level, SELECTED, pin};
 
 /// UIF, BIF and SBIF of TIM1_SR.
 const EVENTS: u32 = 1 | 1 << 7 | 1 << 13;
-
-/// Reason why the timer was not set up or started.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum PwmError {
-    /// It has no clock.
-    NoClock,
-    /// The address of its break register is not [`board::TIM1_BDTR`], which the fault handler writes.
-    WrongAddress,
-    /// It does not take over its compare values where all low sides are on, or does not run.
-    NotInStep,
-    /// Dead time, polarities, break or lock do not read back as they were written.
-    NotLocked,
-}
 
 /// Events of the timer.
 #[derive(Clone, Copy)]
@@ -51,19 +38,20 @@ impl Pwm {
     /// Sets up the timer, with all six switches off and the counter at rest, and connects it with the pins of the board.
     ///
     /// # Errors
-    /// Any [`PwmError`] but [`PwmError::NotInStep`].
+    /// It has no clock; dead time, polarity, break or lock do not read back as they were written; the address of its break
+    /// register is not [`board::TIM1_BDTR`], which the fault handler writes.
     pub fn new(
         timer: pac::TIM1,
         rcc: &mut Rcc,
         debug: &pac::DBGMCU,
         system: &pac::SYSCFG,
         dead_time_code: u8,
-    ) -> Result<Self, PwmError> {
+    ) -> Result<Self, StartError> {
         if timer.bdtr().as_ptr() as u32 != board::TIM1_BDTR {
-            return Err(PwmError::WrongAddress);
+            return Err("TIM1 is not where the fault handler expects it");
         }
         if !clock_on!(rcc.apb2enr(), tim1en) {
-            return Err(PwmError::NoClock);
+            return Err("TIM1 has no clock");
         }
         // Halted by a debugger, the counter stops and the outputs go off. The watchdog runs on and resets the chip, so they
         // do not come back with the core.
@@ -108,7 +96,7 @@ impl Pwm {
         // To the break as well, until the next reset: lock-up of the core, supply voltage, and errors of the flash that
         // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.)
         if !clock_on!(rcc.apb2enr(), syscfgen) {
-            return Err(PwmError::NoClock);
+            return Err("TIM1 has no clock");
         }
         system.cfgr2().modify(|_, w| w.cll().set_bit().pvdl().set_bit().eccl().set_bit());
 
@@ -136,7 +124,7 @@ impl Pwm {
             || locked.aoe().bit()
             || locked.bkf().bits() != board::BREAK_FILTER
         {
-            return Err(PwmError::NotLocked);
+            return Err("dead time, polarity, break or lock of TIM1 do not read back");
         }
 
         // Load all of it. The repetition counter is loaded with 0 first, so that the first update
@@ -178,19 +166,19 @@ impl Pwm {
     /// Starts the counter and checks that the compare values are taken over at the top.
     ///
     /// # Errors
-    /// [`PwmError::NotInStep`].
-    pub fn start(&mut self) -> Result<(), PwmError> {
+    /// It does not run, or takes them over elsewhere.
+    pub fn start(&mut self) -> Result<(), StartError> {
         self.timer.sr().write(|w| w.uif().clear().bif().clear());
         self.timer.cr1().modify(|_, w| w.cen().enabled());
         // The first update comes half a period later; a whole period is time enough.
         for _ in 0..2 * u32::from(board::PWM_TOP) / 16 {
             if self.updated() {
                 let near_the_top = self.timer.cnt().read().cnt().bits() > board::PWM_TOP / 2;
-                return if near_the_top { Ok(()) } else { Err(PwmError::NotInStep) };
+                return if near_the_top { Ok(()) } else { Err("TIM1 does not run in step") };
             }
             asm::delay(16);
         }
-        Err(PwmError::NotInStep)
+        Err("TIM1 does not run in step")
     }
 
     /// Applies the output of the drive: compare values for the next period, outputs on or off now.

@@ -52,46 +52,31 @@ impl Console {
     /// Writes the next line of the list, or `ok` behind the last; nothing if the list has to wait.
     pub(super) fn next_of_list(&mut self, drive: &impl DriveHandle) {
         let Some(List { kind, next }) = self.list else { return };
-        let out = &mut self.out;
         let line = usize::from(next);
+        let settings = self.settings.in_force();
+        // The last result if it is not believable, else the one in use.
+        let learned = self.unbelievable.as_ref().or(settings.learned.as_ref());
+        let believable = self.unbelievable.is_none();
+        let out = &mut self.out;
+        let mut say = |text: &dyn fmt::Display, next| {
+            out.line(format_args!("{text}"));
+            next
+        };
         let written = match kind {
-            ListKind::Help => HELP.get(line).map(|text| {
-                out.line(format_args!("{text}"));
-                next + 1
-            }),
-            ListKind::Settings(prefix) => setting_from(line, prefix).map(|(key, after)| {
-                let setting = Setting::new(key, &self.settings);
-                out.line(format_args!("{setting}"));
-                after
-            }),
-            ListKind::Describe(prefix) => setting_from(line, prefix).map(|(key, after)| {
-                let description = Description::new(key, &self.settings);
-                out.line(format_args!("{description}"));
-                after
-            }),
+            ListKind::Help => HELP.get(line).map(|text| say(text, next + 1)),
+            ListKind::Settings(prefix) => setting_from(line, prefix)
+                .map(|(key, next)| say(&Setting::new(key, &self.settings), next)),
+            ListKind::Describe(prefix) => setting_from(line, prefix)
+                .map(|(key, next)| say(&Description::new(key, &self.settings), next)),
             ListKind::Backup => self.backup(line),
             ListKind::Board => {
-                let confirmed = self.settings.in_force().board_is_confirmed();
-                reply::board(self.settings.in_force().board, confirmed, line).map(|text| {
-                    out.line(format_args!("{text}"));
-                    next + 1
-                })
+                let confirmed = settings.board_is_confirmed();
+                reply::board(settings.board, confirmed, line).map(|text| say(&text, next + 1))
             }
-            ListKind::Fault(fault) => reply::fault(fault, line).map(|text| {
-                out.line(format_args!("{text}"));
-                next + 1
-            }),
-            ListKind::Learned => {
-                // The last result if it is not believable, else the one in use.
-                let result =
-                    self.unbelievable.as_ref().or(self.settings.in_force().learned.as_ref());
-                let believable = self.unbelievable.is_none();
-                let text = result.and_then(|result| reply::learned(result, believable, next));
-                text.map(|text| {
-                    out.line(format_args!("{text}"));
-                    next + 1
-                })
-            }
+            ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
+            ListKind::Learned => learned
+                .and_then(|result| reply::learned(result, believable, next))
+                .map(|text| say(&text, next + 1)),
             ListKind::Trace if drive.tracing() => return,
             ListKind::Trace => self.trace_line(next, drive),
         };

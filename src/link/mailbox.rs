@@ -60,11 +60,6 @@ impl<T> Sender<'_, T> {
 }
 
 impl<T> Receiver<'_, T> {
-    /// Whether there is a message.
-    pub fn is_waiting(&self) -> bool {
-        self.0.full.load(Ordering::Acquire)
-    }
-
     /// Passes the message to `with`, if there is one, then empties the mailbox.
     pub fn take_with<R>(&mut self, with: impl FnOnce(&T) -> R) -> Option<R> {
         if !self.0.full.load(Ordering::Acquire) {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::hash;
 
-/// Reasons to stop. The numbers follow those of the drive's faults; 70 to 73 are those of rejected settings (see
+/// Reasons to stop. The numbers follow those of the drive's faults; 70 to 73 and 76 are those of rejected settings (see
 /// `store/codec.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -28,7 +28,8 @@ pub enum Reason {
 }
 
 impl Reason {
-    const ALL: [Self; 8] = [
+    /// All reasons.
+    pub const ALL: [Self; 8] = [
         Self::Panic,
         Self::HardFault,
         Self::NonMaskable,

@@ -113,16 +113,16 @@ pub fn find_id(id: u32) -> Option<Key> {
 
 /// The same expression for either kind of entry, with the settings that it belongs to.
 macro_rules! with {
-    ($key:expr, $settings:expr, |$entry:ident, $s:ident| $result:expr) => {
+    ($key:expr, |$entry:ident| $result:expr) => {
         match $key {
-            Key::Drive($entry) => {
-                let $s = &$settings.drive;
-                $result
-            }
-            Key::Own($entry) => {
-                let $s = $settings;
-                $result
-            }
+            Key::Drive($entry) => $result,
+            Key::Own($entry) => $result,
+        }
+    };
+    ($key:expr, $settings:expr, |$entry:ident, $s:ident| $result:expr) => {
+        match ($key, $settings) {
+            (Key::Drive($entry), FirmwareSettings { drive: $s, .. }) => $result,
+            (Key::Own($entry), $s) => $result,
         }
     };
 }
@@ -142,58 +142,37 @@ impl fmt::Debug for Key {
 impl Key {
     /// Name at the console and, hashed, in the flash.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Drive(entry) => entry.name,
-            Self::Own(entry) => entry.name,
-        }
+        with!(self, |entry| entry.name)
     }
 
     /// Unit; empty if there is none.
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Drive(entry) => entry.unit,
-            Self::Own(entry) => entry.unit,
-        }
+        with!(self, |entry| entry.unit)
     }
 
     /// Meaning, one sentence without its full stop.
     pub fn help(self) -> &'static str {
-        match self {
-            Self::Drive(entry) => entry.help,
-            Self::Own(entry) => entry.help,
-        }
+        with!(self, |entry| entry.help)
     }
 
     /// Who may change it, and when.
     pub fn change(self) -> Change {
-        match self {
-            Self::Drive(entry) => entry.change,
-            Self::Own(entry) => entry.change,
-        }
+        with!(self, |entry| entry.change)
     }
 
     /// Whether learned values hold for this value only.
     pub fn learned(self) -> bool {
-        match self {
-            Self::Drive(entry) => entry.learned,
-            Self::Own(entry) => entry.learned,
-        }
+        with!(self, |entry| entry.learned)
     }
 
     /// The words that may be set; none for a number.
     pub fn words(self) -> &'static [&'static str] {
-        match self {
-            Self::Drive(entry) => entry.words(),
-            Self::Own(entry) => entry.words(),
-        }
+        with!(self, |entry| entry.words())
     }
 
     /// Whether the setting follows a rule unless it is set.
     pub fn has_rule(self) -> bool {
-        match self {
-            Self::Drive(entry) => entry.has_rule(),
-            Self::Own(entry) => entry.has_rule(),
-        }
+        with!(self, |entry| entry.has_rule())
     }
 
     /// The value.
@@ -227,18 +206,12 @@ impl Key {
     /// # Errors
     /// The text is not a value of this setting.
     pub fn parse(self, text: &str) -> Result<Value, ValueError> {
-        match self {
-            Self::Drive(entry) => entry.parse(text),
-            Self::Own(entry) => entry.parse(text),
-        }
+        with!(self, |entry| entry.parse(text))
     }
 
     /// Sets a value from this key's [`parse`](Self::parse); a value of another type changes nothing.
     pub fn set(self, settings: &mut FirmwareSettings, value: Value) {
-        match self {
-            Self::Drive(entry) => entry.set(&mut settings.drive, value),
-            Self::Own(entry) => entry.set(settings, value),
-        }
+        with!(self, settings, |entry, s| entry.set(s, value))
     }
 
     /// The id of the setting in the flash: the hash of its name.

@@ -73,7 +73,7 @@ impl Rejected {
             Self::Newer(_) => 71,
             Self::Value(_) => 72,
             Self::Refused => 73,
-            Self::Board(_) => 74,
+            Self::Board(_) => 76,
         }
     }
 }

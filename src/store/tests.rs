@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::learned as learned_words;
 use super::*;
+use crate::monitor::record::Reason;
 use crate::settings::keys;
 
 mod older;
@@ -293,8 +294,11 @@ fn resealed(mut record: [u64; codec::WORDS]) -> [u64; codec::WORDS] {
 
 #[test]
 fn numbers_of_settings_follow_those_of_the_records() {
-    let all = [Rejected::Broken, Rejected::Newer(2), Rejected::Value("x"), Rejected::Refused];
-    assert_eq!(all.map(Rejected::code), [70, 71, 72, 73]);
+    let (newer, value) = (Rejected::Newer(2), Rejected::Value("x"));
+    let all = [Rejected::Broken, newer, value, Rejected::Refused, Rejected::Board("x")];
+    let codes = all.map(Rejected::code);
+    assert_eq!(codes, [70, 71, 72, 73, 76]);
+    assert!(Reason::ALL.iter().all(|reason| !codes.contains(&(*reason as u8))));
     assert!(all.iter().all(|why| why.to_string().starts_with("7")));
 }
 

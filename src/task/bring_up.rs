@@ -10,6 +10,7 @@ use heapless::spsc::Queue;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
 
+use crate::chip::StartError;
 use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
@@ -38,81 +39,18 @@ pub struct Board {
     pub supervisor: Supervisor,
 }
 
-/// Reason why the drive was not started.
-#[derive(Clone, Copy)]
-pub enum StartError {
-    /// The firmware started twice.
-    Twice,
-    /// The flash is set to one bank: a save would stop the control interrupt.
-    OneBank,
-    /// Supply or clock are not as they were set.
-    Clock(clocks::ClockError),
-    /// TIM2 or TIM5 has no clock.
-    NoTimer,
-    /// The over-voltage protection does not work.
-    OverVoltage(over_voltage::SelfTestError),
-    /// The design rules refuse the settings.
-    Settings,
-    /// A converter does not respond.
-    Converter(adc::AdcError),
-    /// Too many consecutive unintended resets; a power cycle or the reset pin tries again.
-    Resets,
-    /// The timer of the power stage does not work.
-    Timer(pwm::PwmError),
-    /// The control interrupt does not come at its rate: the timer does not trigger the converters.
-    Interrupt,
-}
-
-impl StartError {
-    /// The reason in words.
-    const fn text(self) -> &'static str {
-        use adc::AdcError as Converter;
-        use clocks::ClockError as Clock;
-        use over_voltage::SelfTestError as Protection;
-        use pwm::PwmError as Timer;
-        match self {
-            Self::Twice => "started twice",
-            Self::OneBank => "option bytes: the flash has one bank; set DBANK to 1",
-            Self::Clock(Clock::PowerController) => "the power controller takes no writes",
-            Self::Clock(Clock::Boost) => "the core voltage is not boosted, which 170 MHz need",
-            Self::Clock(Clock::SupplyMonitor) => "the supply monitor does not read back",
-            Self::Clock(Clock::WaitStates) => "too few wait states of the flash",
-            Self::NoTimer => "a timer has no clock",
-            Self::OverVoltage(Protection::NoClock) => "self-test: DAC3 or COMP1 has no clock",
-            Self::OverVoltage(Protection::LevelNotReady) => "self-test: DAC3 is not ready",
-            Self::OverVoltage(Protection::DoesNotTrip) => {
-                "self-test: the over-voltage comparator does not trip at the level zero"
-            }
-            Self::OverVoltage(Protection::NoBreak) => {
-                "self-test: the over-voltage comparator does not reach the break of TIM1"
-            }
-            Self::OverVoltage(Protection::AlwaysTrips) => {
-                "self-test: the dc link is above the over-voltage level, or its wire is off"
-            }
-            Self::Settings => "the design rules refuse the settings",
-            Self::Converter(Converter::NoClock) => "the converters have no clock",
-            Self::Converter(Converter::Calibration) => "a converter does not calibrate",
-            Self::Converter(Converter::Enabling) => "a converter does not start",
-            Self::Resets => "too many unintended resets; switch the supply off and on",
-            Self::Timer(Timer::WrongAddress) => "TIM1 is not where the fault handler expects it",
-            Self::Timer(Timer::NoClock) => "TIM1 has no clock",
-            Self::Timer(Timer::NotInStep) => "TIM1 does not run in step",
-            Self::Timer(Timer::NotLocked) => {
-                "dead time, polarity, break or lock of TIM1 do not read back"
-            }
-            Self::Interrupt => "the control interrupt does not come at its rate",
-        }
-    }
-}
+const TWICE: StartError = "started twice";
+/// Another bank than the one with the code is written while the control runs.
+const ONE_BANK: StartError = "option bytes: the flash has one bank; set DBANK to 1";
 
 /// Sets everything up and starts the control interrupt. If the drive cannot be started, the outputs stay off, the log
 /// states the reason, and the console answers that the control does not run.
 ///
 /// # Errors
-/// [`StartError::Twice`] on a second call.
+/// On a second call.
 pub fn bring_up() -> Result<Board, StartError> {
-    let mut core = cortex_m::Peripherals::take().ok_or(StartError::Twice)?;
-    let chip = pac::Peripherals::take().ok_or(StartError::Twice)?;
+    let mut core = cortex_m::Peripherals::take().ok_or(TWICE)?;
+    let chip = pac::Peripherals::take().ok_or(TWICE)?;
     let (cause, record, resets) = last_run(&chip.RCC);
     let options = chip.FLASH.optr().read();
     let (options, dual_bank) = (options.bits(), options.dbank().is_dual_bank_mode());
@@ -146,34 +84,32 @@ pub fn bring_up() -> Result<Board, StartError> {
     let _ = chip.GPIOC.split(&mut rcc);
     // First, because the drivers are switched off from here on.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
-    let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc)
-        .ok_or(StartError::Twice)?;
+    let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc).ok_or(TWICE)?;
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     let link = || -> Result<ControlLink, StartError> {
-        let mut pwm = pwm.map_err(StartError::Timer)?;
-        clocked.map_err(StartError::Clock)?;
+        let mut pwm = pwm?;
+        clocked?;
         if !dual_bank {
-            return Err(StartError::OneBank);
+            return Err(ONE_BANK);
         }
-        let encoder = encoder.filter(|_| timed).ok_or(StartError::NoTimer)?;
+        let encoder = encoder.filter(|_| timed).ok_or("a timer has no clock")?;
         let coefficients = start.build(dead_time_s);
         // After the design, which may have replaced refused settings by the defaults.
         let protection = board::protection(SELECTED, &start.settings.drive);
-        over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)
-            .map_err(StartError::OverVoltage)?;
+        over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
         let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
-        start_control(coefficients, pwm, adc.map_err(StartError::Converter)?, encoder, resets)
+        start_control(coefficients, pwm, adc?, encoder, resets)
     }();
     if let Err(error) = &link {
-        defmt::error!("the drive is not started, outputs stay off: {=str}", error.text());
+        defmt::error!("the drive is not started, outputs stay off: {=str}", error);
     }
     // Only with a running control: without it the outputs stay off.
     let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
     let Start { saved, settings, rejected } = start;
-    let tracking = singleton!(: Option<Tracking> = None).ok_or(StartError::Twice)?;
+    let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
     *tracking = Tracking::new(&settings.drive);
-    let not_started = link.as_ref().err().map(|error| error.text());
+    let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
     let supervisor = Supervisor::new(link.ok(), watchdog, chip, tracking, &settings.drive);
@@ -275,31 +211,28 @@ fn start_control(
     resets: u32,
 ) -> Result<ControlLink, StartError> {
     if resets > board::MOST_RESETS {
-        return Err(StartError::Resets);
+        return Err("too many unintended resets; switch the supply off and on");
     }
     let coefficients = coefficients.map_err(|error| {
         defmt::error!("settings: {}", defmt::Display2Format(&error));
-        StartError::Settings
+        "the design rules refuse the settings"
     })?;
-    let status =
-        singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(StartError::Twice)?;
-    let commands =
-        singleton!(: Mailbox<Command> = Mailbox::new(Command::Stop)).ok_or(StartError::Twice)?;
-    let answers = singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Accepted::AsGiven)))
-        .ok_or(StartError::Twice)?;
-    let learned =
-        singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(StartError::Twice)?;
+    let status = singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(TWICE)?;
+    let commands = singleton!(: Mailbox<Command> = Mailbox::new(Command::Stop)).ok_or(TWICE)?;
+    let answers =
+        singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Accepted::AsGiven))).ok_or(TWICE)?;
+    let learned = singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(TWICE)?;
     // Named, so that `cargo xtask size` can tell it from the rest.
     static TRACE_MEMORY: Trace<{ board::TRACE_RECORDS }> = Trace::new();
     let (send_status, status) = status.split();
     let (commands, receive_commands) = commands.split();
     let (send_answers, answers) = answers.split();
     let (send_learned, learned) = learned.split();
-    let (recorder, trace) = TRACE_MEMORY.take().ok_or(StartError::Twice)?;
+    let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
     let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
-    let (send_observations, observations) = observations.ok_or(StartError::Twice)?.split();
+    let (send_observations, observations) = observations.ok_or(TWICE)?.split();
 
-    pwm.start().map_err(StartError::Timer)?;
+    pwm.start()?;
     let drive = Drive::new(coefficients);
     control::Control {
         drive,
@@ -315,7 +248,7 @@ fn start_control(
     }
     .run();
     if !comes_at_its_rate() {
-        return Err(StartError::Interrupt);
+        return Err("the control interrupt does not come at its rate");
     }
     Ok(ControlLink { status, commands, answers, learned, trace, observations })
 }

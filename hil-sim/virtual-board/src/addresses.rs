@@ -12,7 +12,7 @@ const SYMBOL: &str = "INDUCTION_DRIVE_ADDRESSES";
 const VERSION: u32 = 1;
 
 /// The table.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Addresses {
     /// All data of the control interrupt.
     pub control: Region,
@@ -39,44 +39,21 @@ pub struct Addresses {
 }
 
 impl Addresses {
-    /// No table.
-    pub const NONE: Self = {
-        let none = Region { address: 0, size: 0 };
-        Self {
-            control: none,
-            coefficients: none,
-            state: none,
-            orders: 0,
-            order_waits: 0,
-            angle_source: 0,
-            phi: 0,
-            rotor_freq: [0; 2],
-            reference_q: 0,
-            current_q: 0,
-            dc_link: 0,
-        }
-    };
-
     /// The table of an image that has one.
     ///
     /// # Errors
     /// It is of another version.
     pub fn find(image: &Image) -> Result<Option<Self>> {
-        image.symbol(SYMBOL).is_ok().then(|| Self::new(image)).transpose()
-    }
-
-    /// The table of an image.
-    ///
-    /// # Errors
-    /// The image has none, or one of another version.
-    pub fn new(image: &Image) -> Result<Self> {
+        if image.symbol(SYMBOL).is_err() {
+            return Ok(None);
+        }
         let words = image.contents(SYMBOL)?;
         if words.first() != Some(&VERSION) {
             bail!("{SYMBOL} has version {:?}, not {VERSION}", words.first());
         }
         let table: [u32; 16] = words.try_into().ok().context("a table of another size")?;
         let region = |at: usize| Region { address: table[at], size: table[at + 1] };
-        Ok(Self {
+        Ok(Some(Self {
             control: region(1),
             coefficients: region(3),
             state: region(5),
@@ -88,6 +65,6 @@ impl Addresses {
             reference_q: table[13],
             current_q: table[14],
             dc_link: table[15],
-        })
+        }))
     }
 }

@@ -86,7 +86,7 @@ impl Board {
     pub fn new(image: Image, options: Options) -> Result<Self> {
         let plant = Plant::new(&options.plant, options.seed).map_err(|e| anyhow!("{e}"))?;
         let mut cpu =
-            Cpu::new(Chip::new(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
+            Cpu::new(Chip::default(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
             let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;
@@ -158,8 +158,8 @@ impl Board {
     }
 
     /// Addresses of the firmware's data; all zero of an image without the table.
-    pub fn addresses(&self) -> &Addresses {
-        self.addresses.as_ref().unwrap_or(&Addresses::NONE)
+    pub fn addresses(&self) -> Addresses {
+        self.addresses.unwrap_or_default()
     }
 
     /// The rules of the chip that the program has broken since power-on, in order.

@@ -126,7 +126,7 @@ fn add(tally: &mut Tally, class: &Class, seed: u64, outcome: Result<Outcome>) {
     tally.worst_wrong_ms = tally.worst_wrong_ms.max(outcome.wrong_ms);
     tally.peak_a = tally.peak_a.max(outcome.peak_a);
     // Over-current is judged in every class.
-    let bound = if class.bound_ms.is_finite() { class.bound_ms } else { 0.0 };
+    let bound = if class.bound.0.is_finite() { class.bound.0 } else { 0.0 };
     if outcome.wrong_ms > bound {
         let why = format!("wrong for {:.2} ms: {outcome:?}", outcome.wrong_ms);
         tally.failures.push((seed, why));
@@ -144,7 +144,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
             let what = inject(&mut scene.board, &scene.target, &mut rng);
-            let (promised, bound) = (class.bound_ms.is_finite(), class.bound_ms);
+            let (promised, bound) = (class.bound.0.is_finite(), class.bound.0);
             let trip_a = scene.target.settings.trip_a().into();
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
             let mut outcome = judge::watch(&mut scene.board, trip_a, ms, promised)
@@ -268,7 +268,7 @@ fn table(tallies: &BTreeMap<usize, Tally>) -> String {
             text,
             "{} | {:.3} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {}",
             class.name,
-            class.bound_ms,
+            class.bound.0,
             f.runs,
             f.off,
             f.runs - f.off - f.failures.len().min((f.runs - f.off) as usize) as u32,
@@ -289,7 +289,7 @@ fn table(tallies: &BTreeMap<usize, Tally>) -> String {
 /// The bounds and their reasons.
 pub fn bounds() -> String {
     CLASSES.iter().fold(String::from("class | bound, ms | reason\n---|---|---\n"), |mut text, c| {
-        let _ = writeln!(text, "{} | {:.3} | {}", c.name, c.bound_ms, c.why);
+        let _ = writeln!(text, "{} | {:.3} | {}", c.name, c.bound.0, c.bound.1);
         text
     })
 }

@@ -45,6 +45,18 @@ const IRQ_LPUART: u16 = 91;
 /// Exception number of the control interrupt, which is the converters'.
 pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 
+/// Damage inside the chip to the over-voltage protection: DAC3, comparator 1, its way to the break of TIM1. It lasts over
+/// resets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Damage {
+    /// DAC3 gives this code whatever it is told.
+    Level(u16),
+    /// The output of the comparator stays low.
+    Comparator,
+    /// The break sees no comparator.
+    Break,
+}
+
 /// The chip but for its core and memories.
 #[derive(Clone, Debug)]
 pub struct Chip {
@@ -87,6 +99,8 @@ pub struct Chip {
     /// A debugger has halted the core.
     pub(crate) halt: Option<Halt>,
     pub(crate) frozen_watchdog: bool,
+    /// Damage to the over-voltage protection.
+    pub damage: Option<Damage>,
     /// Outputs came back with the core, and are looked at then.
     pub(crate) back_on: Option<u64>,
     /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
@@ -132,9 +146,9 @@ pub struct Chip {
     pub gates: GateWatch,
 }
 
-impl Chip {
-    /// A chip after power-on, whose flash is erased.
-    pub fn new() -> Self {
+/// A chip after power-on, whose flash is erased.
+impl Default for Chip {
+    fn default() -> Self {
         let (gpio, tim1) = (std::array::from_fn(Gpio::new), Tim1::default());
         let gates = GateWatch::new(&power_stage::REFERENCE, &gpio, &tim1);
         Self {
@@ -158,16 +172,17 @@ impl Chip {
             flash_cycles: 1,
             halt: None,
             frozen_watchdog: false,
+            damage: None,
             back_on: None,
             system_hz: 16_000_000,
             bus_hz: 16_000_000,
             system_rose: 0,
             analog: [0; 3],
             last_block: None,
-            scs: Scs::new(),
+            scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
             pwr: Pwr::default(),
-            flash: Flash::new(),
+            flash: Flash::default(),
             gpio,
             syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
@@ -183,11 +198,12 @@ impl Chip {
             gates,
         }
     }
+}
 
+impl Chip {
     /// After a reset: registers at their values, flash contents and the world outside as before.
     pub fn reset(&mut self, cause: Reset) {
-        let fresh = Self::new();
-        let old = std::mem::replace(self, fresh);
+        let old = std::mem::take(self);
         self.now = old.now;
         self.accesses = old.accesses;
         self.instructions = old.instructions;
@@ -198,6 +214,7 @@ impl Chip {
         self.flash_cycles = old.flash_cycles;
         self.pwr.supply_v = old.pwr.supply_v;
         self.analog = old.analog;
+        self.damage = old.damage;
         // Only power-on resets the debug support.
         if cause != Reset::Power {
             self.debug = old.debug;
@@ -291,8 +308,14 @@ impl Chip {
             let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
             self.comp.references[n] = code.unwrap_or(u16::MAX);
         }
+        match self.damage {
+            Some(Damage::Level(code)) => self.comp.references[0] = code,
+            Some(Damage::Comparator) => self.comp.inputs[0] = 0,
+            Some(Damage::Break) | None => {}
+        }
         self.comp.look(self.now);
-        self.tim1.set_comparators(std::array::from_fn(|n| self.comp.output(n)));
+        let reaches = self.damage != Some(Damage::Break);
+        self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp.output(n)));
     }
 
     /// A comparator was written: the level it looks at must have been seen ready.
@@ -341,11 +364,5 @@ impl Chip {
         }
         self.update_lines();
         None
-    }
-}
-
-impl Default for Chip {
-    fn default() -> Self {
-        Self::new()
     }
 }

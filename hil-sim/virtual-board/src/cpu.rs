@@ -81,9 +81,9 @@ impl Cpu {
     pub fn new(chip: Chip, counting: Counting) -> Result<Self, uc_error> {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, chip)?;
         uc.ctl_set_cpu_model(CORTEX_M4)?;
-        for region in memory::MAP {
-            let (base, size) = (u64::from(region.base), region.size as usize);
-            match region.backing {
+        for (base, size, backing) in memory::MAP {
+            let (base, size) = (u64::from(base), size as usize);
+            match backing {
                 Backing::Flash => uc.mem_map(base, size, Permission::READ | Permission::EXEC)?,
                 Backing::Ram => uc.mem_map(base, size, Permission::ALL)?,
                 Backing::Registers => {

@@ -5,7 +5,7 @@ use defmt_decoder::{DecodeError, Table};
 
 use crate::cpu::Cpu;
 use crate::image::Image;
-use crate::memory;
+use crate::memory::{self, Region};
 
 /// Up-buffer 0 in the control block: after its ID and two counts.
 const BUFFER: u32 = 0x18;
@@ -23,17 +23,12 @@ impl Log {
     /// # Errors
     /// It cannot be decoded.
     pub fn find(image: &Image) -> Result<Option<Self>> {
-        image.symbol("_SEGGER_RTT").is_ok().then(|| Self::new(image)).transpose()
-    }
-
-    /// The log of an image.
-    ///
-    /// # Errors
-    /// The image has none.
-    pub fn new(image: &Image) -> Result<Self> {
+        let Ok(Region { address: control_block, .. }) = image.symbol("_SEGGER_RTT") else {
+            return Ok(None);
+        };
         let table = Table::parse(image.bytes()).map_err(|e| anyhow!("{e}"))?;
         let table = table.context("the image has no defmt log")?;
-        Ok(Self { table, control_block: image.symbol("_SEGGER_RTT")?.address, bytes: Vec::new() })
+        Ok(Some(Self { table, control_block, bytes: Vec::new() }))
     }
 
     /// Forgets the beginning of a frame.

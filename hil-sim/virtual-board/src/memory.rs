@@ -27,17 +27,6 @@ pub enum Backing {
     Registers,
 }
 
-/// A region of the memory map.
-#[derive(Clone, Copy, Debug)]
-pub struct Mapping {
-    /// First address.
-    pub base: u32,
-    /// Bytes.
-    pub size: u32,
-    /// Its kind.
-    pub backing: Backing,
-}
-
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
 /// Flash in both banks, bytes.
@@ -62,24 +51,24 @@ pub const BIT_BAND: u32 = 0x4200_0000;
 /// Peripheral registers that have such an alias.
 pub const PERIPHERALS: u32 = 0x4000_0000;
 
-/// All regions but the alias of CCM.
-pub const MAP: [Mapping; 9] = [
-    Mapping { base: FLASH, size: FLASH_SIZE / 2, backing: Backing::Flash },
-    Mapping { base: BANK_2, size: FLASH_SIZE / 2, backing: Backing::Registers },
-    Mapping { base: RAM, size: RAM_SIZE, backing: Backing::Ram },
-    Mapping { base: CCM, size: CCM_SIZE, backing: Backing::Ram },
-    Mapping { base: PERIPHERALS, size: 0x3_0000, backing: Backing::Registers },
-    Mapping { base: BIT_BAND, size: 0x60_0000, backing: Backing::Registers },
-    Mapping { base: 0x4800_0000, size: 0x2000, backing: Backing::Registers },
-    Mapping { base: 0x5000_0000, size: 0x6_1000, backing: Backing::Registers },
-    Mapping { base: 0xe000_0000, size: 0x10_0000, backing: Backing::Registers },
+/// All regions but the alias of CCM: first address, bytes, kind.
+pub const MAP: [(u32, u32, Backing); 9] = [
+    (FLASH, FLASH_SIZE / 2, Backing::Flash),
+    (BANK_2, FLASH_SIZE / 2, Backing::Registers),
+    (RAM, RAM_SIZE, Backing::Ram),
+    (CCM, CCM_SIZE, Backing::Ram),
+    (PERIPHERALS, 0x3_0000, Backing::Registers),
+    (BIT_BAND, 0x60_0000, Backing::Registers),
+    (0x4800_0000, 0x2000, Backing::Registers),
+    (0x5000_0000, 0x6_1000, Backing::Registers),
+    (0xe000_0000, 0x10_0000, Backing::Registers),
 ];
 
 /// Whether the chip has nothing at an address, so that an access is a fault of the processor. (Not:
 /// registers that exist but are not modelled.)
 pub fn is_reserved(address: u32) -> bool {
     let inside = |base: u32, size: u32| (base..base + size).contains(&address);
-    let memories = MAP.iter().any(|region| inside(region.base, region.size));
+    let memories = MAP.iter().any(|(base, size, _)| inside(*base, *size));
     // System memory and one-time programmable bytes, option bytes of both banks.
     let system = inside(0x1fff_0000, 0x8000) || inside(0x1fff_f800, 0x100);
     // Peripherals with their alias, external memories, the core's own registers.

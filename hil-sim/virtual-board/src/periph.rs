@@ -60,6 +60,16 @@ pub enum Effect {
 /// A register without behaviour: offset, value after reset, bits that can be written.
 pub type Plain = (u32, u32, u32);
 
+/// The registers of a peripheral as `KNOWN`, a row each: name (`_`: of no meaning to the model), offset, value after reset,
+/// bits that can be written. The names become constants.
+macro_rules! registers {
+    ($($name:tt = $offset:expr, $reset:expr, $mask:expr;)*) => {
+        $(const $name: u32 = $offset;)*
+        const KNOWN: &[$crate::periph::Plain] = &[$(($offset, $reset, $mask)),*];
+    };
+}
+use registers;
+
 /// Registers without behaviour.
 #[derive(Clone, Debug)]
 pub struct Store {

@@ -4,72 +4,60 @@
 
 use std::fmt;
 
-/// A rule, and in [`Rule::source`] where it is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Rule {
-    /// A register of a peripheral whose clock is off in RCC: writes are lost, reads give the value after reset.
-    ClockGate,
-    /// The first access to a peripheral less than two cycles after its clock was switched on. It is counted only where
-    /// the core stops at every instruction ([`Counting::every_instruction`](crate::Counting)).
-    EnableDelay,
-    /// A system clock above the limit of the core's voltage range.
-    VoltageRange,
-    /// Too few wait states of the flash for the clock.
-    Latency,
-    /// The bus clock rises from 80 MHz or less to more in one step, without a microsecond at half of it.
-    ClockStep,
-    /// `TIM1_BDTR` is written with another `LOCK` than the first time: it keeps the first.
-    LockOnce,
-    /// The flash is erased or programmed with its data cache on.
-    DataCache,
-    /// A converter is started without a clock: `CKMODE` 0 and nothing in `CCIPR.ADC12SEL`.
-    AdcClock,
-    /// A converter is used before its regulator, its calibration or its start-up allows it.
-    AdcEarly,
-    /// `ADC_JSQR` is written while injected conversions run, with the queue off: the write is lost.
-    JsqrStarted,
-    /// A register of the watchdog is written while its last value is still on its way: the write is lost.
-    IwdgBusy,
-    /// A pin is not in the mode, or not at the alternate function, that its use needs.
-    PinMode,
-    /// After a halt by a debugger that stopped TIM1, the outputs came back without the program, and it let them.
-    ResumedOutputs,
-    /// The supply monitor is locked while it is off, so that it cannot be switched on any more.
-    SupplyMonitor,
-    /// The mode of a converter to analog is written before its first data, or while it is on.
-    DacMode,
-    /// A comparator looks at a level whose converter was never seen ready.
-    DacReady,
+/// The rules, each with its meaning and where it is written.
+macro_rules! rules {
+    ($($(#[$meaning:meta])* $rule:ident: $source:literal,)*) => {
+        /// A rule, and in [`Rule::source`] where it is written.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Rule {
+            $($(#[$meaning])* $rule,)*
+        }
+
+        impl Rule {
+            /// Where it is written.
+            pub fn source(self) -> &'static str {
+                match self {
+                    $(Self::$rule => $source,)*
+                }
+            }
+        }
+    };
 }
 
-impl Rule {
-    /// Where it is written.
-    pub fn source(self) -> &'static str {
-        match self {
-            Self::ClockGate => "RM0440, RCC, peripheral clock enable registers",
-            Self::EnableDelay => {
-                "RM0440, RCC, delay after a clock enable; ST's LL_AHB2_GRP1_EnableClock reads back"
-            }
-            Self::VoltageRange => "RM0440, PWR, dynamic voltage scaling; stm32g4xx_hal_pwr_ex.c",
-            Self::Latency => "RM0440, FLASH, wait states by clock and voltage range",
-            Self::ClockStep => "RM0440, RCC, system clock selection: AHB/2 for 1 us above 80 MHz",
-            Self::LockOnce => "RM0440, TIMx_BDTR.LOCK; stm32g4xx_ll_tim.h: once after the reset",
-            Self::DataCache => "stm32g4xx_hal_flash.c and _flash_ex.c switch DCEN off first",
-            Self::AdcClock => "RM0440, ADC clocks: CKMODE 0 takes the clock of CCIPR.ADC12SEL",
-            Self::AdcEarly => {
-                "RM0440, ADC regulator, calibration, on-off control; DS12288, tADCVREG_STUP"
-            }
-            Self::JsqrStarted => "RM0440, ADC_JSQR and queue of context, JQDIS = 1",
-            Self::IwdgBusy => "RM0440, IWDG_SR; stm32g4xx_hal_iwdg.c: six prescaled clocks",
-            Self::PinMode => "DS12288, pins and alternate functions; RM0440, GPIOx_MODER",
-            Self::ResumedOutputs => {
-                "RM0440, TIM1 debug mode: outputs off as if MOE was reset, MOE unchanged"
-            }
-            Self::SupplyMonitor => "RM0440, SYSCFG_CFGR2.PVDL locks PVDE and PVDLS",
-            Self::DacMode => "RM0440, DAC_MCR.MODE; errata of sibling chips: a data register first",
-            Self::DacReady => "RM0440, DAC_SR.DAC1RDY; DS12288, tWAKEUP",
-        }
-    }
+rules! {
+    /// A register of a peripheral whose clock is off in RCC: writes are lost, reads give the value after reset.
+    ClockGate: "RM0440, RCC, peripheral clock enable registers",
+    /// The first access to a peripheral less than two cycles after its clock was switched on. It is counted only where
+    /// the core stops at every instruction ([`Counting::every_instruction`](crate::Counting)).
+    EnableDelay: "RM0440, RCC, delay after a clock enable; ST's LL_AHB2_GRP1_EnableClock reads back",
+    /// A system clock above the limit of the core's voltage range.
+    VoltageRange: "RM0440, PWR, dynamic voltage scaling; stm32g4xx_hal_pwr_ex.c",
+    /// Too few wait states of the flash for the clock.
+    Latency: "RM0440, FLASH, wait states by clock and voltage range",
+    /// The bus clock rises from 80 MHz or less to more in one step, without a microsecond at half of it.
+    ClockStep: "RM0440, RCC, system clock selection: AHB/2 for 1 us above 80 MHz",
+    /// `TIM1_BDTR` is written with another `LOCK` than the first time: it keeps the first.
+    LockOnce: "RM0440, TIMx_BDTR.LOCK; stm32g4xx_ll_tim.h: once after the reset",
+    /// The flash is erased or programmed with its data cache on.
+    DataCache: "stm32g4xx_hal_flash.c and _flash_ex.c switch DCEN off first",
+    /// A converter is started without a clock: `CKMODE` 0 and nothing in `CCIPR.ADC12SEL`.
+    AdcClock: "RM0440, ADC clocks: CKMODE 0 takes the clock of CCIPR.ADC12SEL",
+    /// A converter is used before its regulator, its calibration or its start-up allows it.
+    AdcEarly: "RM0440, ADC regulator, calibration, on-off control; DS12288, tADCVREG_STUP",
+    /// `ADC_JSQR` is written while injected conversions run, with the queue off: the write is lost.
+    JsqrStarted: "RM0440, ADC_JSQR and queue of context, JQDIS = 1",
+    /// A register of the watchdog is written while its last value is still on its way: the write is lost.
+    IwdgBusy: "RM0440, IWDG_SR; stm32g4xx_hal_iwdg.c: six prescaled clocks",
+    /// A pin is not in the mode, or not at the alternate function, that its use needs.
+    PinMode: "DS12288, pins and alternate functions; RM0440, GPIOx_MODER",
+    /// After a halt by a debugger that stopped TIM1, the outputs came back without the program, and it let them.
+    ResumedOutputs: "RM0440, TIM1 debug mode: outputs off as if MOE was reset, MOE unchanged",
+    /// The supply monitor is locked while it is off, so that it cannot be switched on any more.
+    SupplyMonitor: "RM0440, SYSCFG_CFGR2.PVDL locks PVDE and PVDLS",
+    /// The mode of a converter to analog is written before its first data, or while it is on.
+    DacMode: "RM0440, DAC_MCR.MODE; errata of sibling chips: a data register first",
+    /// A comparator looks at a level whose converter was never seen ready.
+    DacReady: "RM0440, DAC_SR.DAC1RDY; DS12288, tWAKEUP",
 }
 
 impl fmt::Display for Rule {

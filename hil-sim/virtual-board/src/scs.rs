@@ -33,9 +33,7 @@ impl SysTick {
     fn period(&self) -> u64 {
         (u64::from(self.reload) + 1) * self.cycle.max(1)
     }
-}
 
-impl SysTick {
     /// When it next counts to zero.
     pub fn next_event(&self) -> u64 {
         if self.control & 1 != 0 { self.expires } else { u64::MAX }
@@ -82,6 +80,19 @@ pub struct Scs {
     pub systick: SysTick,
 }
 
+/// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
+const PLAIN: &[Plain] = &[
+    (0xe000_ed14, 0x200, u32::MAX),
+    (0xe000_ed24, 0, u32::MAX),
+    (0xe000_ed88, 0, u32::MAX),
+    (0xe000_ed10, 0, u32::MAX),
+    (0xe000_ed34, 0, u32::MAX),
+    (0xe000_ed3c, 0, u32::MAX),
+    (0xe000_ef38, 0, u32::MAX),
+    (0xe000_ef34, 0xc000_0000, u32::MAX),
+];
+
+/// After a reset, on the internal oscillator.
 impl Default for Scs {
     fn default() -> Self {
         Self {
@@ -102,30 +113,12 @@ impl Default for Scs {
             dwt_control: 0,
             cycles_from: 0,
             cycles_held: 0,
-            systick: SysTick::default(),
+            systick: SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() },
         }
     }
 }
 
-/// Registers without behaviour: CCR, SHCSR, CPACR, SCR, MMFAR, AFSR, FPCAR, FPCCR.
-const PLAIN: &[Plain] = &[
-    (0xe000_ed14, 0x200, u32::MAX),
-    (0xe000_ed24, 0, u32::MAX),
-    (0xe000_ed88, 0, u32::MAX),
-    (0xe000_ed10, 0, u32::MAX),
-    (0xe000_ed34, 0, u32::MAX),
-    (0xe000_ed3c, 0, u32::MAX),
-    (0xe000_ef38, 0, u32::MAX),
-    (0xe000_ef34, 0xc000_0000, u32::MAX),
-];
-
 impl Scs {
-    /// After a reset, on the internal oscillator.
-    pub fn new() -> Self {
-        let systick = SysTick { cycle: crate::periph::rcc::HSI_TICKS, ..SysTick::default() };
-        Self { systick, ..Self::default() }
-    }
-
     /// The vector of an exception.
     pub fn vector(&self, exception: u16) -> u32 {
         self.vtor + 4 * u32::from(exception)

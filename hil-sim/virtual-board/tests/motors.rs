@@ -6,21 +6,22 @@ use hil_sim::config::motors::Motor;
 use hil_sim::plant::Plant;
 use induction_drive::board;
 use virtual_board::Options;
+use virtual_board::power_stage::REFERENCE;
 
 #[test]
 fn after_the_printed_lines_the_drive_reads_the_sensors_of_every_motor_right() {
-    assert_eq!(Options::set_lines(&Config::default()), Vec::<String>::new());
+    assert_eq!(Options::set_lines(&REFERENCE, &Config::default()), Vec::<String>::new());
     for motor in Motor::all() {
         let name = motor.name.clone();
         let config = Config::of_motor(Some(&name)).unwrap();
         let mut settings = board::settings();
-        for line in Options::set_lines(&config) {
+        for line in Options::set_lines(&REFERENCE, &config) {
             let words: Vec<&str> = line.split(' ').collect();
             let ["set", key, value] = words[..] else { panic!("{line}") };
             let entry = find(key).expect(key);
             entry.set(&mut settings, entry.parse(value).unwrap());
         }
-        let plant = Options::plant(&config);
+        let plant = Options::plant(&REFERENCE, &config);
         let sample = Plant::new(&plant, 1).unwrap().sample();
         let scales = &settings.scales;
         let dc_link = f64::from(scales.dc_link.at(sample.dc_link));

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use virtual_board::chip::{Chip, clock_of, pins};
+use virtual_board::dump;
 
 /// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is as ADC1.
 const BLOCKS: [(&str, &str, u32); 21] = [
@@ -91,7 +92,7 @@ const MODEL_ONLY: &[(&str, u32, &str)] = &[];
 
 /// A chip whose peripherals have their clocks.
 fn clocked() -> Chip {
-    let mut chip = Chip::new();
+    let mut chip = Chip::default();
     for (register, bits) in [
         (0x48, 0x111f),
         (0x4c, 0x050f_607f),
@@ -131,7 +132,7 @@ fn reset_values_are_those_of_the_access_crate() -> Result<()> {
         for register in svd::registers(module)? {
             let address = base + register.offset;
             // Enable registers were written.
-            let mut chip = if peripheral == "RCC" { Chip::new() } else { clocked() };
+            let mut chip = if peripheral == "RCC" { Chip::default() } else { clocked() };
             let Some(value) = read(&mut chip, address) else { continue };
             compared += 1;
             let name = format!("{peripheral}_{}", register.name.to_uppercase());
@@ -182,6 +183,30 @@ fn writable_bits_are_those_of_both_sources() -> Result<()> {
     Ok(())
 }
 
+/// The registers that are compared with those of a real board have the names and addresses of the access crate.
+#[test]
+fn compared_registers_are_those_of_the_access_crate() -> Result<()> {
+    // Other names there: C1CSR, APB1L_FZ, APB2_FZ; the protection of memory is the core's.
+    let elsewhere = ["COMP1_", "DBGMCU_", "MPU_"];
+    let compared = dump::registers()?;
+    for (name, address, _) in &compared {
+        let Some((_, register)) = name.split_once('_') else { panic!("{name}") };
+        if elsewhere.iter().any(|first| name.starts_with(first)) {
+            continue;
+        }
+        let mut found = false;
+        for (module, _, base) in BLOCKS {
+            let offset = address.wrapping_sub(base);
+            found |= svd::registers(module)?
+                .iter()
+                .any(|known| known.offset == offset && known.name.eq_ignore_ascii_case(register));
+        }
+        assert!(found, "{name} at {address:#x}");
+    }
+    assert!(compared.len() > 60, "{}", compared.len());
+    Ok(())
+}
+
 #[test]
 fn clocks_are_those_of_the_second_source() {
     let mut compared = 0;
@@ -200,12 +225,12 @@ fn clocks_are_those_of_the_second_source() {
 #[test]
 fn pins_are_those_of_the_second_source() {
     let signals = pins::OUTPUTS.iter().chain([&pins::BREAK]).chain(&pins::ENCODER);
-    for (signal, ours) in signals.chain(&pins::SERIAL) {
-        let mut ours: Vec<_> = ours.to_vec();
-        let mut theirs = metapac::pins_of(signal);
+    for signal in signals.chain(&pins::SERIAL) {
+        let mut ours: Vec<_> = pins::pins_of(*signal).collect();
+        let mut theirs = metapac::pins_of(signal.0);
         ours.sort_unstable();
         theirs.sort_unstable();
-        assert_eq!(ours, theirs, "{signal}");
+        assert_eq!(ours, theirs, "{}", signal.0);
     }
     for converter in 0..2 {
         for channel in 0..19 {

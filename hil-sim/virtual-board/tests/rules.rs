@@ -59,7 +59,7 @@ use Step::{Halt, Next, Read, Wait, Write};
 
 /// A chip after a script.
 fn after(script: &[Step]) -> Chip {
-    let mut chip = Chip::new();
+    let mut chip = Chip::default();
     let pass = |chip: &mut Chip, ticks: u64| {
         let end = chip.now + ticks;
         while chip.now < end && chip.reset.is_none() {

@@ -15,6 +15,7 @@ use hil_sim::plant::Plant;
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 use hil_sim::stats::Stats;
 use virtual_board::Options;
+use virtual_board::power_stage::REFERENCE;
 
 /// The quantities compared, one set per period.
 #[derive(Clone, Copy)]
@@ -60,7 +61,7 @@ fn both(
         pair.run(*periods, |pair, _| board.push(point(&pair.board.plant, &pair.shadow.drive)))?;
     }
 
-    let mut rig = Rig::new(&Options::plant(config), &pair.shadow.settings(), seed)?;
+    let mut rig = Rig::new(&Options::plant(&REFERENCE, config), &pair.shadow.settings(), seed)?;
     rig.start(mode)?;
     let mut host = Vec::new();
     for (_, command, periods) in steps {

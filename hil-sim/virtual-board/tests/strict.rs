@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use hil_sim::Config;
 use virtual_board::cpu::Register;
 use virtual_board::periph::Reset;
+use virtual_board::periph::flash::DBANK;
 use virtual_board::rules::{Rule, Violation};
 use virtual_board::{Board, Counting, Image, Options};
 
@@ -152,7 +153,7 @@ fn a_stack_in_the_guard_faults() -> Result<()> {
 #[test]
 fn a_single_bank_chip_is_refused() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 16))?;
-    board.chip().flash.set_banks(false);
+    board.chip().flash.options &= !DBANK;
     board.run_periods(START)?;
     let heard = board.take_console();
     assert!(heard.contains("not started") && heard.contains("bank"), "{heard}");

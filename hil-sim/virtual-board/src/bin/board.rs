@@ -63,7 +63,7 @@ fn run(mut options: Options) -> Result<()> {
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
-    let set_lines = virtual_board::Options::set_lines_on(stage, &config);
+    let set_lines = virtual_board::Options::set_lines(stage, &config);
     if !set_lines.is_empty() {
         say(
             "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",

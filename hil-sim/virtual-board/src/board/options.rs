@@ -27,13 +27,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// The plant that a configuration describes, with the sensors and the dead time of the reference board.
-    pub fn plant(config: &Config) -> PlantSettings {
-        Self::plant_on(&power_stage::REFERENCE, config)
-    }
-
     /// The plant that a configuration describes, with the power stage, its sensors and the dead time of its board.
-    pub fn plant_on(stage: &PowerStage, config: &Config) -> PlantSettings {
+    pub fn plant(stage: &PowerStage, config: &Config) -> PlantSettings {
         let mut plant = hil_sim::config::plant_settings(config);
         let settings = stage.firmware_settings();
         if stage.sensors == Sensors::InLine {
@@ -56,15 +51,9 @@ impl Options {
         plant
     }
 
-    /// The lines for the console that adapt the image of the reference board to a configuration; see
-    /// [`Options::set_lines_on`]. Empty with the defaults.
-    pub fn set_lines(config: &Config) -> Vec<String> {
-        Self::set_lines_on(&power_stage::REFERENCE, config)
-    }
-
     /// The lines for the console that adapt the image of a board to a configuration: its motor, and on the reference board
     /// scales for its sensors at the converters of this board.
-    pub fn set_lines_on(stage: &PowerStage, config: &Config) -> Vec<String> {
+    pub fn set_lines(stage: &PowerStage, config: &Config) -> Vec<String> {
         let [image, default] = [stage.firmware_settings(), Config::default().drive];
         let mut wanted = config.drive;
         // Timer and converters are the board's.
@@ -77,7 +66,7 @@ impl Options {
             SETTINGS.iter().filter(|entry| !in_line || entry.get(&wanted) != entry.get(&default));
         let differing: Vec<_> = may_differ.collect();
         if in_line {
-            let sensors = Self::plant(config).measurement;
+            let sensors = Self::plant(stage, config).measurement;
             [wanted.scales.current_a, wanted.scales.current_b] = current_lines(&sensors);
         } else {
             wanted.scales = image.scales;
@@ -86,12 +75,12 @@ impl Options {
         needed.map(|entry| format!("set {} {}", entry.name, entry.get(&wanted))).collect()
     }
 
-    /// With the settings for a configuration saved, as if [`Options::set_lines_on`] were typed and saved before.
+    /// With the settings for a configuration saved, as if [`Options::set_lines`] were typed and saved before.
     ///
     /// # Errors
     /// A line that the image would refuse.
     pub fn set_up(mut self, config: &Config) -> Result<Self> {
-        for line in Self::set_lines_on(self.power_stage, config) {
+        for line in Self::set_lines(self.power_stage, config) {
             let (name, value) = line.trim_start_matches("set ").split_once(' ').unwrap_or_default();
             let entry = find(name).with_context(|| line.clone())?;
             let value = entry.parse(value).map_err(|why| anyhow!("{line}: {why}"))?;
@@ -108,7 +97,7 @@ impl Options {
 
     /// A board with this power stage and the motor of a configuration; [`PowerStage::config`] gives one that suits it.
     pub fn on(power_stage: &'static PowerStage, config: &Config, seed: u64) -> Self {
-        let plant = Self::plant_on(power_stage, config);
+        let plant = Self::plant(power_stage, config);
         Self {
             plant,
             seed,

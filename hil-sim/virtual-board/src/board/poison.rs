@@ -41,13 +41,11 @@ impl Board {
 
     /// Remembers the state before a control interrupt.
     pub(super) fn remember(&mut self) {
-        let Some(poison) = &self.poison else { return };
+        let Some(mut poison) = self.poison.take() else { return };
         let sp = self.cpu.get(Register::SP);
         let stack = self.stack_above(sp, poison.top);
-        let before = Preempted { registers: self.cpu.registers(), sp, stack };
-        if let Some(poison) = &mut self.poison {
-            poison.before = Some(before);
-        }
+        poison.before = Some(Preempted { registers: self.cpu.registers(), sp, stack });
+        self.poison = Some(poison);
     }
 
     /// Poisons the floating-point registers as it begins.

@@ -66,7 +66,7 @@ pub struct Target {
 
 impl Target {
     fn new(board: &Board, config: &Config, settings: Settings) -> Result<Self> {
-        let Addresses { coefficients, state, control, .. } = *board.addresses();
+        let Addresses { coefficients, state, control, .. } = board.addresses();
         let between = |first: &str, end: &str| {
             let address = board.image().symbol(first)?.address;
             anyhow::Ok(Region { address, size: board.image().symbol(end)?.address - address })

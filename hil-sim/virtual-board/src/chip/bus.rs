@@ -190,25 +190,25 @@ impl Chip {
         }
         let rules = &mut self.rules;
         let effect = match address & !0x3ff {
-            TIM1 => self.tim1.write(offset, value, now, rules)?,
-            ADC1 => self.adc.write(offset, value, now, rules)?,
+            TIM1 => self.tim1.write(offset, value, rules)?,
+            ADC1 => self.adc.write(offset, value, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => {
                 self.pwr.write(offset, value, self.syscfg.get(plain::CFGR2) & plain::PVDL != 0)?
             }
-            FLASH_REGISTERS => self.flash.write(offset, value, now, rules)?,
+            FLASH_REGISTERS => self.flash.write(offset, value, rules)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
-            IWDG => self.iwdg.write(offset, value, now, rules)?,
+            IWDG => self.iwdg.write(offset, value, rules)?,
             SYSCFG => match offset {
                 0x200..0x220 => self.comp.write(offset - 0x200, value, now)?,
                 _ => self.syscfg.write(offset, value)?,
             },
             EXTI => self.exti.write(offset, value)?,
             GPIO_FIRST..=GPIO_LAST => self.gpio[port(address)].write(offset, value)?,
-            DAC1 => self.dac.write(0, offset, value, now, rules)?,
-            DAC3 => self.dac.write(1, offset, value, now, rules)?,
+            DAC1 => self.dac.write(0, offset, value, rules)?,
+            DAC3 => self.dac.write(1, offset, value, rules)?,
             _ => return None,
         };
         self.check_rules(address, value);

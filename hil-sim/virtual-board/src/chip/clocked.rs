@@ -61,8 +61,7 @@ impl Chip {
 
     /// The value of a register after a reset, of a peripheral that has no clock.
     pub(super) fn at_reset(&self, address: u32) -> Option<u32> {
-        let mut fresh = Self::new();
-        fresh.read_clocked(address)
+        Self::default().read_clocked(address)
     }
 
     /// Checks clock tree, voltage range and wait states against each other, after one of them was written.

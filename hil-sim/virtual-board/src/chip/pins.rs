@@ -6,94 +6,53 @@ use crate::rules::Rule;
 
 /// A pin: its port, A is 0, and its number.
 pub type Pin = (usize, u32);
-/// A signal: its name, and the pins that it reaches with the alternate function of each.
-pub type Signal = (&'static str, &'static [(Pin, u32)]);
-
-const A: usize = 0;
-const B: usize = 1;
-const C: usize = 2;
-const F: usize = 5;
+/// A signal: its name, and the pins that it reaches, each with its alternate function, as in "A8:6 C0:2".
+pub type Signal = (&'static str, &'static str);
 
 /// The outputs of TIM1 in the order of `TIM1_CCER`.
 pub const OUTPUTS: [Signal; 6] = [
-    ("TIM1_CH1", &[((A, 8), 6), ((C, 0), 2)]),
-    ("TIM1_CH1N", &[((A, 7), 6), ((A, 11), 6), ((B, 13), 6), ((C, 13), 4)]),
-    ("TIM1_CH2", &[((A, 9), 6), ((C, 1), 2)]),
-    ("TIM1_CH2N", &[((A, 12), 6), ((B, 0), 6), ((B, 14), 6)]),
-    ("TIM1_CH3", &[((A, 10), 6), ((C, 2), 2)]),
-    ("TIM1_CH3N", &[((B, 1), 6), ((B, 9), 12), ((B, 15), 4), ((F, 0), 6)]),
+    ("TIM1_CH1", "A8:6 C0:2"),
+    ("TIM1_CH1N", "A7:6 A11:6 B13:6 C13:4"),
+    ("TIM1_CH2", "A9:6 C1:2"),
+    ("TIM1_CH2N", "A12:6 B0:6 B14:6"),
+    ("TIM1_CH3", "A10:6 C2:2"),
+    ("TIM1_CH3N", "B1:6 B9:12 B15:4 F0:6"),
 ];
 /// The break input.
-pub const BREAK: Signal = (
-    "TIM1_BKIN",
-    &[
-        ((A, 6), 6),
-        ((A, 14), 6),
-        ((A, 15), 9),
-        ((B, 8), 12),
-        ((B, 10), 12),
-        ((B, 12), 6),
-        ((C, 13), 2),
-    ],
-);
+pub const BREAK: Signal = ("TIM1_BKIN", "A6:6 A14:6 A15:9 B8:12 B10:12 B12:6 C13:2");
 /// The encoder.
-pub const ENCODER: [Signal; 2] = [
-    ("TIM2_CH1", &[((A, 0), 1), ((A, 5), 1), ((A, 15), 1)]),
-    ("TIM2_CH2", &[((A, 1), 1), ((B, 3), 1)]),
-];
+pub const ENCODER: [Signal; 2] = [("TIM2_CH1", "A0:1 A5:1 A15:1"), ("TIM2_CH2", "A1:1 B3:1")];
 /// The console.
-pub const SERIAL: [Signal; 2] = [
-    ("LPUART1_TX", &[((A, 2), 12), ((B, 11), 8), ((C, 1), 8)]),
-    ("LPUART1_RX", &[((A, 3), 12), ((B, 10), 8), ((C, 0), 8)]),
+pub const SERIAL: [Signal; 2] =
+    [("LPUART1_TX", "A2:12 B11:8 C1:8"), ("LPUART1_RX", "A3:12 B10:8 C0:8")];
+/// The pins of the channels of ADC1 and ADC2 from channel 1 on; `-` is inside the chip.
+const ANALOG: [&str; 2] = [
+    "A0 A1 A2 A3 B14 C0 C1 C2 C3 F0 B12 B1 - B11 B0",
+    "A0 A1 A6 A7 C4 C0 C1 C2 C3 F1 C5 B2 A5 B11 B15 - A4",
 ];
+
+fn pin(name: &str) -> Option<Pin> {
+    let (port, number) = name.split_at_checked(1)?;
+    let number = number.parse().ok()?;
+    Some((usize::from(port.as_bytes()[0] - b'A'), number))
+}
+
+/// The pins that a signal reaches, with the alternate function of each.
+pub fn pins_of(signal: Signal) -> impl Iterator<Item = (Pin, u32)> {
+    signal.1.split(' ').filter_map(|reach| {
+        let (name, function) = reach.split_once(':')?;
+        Some((pin(name)?, function.parse().ok()?))
+    })
+}
 
 /// The pin of a channel of ADC1 or ADC2, counted from 0; `None` is inside the chip.
 pub fn analog(converter: usize, channel: u32) -> Option<Pin> {
-    let both = match channel {
-        1 => (A, 0),
-        2 => (A, 1),
-        6 => (C, 0),
-        7 => (C, 1),
-        8 => (C, 2),
-        9 => (C, 3),
-        14 => (B, 11),
-        _ if converter == 0 => {
-            return Some(match channel {
-                3 => (A, 2),
-                4 => (A, 3),
-                5 => (B, 14),
-                10 => (F, 0),
-                11 => (B, 12),
-                12 => (B, 1),
-                15 => (B, 0),
-                _ => return None,
-            });
-        }
-        _ => {
-            return Some(match channel {
-                3 => (A, 6),
-                4 => (A, 7),
-                5 => (C, 4),
-                10 => (F, 1),
-                11 => (C, 5),
-                12 => (B, 2),
-                13 => (A, 5),
-                15 => (B, 15),
-                17 => (A, 4),
-                _ => return None,
-            });
-        }
-    };
-    Some(both)
-}
-
-fn name((port, pin): Pin) -> String {
-    format!("P{}{pin}", char::from(b'A' + port as u8))
+    ANALOG[converter].split(' ').nth(channel.checked_sub(1)? as usize).and_then(pin)
 }
 
 impl Chip {
     fn reaches(&self, signal: Signal) -> bool {
-        signal.1.iter().any(|((port, pin), af)| self.gpio[*port].pad(*pin) == Pad::Alternate(*af))
+        pins_of(signal).any(|((port, pin), af)| self.gpio[port].pad(pin) == Pad::Alternate(af))
     }
 
     fn require_pin(&mut self, signal: Signal, use_: &str) {
@@ -134,14 +93,11 @@ impl Chip {
     pub(super) fn check_analog_pins(&mut self) {
         for (n, channels) in self.adc.take_converted().into_iter().enumerate() {
             for channel in (0..19).filter(|channel| channels >> channel & 1 != 0) {
-                let Some(pin) = analog(n, channel) else { continue };
-                let is_analog = self.gpio[pin.0].pad(pin.1) == Pad::Analog;
+                let Some((port, pin)) = analog(n, channel) else { continue };
+                let is_analog = self.gpio[port].pad(pin) == Pad::Analog;
                 self.rules.require(is_analog, Rule::PinMode, || {
-                    format!(
-                        "ADC{} converts channel {channel}, but {} is not analog",
-                        n + 1,
-                        name(pin)
-                    )
+                    let (adc, port) = (n + 1, char::from(b'A' + port as u8));
+                    format!("ADC{adc} converts channel {channel}, but P{port}{pin} is not analog")
                 });
             }
         }

@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn contents_and_torn_words_outlast_a_session() {
         let path = path("kept");
-        let mut flash = Flash::new();
+        let mut flash = Flash::default();
         let mut file = FlashFile::open(&path, &mut flash).unwrap();
         let mut contents = vec![0xff; BANK];
         contents[5] = 0x12;
@@ -113,11 +113,11 @@ mod tests {
         flash.replace_contents(&contents, &torn);
         // Written when the flash has done something, not before.
         file.follow(&flash, 0).unwrap();
-        assert_eq!(FlashFile::open(&path, &mut Flash::new()).map(|_| ()).ok(), Some(()));
+        assert_eq!(FlashFile::open(&path, &mut Flash::default()).map(|_| ()).ok(), Some(()));
         assert_eq!(fs::read(&path).unwrap()[MARK.len() + 5], 0xff);
         flash.operations += 1;
         file.follow(&flash, 0).unwrap();
-        let mut later = Flash::new();
+        let mut later = Flash::default();
         FlashFile::open(&path, &mut later).unwrap();
         assert_eq!(later.contents(), (&contents[..], &torn[..]));
         assert_eq!(later.load(BANK_2 + 72), (u32::MAX, true));
@@ -132,7 +132,7 @@ mod tests {
             (vec![0; MARK.len() + BANK + TORN], "not a file that --flash has written"),
         ] {
             fs::write(&path, &bytes).unwrap();
-            let mut flash = Flash::new();
+            let mut flash = Flash::default();
             let why = FlashFile::open(&path, &mut flash).map(|_| ()).unwrap_err();
             let why = why.downcast_ref::<Error>().expect("the request has to be changed");
             assert_eq!(why.exit_code(), 2);
@@ -142,7 +142,7 @@ mod tests {
         }
         fs::remove_file(path).unwrap();
         let nowhere = Path::new("/nonexistent/flash");
-        let why = FlashFile::open(nowhere, &mut Flash::new()).map(|_| ()).unwrap_err();
+        let why = FlashFile::open(nowhere, &mut Flash::default()).map(|_| ()).unwrap_err();
         assert!(format!("{why:#}").contains("/nonexistent/flash"), "{why:#}");
     }
 }

@@ -4,47 +4,37 @@
 
 mod converter;
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER, Store, registers};
 use crate::rules::{Rule, Rules};
 use converter::{Converter, Sequence};
 
-const KNOWN: &[Plain] = &[
-    (ISR, 0, 0),
-    (IER, 0, 0x7ff),
-    (CR, 0x2000_0000, 0),
-    (CFGR, 0x8000_0000, 0xffff_fffb),
-    (0x10, 0, 0x0e01_07ff),
-    (SMPR1, 0, 0xbfff_ffff),
-    (SMPR1 + 4, 0, 0x07ff_ffff),
-    (TR1, 0x0fff_0000, 0x0fff_7fff),
-    (0x24, 0x00ff_0000, 0x00ff_00ff),
-    (0x28, 0x00ff_0000, 0x00ff_00ff),
-    (SQR1, 0, 0x1f7d_f7cf),
-    (SQR1 + 4, 0, 0x1f7d_f7df),
-    (SQR1 + 8, 0, 0x1f7d_f7df),
-    (SQR1 + 12, 0, 0x7df),
-    (DR, 0, 0),
-    (JSQR, 0, 0xfbef_bfff),
-    (JDR1, 0, 0),
-    (0x84, 0, 0),
-    (0x88, 0, 0),
-    (0x8c, 0, 0),
-    (0xa0, 0, 0x7_ffff),
-    (0xa4, 0, 0x7_ffff),
-    (0xb0, 0, 0x7_ffff),
-    (0xb4, 0, 0x7f_007f),
-    (0xc0, 0, 0x3fff),
-];
-const ISR: u32 = 0x00;
-const IER: u32 = 0x04;
-const CR: u32 = 0x08;
-const CFGR: u32 = 0x0c;
-const SMPR1: u32 = 0x14;
-const TR1: u32 = 0x20;
-const SQR1: u32 = 0x30;
-const DR: u32 = 0x40;
-const JSQR: u32 = 0x4c;
-const JDR1: u32 = 0x80;
+registers! {
+    ISR = 0x00, 0, 0;
+    IER = 0x04, 0, 0x7ff;
+    CR = 0x08, 0x2000_0000, 0;
+    CFGR = 0x0c, 0x8000_0000, 0xffff_fffb;
+    _ = 0x10, 0, 0x0e01_07ff;
+    SMPR1 = 0x14, 0, 0xbfff_ffff;
+    _ = SMPR1 + 4, 0, 0x07ff_ffff;
+    TR1 = 0x20, 0x0fff_0000, 0x0fff_7fff;
+    _ = 0x24, 0x00ff_0000, 0x00ff_00ff;
+    _ = 0x28, 0x00ff_0000, 0x00ff_00ff;
+    SQR1 = 0x30, 0, 0x1f7d_f7cf;
+    _ = SQR1 + 4, 0, 0x1f7d_f7df;
+    _ = SQR1 + 8, 0, 0x1f7d_f7df;
+    _ = SQR1 + 12, 0, 0x7df;
+    DR = 0x40, 0, 0;
+    JSQR = 0x4c, 0, 0xfbef_bfff;
+    JDR1 = 0x80, 0, 0;
+    _ = 0x84, 0, 0;
+    _ = 0x88, 0, 0;
+    _ = 0x8c, 0, 0;
+    _ = 0xa0, 0, 0x7_ffff;
+    _ = 0xa4, 0, 0x7_ffff;
+    _ = 0xb0, 0, 0x7_ffff;
+    _ = 0xb4, 0, 0x7f_007f;
+    _ = 0xc0, 0, 0x3fff;
+}
 /// Common control register of both.
 const CCR: u32 = 0x308;
 const CSR: u32 = 0x300;
@@ -151,13 +141,8 @@ impl Adc {
     }
 
     /// Writes one.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         self.happen(now);
         match offset {
             CCR => self.common = value & 0x01ff_ef1f,

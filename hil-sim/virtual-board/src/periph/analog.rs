@@ -3,18 +3,10 @@
 //! A comparator is given its input and its reference in codes of a 12-bit converter. Its output follows after its
 //! delay, with its hysteresis below the reference.
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER};
 
+/// Bits that can be written.
 const MASK: u32 = 0x80ff_8171;
-const COMP: &[Plain] = &[
-    (0x00, 0, MASK),
-    (0x04, 0, MASK),
-    (0x08, 0, MASK),
-    (0x0c, 0, MASK),
-    (0x10, 0, MASK),
-    (0x14, 0, MASK),
-    (0x18, 0, MASK),
-];
 const EN: u32 = 1;
 const POL: u32 = 1 << 15;
 const VALUE: u32 = 1 << 30;
@@ -29,7 +21,7 @@ const HYSTERESIS: u16 = 12;
 /// The comparators 1 to 7.
 #[derive(Clone, Debug)]
 pub struct Comparators {
-    store: Store,
+    control: [u32; 7],
     /// Codes at their positive inputs.
     pub inputs: [u16; 7],
     /// Codes at their negative inputs.
@@ -44,7 +36,7 @@ pub struct Comparators {
 impl Default for Comparators {
     fn default() -> Self {
         Self {
-            store: Store::new(COMP),
+            control: [0; 7],
             inputs: [0; 7],
             references: [0; 7],
             high: [false; 7],
@@ -56,30 +48,26 @@ impl Default for Comparators {
 }
 
 impl Comparators {
-    fn control(&self, n: usize) -> u32 {
-        self.store.get(4 * n as u32)
-    }
-
     /// Whether it is on.
     pub fn is_on(&self, n: usize) -> bool {
-        self.control(n) & EN != 0
+        self.control[n] & EN != 0
     }
 
     /// Its INPSEL: the pin at its positive input.
     pub fn input_of(&self, n: usize) -> u32 {
-        self.control(n) >> 8 & 1
+        self.control[n] >> 8 & 1
     }
 
     /// Its INMSEL: the source of its negative input.
     pub fn reference_of(&self, n: usize) -> u32 {
-        self.control(n) >> 4 & 7
+        self.control[n] >> 4 & 7
     }
 
     /// Compares inputs and references as they are now.
     pub fn look(&mut self, now: u64) {
         for n in 0..7 {
             let (input, reference) = (self.inputs[n], self.references[n]);
-            let hysteresis = HYSTERESIS * (self.control(n) >> 16 & 7) as u16;
+            let hysteresis = HYSTERESIS * (self.control[n] >> 16 & 7) as u16;
             let level = if self.high[n] { reference.saturating_sub(hysteresis) } else { reference };
             let high = input > level;
             if high != self.high[n] {
@@ -104,23 +92,23 @@ impl Comparators {
 
     /// The output of comparator `n`, counted from 0, with its polarity.
     pub fn output(&self, n: usize) -> bool {
-        let control = self.control(n);
+        let control = self.control[n];
         let valid = control & EN != 0 && self.started_at[n] == 0;
         valid && self.output[n] != (control & POL != 0)
     }
 
     /// Reads a register.
     pub fn read(&self, offset: u32) -> Option<u32> {
-        let value = self.store.read(offset)?;
-        Some(value | if self.output((offset / 4) as usize) { VALUE } else { 0 })
+        let n = (offset / 4) as usize;
+        Some(self.control.get(n)? | if self.output(n) { VALUE } else { 0 })
     }
 
     /// Writes a register; a locked one stays as it is.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
-        let before = self.store.read(offset)?;
+        let n = (offset / 4) as usize;
+        let before = *self.control.get(n)?;
         if before & LOCK == 0 {
-            self.store.write(offset, value)?;
-            let n = (offset / 4) as usize;
+            self.control[n] = value & MASK;
             match (before & EN, value & EN) {
                 (0, EN) => self.started_at[n] = now + START,
                 (EN, 0) => self.started_at[n] = NEVER,

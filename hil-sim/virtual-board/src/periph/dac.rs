@@ -1,23 +1,20 @@
 //! Two of the converters to analog (RM0440, section 22), 12 bits right-aligned, without triggers: 1 and 3.
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER, Store, registers};
 use crate::rules::{Rule, Rules};
 
-const KNOWN: &[Plain] = &[
-    (CR, 0, 0x7fff_7fff),
-    (DHR[0], 0, 0x0fff_0fff),
-    (DHR[1], 0, 0x0fff_0fff),
-    (DOR[0], 0, 0),
-    (DOR[1], 0, 0),
-    (SR, 0, 0),
-    (0x38, 0, 0x1f_001f),
-    (MCR, 0, 0x0307_c307),
-];
-const CR: u32 = 0x00;
+registers! {
+    CR = 0x00, 0, 0x7fff_7fff;
+    _ = DHR[0], 0, 0x0fff_0fff;
+    _ = DHR[1], 0, 0x0fff_0fff;
+    _ = DOR[0], 0, 0;
+    _ = DOR[1], 0, 0;
+    SR = 0x34, 0, 0;
+    _ = 0x38, 0, 0x1f_001f;
+    MCR = 0x3c, 0, 0x0307_c307;
+}
 const DHR: [u32; 2] = [0x08, 0x14];
 const DOR: [u32; 2] = [0x2c, 0x30];
-const SR: u32 = 0x34;
-const MCR: u32 = 0x3c;
 /// DACxRDY of channel 1; the bits of channel 2 are 16 places higher.
 const RDY: u32 = 1 << 11;
 /// From the enable bit to a valid output without buffer, ticks: 8 us (datasheet, tWAKEUP).
@@ -120,9 +117,9 @@ impl Dacs {
         which: usize,
         offset: u32,
         value: u32,
-        now: u64,
         rules: &mut Rules,
     ) -> Option<Effect> {
+        let now = rules.now;
         let Dac { store, channels } = &mut self.0[which];
         let on = |store: &Store, n: usize| store.get(CR) >> (16 * n) & 1 != 0;
         let was = [on(store, 0), on(store, 1)];

@@ -1,25 +1,22 @@
 //! TIM2 as counter of the encoder (RM0440, section 30): counts with the plant's, from 0 at its start,
 //! in encoder mode 3 only.
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 
 const ALL: u32 = u32::MAX;
-const KNOWN: &[Plain] = &[
-    (0x00, 0, 0x1bff),
-    (0x04, 0, 0x02f5_fffd),
-    (0x08, 0, 0x0331_ffff),
-    (0x0c, 0, 0x00f0_7fff),
-    (0x10, 0, 0),
-    (0x18, 0, 0x0101_ffff),
-    (0x1c, 0, 0x0101_ffff),
-    (0x20, 0, 0x0033_ffff),
-    (0x24, 0, 0),
-    (0x28, 0, 0xffff),
-    (0x2c, ALL, ALL),
-];
-const CR1: u32 = 0x00;
-const SMCR: u32 = 0x08;
-const CNT: u32 = 0x24;
+registers! {
+    CR1 = 0x00, 0, 0x1bff;
+    _ = 0x04, 0, 0x02f5_fffd;
+    SMCR = 0x08, 0, 0x0331_ffff;
+    _ = 0x0c, 0, 0x00f0_7fff;
+    _ = 0x10, 0, 0;
+    _ = 0x18, 0, 0x0101_ffff;
+    _ = 0x1c, 0, 0x0101_ffff;
+    _ = 0x20, 0, 0x0033_ffff;
+    CNT = 0x24, 0, 0;
+    _ = 0x28, 0, 0xffff;
+    _ = 0x2c, ALL, ALL;
+}
 
 /// The timer.
 #[derive(Clone, Debug)]

@@ -6,33 +6,28 @@
 
 use std::ops::Range;
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
 use crate::rules::{Rule, Rules};
 
-const KNOWN: &[Plain] = &[
-    (ACR, 0x0004_0600, 0x4_7f0f),
-    (0x04, 0, 0),
-    (KEYR, 0, 0),
-    (0x0c, 0, 0),
-    (SR, 0, 0),
+registers! {
+    ACR = 0x00, 0x0004_0600, 0x4_7f0f;
+    _ = 0x04, 0, 0;
+    KEYR = 0x08, 0, 0;
+    _ = 0x0c, 0, 0;
+    SR = 0x10, 0, 0;
     // OBL_LAUNCH and OPTSTRT need the option bytes unlocked.
-    (CR, 0xc000_0000, 0xf701_8bff),
-    (ECCR, 0, 0),
-    (OPTR, 0, 0),
-    (0x24, 0xffff_0000, 0),
-    (0x2c, 0, 0),
-    (0x30, 0, 0),
-];
-const ACR: u32 = 0x00;
-const KEYR: u32 = 0x08;
-const SR: u32 = 0x10;
-const CR: u32 = 0x14;
-const ECCR: u32 = 0x18;
-const OPTR: u32 = 0x20;
+    CR = 0x14, 0xc000_0000, 0xf701_8bff;
+    ECCR = 0x18, 0, 0;
+    OPTR = 0x20, 0, 0;
+    _ = 0x24, 0xffff_0000, 0;
+    _ = 0x2c, 0, 0;
+    _ = 0x30, 0, 0;
+}
 
 const DCEN: u32 = 1 << 10;
-const DBANK: u32 = 1 << 22;
+/// Option: two banks of pages of 2 KiB, or one bank of pages of 4 KiB.
+pub const DBANK: u32 = 1 << 22;
 /// Option bytes from the factory.
 const OPTIONS: u32 = 0xffef_f8aa;
 /// Supply, V, below which the chip is held in reset, by BOR_LEV (datasheet, typical, falling).
@@ -80,9 +75,9 @@ pub struct Flash {
     pub power_lost: bool,
 }
 
-impl Flash {
-    /// Erased.
-    pub fn new() -> Self {
+/// Erased.
+impl Default for Flash {
+    fn default() -> Self {
         let size = (FLASH + FLASH_SIZE - BANK_2) as usize;
         Self {
             store: Store::new(KNOWN),
@@ -100,7 +95,9 @@ impl Flash {
             power_lost: false,
         }
     }
+}
 
+impl Flash {
     /// The same contents after a reset.
     pub fn after_reset(self) -> Self {
         Self {
@@ -108,7 +105,7 @@ impl Flash {
             torn: self.torn,
             operations: self.operations,
             options: self.options,
-            ..Self::new()
+            ..Self::default()
         }
     }
 
@@ -120,11 +117,6 @@ impl Flash {
     /// Supply, V, below which the chip is held in reset.
     pub fn brown_out_v(&self) -> f64 {
         BROWN_OUT[(self.options >> 8 & 7) as usize]
-    }
-
-    /// Makes the flash one bank of pages of 4 KiB, or two banks of pages of 2 KiB.
-    pub fn set_banks(&mut self, two: bool) {
-        self.options = self.options & !DBANK | if two { DBANK } else { 0 };
     }
 
     /// Gives a double word of the second bank a wrong check code.
@@ -250,13 +242,8 @@ impl Flash {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         let cr = self.store.get(CR);
         match offset {
             KEYR => {
@@ -285,11 +272,5 @@ impl Flash {
             _ => return self.store.write(offset, value),
         }
         Some(if self.power_lost { Effect::Look } else { Effect::None })
-    }
-}
-
-impl Default for Flash {
-    fn default() -> Self {
-        Self::new()
     }
 }

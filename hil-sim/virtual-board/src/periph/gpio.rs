@@ -1,30 +1,21 @@
 //! Pins (RM0440, section 9). Inputs are as they are pulled.
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 
 const ALL: u32 = u32::MAX;
-const KNOWN: &[Plain] = &[
-    (0x00, ALL, ALL),
-    (0x04, 0, 0xffff),
-    (0x08, 0, ALL),
-    (0x0c, 0, ALL),
-    (0x10, 0, 0),
-    (0x14, 0, 0xffff),
-    (0x18, 0, 0),
-    (0x1c, 0, 0x1_ffff),
-    (0x20, 0, ALL),
-    (0x24, 0, ALL),
-    (0x28, 0, 0),
-];
-const MODER: u32 = 0x00;
-const OTYPER: u32 = 0x04;
-const OSPEEDR: u32 = 0x08;
-const PUPDR: u32 = 0x0c;
-const IDR: u32 = 0x10;
-const ODR: u32 = 0x14;
-const BSRR: u32 = 0x18;
-const AFRL: u32 = 0x20;
-const BRR: u32 = 0x28;
+registers! {
+    MODER = 0x00, ALL, ALL;
+    OTYPER = 0x04, 0, 0xffff;
+    OSPEEDR = 0x08, 0, ALL;
+    PUPDR = 0x0c, 0, ALL;
+    IDR = 0x10, 0, 0;
+    ODR = 0x14, 0, 0xffff;
+    BSRR = 0x18, 0, 0;
+    _ = 0x1c, 0, 0x1_ffff;
+    AFRL = 0x20, 0, ALL;
+    _ = 0x24, 0, ALL;
+    BRR = 0x28, 0, 0;
+}
 
 /// What a port does with a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

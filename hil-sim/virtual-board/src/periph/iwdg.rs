@@ -76,13 +76,8 @@ impl Iwdg {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         match (offset, value) {
             (0x00, 0x5555) => self.unlocked = true,
             (0x00, 0xaaaa) => {

@@ -2,27 +2,20 @@
 
 use std::collections::VecDeque;
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER, Store, registers};
 
-const KNOWN: &[Plain] = &[
-    (CR1, 0, 0xf3ff_7fff),
-    (0x04, 0, 0xff0f_b010),
-    (CR3, 0, 0xfef0_f7c9),
-    (BRR, 0, 0xf_ffff),
-    (0x18, 0, 0),
-    (ISR, 0, 0),
-    (ICR, 0, 0),
-    (RDR, 0, 0),
-    (TDR, 0, 0),
-    (0x2c, 0, 0xf),
-];
-const CR1: u32 = 0x00;
-const CR3: u32 = 0x08;
-const BRR: u32 = 0x0c;
-const ISR: u32 = 0x1c;
-const ICR: u32 = 0x20;
-const RDR: u32 = 0x24;
-const TDR: u32 = 0x28;
+registers! {
+    CR1 = 0x00, 0, 0xf3ff_7fff;
+    _ = 0x04, 0, 0xff0f_b010;
+    CR3 = 0x08, 0, 0xfef0_f7c9;
+    BRR = 0x0c, 0, 0xf_ffff;
+    _ = 0x18, 0, 0;
+    ISR = 0x1c, 0, 0;
+    ICR = 0x20, 0, 0;
+    RDR = 0x24, 0, 0;
+    TDR = 0x28, 0, 0;
+    _ = 0x2c, 0, 0xf;
+}
 
 const UE: u32 = 1;
 const RE: u32 = 1 << 2;
@@ -144,11 +137,8 @@ impl Lpuart {
     /// Reads a register, with its side effects.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
-            ISR => Some(
-                self.status
-                    | self.store.get(CR1) << 18 & 1 << 22
-                    | self.store.get(CR1) << 18 & 1 << 21,
-            ),
+            // REACK and TEACK follow RE and TE.
+            ISR => Some(self.status | self.store.get(CR1) << 18 & 3 << 21),
             RDR => {
                 self.status &= !RXNE;
                 Some(u32::from(self.received))

@@ -1,25 +1,21 @@
 //! Supply (RM0440, section 6): voltage range, supply monitor. The regulator is always ready.
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 
-const KNOWN: &[Plain] = &[
-    (CR1, 0x200, 0x4707),
-    (CR2, 0, 0xcf),
-    (0x08, 0x8000, 0xe51f),
-    (0x0c, 0, 0x31f),
-    (0x10, 0, 0),
-    (SR2, 0, 0),
-    (0x18, 0, 0),
-    (0x20, 0, 0xbfff),
-    (0x24, 0, 0x5fff),
-    (0x28, 0, 0xffff),
-    (0x2c, 0, 0xffef),
-    (CR5, 0x100, 0x100),
-];
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const SR2: u32 = 0x14;
-const CR5: u32 = 0x80;
+registers! {
+    CR1 = 0x00, 0x200, 0x4707;
+    CR2 = 0x04, 0, 0xcf;
+    _ = 0x08, 0x8000, 0xe51f;
+    _ = 0x0c, 0, 0x31f;
+    _ = 0x10, 0, 0;
+    SR2 = 0x14, 0, 0;
+    _ = 0x18, 0, 0;
+    _ = 0x20, 0, 0xbfff;
+    _ = 0x24, 0, 0x5fff;
+    _ = 0x28, 0, 0xffff;
+    _ = 0x2c, 0, 0xffef;
+    CR5 = 0x80, 0x100, 0x100;
+}
 const PVDE: u32 = 1;
 const PVDO: u32 = 1 << 11;
 /// Levels of the supply monitor for a falling supply, V (datasheet, typical), by PVDLS; the last is a pin.

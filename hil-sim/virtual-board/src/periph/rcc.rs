@@ -1,16 +1,9 @@
 //! Clocks and resets (RM0440, section 7). Oscillators and PLL are ready as soon as they are on, but for
 //! a crystal that is dead.
 
-use super::{Effect, NEVER, Plain, Reset, Store};
+use super::{Effect, NEVER, Reset, Store, registers};
 use induction_drive::board::{CLOCK_HZ, HSE_HZ, HSI_HZ};
 
-const CR: u32 = 0x00;
-const CFGR: u32 = 0x08;
-const CIFR: u32 = 0x1c;
-const CICR: u32 = 0x20;
-const PLLCFGR: u32 = 0x0c;
-const CCIPR: u32 = 0x88;
-const CSR: u32 = 0x94;
 /// Clocks of the peripherals.
 pub const AHB1ENR: u32 = 0x48;
 /// See [`AHB1ENR`].
@@ -22,32 +15,32 @@ pub const APB1ENR2: u32 = 0x5c;
 /// See [`AHB1ENR`].
 pub const APB2ENR: u32 = 0x60;
 
-const KNOWN: &[Plain] = &[
-    (CR, 0x100, 0x010d_0300),
-    (0x04, 0x4000_0000, 0x7f00_0000),
-    (CFGR, 0x5, 0x7f00_3ff3),
-    (PLLCFGR, 0x1000, 0xff73_7ff3),
-    (0x18, 0, 0x63b),
-    (CIFR, 0, 0),
-    (CICR, 0, 0),
-    (0x28, 0, 0x111f),
-    (0x2c, 0, 0x050f_607f),
-    (0x30, 0, 0x101),
-    (0x38, 0, 0xd2fe_c13f),
-    (0x3c, 0, 0x103),
-    (0x40, 0, 0x0437_f801),
-    (AHB1ENR, 0x100, 0x111f),
-    (AHB2ENR, 0, 0x050f_607f),
-    (0x50, 0, 0x101),
-    (APB1ENR1, 0x400, 0xd2fe_cd3f),
-    (APB1ENR2, 0, 0x103),
-    (APB2ENR, 0, 0x0437_f801),
-    (CCIPR, 0, u32::MAX),
-    (0x90, 0, 0),
-    (CSR, 0, 1),
-    (0x98, 0, 1),
-    (0x9c, 0, 0x0030_0003),
-];
+registers! {
+    CR = 0x00, 0x100, 0x010d_0300;
+    _ = 0x04, 0x4000_0000, 0x7f00_0000;
+    CFGR = 0x08, 0x5, 0x7f00_3ff3;
+    PLLCFGR = 0x0c, 0x1000, 0xff73_7ff3;
+    _ = 0x18, 0, 0x63b;
+    CIFR = 0x1c, 0, 0;
+    CICR = 0x20, 0, 0;
+    _ = 0x28, 0, 0x111f;
+    _ = 0x2c, 0, 0x050f_607f;
+    _ = 0x30, 0, 0x101;
+    _ = 0x38, 0, 0xd2fe_c13f;
+    _ = 0x3c, 0, 0x103;
+    _ = 0x40, 0, 0x0437_f801;
+    _ = AHB1ENR, 0x100, 0x111f;
+    _ = AHB2ENR, 0, 0x050f_607f;
+    _ = 0x50, 0, 0x101;
+    _ = APB1ENR1, 0x400, 0xd2fe_cd3f;
+    _ = APB1ENR2, 0, 0x103;
+    _ = APB2ENR, 0, 0x0437_f801;
+    CCIPR = 0x88, 0, u32::MAX;
+    _ = 0x90, 0, 0;
+    CSR = 0x94, 0, 1;
+    _ = 0x98, 0, 1;
+    _ = 0x9c, 0, 0x0030_0003;
+}
 
 const HSEON: u32 = 1 << 16;
 const CSSON: u32 = 1 << 19;

@@ -8,51 +8,35 @@ mod outputs;
 
 pub use outputs::{Output, Wave};
 
-use super::{Effect, NEVER, Plain, Store};
+use super::{Effect, NEVER, Store, registers};
 use crate::rules::{Rule, Rules};
 
-const KNOWN: &[Plain] = &[
-    (CR1, 0, 0x1bff),
-    (CR2, 0, 0x02f5_fffd),
-    (0x08, 0, 0x0331_ffff),
-    (DIER, 0, 0x00f0_7fff),
-    (SR, 0, 0),
-    (EGR, 0, 0),
-    (CCMR1, 0, 0x0101_ffff),
-    (CCMR2, 0, 0x0101_ffff),
-    (CCER, 0, 0x0033_ffff),
-    (CNT, 0, 0),
-    (PSC, 0, 0xffff),
-    (ARR, 0xffff, 0xf_ffff),
-    (RCR, 0, 0xffff),
-    (CCR1, 0, 0xf_ffff),
-    (0x38, 0, 0xf_ffff),
-    (0x3c, 0, 0xf_ffff),
-    (CCR4, 0, 0xf_ffff),
-    (BDTR, 0, 0x3fff_ffff),
-    (0x48, 0, 0xe00f_ffff),
-    (0x4c, 0, 0xf_ffff),
-    (0x50, 0, 0x0101_fcfc),
-    (0x54, 0, 0x300ff),
-    (AF1, 1, 0x3_ffff),
-    (0x64, 1, 0x7_3fff),
-];
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const DIER: u32 = 0x0c;
-const SR: u32 = 0x10;
-const EGR: u32 = 0x14;
-const CCMR1: u32 = 0x18;
-const CCMR2: u32 = 0x1c;
-const CCER: u32 = 0x20;
-const CNT: u32 = 0x24;
-const PSC: u32 = 0x28;
-const ARR: u32 = 0x2c;
-const RCR: u32 = 0x30;
-const CCR1: u32 = 0x34;
-const CCR4: u32 = 0x40;
-const BDTR: u32 = 0x44;
-const AF1: u32 = 0x60;
+registers! {
+    CR1 = 0x00, 0, 0x1bff;
+    CR2 = 0x04, 0, 0x02f5_fffd;
+    _ = 0x08, 0, 0x0331_ffff;
+    _ = 0x0c, 0, 0x00f0_7fff;
+    SR = 0x10, 0, 0;
+    EGR = 0x14, 0, 0;
+    CCMR1 = 0x18, 0, 0x0101_ffff;
+    CCMR2 = 0x1c, 0, 0x0101_ffff;
+    CCER = 0x20, 0, 0x0033_ffff;
+    CNT = 0x24, 0, 0;
+    PSC = 0x28, 0, 0xffff;
+    ARR = 0x2c, 0xffff, 0xf_ffff;
+    RCR = 0x30, 0, 0xffff;
+    CCR1 = 0x34, 0, 0xf_ffff;
+    _ = 0x38, 0, 0xf_ffff;
+    _ = 0x3c, 0, 0xf_ffff;
+    CCR4 = 0x40, 0, 0xf_ffff;
+    BDTR = 0x44, 0, 0x3fff_ffff;
+    _ = 0x48, 0, 0xe00f_ffff;
+    _ = 0x4c, 0, 0xf_ffff;
+    _ = 0x50, 0, 0x0101_fcfc;
+    _ = 0x54, 0, 0x300ff;
+    AF1 = 0x60, 1, 0x3_ffff;
+    _ = 0x64, 1, 0x7_3fff;
+}
 
 const UIF: u32 = 1;
 const BIF: u32 = 1 << 7;
@@ -294,13 +278,8 @@ impl Tim1 {
     }
 
     /// Writes a register.
-    pub fn write(
-        &mut self,
-        offset: u32,
-        value: u32,
-        now: u64,
-        rules: &mut Rules,
-    ) -> Option<Effect> {
+    pub fn write(&mut self, offset: u32, value: u32, rules: &mut Rules) -> Option<Effect> {
+        let now = rules.now;
         let old = self.store.read(offset)?;
         match offset {
             SR => {

@@ -1,13 +1,15 @@
 //! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well.
 
-use super::{Effect, Plain, Store};
+use super::{Effect, Store, registers};
 
 const ALL: u32 = u32::MAX;
-const KNOWN: &[Plain] =
-    &[(0x00, 0, 0x1bff), (0x14, 0, 0), (0x24, 0, 0), (0x28, 0, 0xffff), (0x2c, ALL, ALL)];
-const CR1: u32 = 0x00;
-const EGR: u32 = 0x14;
-const CNT: u32 = 0x24;
+registers! {
+    CR1 = 0x00, 0, 0x1bff;
+    EGR = 0x14, 0, 0;
+    CNT = 0x24, 0, 0;
+    _ = 0x28, 0, 0xffff;
+    _ = 0x2c, ALL, ALL;
+}
 
 /// The timer.
 #[derive(Clone, Debug)]

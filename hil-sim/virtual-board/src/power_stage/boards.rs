@@ -27,6 +27,22 @@ const LIN: Input = Input {
     thresholds: L639X,
 };
 
+/// Amplifiers of shunts, without their scale.
+const AMPLIFIERS: Shunts = Shunts {
+    volts_per_a: 0.0,
+    zero_v: 0.0,
+    // TSV994: rail to rail, 10 mV from its supply (assumed).
+    rails_v: (0.010, 3.29),
+    // Assumed: filter and slew of the amplifier.
+    settling_s: 0.4e-6,
+    // Resistors of 1 % (assumed); one of each sign, the third right.
+    gain_error: [0.004, -0.004, 0.0],
+    // Offset of the amplifiers through the gain (assumed), V.
+    offset_v: [2e-3, -2e-3, 1e-3],
+    // One code, rms (assumed).
+    noise_v: 0.0008,
+};
+
 /// The inverter of the dissertation, with sensors in the lines a and b. The dissertation does not describe its drivers:
 /// inputs active high with external pull-downs of 10 kOhm, as the documentation asks for, without interlock.
 pub const REFERENCE: PowerStage = PowerStage {
@@ -56,20 +72,7 @@ const IHM08M1: PowerStage = PowerStage {
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 320e-9 },
     // Assumed: the MOSFETs switch in less than 100 ns, so the driver's own dead time is enough.
     limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
-    sensors: Sensors::LowSide(Shunts {
-        volts_per_a: -0.010 * 5.18,
-        zero_v: 1.71,
-        // TSV994: rail to rail, 10 mV from its supply (assumed).
-        rails_v: (0.010, 3.29),
-        // Assumed: filter and slew of the amplifier.
-        settling_s: 0.4e-6,
-        // Resistors of 1 % (assumed); one of each sign, the third right.
-        gain_error: [0.004, -0.004, 0.0],
-        // Offset of the amplifiers through the gain (assumed), V.
-        offset_v: [2e-3, -2e-3, 1e-3],
-        // One code, rms (assumed).
-        noise_v: 0.0008,
-    }),
+    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
     dc_link_divider: Some(19.15),
     // 125 ns (L6398 data sheet). A switch drops little; assumed.
@@ -86,15 +89,7 @@ const IHM023V3: PowerStage = PowerStage {
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 180e-9 },
     // Assumed: an IGBT is off within 0.5 us.
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
-    sensors: Sensors::LowSide(Shunts {
-        volts_per_a: -0.15 * 1.7,
-        zero_v: 1.7,
-        rails_v: (0.010, 3.29),
-        settling_s: 0.4e-6,
-        gain_error: [0.004, -0.004, 0.0],
-        offset_v: [2e-3, -2e-3, 1e-3],
-        noise_v: 0.0008,
-    }),
+    sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
     // 125 ns (L6390 data sheet); drop of an IGBT, assumed.
     delay_and_drop: Some((125e-9, 1.5)),
