@@ -3,8 +3,9 @@
 //! A key is one of the bench ([`BENCH`]: the simulated motor, inverter, sensors and load) or one of the drive
 //! ([`drive_core::settings::SETTINGS`]). A name that both have sets both: the drive knows its bench. `drive.NAME` sets
 //! the drive alone, which is then wrong about the bench. Assignments count in their order; in a file, those of `drive.`
-//! come last.
+//! come last. `after.NAME` is a key of the plant whose value changes after the learning.
 
+mod after;
 mod alias;
 pub mod file;
 mod key;
@@ -17,6 +18,7 @@ use std::path::Path;
 
 use drive_core::settings::{Line, Settings};
 
+pub use after::After;
 use file::FileAssignment;
 pub use key::Key;
 pub use keys::*;
@@ -158,7 +160,7 @@ impl Config {
     /// The assignments that make this configuration of `base`.
     pub fn changes_from(&self, base: &Self) -> Vec<String> {
         let (mut rebuilt, mut changes) = (base.clone(), Vec::new());
-        for key in Key::all() {
+        for key in Key::all().chain(Key::after()) {
             let value = key.get(self);
             if value != key.get(&rebuilt) {
                 let change = (key.assigned_name(), value);

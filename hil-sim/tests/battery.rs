@@ -20,12 +20,16 @@ fn get(metrics: &Metrics, name: &str) -> f64 {
 #[test]
 fn the_drive_passes_on_the_motor_that_it_is_made_for() {
     for learn in ["no", "yes"] {
-        let (metrics, faults) = battery(&[&format!("prepare.learn={learn}")]);
+        let (metrics, faults) = battery(&[&format!("prepare.learn={learn}"), "runs=48"]);
         let rms = get(&metrics, "angle_error_rms_deg");
         assert!((rms - 1.86).abs() < 0.15, "{rms}");
         assert!((4.0..6.0).contains(&get(&metrics, "angle_error_p99_deg")));
         assert!(get(&metrics, "angle_error_max_deg") < 13.0);
-        for name in ["lost_runs", "wrong_runs", "flux_off_runs", "trips", "refused_starts"] {
+        // Torque of sound runs: angle errors of 2° rms cost little at the mean.
+        assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
+        let none =
+            ["lost_runs", "silent_runs", "stuck_runs", "trips", "refused_starts", "limited_runs"];
+        for name in none {
             assert_eq!(get(&metrics, name), 0.0, "{name}");
         }
         assert_eq!((get(&metrics, "runs"), faults), (48.0, 0));
@@ -66,4 +70,90 @@ fn a_flux_that_is_too_small_or_too_large_is_counted() {
         assert!(get(&metrics, "flux_off_longest_s") > 1.0, "{k}: {metrics:?}");
     }
     assert_eq!(get(&of_ratio(1.0), "flux_off_runs"), 0.0);
+}
+
+/// With an encoder and a rotor resistance believed `k` times too large, torque over command is
+/// `k (1 + x^2)/(1 + (k x)^2)`, `x = i_q/i_d` (indirect field orientation, steady). The battery draws i_q evenly between
+/// 0.5 and 3 A beside 0.7 A; the mean of 48 such runs has a standard error of 3 % of the torque at 3 A.
+#[test]
+fn the_torque_error_is_that_of_the_equations() {
+    for k in [0.5_f64, 2.0] {
+        let r_r = format!("drive.motor.r_r={}", 1.1 * k);
+        let (metrics, _) = battery(&["angle_source=encoder", &r_r, "runs=96"]);
+        let n = 1000;
+        let error = |i_q: f64| {
+            let x = i_q / 0.7;
+            (k * (1.0 + x * x) / (1.0 + (k * x).powi(2)) - 1.0) * i_q / 3.0
+        };
+        let currents = (0..n).map(|step| 0.5 + 2.5 * (f64::from(step) + 0.5) / f64::from(n));
+        let expected = 100.0 * currents.map(error).sum::<f64>() / f64::from(n);
+        let found = get(&metrics, "torque_error_mean_pct");
+        assert!((found - expected).abs() < 6.0, "{k}: {found}, expected {expected}");
+        assert!(expected.abs() > 20.0);
+    }
+}
+
+/// Values after the learning act on the runs alone: the drive learns a saliency that has gone when it starts, and each start
+/// is refused by fault 25. Without saliency from the beginning the learning is refused before.
+#[test]
+fn values_after_the_learning_do_not_act_while_it_lasts() {
+    let learn = |set: &str| battery(&["prepare.learn=yes", set, "runs=3"]).0;
+    assert_eq!(get(&learn("after.saliency.a_psi=0"), "refused_by_fault_25"), 3.0);
+    assert_eq!(get(&learn("saliency.a_psi=0"), "refused_starts"), 3.0);
+    let fine = battery(&["prepare.learn=yes", "saliency.a_psi=0", "after.saliency.a_psi=-0.035"]);
+    assert!(get(&fine.0, "refused_starts") > 0.0);
+    let error = Config::load(None, None, &["after.plant=g".to_owned()]).unwrap_err().to_string();
+    assert!(error.contains("after.plant"), "{error}");
+    let error = Config::load(None, None, &["after.motor.r_r=-1".to_owned()]).unwrap_err();
+    let text = "after.motor.r_r = -1: out of range; allowed: 0.001 to 1000 ohm";
+    assert_eq!(error.to_string(), text);
+}
+
+/// A drive that may track up to 100 rpm only stops the runs at more, at a sound angle; one without saliency stops runs whose
+/// angle is wrong.
+#[test]
+fn sound_runs_that_are_stopped_are_told_from_others() {
+    let (sound, _) = battery(&["injection.tracked_rpm=100", "runs=12"]);
+    assert!(get(&sound, "trips") >= 4.0, "{sound:?}");
+    assert_eq!(get(&sound, "sound_runs_stopped"), get(&sound, "trips"));
+    let (wrong, _) = battery(&["saliency.a_psi=0", "injection.check=no", "runs=12"]);
+    assert!(get(&wrong, "trips") >= 6.0, "{wrong:?}");
+    assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
+}
+
+/// The flux turned at once: the drive finds it again or stops. Without saliency and watches it stays wrong, most of
+/// the time to the end of the run.
+#[test]
+fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
+    let (watched, faults) = battery(&["battery.runs=forced", "runs=27"]);
+    assert_eq!((get(&watched, "silent_runs"), faults), (0.0, 0), "{watched:?}");
+    // Turned: an angle error of 60° and more for longer than a period.
+    assert!(get(&watched, "wrong_longest_s") > 0.01, "{watched:?}");
+    let blind = [
+        "battery.runs=forced",
+        "runs=27",
+        "saliency.a_psi=0",
+        "injection.check=no",
+        "injection.monitor=no",
+    ];
+    let (blind, _) = battery(&blind);
+    assert!(get(&blind, "silent_runs") >= 9.0 && get(&blind, "stuck_runs") >= 1.0, "{blind:?}");
+}
+
+/// Commands that never rest neither hide a turned flux nor stop a sound drive: half of the runs turn it, and none of
+/// the others stops.
+#[test]
+fn commands_that_never_rest_are_borne() {
+    let (metrics, faults) = battery(&["battery.runs=restless", "runs=12", "prepare.learn=yes"]);
+    assert_eq!((get(&metrics, "silent_runs"), faults), (0.0, 0), "{metrics:?}");
+}
+
+/// Drawn disturbances are those of the seed, whatever the order of the runs, and cost accuracy.
+#[test]
+fn drawn_disturbances_cost_accuracy() {
+    let run = |set: &str| battery(&["plant=r", "prepare.learn=yes", "runs=24", set]).0;
+    let (none, drawn) = (run("disturbed.drawn=0"), run("disturbed.drawn=1"));
+    let rms = |metrics: &Metrics| get(metrics, "angle_error_rms_deg");
+    assert!(rms(&drawn) > 1.2 * rms(&none), "{} {}", rms(&drawn), rms(&none));
+    assert_eq!(rms(&drawn), rms(&run("disturbed.drawn=1")));
 }

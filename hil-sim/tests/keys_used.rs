@@ -80,7 +80,7 @@ fn short(name: &str) -> Config {
 }
 
 /// Settings beside which a key has an effect that has none beside the defaults.
-const BESIDE: [&[&str]; 10] = [
+const BESIDE: [&[&str]; 11] = [
     &[],
     &["load.mode=free"],
     &["load.mode=speed", "load.speed_rpm=60"],
@@ -91,10 +91,11 @@ const BESIDE: [&[&str]; 10] = [
     &["spread.machine=1.5"],
     &["current_plant=motor"],
     &["plant=r"],
+    &["battery.runs=load"],
 ];
 
 /// Keys that are used although a short undisturbed run does not show it.
-const QUIET: [(&[&str], &str); 9] = [
+const QUIET: [(&[&str], &str); 10] = [
     (&["nameplate."], "the plate of the motor, whole; the rules take some of its numbers"),
     (&["limits."], "protections: without effect until they act"),
     (&["scales.ntc."], "the simulated thermistor and the drive's are the same"),
@@ -121,6 +122,7 @@ const QUIET: [(&[&str], &str); 9] = [
         "of other demodulators than the default",
     ),
     (&["sequence.stop_a_per_s"], "acts at a stop"),
+    (&["battery.relearn"], "acts from the second dozen of runs on, with prepare.learn"),
     (
         &["plant", "flux_level", "iron.", "warming.", "dc_link.", "shaft.", "inverter.open_phase"],
         "of the other machine model, or with an effect beside another key only",

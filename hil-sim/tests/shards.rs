@@ -25,7 +25,10 @@ const SMALL: [(&str, &[&str]); 6] = [
         ],
     ),
     ("machines", &["--set", "runs=2", "--set", "spread.machine=1.5", "--seconds", "0.2"]),
-    ("battery", &["--set", "runs=14"]),
+    (
+        "battery",
+        &["--set", "runs=14", "--set", "disturbed.drawn=0.5", "--set", "after.motor.r_r=1.2"],
+    ),
     ("lock-monitor", &["--set", "runs=1"]),
     ("saliency-check", &["--set", "runs=2"]),
 ];

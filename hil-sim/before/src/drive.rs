@@ -1,7 +1,7 @@
 //! The earlier drive as the battery runs it.
 
 use drive_before::sensing::Line;
-use drive_before::{Command, Compare, Drive, Hardware, Mode, Sample, Settings, State};
+use drive_before::{Command, Compare, Drive, Hardware, Mode, Sample, Settings, State, Taken};
 use drive_core::{Compare as CompareNow, Sample as SampleNow};
 use hil_sim::Config;
 use hil_sim::experiments::battery::{Condition, DriveUnderTest, Purpose};
@@ -66,8 +66,12 @@ impl DriveUnderTest for Before {
         }))
     }
 
-    fn torque(&mut self, i_q: f32) -> Result<(), String> {
-        self.command(Command::Torque(i_q))
+    fn torque(&mut self, i_q: f32) -> Result<f32, String> {
+        match self.0.command(Command::Torque(i_q)) {
+            Ok(Taken::Limited(taken)) => Ok(taken),
+            Ok(_) => Ok(i_q),
+            Err(refused) => Err(refused.to_string()),
+        }
     }
 
     fn speed(&mut self, rpm: f32) -> Result<(), String> {

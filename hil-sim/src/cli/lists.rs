@@ -42,8 +42,10 @@ fn pretty(value: &serde_json::Value) -> Result<String, Error> {
 pub fn keys(prefix: Option<&str>, as_toml: bool, input: &Input) -> Result<String, Error> {
     let config = input.config()?;
     let prefix = prefix.unwrap_or_default();
+    // Those of `after.` repeat the plant's; they are shown when they are asked for.
+    let after = Key::after().filter(|_| !prefix.is_empty());
     let found: Vec<Key> =
-        Key::all().filter(|key| key.assigned_name().starts_with(prefix)).collect();
+        Key::all().chain(after).filter(|key| key.assigned_name().starts_with(prefix)).collect();
     if found.is_empty() {
         let groups = Key::all().filter_map(|key| key.name().split_once('.'));
         let known: Vec<&str> =

@@ -5,7 +5,7 @@ use drive_core::settings::entry::Entry;
 use drive_core::settings::value as drive;
 use drive_core::settings::{SETTINGS, find};
 
-use super::{Allowed, BENCH, BenchKey, Config, DRIVE, Value};
+use super::{Allowed, BENCH, BenchKey, Config, DRIVE, Value, after, after::After};
 use crate::error::{Error, nearest};
 
 /// A key of the bench or of the drive.
@@ -15,6 +15,8 @@ pub enum Key {
     Bench(&'static BenchKey),
     /// A setting of the drive.
     Drive(&'static Entry<Settings>),
+    /// A key of the plant, as it is after the learning.
+    After(&'static BenchKey),
 }
 
 fn on_bench(name: &str) -> Option<&'static BenchKey> {
@@ -27,11 +29,19 @@ impl Key {
         BENCH.iter().map(Self::Bench).chain(SETTINGS.iter().map(Self::Drive))
     }
 
+    /// The keys of the plant, as they are after the learning.
+    pub fn after() -> impl Iterator<Item = Self> {
+        BENCH.iter().filter(|key| after::is_of_plant(key)).map(Self::After)
+    }
+
     /// The keys that an assignment to `name` sets, one or two.
     ///
     /// # Errors
     /// [`Error::UnknownKey`] with the most similar name.
     pub fn named(name: &str) -> Result<Vec<Self>, Error> {
+        if let Some(key) = Self::after().find(|key| key.name() == name) {
+            return Ok(vec![key]);
+        }
         let (bench, drive) = match name.strip_prefix(DRIVE) {
             Some(name) => (None, find(name)),
             None => (on_bench(name), find(name)),
@@ -39,7 +49,7 @@ impl Key {
         let keys: Vec<_> =
             bench.map(Self::Bench).into_iter().chain(drive.map(Self::Drive)).collect();
         if keys.is_empty() {
-            let known = Self::all().map(Self::name);
+            let known = Self::all().chain(Self::after()).map(Self::name);
             return Err(Error::UnknownKey {
                 key: name.to_owned(),
                 nearest: nearest(name, known).map(str::to_owned),
@@ -53,6 +63,7 @@ impl Key {
         match self {
             Self::Bench(key) => key.name,
             Self::Drive(entry) => entry.name,
+            Self::After(key) => key.after,
         }
     }
 
@@ -69,7 +80,7 @@ impl Key {
     /// Unit, empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Bench(key) => key.unit,
+            Self::Bench(key) | Self::After(key) => key.unit,
             Self::Drive(entry) => entry.unit,
         }
     }
@@ -77,7 +88,7 @@ impl Key {
     /// Meaning.
     pub fn help(self) -> &'static str {
         match self {
-            Self::Bench(key) => key.doc.trim().trim_end_matches('.'),
+            Self::Bench(key) | Self::After(key) => key.doc.trim().trim_end_matches('.'),
             Self::Drive(entry) => entry.help,
         }
     }
@@ -86,7 +97,7 @@ impl Key {
     /// here is that of the defaults.
     pub fn allowed(self) -> Allowed {
         match self {
-            Self::Bench(key) => key.allowed,
+            Self::Bench(key) | Self::After(key) => key.allowed,
             Self::Drive(entry) => match entry.range(&Settings::default()) {
                 Some((min, max)) => Allowed::Range { min: double(min), max: double(max) },
                 None => Allowed::Words(entry.words()),
@@ -105,6 +116,7 @@ impl Key {
     pub fn get(self, config: &Config) -> Value {
         match self {
             Self::Bench(key) => (key.get)(config),
+            Self::After(key) => config.after.get(key),
             Self::Drive(entry) => match entry.get(&config.drive) {
                 drive::Value::Number(value) => Value::of_single(value),
                 drive::Value::Whole(value) => Value::Number(value.into()),
@@ -121,6 +133,7 @@ impl Key {
     pub fn set(self, config: &mut Config, value: &Value) -> Result<(), &'static str> {
         match self {
             Self::Bench(key) => (key.set)(config, value),
+            Self::After(key) => After::set(config, key, value),
             Self::Drive(entry) => {
                 let text = match value {
                     Value::Switch(on) => drive::Words::word(*on).to_owned(),

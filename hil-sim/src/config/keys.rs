@@ -6,6 +6,7 @@
 
 use drive_core::Settings;
 
+use super::after::After;
 use super::value::{Allowed, Field, Value, words};
 
 words! {
@@ -59,6 +60,22 @@ words! {
 }
 
 words! {
+    /// Which runs the battery consists of.
+    BatteryRuns {
+        /// The twelve kinds.
+        Kinds = "kinds",
+        /// Load steps of battery.load_share.
+        Load = "load",
+        /// Torque near its largest at rest.
+        Hold = "hold",
+        /// The flux turned at once.
+        Forced = "forced",
+        /// Torque commands that never rest.
+        Restless = "restless",
+    }
+}
+
+words! {
     /// A phase that is interrupted between inverter and motor.
     OpenPhase {
         /// None.
@@ -76,6 +93,8 @@ words! {
 pub struct BenchKey {
     /// How `--set` and TOML name it.
     pub name: &'static str,
+    /// The name of the value that it takes after the learning, if it is one of the plant.
+    pub after: &'static str,
     /// Unit, empty for a pure number.
     pub unit: &'static str,
     /// The values it can have.
@@ -131,11 +150,14 @@ macro_rules! keys {
             /// The drive.
             #[serde(skip)]
             pub drive: Settings,
+            /// Keys of the plant that change after the learning.
+            #[serde(skip)]
+            pub after: After,
         }
 
         impl Default for Config {
             fn default() -> Self {
-                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default() };
+                let mut config = Self { $($group: $type::default(),)+ drive: Settings::default(), after: After::default() };
                 // The saliency of the simulated motor is known, and so are its tables at 0.7 A.
                 config.drive.injection.synchronous.allow_unlearned = true;
                 config.calibrate();
@@ -146,6 +168,7 @@ macro_rules! keys {
         /// The keys of the bench, in groups.
         pub static BENCH: &[BenchKey] = &[$($(BenchKey {
             name: concat!($prefix, stringify!($field)),
+            after: concat!("after.", $prefix, stringify!($field)),
             unit: $unit,
             allowed: allowed!($($allowed)+),
             doc: concat!($($doc,)+),
@@ -369,6 +392,23 @@ keys! {
     "prepare." prepare: PrepareConfig {
         /// Whether a sensorless drive learns first, with the shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
+    }
+    /// The experiment battery.
+    "battery." battery: BatteryConfig {
+        /// Which runs: kinds for the twelve kinds, load for load steps, hold for torque near its largest at rest, forced
+        /// for a flux that is turned at once, restless for torque commands that never rest.
+        runs: BatteryRuns = BatteryRuns::Kinds, [BatteryRuns], "";
+        /// Load step of battery.runs = load, in relation to the torque at the nominal limit of the torque current.
+        load_share: f64 = 0.4, [0 .. 2], "";
+        /// Whether the drive learns anew for every twelve runs; otherwise once, unless disturbances are drawn.
+        relearn: bool = false, [switch], "";
+    }
+    /// Disturbances of the battery: all those of the page Statistics together, in relation to their full sizes.
+    "disturbed." disturbed: DisturbedConfig {
+        /// Size of each.
+        together: f64 = 0.0, [0 .. 2], "";
+        /// Largest part that is drawn for each and added, of either sign where it has one.
+        drawn: f64 = 0.0, [0 .. 2], "";
     }
     /// Errors that monte-carlo draws for every run, beside the operating point.
     "spread." spread: SpreadConfig {

@@ -15,7 +15,7 @@ fn set_table(config: &mut Config, table: &toml::Table) -> Result<(), Error> {
 fn every_default_is_allowed_and_every_key_round_trips() {
     assert_eq!(Config::default().changes(), [""; 0]);
     assert!(Config::default().drive.check().is_ok());
-    for key in Key::all() {
+    for key in Key::all().chain(Key::after()) {
         let (mut config, name) = (Config::default(), key.name());
         let value = key.get(&config);
         assert_eq!(key.set(&mut config, &value), Ok(()), "{name}");
@@ -40,7 +40,7 @@ fn every_default_is_allowed_and_every_key_round_trips() {
 
 #[test]
 fn names_are_unique() {
-    let names: Vec<String> = Key::all().map(Key::assigned_name).collect();
+    let names: Vec<String> = Key::all().chain(Key::after()).map(Key::assigned_name).collect();
     for (i, name) in names.iter().enumerate() {
         assert!(!names[..i].contains(name), "{name}");
     }

@@ -1,10 +1,12 @@
-//! The battery: twelve kinds of runs that shake the angle, on any simulated motor and with any drive.
+//! The battery: runs that shake the angle, on any simulated motor and with any drive.
 //!
 //! The runs and the verdicts are those of a study of this drive on an independent saturating motor: what counts is not
 //! the error alone but whether the drive notices. A run is *lost* when the error is beyond 45° at any time, *wrong* when
 //! it is beyond 30° for more than 0.5 s while the drive regulates, and its *flux is off* when the flux is below half or
-//! above twice its nominal value for as long.
+//! above twice its nominal value for as long. It is *silent* when it is wrong or its flux is off.
 
+mod bench;
+mod disturbed;
 mod drive;
 mod kind;
 mod summary;
@@ -13,7 +15,7 @@ mod trial;
 use std::sync::OnceLock;
 
 pub use drive::{Condition, DriveUnderTest, Purpose};
-pub use kind::{KINDS, Kind};
+pub use kind::{KINDS, Kind, nominal_limit_a};
 pub use summary::Summary;
 pub use trial::{Trial, learned, trial};
 
@@ -32,44 +34,78 @@ use crate::outcome::Outcome;
 pub const EXPERIMENT: Experiment = Experiment {
     name: "battery",
     stands_for: "what section 5.2 leaves open",
-    about: "Twelve kinds of runs, four of each: angle error, and what the drive does not notice; `--set runs=N`.",
-    uses: &[BENCH, DRIVE, &["prepare.learn", "runs"]],
+    about: "Runs of `battery.runs`, eight of each of twelve kinds: angle error, and what the drive does not notice.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "battery.", "disturbed.", "after.", "runs"]],
     not: &[],
     run: whole::<Battery>,
 };
 
-/// Runs, unless `runs` says otherwise: four of each kind.
-pub const RUNS: usize = 4 * KINDS.len();
+/// Runs for which the drive learns anew.
+const GROUP: usize = KINDS.len();
 
 /// The seed of a run.
 pub fn seed_of(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(1_000_003).wrapping_add(number as u64)
 }
 
+/// What is drawn beside the noise has seeds of its own.
+const LEARNING: u64 = 1 << 40;
+const DRAWN: u64 = 2 << 40;
+
+/// The drive of a group of runs, or the number of the fault with which it refused to learn.
+type Learnt = Result<Drive, u8>;
+
 /// The runs.
 pub struct Battery {
     config: Config,
+    /// The bench after the learning.
+    after: Config,
     seed: u64,
-    /// The drive that all runs begin with, or the number of the fault with which it refused to learn.
-    drive: OnceLock<Result<Drive, u8>>,
+    kinds: Vec<Kind>,
+    runs: usize,
+    /// The drive of each group.
+    drives: Vec<OnceLock<Learnt>>,
 }
 
 impl Battery {
-    /// The drive of the configuration; with `prepare.learn` it has learned.
-    fn drive(&self) -> Result<&Result<Drive, u8>, Error> {
-        if let Some(drive) = self.drive.get() {
+    /// The group of a run: all are one unless the drive learns anew.
+    fn group(&self, number: usize) -> usize {
+        let many = self.config.battery.relearn || self.config.disturbed.drawn > 0.0;
+        if many { number / GROUP } else { 0 }
+    }
+
+    /// Sizes of the disturbances that are always there, and of those that come after the learning.
+    fn sizes(&self, number: usize) -> [Vec<f64>; 2] {
+        let group = seed_of(self.seed, self.group(number)) ^ LEARNING;
+        let run = seed_of(self.seed, number) ^ DRAWN;
+        [
+            disturbed::sizes(&self.config, &disturbed::ALWAYS, group),
+            disturbed::sizes(&self.config, &disturbed::AFTER, run),
+        ]
+    }
+
+    /// The drive of a group; with `prepare.learn` it has learned.
+    fn drive(&self, number: usize) -> Result<&Learnt, Error> {
+        let (group, config) = (self.group(number), &self.config);
+        if let Some(drive) = self.drives[group].get() {
             return Ok(drive);
         }
-        let (config, settings) = (&self.config, &self.config.drive);
+        let settings = &config.drive;
         let drive = Drive::new(settings.build().map_err(Error::refused)?);
         let tracks = settings.angle_source == AngleSource::Injection
             && settings.injection.demodulator == DemodulatorKind::Synchronous;
         let drive = match config.prepare.learn && tracks {
-            true => learned(config, &plant_settings(config), drive, self.seed)?,
+            true => {
+                let mut bench = config.clone();
+                disturbed::add(&mut bench, &disturbed::ALWAYS, &self.sizes(number)[0]);
+                let seed =
+                    if group == 0 { self.seed } else { seed_of(self.seed, group) ^ LEARNING };
+                learned(config, &plant_settings(&bench), drive, seed)?
+            }
             false => Ok(drive),
         };
         // Two threads that came at once found the same.
-        Ok(self.drive.get_or_init(|| drive))
+        Ok(self.drives[group].get_or_init(|| drive))
     }
 }
 
@@ -78,19 +114,31 @@ impl Study for Battery {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
-        check_model(context.config)?;
-        let (config, drive) = (context.config.clone(), OnceLock::new());
-        Ok(Self { config, seed: context.seed, drive })
+        let config = context.config.clone();
+        check_model(&config)?;
+        let after = config.after_learning().map_err(Error::refused)?;
+        check_model(&after)?;
+        let (kinds, runs) = kind::chosen(&config);
+        let runs = config.extent.runs.map_or(runs, |runs| runs as usize);
+        let drives = std::iter::repeat_with(OnceLock::new).take(runs.div_ceil(GROUP)).collect();
+        Ok(Self { config, after, seed: context.seed, kinds, runs, drives })
     }
 
     fn runs(&self) -> usize {
-        self.config.extent.runs.map_or(RUNS, |runs| runs as usize)
+        self.runs
     }
 
     fn run(&self, number: usize) -> Result<Trial, Error> {
-        let (kind, seed) = (KINDS[number % KINDS.len()], seed_of(self.seed, number));
-        match self.drive()? {
-            Ok(drive) => trial(&self.config, &plant_settings(&self.config), drive, kind, seed),
+        let kind = self.kinds[number % self.kinds.len()];
+        let seed = seed_of(self.seed, number);
+        match self.drive(number)? {
+            Ok(drive) => {
+                let mut bench = self.after.clone();
+                let [always, after] = self.sizes(number);
+                disturbed::add(&mut bench, &disturbed::ALWAYS, &always);
+                disturbed::add(&mut bench, &disturbed::AFTER, &after);
+                trial(&bench, &plant_settings(&bench), drive, kind, seed)
+            }
             Err(fault) => Ok(Trial::refused(kind, seed, *fault)),
         }
     }
@@ -98,11 +146,29 @@ impl Study for Battery {
     fn outcome(&self, _: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
         Summary::of(&trials).metrics(&mut outcome.metrics);
-        outcome.faults.extend(trials.iter().filter_map(Trial::failure));
+        let failures = trials.iter().enumerate().filter_map(|(number, trial)| {
+            trial.failure().map(|failure| format!("run {number}: {failure}"))
+        });
+        outcome.faults.extend(failures);
         outcome.tables.push(summary::by_kind(&trials));
+        if trials.iter().any(Trial::is_silent) {
+            outcome.tables.push(summary::silent(&trials, |number| self.disturbances(number)));
+        }
         outcome.figures.push(summary::figure(&trials));
         outcome.remarks = assumptions(&self.config);
         outcome.remarks.push(summary::REMARK.to_owned());
         Ok(outcome)
+    }
+}
+
+impl Battery {
+    /// The disturbances of a run in words, in % of their full sizes.
+    fn disturbances(&self, number: usize) -> String {
+        let [always, after] = self.sizes(number);
+        let all =
+            disturbed::ALWAYS.iter().chain(&disturbed::AFTER).zip(always.iter().chain(&after));
+        let acting = all.filter(|(_, size)| **size != 0.0);
+        let words = acting.map(|(one, size)| format!("{}: {:.0} %", one.name, 100.0 * size));
+        words.collect::<Vec<_>>().join(", ")
     }
 }

@@ -67,7 +67,7 @@ impl Header {
     pub fn config(&self) -> Result<Config, Error> {
         let mut config = Config::default();
         // A key of the bench may set one of the drive, which comes later in the list.
-        let listed: Vec<String> = Key::all().map(Key::assigned_name).collect();
+        let listed: Vec<String> = Key::all().chain(Key::after()).map(Key::assigned_name).collect();
         let place = |name: &String| listed.iter().position(|known| known == name);
         let mut settings: Vec<_> = self.settings.iter().collect();
         settings.sort_by_key(|(name, _)| place(name));

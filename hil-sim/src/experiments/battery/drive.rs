@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drive_core::{Command, Compare, Drive, Mode, Sample, State};
+use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, State};
 
 /// What the drive is started for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,11 +48,11 @@ pub trait DriveUnderTest: Clone + Send + Sync {
     /// # Errors
     /// The reason why it does not.
     fn start(&mut self, purpose: Purpose) -> Result<(), String>;
-    /// Gives a torque current, A peak; the drive may limit it.
+    /// Gives a torque current, A peak; returns that which the drive takes. It may limit it.
     ///
     /// # Errors
     /// The reason why it is refused.
-    fn torque(&mut self, i_q: f32) -> Result<(), String>;
+    fn torque(&mut self, i_q: f32) -> Result<f32, String>;
     /// Gives a speed, mechanical rpm.
     ///
     /// # Errors
@@ -78,8 +78,12 @@ impl DriveUnderTest for Drive {
         command(self, &Command::Start(mode))
     }
 
-    fn torque(&mut self, i_q: f32) -> Result<(), String> {
-        command(self, &Command::Torque(i_q))
+    fn torque(&mut self, i_q: f32) -> Result<f32, String> {
+        match Self::command(self, &Command::Torque(i_q)) {
+            Ok(Accepted::Limited(taken)) => Ok(taken),
+            Ok(_) => Ok(i_q),
+            Err(refused) => Err(refused.to_string()),
+        }
     }
 
     fn speed(&mut self, rpm: f32) -> Result<(), String> {

@@ -3,6 +3,8 @@
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
+use crate::config::{BatteryRuns, Config};
+
 /// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
@@ -18,12 +20,24 @@ pub enum Kind {
     Speed(i16),
     /// Speed regulated, a step of 0.4 Nm on a free shaft.
     Load,
-    /// Torque current near its largest for six seconds, shaft locked. Not one of the battery: there it would need a
-    /// motor whose flux collapses.
+    /// Speed regulated, a step of this share of the torque at the [nominal limit](nominal_limit_a), in thousandths; free
+    /// shaft.
+    LoadStep(u16),
+    /// Torque current near its largest for six seconds, shaft locked.
     Hold,
+    /// Constant torque current while a dynamometer holds this speed, rpm; the rotor flux is turned at once.
+    Forced(i16),
+    /// A torque current that steps about a constant one so many times a second, shaft locked. With `forced`, the rotor
+    /// flux is turned at once.
+    Restless {
+        /// Steps in a second.
+        hz: u16,
+        /// Whether the flux is turned.
+        forced: bool,
+    },
 }
 
-/// The kinds in the order of the runs.
+/// The twelve kinds, in the order of the runs.
 pub const KINDS: [Kind; 12] = [
     Kind::Constant(0),
     Kind::Constant(30),
@@ -39,6 +53,44 @@ pub const KINDS: [Kind; 12] = [
     Kind::Load,
 ];
 
+/// The other lists of kinds, likewise.
+const FORCED: [Kind; 3] = [Kind::Forced(0), Kind::Forced(60), Kind::Forced(300)];
+const RESTLESS: [Kind; 6] = [
+    Kind::Restless { hz: 100, forced: false },
+    Kind::Restless { hz: 600, forced: false },
+    Kind::Restless { hz: 6000, forced: false },
+    Kind::Restless { hz: 100, forced: true },
+    Kind::Restless { hz: 600, forced: true },
+    Kind::Restless { hz: 6000, forced: true },
+];
+
+/// The kinds that a configuration asks for, and how many runs there are unless it says.
+pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
+    match config.battery.runs {
+        BatteryRuns::Kinds => (KINDS.to_vec(), 8 * KINDS.len()),
+        BatteryRuns::Load => {
+            (vec![Kind::LoadStep((1e3 * config.battery.load_share).round() as u16)], 32)
+        }
+        BatteryRuns::Hold => (vec![Kind::Hold], 64),
+        BatteryRuns::Forced => (FORCED.to_vec(), 90 * FORCED.len()),
+        BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
+    }
+}
+
+/// The nominal limit of the torque current, A peak: the smaller of that of the speed loop, 3 A with the dissertation's
+/// motor, and the current that the drive's limit leaves beside the magnetising current. A drive that has learned a
+/// lower one is measured by the nominal one.
+pub fn nominal_limit_a(config: &Config) -> f64 {
+    let (all, i_d) = (f64::from(config.drive.current_limit_a()), f64::from(config.drive.i_d()));
+    config.amperes(MOST_A).min((all * all - i_d * i_d).max(0.0).sqrt())
+}
+
+/// Torque, Nm, of a torque current, A peak, at the right angle and the flux of the magnetising current: 3/2 P L_m^2/L_r
+/// i_d i_q.
+pub fn torque_nm(config: &Config, i_q: f64) -> f64 {
+    i_q * f64::from(config.drive.motor.torque_per_ampere(config.drive.i_d()))
+}
+
 /// Largest torque current, A, and the least of a constant one.
 const MOST_A: f64 = 3.0;
 const LEAST_A: f64 = 0.5;
@@ -47,21 +99,54 @@ const LOAD_NM: f64 = 0.4;
 const LOAD_RPM: [f64; 4] = [0.0, 30.0, 150.0, -150.0];
 /// Time between two changes of a torque current, s.
 const LEVEL_S: f64 = 0.5;
+/// Least and largest turn of the flux, degrees, and the time before and after it, s.
+const TURN_DEG: (f64, f64) = (60.0, 180.0);
+const TURN_S: (f64, f64) = (1.0, 4.0);
+/// How far a current that never rests is from the constant one at the most, A.
+const RESTLESS_A: f64 = 0.2;
+
+/// A load torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoadTorque {
+    /// Nm on the dissertation's motor; see [`Config::newton_metres`].
+    Nm(f64),
+    /// Share of the torque at the [nominal limit](nominal_limit_a).
+    Share(f64),
+}
+
+impl LoadTorque {
+    /// In Nm on the motor of the configuration.
+    pub fn newton_metres(self, config: &Config) -> f64 {
+        match self {
+            Self::Nm(torque) => config.newton_metres(torque),
+            Self::Share(share) => share * torque_nm(config, nominal_limit_a(config)),
+        }
+    }
+}
 
 /// A part of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// Torque current, A, or speed, rpm, at the beginning and at the end; straight between them.
     pub reference: (f64, f64),
-    /// Torque of the load, Nm, where the shaft is free.
-    pub load_nm: f64,
+    /// Torque of the load where the shaft is free.
+    pub load: LoadTorque,
+    /// Turn of the rotor flux at the beginning, electrical degrees.
+    pub turn_deg: f64,
     /// Length, s.
     pub seconds: f64,
 }
 
 impl Part {
     fn constant(reference: f64, seconds: f64) -> Self {
-        Self { reference: (reference, reference), load_nm: 0.0, seconds }
+        let reference = (reference, reference);
+        Self { reference, load: LoadTorque::Nm(0.0), turn_deg: 0.0, seconds }
+    }
+
+    /// A load that comes and goes while a speed is held, rpm.
+    fn loaded(rpm: f64, load: LoadTorque) -> Vec<Self> {
+        let loaded = Self { load, ..Self::constant(rpm, 2.0) };
+        vec![Self::constant(rpm, 1.5), loaded, Self::constant(rpm, 1.0)]
     }
 }
 
@@ -86,18 +171,31 @@ impl Kind {
             Self::Ramp => "torque ramp".to_owned(),
             Self::Speed(rpm) => format!("speed {rpm} rpm"),
             Self::Load => "load of 0.4 Nm".to_owned(),
+            Self::LoadStep(share) => {
+                format!("load of {} % of the limit", f64::from(share) / 10.0)
+            }
             Self::Hold => "2.25 to 3 A at rest".to_owned(),
+            Self::Forced(rpm) => format!("flux turned, {rpm} rpm"),
+            Self::Restless { hz, forced } => {
+                format!("steps at {hz} Hz{}", if forced { ", flux turned" } else { "" })
+            }
         }
+    }
+
+    /// Whether the flux is turned: then a stop is no failure.
+    pub fn turns_flux(self) -> bool {
+        matches!(self, Self::Forced(_) | Self::Restless { forced: true, .. })
     }
 
     /// The shaft.
     pub fn shaft(self) -> Shaft {
         match self {
-            Self::Constant(0) | Self::Steps | Self::Reversals | Self::Ramp | Self::Hold => {
+            Self::Constant(0) | Self::Forced(0) => Shaft::Locked,
+            Self::Constant(rpm) | Self::Forced(rpm) => Shaft::Held(rpm.into()),
+            Self::Steps | Self::Reversals | Self::Ramp | Self::Hold | Self::Restless { .. } => {
                 Shaft::Locked
             }
-            Self::Constant(rpm) => Shaft::Held(rpm.into()),
-            Self::Speed(_) | Self::Load => Shaft::Free,
+            Self::Speed(_) | Self::Load | Self::LoadStep(_) => Shaft::Free,
         }
     }
 
@@ -122,17 +220,93 @@ impl Kind {
             Self::Ramp => {
                 let ramp = (-sign * MOST_A, sign * MOST_A);
                 let begin = Part::constant(ramp.0, LEVEL_S);
-                vec![begin, Part { reference: ramp, load_nm: 0.0, seconds: 3.0 }]
+                vec![begin, Part { reference: ramp, ..Part::constant(0.0, 3.0) }]
             }
             Self::Speed(rpm) => {
                 vec![Part::constant(rpm.into(), 2.0), Part::constant(-f64::from(rpm), 2.0)]
             }
-            Self::Load => {
+            Self::Load | Self::LoadStep(_) => {
                 let rpm = LOAD_RPM[random.random_range(0..LOAD_RPM.len())];
-                let before = Part::constant(rpm, 1.5);
-                let loaded = Part { load_nm: sign * LOAD_NM, ..Part::constant(rpm, 2.0) };
-                vec![before, loaded, Part::constant(rpm, 1.0)]
+                Part::loaded(
+                    rpm,
+                    match self {
+                        Self::LoadStep(share) => LoadTorque::Share(sign * f64::from(share) / 1e3),
+                        _ => LoadTorque::Nm(sign * LOAD_NM),
+                    },
+                )
             }
+            Self::Forced(_) => {
+                let i_q = sign * random.random_range(0.0..=MOST_A);
+                let turned = Part { turn_deg: turn(random), ..Part::constant(i_q, TURN_S.1) };
+                vec![Part::constant(i_q, TURN_S.0), turned]
+            }
+            Self::Restless { hz, forced } => {
+                let middle = sign * random.random_range(0.0..=MOST_A - RESTLESS_A);
+                let turned = (TURN_S.0 * f64::from(hz)) as usize;
+                let parts = ((TURN_S.0 + TURN_S.1) * f64::from(hz)) as usize;
+                let turn_deg = if forced { turn(random) } else { 0.0 };
+                let steps = (0..parts).map(|number| {
+                    let i_q = middle + random.random_range(-RESTLESS_A..=RESTLESS_A);
+                    let turn_deg = if number == turned { turn_deg } else { 0.0 };
+                    Part { turn_deg, ..Part::constant(i_q, 1.0 / f64::from(hz)) }
+                });
+                steps.collect()
+            }
+        }
+    }
+}
+
+/// A turn of the flux, degrees, of either sign.
+fn turn(random: &mut impl Rng) -> f64 {
+    let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+    sign * random.random_range(TURN_DEG.0..=TURN_DEG.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::config::Value;
+
+    /// With Table 5 beside 2.0 A the vector limit of 3.5 A leaves sqrt(3.5^2 - 2^2) = 2.872 A, and 62 % of its torque is
+    /// 0.62 * 3/2 * 2 * 0.1771^2/0.2047 * 2.0 * 2.872 = 1.637 Nm. Beside 0.7 A the 3 A of the speed loop are less.
+    #[test]
+    fn load_steps_are_shares_of_the_torque_at_the_nominal_limit() {
+        let mut config = Config::default();
+        assert!((nominal_limit_a(&config) - 3.0).abs() < 1e-6);
+        config.set("sequence.i_d", &Value::Number(2.0)).unwrap();
+        assert!((nominal_limit_a(&config) - 2.872).abs() < 1e-3);
+        config.battery.runs = BatteryRuns::Load;
+        config.battery.load_share = 0.62;
+        let (kinds, runs) = chosen(&config);
+        assert_eq!((kinds.as_slice(), runs), (&[Kind::LoadStep(620)][..], 32));
+        let parts = kinds[0].parts(&mut Xoshiro256PlusPlus::seed_from_u64(1));
+        let loads: Vec<f64> =
+            parts.iter().map(|part| part.load.newton_metres(&config).abs()).collect();
+        assert_eq!((loads[0], loads[2]), (0.0, 0.0));
+        assert!((loads[1] - 1.637).abs() < 2e-3, "{loads:?}");
+    }
+
+    /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is
+    /// turned once.
+    #[test]
+    fn restless_commands_never_rest() {
+        for kind in RESTLESS {
+            let Kind::Restless { hz, forced } = kind else { continue };
+            let parts = kind.parts(&mut Xoshiro256PlusPlus::seed_from_u64(3));
+            assert_eq!(parts.len(), 5 * usize::from(hz));
+            let seconds: f64 = parts.iter().map(|part| part.seconds).sum();
+            assert!((seconds - 5.0).abs() < 1e-6, "{seconds}");
+            let steps = parts.windows(2).map(|two| (two[1].reference.0 - two[0].reference.0).abs());
+            // Two uniform values within ±0.2 A are 0.133 A apart in the mean.
+            let mean = steps.sum::<f64>() / (parts.len() - 1) as f64;
+            assert!((mean - 0.133).abs() < 0.015, "{hz}: {mean}");
+            let turns: Vec<f64> =
+                parts.iter().map(|part| part.turn_deg.abs()).filter(|turn| *turn > 0.0).collect();
+            assert_eq!(turns.len(), usize::from(forced));
+            assert!(turns.iter().all(|turn| (60.0..=180.0).contains(turn)));
         }
     }
 }

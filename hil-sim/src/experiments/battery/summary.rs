@@ -2,15 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use super::kind::KINDS;
-use super::trial::{CLASSES_PER_DEG, Trial};
+use super::bench::CLASSES_PER_DEG;
+use super::kind::Kind;
+use super::trial::Trial;
 use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
 use crate::stats::Stats;
 
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: while the drive regulates, from 0.5 s after the first reference on. Lost: beyond 45° at \
     any time from the start on. Wrong: beyond 30° for more than 0.5 s, interruptions up to 0.1 s included. Flux off: below half or above \
-    twice that of the magnetising current for more than 0.5 s. Trips: stopped by a fault while it regulates.";
+    twice that of the magnetising current for more than 0.5 s. Silent: wrong or flux off. Stuck: silent to the end of the \
+    run. Trips: stopped by a fault while it regulates. Sound: trips with the angle within 30° and the flux within a factor \
+    of two at all times before. Limited: the drive allows less torque current than the nominal limit. After the flux was \
+    turned at once, wrong and flux off count from there, and the error no more.";
 
 /// The verdict.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +31,20 @@ pub struct Summary {
     pub wrong: (usize, f64),
     /// Runs with the flux off for long, and the longest time, s.
     pub flux_off: (usize, f64),
+    /// Runs wrong or with the flux off for long, and those of them that were so to the end.
+    pub silent: usize,
+    /// See `silent`.
+    pub stuck: usize,
     /// Runs stopped, by number of the fault.
     pub trips: BTreeMap<u8, usize>,
+    /// Runs stopped although angle and flux were sound.
+    pub sound_stops: usize,
+    /// Runs with a drive that has learned a lower limit of the torque current.
+    pub limited: usize,
+    /// The least limit, in relation to the nominal one.
+    pub limit_share: Option<f64>,
+    /// Error of the torque of runs at constant torque, in relation to that at the nominal limit.
+    pub torque_error: Stats,
     /// Starts refused, by number of the fault.
     pub refused: BTreeMap<u8, usize>,
 }
@@ -46,6 +62,12 @@ impl Summary {
             all.wrong.1 = all.wrong.1.max(trial.wrong_s);
             all.flux_off.0 += usize::from(trial.is_flux_off());
             all.flux_off.1 = all.flux_off.1.max(trial.flux_off_s);
+            all.silent += usize::from(trial.is_silent());
+            all.stuck += usize::from(trial.stuck);
+            all.sound_stops += usize::from(trial.sound_stop);
+            all.limited += usize::from(trial.is_limited());
+            all.limit_share = trial.limit_share.into_iter().chain(all.limit_share).reduce(f64::min);
+            trial.torque_error.into_iter().for_each(|error| all.torque_error.push(error));
             trial.trip.into_iter().for_each(|fault| *all.trips.entry(fault).or_default() += 1);
             trial.refused.into_iter().for_each(|fault| *all.refused.entry(fault).or_default() += 1);
             for &(class, count) in &trial.histogram {
@@ -66,6 +88,9 @@ impl Summary {
         metrics.set("wrong_longest_s", self.wrong.1);
         metrics.set("flux_off_runs", self.flux_off.0 as f64);
         metrics.set("flux_off_longest_s", self.flux_off.1);
+        metrics.set("silent_runs", self.silent as f64);
+        metrics.set("stuck_runs", self.stuck as f64);
+        metrics.set("sound_runs_stopped", self.sound_stops as f64);
         metrics.set("trips", self.trips.values().sum::<usize>() as f64);
         for (fault, count) in &self.trips {
             metrics.set(format!("trips_by_fault_{fault}"), *count as f64);
@@ -73,6 +98,16 @@ impl Summary {
         metrics.set("refused_starts", self.refused.values().sum::<usize>() as f64);
         for (fault, count) in &self.refused {
             metrics.set(format!("refused_by_fault_{fault}"), *count as f64);
+        }
+        metrics.set("limited_runs", self.limited as f64);
+        if let Some(share) = self.limit_share {
+            metrics.set("limit_pct", 100.0 * share);
+        }
+        if self.torque_error.count() > 0 {
+            let error = &self.torque_error;
+            metrics.set("torque_error_mean_pct", 100.0 * error.mean());
+            metrics.set("torque_error_deviation_pct", 100.0 * error.deviation());
+            metrics.set("torque_error_max_pct", 100.0 * error.largest());
         }
         metrics.set("runs", self.runs as f64);
     }
@@ -91,8 +126,11 @@ impl Summary {
             ("lost", Cell::from(self.lost.to_string())),
             ("wrong (longest)", Cell::from(lasting(self.wrong))),
             ("flux off (longest)", Cell::from(lasting(self.flux_off))),
+            ("stuck", Cell::from(self.stuck.to_string())),
             ("trips, fault: runs", Cell::from(by_fault(&self.trips))),
+            ("sound", Cell::from(self.sound_stops.to_string())),
             ("refused, fault: runs", Cell::from(by_fault(&self.refused))),
+            ("limited", Cell::from(self.limited.to_string())),
         ]
     }
 }
@@ -124,15 +162,41 @@ fn quantile(histogram: &BTreeMap<u32, u64>, share: f64) -> f64 {
 /// The runs of each kind.
 pub fn by_kind(trials: &[Trial]) -> Table {
     let mut table = Table::new("By kind", &[]);
-    for kind in KINDS {
-        let of_kind = || trials.iter().filter(move |trial| trial.kind == kind);
-        if of_kind().next().is_some() {
-            let cells = Summary::of(of_kind()).cells();
-            table.record([("kind", Cell::from(kind.name()))].into_iter().chain(cells));
+    let mut kinds: Vec<Kind> = Vec::new();
+    for trial in trials {
+        if !kinds.contains(&trial.kind) {
+            kinds.push(trial.kind);
         }
+    }
+    for kind in kinds {
+        let cells = Summary::of(trials.iter().filter(|trial| trial.kind == kind)).cells();
+        table.record([("kind", Cell::from(kind.name()))].into_iter().chain(cells));
     }
     let all = Summary::of(trials).cells();
     table.record([("kind", Cell::from("all"))].into_iter().chain(all));
+    table
+}
+
+/// The silent runs, each with its disturbances in words.
+pub fn silent(trials: &[Trial], disturbances: impl Fn(usize) -> String) -> Table {
+    let mut table = Table::new("Silently wrong", &[])
+        .note("Disturbances: of the page Statistics, in relation to their full sizes.");
+    for (number, trial) in trials.iter().enumerate().filter(|(_, trial)| trial.is_silent()) {
+        let end = match trial.trip {
+            Some(fault) => format!("fault {fault}"),
+            None if trial.stuck => "stuck".to_owned(),
+            None => "sound".to_owned(),
+        };
+        table.record([
+            ("run", Cell::from(number.to_string())),
+            ("seed", Cell::from(trial.seed.to_string())),
+            ("kind", Cell::from(trial.kind.name())),
+            ("wrong (s)", Cell::fixed(trial.wrong_s, 2)),
+            ("flux off (s)", Cell::fixed(trial.flux_off_s, 2)),
+            ("end", Cell::from(end)),
+            ("disturbances", Cell::from(disturbances(number))),
+        ]);
+    }
     table
 }
 

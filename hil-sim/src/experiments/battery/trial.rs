@@ -2,28 +2,22 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Compare, Fault};
+use drive_core::Fault;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
+use super::bench::{Bench, CLASSES_PER_DEG};
 use super::drive::{Condition, DriveUnderTest, Purpose};
-use super::kind::{Kind, Part, Shaft};
-use crate::config::{Config, open_phase};
+use super::kind::{Kind, Part, Shaft, nominal_limit_a, torque_nm};
+use crate::config::Config;
 use crate::error::Error;
 use crate::experiments::torque::LOST_DEG;
-use crate::plant::{Load, Plant, PlantSettings};
-use crate::rig::{RATE_HZ, wrapped_degrees};
+use crate::plant::{Load, PlantSettings};
 use crate::stats::Stats;
 
-/// An error beyond this, degrees, is wrong.
-const WRONG_DEG: f64 = 30.0;
-/// Flux in relation to its nominal value that is off: below the first, above the second.
-const FLUX_OFF: (f64, f64) = (0.5, 2.0);
 /// A state that lasts longer, s, should have been noticed.
 pub const UNNOTICED_S: f64 = 0.5;
-/// A state lasts on over interruptions up to this, s: an angle that runs through has a sound one now and then.
-const GAP_S: f64 = 0.1;
 /// Time after the first reference that the statistics of the error leave out, s: the angle settles.
 const SETTLING_S: f64 = 0.5;
 /// Pace of a reference that changes gradually, s.
@@ -33,8 +27,10 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// Longest start and longest learning, s.
 const LONGEST_START_S: f64 = 30.0;
 const LONGEST_LEARNING_S: f64 = 1000.0;
-/// Classes of the histogram in a degree.
-pub const CLASSES_PER_DEG: f64 = 10.0;
+/// The last class of the histogram, that of 180°.
+pub const LARGEST_CLASS: usize = (180.0 * CLASSES_PER_DEG) as usize;
+/// A learned limit below this share of the nominal one is a lower one.
+const LIMITED_SHARE: f64 = 0.999;
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -47,14 +43,24 @@ pub struct Trial {
     pub error: Stats,
     /// How often the magnitude was in each class of 0.1° that occurred: number of the class, and of samples.
     pub histogram: Vec<(u32, u32)>,
-    /// Largest error from the start on, that of a shaft brought up to speed and of the settling included, degrees.
+    /// Largest error from the start on, that of a shaft brought up to speed and of the settling included, and none
+    /// after the flux was turned; degrees.
     pub largest_deg: f64,
-    /// Longest time for which the angle was wrong while the drive regulated, s.
+    /// Longest time for which the angle was wrong while the drive regulated, s; after a turn of the flux, if there is one.
     pub wrong_s: f64,
-    /// Longest time for which the flux was off while the drive regulated, s.
+    /// Longest time for which the flux was off while the drive regulated, s; likewise.
     pub flux_off_s: f64,
+    /// Whether the angle was wrong or the flux off to the end of the run, and long enough to be noticed.
+    pub stuck: bool,
+    /// Torque current that the drive allows, in relation to the [nominal limit](super::nominal_limit_a).
+    pub limit_share: Option<f64>,
+    /// Mean torque of the motor minus that of the torque current that the drive has taken, in the direction of the
+    /// latter and in relation to the torque at the nominal limit; of a run at constant torque that reached its end.
+    pub torque_error: Option<f64>,
     /// Number of the fault that stopped the drive while it regulated.
     pub trip: Option<u8>,
+    /// Whether angle and flux were sound from the first reference until then.
+    pub sound_stop: bool,
     /// Number of the fault with which the drive refused to start, or before that to learn.
     pub refused: Option<u8>,
 }
@@ -69,7 +75,11 @@ impl Trial {
             largest_deg: 0.0,
             wrong_s: 0.0,
             flux_off_s: 0.0,
+            stuck: false,
+            limit_share: None,
+            torque_error: None,
             trip: None,
+            sound_stop: false,
             refused: None,
         }
     }
@@ -94,6 +104,16 @@ impl Trial {
         self.flux_off_s > UNNOTICED_S
     }
 
+    /// Whether the drive was silently wrong: angle or flux, for so long.
+    pub fn is_silent(&self) -> bool {
+        self.is_wrong() || self.is_flux_off()
+    }
+
+    /// Whether the drive has learned a lower limit of the torque current than the nominal one.
+    pub fn is_limited(&self) -> bool {
+        self.limit_share.is_some_and(|share| share < LIMITED_SHARE)
+    }
+
     /// The reason why the run is none that a drive should have, after its kind and seed.
     pub fn failure(&self) -> Option<String> {
         let fault = |code: u8| {
@@ -101,123 +121,19 @@ impl Trial {
             let text = fault.map_or(String::new(), |fault| format!(": {fault}"));
             format!("fault {code}{text}")
         };
-        let reason = match self {
-            Self { refused: Some(code), .. } => format!("start refused with {}", fault(*code)),
-            Self { trip: Some(code), .. } => fault(*code),
-            _ if self.is_lost() => format!("angle error beyond {LOST_DEG}°"),
-            _ if self.is_wrong() => format!("angle wrong for {:.2} s", self.wrong_s),
-            _ if self.is_flux_off() => format!("flux off for {:.2} s", self.flux_off_s),
-            _ => return None,
-        };
+        let stops = self.trip.filter(|_| !self.kind.turns_flux());
+        let reasons = [
+            self.refused.map(|code| format!("start refused with {}", fault(code))),
+            self.is_wrong().then(|| format!("angle wrong for {:.2} s", self.wrong_s)),
+            self.is_flux_off().then(|| format!("flux off for {:.2} s", self.flux_off_s)),
+            self.is_lost().then(|| format!("angle error beyond {LOST_DEG}°")),
+            stops.map(fault),
+        ];
+        let reason = reasons.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        if reason.is_empty() {
+            return None;
+        }
         Some(format!("{}, seed {}: {reason}", self.kind.name(), self.seed))
-    }
-}
-
-/// How long a state lasts at the longest.
-#[derive(Default)]
-struct Lasting {
-    since: Option<f64>,
-    last: f64,
-    longest: f64,
-}
-
-impl Lasting {
-    fn push(&mut self, t: f64, is: bool) {
-        if is {
-            let since = *self.since.get_or_insert(t);
-            (self.last, self.longest) = (t, self.longest.max(t - since));
-        } else if t - self.last > GAP_S {
-            self.since = None;
-        }
-    }
-}
-
-/// A drive and a plant, and what is seen of them.
-struct Bench<D> {
-    plant: Plant,
-    drive: D,
-    pending: Compare,
-    periods: u64,
-    /// Flux of the magnetising current, Wb.
-    nominal_flux: f64,
-    /// Time from which on the error is counted, s; unset before the first reference.
-    counted_from: Option<f64>,
-    counts: Vec<u32>,
-    wrong: Lasting,
-    flux_off: Lasting,
-}
-
-impl<D: DriveUnderTest> Bench<D> {
-    fn new(
-        config: &Config,
-        plant: &PlantSettings,
-        drive: &D,
-        load: Load,
-        seed: u64,
-    ) -> Result<Self, Error> {
-        let mut settings = *plant;
-        settings.mechanics.load = load;
-        let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
-        plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
-        Ok(Self {
-            plant,
-            drive: drive.clone(),
-            pending: Compare::OFF,
-            periods: 0,
-            nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
-            counted_from: None,
-            counts: vec![0; (180.0 * CLASSES_PER_DEG) as usize + 1],
-            wrong: Lasting::default(),
-            flux_off: Lasting::default(),
-        })
-    }
-
-    fn time(&self) -> f64 {
-        self.periods as f64 / RATE_HZ
-    }
-
-    /// One period; the plant is delayed as [`drive_core::io`] says.
-    fn step(&mut self) {
-        let sample = self.plant.sample();
-        let compare = self.drive.step(&sample);
-        if !compare.enabled {
-            self.pending = Compare::OFF;
-        }
-        self.plant.advance(&self.pending, 1.0 / RATE_HZ);
-        self.pending = compare;
-        self.periods += 1;
-    }
-
-    /// Until the drive has left [`Condition::Busy`], or for so many seconds.
-    fn wait(&mut self, seconds: f64) -> Condition {
-        for _ in 0..(seconds * RATE_HZ) as u64 {
-            self.step();
-            if self.drive.condition() != Condition::Busy {
-                break;
-            }
-        }
-        self.drive.condition()
-    }
-
-    /// Runs for some seconds, or until the drive no longer regulates; says whether it still does.
-    fn watch(&mut self, seconds: f64, trial: &mut Trial) -> bool {
-        for _ in 0..(seconds * RATE_HZ).round() as u64 {
-            let (t, flux) = (self.time(), self.plant.rotor_flux());
-            self.step();
-            if self.drive.condition() != Condition::Regulating {
-                return false;
-            }
-            let error = wrapped_degrees(flux.arg() - self.drive.flux_turns() * TAU);
-            let share = flux.norm() / self.nominal_flux;
-            trial.largest_deg = trial.largest_deg.max(error.abs());
-            self.wrong.push(t, error.abs() > WRONG_DEG);
-            self.flux_off.push(t, share < FLUX_OFF.0 || share > FLUX_OFF.1);
-            if self.counted_from.is_some_and(|from| t >= from) {
-                trial.error.push(error);
-                self.counts[(error.abs() * CLASSES_PER_DEG) as usize] += 1;
-            }
-        }
-        true
     }
 }
 
@@ -257,6 +173,7 @@ pub fn trial<D: DriveUnderTest>(
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let parts = kind.parts(&mut random);
     let mut trial = Trial::new(kind, seed);
+    trial.limit_share = limit_share(config, drive);
     let (load, purpose) = match kind.shaft() {
         Shaft::Locked => (Load::Locked, Purpose::Torque),
         Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Purpose::Torque),
@@ -269,88 +186,131 @@ pub fn trial<D: DriveUnderTest>(
         Condition::Fault(code) => return Ok(Trial { refused: Some(code), ..trial }),
         other => return Err(Error::Internal(format!("after a start the drive is {other}"))),
     }
-    let still = bring_up(&mut bench, kind.shaft(), config, &mut trial)?
-        && follow(&mut bench, purpose, config, &parts, &mut trial)?;
-    if !still && let Condition::Fault(code) = bench.drive.condition() {
-        trial.trip = Some(code);
+    let mut still = bring_up(&mut bench, kind.shaft(), config)?;
+    if still {
+        let taken = follow(&mut bench, purpose, config, &parts)?;
+        still = taken.is_some();
+        let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
+        trial.torque_error = constant.map(|i_q| {
+            let error = (bench.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
+            error / torque_nm(config, nominal_limit_a(config))
+        });
     }
-    trial.wrong_s = bench.wrong.longest;
-    trial.flux_off_s = bench.flux_off.longest;
-    let classes = (0..).zip(bench.counts).filter(|(_, count)| *count > 0);
-    trial.histogram = classes.collect();
+    bench.finish(still, &mut trial);
     Ok(trial)
 }
 
-/// Brings a held shaft up to speed without torque.
+/// The torque current that a drive which is off would take, in relation to the nominal limit; none where it says nothing.
+fn limit_share<D: DriveUnderTest>(config: &Config, drive: &D) -> Option<f64> {
+    let (mut asked, nominal) = (drive.clone(), nominal_limit_a(config));
+    asked.start(Purpose::Torque).ok()?;
+    let taken = asked.torque(nominal as f32).ok()?;
+    Some(f64::from(taken) / nominal)
+}
+
+/// Brings a held shaft up to speed without torque; says whether the drive regulated to the end.
 fn bring_up<D: DriveUnderTest>(
     bench: &mut Bench<D>,
     shaft: Shaft,
     config: &Config,
-    trial: &mut Trial,
 ) -> Result<bool, Error> {
     let Shaft::Held(rpm) = shaft else { return Ok(true) };
     let speed = config.rpm(rpm) * TAU / 60.0;
     let steps = (rpm.abs() / RAMP_RPM_PER_S / PACE_S).ceil() as u32;
     for n in 1..=steps {
-        let speed = speed * f64::from(n) / f64::from(steps);
-        bench.plant.set_load(Load::Speed { speed }).map_err(Error::refused)?;
-        if !bench.watch(PACE_S, trial) {
+        bench.set_load(Load::Speed { speed: speed * f64::from(n) / f64::from(steps) })?;
+        if !bench.watch(PACE_S) {
             return Ok(false);
         }
     }
-    Ok(bench.watch(0.3, trial))
+    Ok(bench.watch(0.3))
 }
 
-/// Follows the references; says whether the drive regulated to the end.
+/// Follows the references. Returns the last one as the drive has taken it, A or rpm; none when it did not regulate to the
+/// end.
 fn follow<D: DriveUnderTest>(
     bench: &mut Bench<D>,
     purpose: Purpose,
     config: &Config,
     parts: &[Part],
-    trial: &mut Trial,
-) -> Result<bool, Error> {
+) -> Result<Option<f64>, Error> {
     bench.counted_from = Some(bench.time() + SETTLING_S);
+    let mut taken = 0.0;
     for part in parts {
         if purpose == Purpose::Speed {
-            let torque = config.newton_metres(part.load_nm);
-            bench.plant.set_load(Load::Free { torque }).map_err(Error::refused)?;
+            bench.set_load(Load::Free { torque: part.load.newton_metres(config) })?;
+        }
+        if part.turn_deg != 0.0 {
+            bench.turn_flux(part.turn_deg);
         }
         let (from, to) = part.reference;
         let steps = if from == to { 1 } else { (part.seconds / PACE_S).round() as u32 };
         for n in 1..=steps {
             let reference = from + (to - from) * f64::from(n) / f64::from(steps);
             let given = match purpose {
-                Purpose::Speed => bench.drive.speed(config.rpm(reference) as f32),
+                Purpose::Speed => {
+                    let rpm = config.rpm(reference) as f32;
+                    bench.drive.speed(rpm).map(|()| rpm)
+                }
                 _ => bench.drive.torque(config.amperes(reference) as f32),
             };
-            given.map_err(Error::Refused)?;
-            if !bench.watch(part.seconds / f64::from(steps), trial) {
-                return Ok(false);
+            taken = given.map_err(Error::Refused)?.into();
+            if !bench.watch(part.seconds / f64::from(steps)) {
+                return Ok(None);
             }
         }
     }
-    Ok(true)
+    Ok(Some(taken))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use drive_core::{Compare, Drive, Sample};
 
+    use super::*;
+    use crate::config::plant_settings;
+
+    /// A drive that takes no more than this torque current, A.
+    #[derive(Clone)]
+    struct Lower(Drive, f32);
+
+    impl DriveUnderTest for Lower {
+        fn step(&mut self, sample: &Sample) -> Compare {
+            self.0.step(sample)
+        }
+        fn start(&mut self, purpose: Purpose) -> Result<(), String> {
+            DriveUnderTest::start(&mut self.0, purpose)
+        }
+        fn torque(&mut self, i_q: f32) -> Result<f32, String> {
+            DriveUnderTest::torque(&mut self.0, i_q.clamp(-self.1, self.1))
+        }
+        fn speed(&mut self, rpm: f32) -> Result<(), String> {
+            DriveUnderTest::speed(&mut self.0, rpm)
+        }
+        fn condition(&self) -> Condition {
+            self.0.condition()
+        }
+        fn flux_turns(&self) -> f64 {
+            self.0.flux_turns()
+        }
+    }
+
+    /// A lower limit is seen in every run, and the torque is judged by the command that was taken: with 0.5 A for any
+    /// command the error stays that of a sound drive, a few per cent of the torque at the limit.
     #[test]
-    fn a_state_lasts_over_short_interruptions_only() {
-        let mut lasting = Lasting::default();
-        let mut at = |from: f64, to: f64, is: bool| {
-            (0..((to - from) * 1e3).round() as u32)
-                .for_each(|n| lasting.push(from + f64::from(n) * 1e-3, is));
-            lasting.longest
+    fn a_lower_limit_is_seen_and_torque_is_judged_by_what_was_taken() {
+        let config = Config::default();
+        let drive = Drive::new(config.drive.build().unwrap());
+        let of = |limit: f32| {
+            let drive = Lower(drive.clone(), limit);
+            trial(&config, &plant_settings(&config), &drive, Kind::Constant(0), 5).unwrap()
         };
-        assert!((at(0.0, 0.2, true) - 0.199).abs() < 1e-9);
-        at(0.2, 0.29, false);
-        // Interrupted for 0.09 s: one stretch from 0 on.
-        assert!((at(0.29, 0.4, true) - 0.399).abs() < 1e-9);
-        at(0.4, 0.6, false);
-        // Interrupted for 0.2 s: a new one, which is shorter.
-        assert!((at(0.6, 0.9, true) - 0.399).abs() < 1e-9);
-        assert!((at(0.9, 1.2, true) - 0.599).abs() < 1e-9);
+        let (lower, whole) = (of(0.5), of(10.0));
+        assert_eq!((lower.is_limited(), whole.is_limited()), (true, false));
+        assert!((lower.limit_share.unwrap() - 0.5 / 3.0).abs() < 1e-6, "{:?}", lower.limit_share);
+        for trial in [lower, whole] {
+            let error = trial.torque_error.unwrap();
+            assert!(error.abs() < 0.04, "{error}");
+        }
     }
 }

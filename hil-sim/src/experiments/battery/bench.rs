@@ -1,0 +1,213 @@
+//! A drive and a plant in a run of the battery, and what is seen of them.
+
+use std::f64::consts::TAU;
+
+use drive_core::Compare;
+
+use super::drive::{Condition, DriveUnderTest};
+use super::trial::{LARGEST_CLASS, Trial};
+use crate::config::{Config, open_phase};
+use crate::error::Error;
+use crate::plant::{Load, Plant, PlantSettings};
+use crate::rig::{RATE_HZ, wrapped_degrees};
+use crate::stats::Stats;
+
+/// An error beyond this, degrees, is wrong.
+const WRONG_DEG: f64 = 30.0;
+/// Flux in relation to its nominal value that is off: below the first, above the second.
+const FLUX_OFF: (f64, f64) = (0.5, 2.0);
+/// A state lasts on over interruptions up to this, s: an angle that runs through has a sound one now and then.
+const GAP_S: f64 = 0.1;
+/// Classes of the histogram in a degree.
+pub const CLASSES_PER_DEG: f64 = 10.0;
+
+/// How long a state lasts at the longest.
+#[derive(Default)]
+pub struct Lasting {
+    since: Option<f64>,
+    last: f64,
+    longest: f64,
+}
+
+impl Lasting {
+    fn push(&mut self, t: f64, is: bool) {
+        if is {
+            let since = *self.since.get_or_insert(t);
+            (self.last, self.longest) = (t, self.longest.max(t - since));
+        } else if t - self.last > GAP_S {
+            self.since = None;
+        }
+    }
+}
+
+/// A drive and a plant, and what is seen of them.
+pub struct Bench<D> {
+    /// The plant.
+    pub plant: Plant,
+    /// The drive.
+    pub drive: D,
+    pending: Compare,
+    periods: u64,
+    /// Flux of the magnetising current, Wb.
+    nominal_flux: f64,
+    /// Time from which on the error is counted, s; unset before the first reference, and after the flux was turned.
+    pub counted_from: Option<f64>,
+    /// Torque of the motor over the same time, Nm.
+    pub torque: Stats,
+    error: Stats,
+    counts: Vec<u32>,
+    largest_deg: f64,
+    wrong: Lasting,
+    flux_off: Lasting,
+    /// Whether angle or flux was off at any time since the first reference, and whether one is now.
+    was_off: bool,
+    is_off: bool,
+    /// Whether the flux was turned.
+    turned: bool,
+}
+
+impl<D: DriveUnderTest> Bench<D> {
+    /// A copy of a drive that is off, and the plant with another load.
+    ///
+    /// # Errors
+    /// When the plant is refused.
+    pub fn new(
+        config: &Config,
+        plant: &PlantSettings,
+        drive: &D,
+        load: Load,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let mut settings = *plant;
+        settings.mechanics.load = load;
+        let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
+        plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
+        Ok(Self {
+            plant,
+            drive: drive.clone(),
+            pending: Compare::OFF,
+            periods: 0,
+            nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
+            counted_from: None,
+            torque: Stats::default(),
+            error: Stats::default(),
+            counts: vec![0; LARGEST_CLASS + 1],
+            largest_deg: 0.0,
+            wrong: Lasting::default(),
+            flux_off: Lasting::default(),
+            was_off: false,
+            is_off: false,
+            turned: false,
+        })
+    }
+
+    /// Time from the beginning, s.
+    pub fn time(&self) -> f64 {
+        self.periods as f64 / RATE_HZ
+    }
+
+    /// One period; the plant is delayed as [`drive_core::io`] says.
+    fn step(&mut self) {
+        let sample = self.plant.sample();
+        let compare = self.drive.step(&sample);
+        if !compare.enabled {
+            self.pending = Compare::OFF;
+        }
+        self.plant.advance(&self.pending, 1.0 / RATE_HZ);
+        self.pending = compare;
+        self.periods += 1;
+    }
+
+    /// Until the drive has left [`Condition::Busy`], or for so many seconds.
+    pub fn wait(&mut self, seconds: f64) -> Condition {
+        for _ in 0..(seconds * RATE_HZ) as u64 {
+            self.step();
+            if self.drive.condition() != Condition::Busy {
+                break;
+            }
+        }
+        self.drive.condition()
+    }
+
+    /// Couples another load.
+    ///
+    /// # Errors
+    /// When it is out of range.
+    pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
+        self.plant.set_load(load).map_err(Error::refused)
+    }
+
+    /// Turns the rotor flux of the motor at once. The error is counted no more, and how long angle and flux are off is
+    /// counted from here.
+    pub fn turn_flux(&mut self, degrees: f64) {
+        self.plant.turn_rotor_flux(degrees.to_radians());
+        (self.turned, self.counted_from) = (true, None);
+        (self.wrong, self.flux_off) = (Lasting::default(), Lasting::default());
+    }
+
+    /// Runs for some seconds, or until the drive no longer regulates; says whether it still does.
+    pub fn watch(&mut self, seconds: f64) -> bool {
+        for _ in 0..(seconds * RATE_HZ).round() as u64 {
+            let (t, flux, torque) = (self.time(), self.plant.rotor_flux(), self.plant.torque());
+            self.step();
+            if self.drive.condition() != Condition::Regulating {
+                return false;
+            }
+            let error = wrapped_degrees(flux.arg() - self.drive.flux_turns() * TAU);
+            let share = flux.norm() / self.nominal_flux;
+            let (wrong, flux_off) =
+                (error.abs() > WRONG_DEG, share < FLUX_OFF.0 || share > FLUX_OFF.1);
+            self.wrong.push(t, wrong);
+            self.flux_off.push(t, flux_off);
+            self.is_off = wrong || flux_off;
+            if !self.turned {
+                self.largest_deg = self.largest_deg.max(error.abs());
+            }
+            if self.counted_from.is_some_and(|from| t >= from) {
+                self.error.push(error);
+                self.torque.push(torque);
+                self.counts[(error.abs() * CLASSES_PER_DEG) as usize] += 1;
+            }
+            self.was_off |= self.is_off && (self.turned || self.counted_from.is_some());
+        }
+        true
+    }
+
+    /// Fills in what was seen of the run; `still` says whether the drive regulated to its end.
+    pub fn finish(self, still: bool, trial: &mut Trial) {
+        if !still && let Condition::Fault(code) = self.drive.condition() {
+            trial.trip = Some(code);
+            trial.sound_stop = !self.was_off;
+        }
+        trial.error = self.error;
+        trial.largest_deg = self.largest_deg;
+        trial.wrong_s = self.wrong.longest;
+        trial.flux_off_s = self.flux_off.longest;
+        trial.stuck = still && self.is_off && trial.is_silent();
+        let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);
+        trial.histogram = classes.collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_lasts_over_short_interruptions_only() {
+        let mut lasting = Lasting::default();
+        let mut at = |from: f64, to: f64, is: bool| {
+            (0..((to - from) * 1e3).round() as u32)
+                .for_each(|n| lasting.push(from + f64::from(n) * 1e-3, is));
+            lasting.longest
+        };
+        assert!((at(0.0, 0.2, true) - 0.199).abs() < 1e-9);
+        at(0.2, 0.29, false);
+        // Interrupted for 0.09 s: one stretch from 0 on.
+        assert!((at(0.29, 0.4, true) - 0.399).abs() < 1e-9);
+        at(0.4, 0.6, false);
+        // Interrupted for 0.2 s: a new one, which is shorter.
+        assert!((at(0.6, 0.9, true) - 0.399).abs() < 1e-9);
+        assert!((at(0.9, 1.2, true) - 0.599).abs() < 1e-9);
+    }
+}

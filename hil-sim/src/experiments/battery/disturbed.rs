@@ -1,0 +1,124 @@
+//! Disturbances of the bench: what a real inverter, real sensors and a real motor add, all together.
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::config::Config;
+
+/// A disturbance.
+pub struct Disturbance {
+    /// In words, with its full size on the dissertation's bench; on others it is in proportion.
+    pub name: &'static str,
+    /// Whether it has a sign.
+    signed: bool,
+    /// Adds it to the bench, in relation to its full size.
+    add: fn(&mut Config, f64),
+}
+
+const fn signed(name: &'static str, add: fn(&mut Config, f64)) -> Disturbance {
+    Disturbance { name, signed: true, add }
+}
+
+const fn one_sided(name: &'static str, add: fn(&mut Config, f64)) -> Disturbance {
+    Disturbance { name, signed: false, add }
+}
+
+/// Those that are there while the drive learns, and after.
+pub static ALWAYS: [Disturbance; 7] = [
+    signed("slots 0.3 %", |c, x| c.iron.slots += 0.003 * x),
+    signed("stator-fixed 0.3 %", |c, x| c.iron.stator_fixed += 0.003 * x),
+    signed("cross-talk 0.5 %", |c, x| c.measurement.cross_talk_a += 0.005 * x),
+    one_sided("lag 2 µs", |c, x| c.measurement.lag_b_us += 2.0 * x),
+    one_sided("450 pF", |c, x| c.inverter.node_capacitance_f += 450e-12 * c.amperes(1.0) * x),
+    signed("dead time 0.2 µs", |c, x| c.inverter.extra_dead_time_s += 0.2e-6 * x),
+    one_sided("0.3 ohm", |c, x| c.inverter.on_resistance += 0.3 / c.amperes(1.0) * x),
+];
+
+/// Those that come after the learning.
+pub static AFTER: [Disturbance; 8] = [
+    one_sided("ripple 2 %", |c, x| c.dc_link.ripple += 0.02 * x),
+    one_sided("dc lag 300 µs", |c, x| c.measurement.dc_lag_us += 300.0 * x),
+    signed("dc gain 0.5 %", |c, x| c.measurement.dc_gain_error += 0.005 * x),
+    signed("cubic 0.5 %", |c, x| c.measurement.cubic_error += 0.005 * x),
+    signed("rotor 20 % warmer", |c, x| c.motor.r_r *= 1.0 + 0.2 * x),
+    signed("drift 1 mA/s", |c, x| c.measurement.drift_a += c.amperes(0.001) * x),
+    one_sided("Coulomb 0.05 Nm", |c, x| c.shaft.static_nm += c.newton_metres(0.05) * x),
+    one_sided("once a turn 0.03 Nm", |c, x| c.shaft.once_nm += c.newton_metres(0.03) * x),
+];
+
+/// Sizes of disturbances, each in relation to its full size: those of the configuration, and what is drawn.
+pub fn sizes(config: &Config, all: &[Disturbance], seed: u64) -> Vec<f64> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let (together, most) = (config.disturbed.together, config.disturbed.drawn);
+    let size = |disturbance: &Disturbance| {
+        let drawn = random.random_range(-1.0..=1.0);
+        together + most * if disturbance.signed { drawn } else { f64::abs(drawn) }
+    };
+    all.iter().map(size).collect()
+}
+
+/// Adds disturbances of these sizes to the bench. Slots and stator-fixed saliency act on a motor of iron only.
+pub fn add(config: &mut Config, all: &[Disturbance], sizes: &[f64]) {
+    for (disturbance, &size) in all.iter().zip(sizes) {
+        (disturbance.add)(config, size);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Value;
+
+    fn config(set: &[(&str, f64)]) -> Config {
+        let mut config = Config::default();
+        set.iter().for_each(|(key, value)| config.set(key, &Value::Number(*value)).unwrap());
+        config
+    }
+
+    /// The changed keys are those of the list, with its values.
+    #[test]
+    fn together_is_the_list() {
+        let mut c = config(&[("disturbed.together", 1.0)]);
+        for all in [&ALWAYS[..], &AFTER[..]] {
+            let sizes = sizes(&c, all, 1);
+            assert!(sizes.iter().all(|&size| size == 1.0));
+            add(&mut c, all, &sizes);
+        }
+        let mut expected = config(&[
+            ("disturbed.together", 1.0),
+            ("iron.slots", 0.003),
+            ("iron.stator_fixed", 0.003),
+            ("measurement.cross_talk_a", 0.005),
+            ("measurement.lag_b_us", 2.0),
+            ("inverter.node_capacitance_f", 450e-12),
+            ("inverter.extra_dead_time_s", 0.2e-6),
+            ("inverter.on_resistance", 0.3),
+            ("dc_link.ripple", 0.02),
+            ("measurement.dc_lag_us", 300.0),
+            ("measurement.dc_gain_error", 0.005),
+            ("measurement.cubic_error", 0.005),
+            ("measurement.drift_a", 0.001),
+            ("shaft.static_nm", 0.05),
+            ("shaft.once_nm", 0.03),
+        ]);
+        expected.motor.r_r = 1.1 * 1.2;
+        assert_eq!(c.changes(), expected.changes());
+    }
+
+    /// Over 2000 seeds: as often positive as negative where there is a sign, never negative otherwise, up to the size.
+    #[test]
+    fn drawn_sizes_fill_their_range() {
+        let c = config(&[("disturbed.drawn", 0.5)]);
+        let drawn: Vec<Vec<f64>> = (0..2000).map(|seed| sizes(&c, &ALWAYS, seed)).collect();
+        for (n, disturbance) in ALWAYS.iter().enumerate() {
+            let of = || drawn.iter().map(|sizes| sizes[n]);
+            let (least, most) = (of().fold(1.0, f64::min), of().fold(-1.0, f64::max));
+            let from = if disturbance.signed { -0.5 } else { 0.0 };
+            assert!((least - from).abs() < 0.005 && (most - 0.5).abs() < 0.005, "{n}");
+            // Standard deviation of the mean: 0.5/sqrt(3 * 2000).
+            let mean = of().sum::<f64>() / 2000.0;
+            assert!((mean - 0.5 * (from + 0.5)).abs() < 4.0 * 0.0065, "{n}: {mean}");
+        }
+        assert_eq!(sizes(&c, &AFTER, 7), sizes(&c, &AFTER, 7));
+    }
+}
