@@ -13,8 +13,8 @@
 use drive_core::Compare;
 use serde::{Deserialize, Serialize};
 
-use crate::averaged::{Averaged, smooth_sign};
-use crate::complex::{Complex, clarke, phases};
+use crate::averaged::Averaged;
+use crate::complex::clarke;
 use crate::error::{PlantError, check};
 
 /// Settings of the inverter.
@@ -171,11 +171,5 @@ impl Inverter {
             lost: duties.map(|d| taken(d, d) + self.residual),
             gained: duties.map(|d| taken(1.0 - d, d) + self.residual),
         }
-    }
-
-    /// The leg voltages `legs` less the drops of the switches, as a space vector.
-    pub(crate) fn dropped(&self, legs: [f64; 3], i: Complex) -> Complex {
-        let signs = phases(i).map(smooth_sign);
-        clarke(legs) - clarke(signs) * self.residual - i * self.on_resistance
     }
 }

@@ -9,8 +9,10 @@
 
 use drive_core::Compare;
 
-use crate::complex::{Complex, phases};
+use crate::averaged::smooth_sign;
+use crate::complex::{Complex, clarke, phases};
 use crate::inverter::Inverter;
+use crate::terminals::Source;
 
 /// Current below which a leg without a switch on has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -144,4 +146,20 @@ pub(crate) fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3]
         Level::Off if currents[k] < -NO_CURRENT => vdc,
         Level::Off => 0.5 * vdc,
     })
+}
+
+/// The legs with the drops of the switches that conduct.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Legs<'a> {
+    /// Leg voltages as a space vector, V.
+    pub legs: Complex,
+    pub inverter: &'a Inverter,
+}
+
+impl Source for Legs<'_> {
+    #[inline(always)]
+    fn voltage(&self, i: Complex) -> Complex {
+        let signs = phases(i).map(smooth_sign);
+        self.legs - clarke(signs) * self.inverter.residual - i * self.inverter.on_resistance
+    }
 }
