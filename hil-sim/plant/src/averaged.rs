@@ -37,6 +37,13 @@ pub(crate) struct Averaged {
     pub on_resistance: f64,
 }
 
+impl Averaged {
+    /// Whether the switches have neither capacitance nor resistance.
+    pub(crate) fn ideal(&self) -> bool {
+        self.inverse_knee == 0.0 && self.on_resistance == 0.0
+    }
+}
+
 /// Share of the dead-time error of a current, in units of that which just swings the leg: while the
 /// leg swings linearly it is `y/2`, and `1 - 1/(2 y)` where it arrives before the end.
 #[inline]
@@ -48,9 +55,6 @@ fn swung(y: f64) -> f64 {
 impl Source for Averaged {
     #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
-        if self.inverse_knee != 0.0 || self.on_resistance != 0.0 {
-            return self.voltage_of_real_switches(i);
-        }
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
@@ -58,25 +62,28 @@ impl Source for Averaged {
         };
         self.v - clarke([error(0), error(1), error(2)])
     }
-
 }
 
-impl Averaged {
-    /// The voltage with capacitance at the nodes and resistance of the switches.
-    #[inline(never)]
-    fn voltage_of_real_switches(&self, i: Complex) -> Complex {
+/// The same with capacitance at the nodes and resistance of the switches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RealSwitches(pub Averaged);
+
+impl Source for RealSwitches {
+    #[inline(always)]
+    fn voltage(&self, i: Complex) -> Complex {
+        let legs = &self.0;
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
-            let size = if sign > 0.0 { self.lost[k] } else { self.gained[k] };
-            let share = if self.inverse_knee == 0.0 {
+            let size = if sign > 0.0 { legs.lost[k] } else { legs.gained[k] };
+            let share = if legs.inverse_knee == 0.0 {
                 sign
             } else {
-                swung(currents[k] * self.inverse_knee)
+                swung(currents[k] * legs.inverse_knee)
             };
-            share * (size - self.residual) + sign * self.residual
+            share * (size - legs.residual) + sign * legs.residual
         };
-        self.v - clarke([error(0), error(1), error(2)]) - i * self.on_resistance
+        legs.v - clarke([error(0), error(1), error(2)]) - i * legs.on_resistance
     }
 }
 
@@ -84,7 +91,7 @@ impl Averaged {
 /// them, V s.
 #[inline]
 pub(crate) fn step<M: MachineModel>(
-    terminals: &Terminals<Averaged>,
+    terminals: &impl Terminals,
     motor: &mut MotorModel<M>,
     h: f64,
 ) -> Complex {

@@ -8,7 +8,7 @@
 use crate::complex::{Complex, clarke, phases, square};
 use crate::integrate::{MotorModel, MotorState};
 use crate::model::{ElectricalState as _, MachineModel};
-use crate::terminals::{Terminals, without};
+use crate::terminals::{All, Open, Without, without};
 
 /// Current below which a phase counts as without, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -39,7 +39,7 @@ pub(crate) fn step<M: MachineModel>(
     }
     for _ in 0..CHANGES {
         let conduction = conduction(motor, vdc, blocked);
-        let (next, v) = motor.stepped(&terminals(conduction, vdc), rest);
+        let (next, v) = advanced(motor, conduction, vdc, rest);
         let Some((phase, fraction)) = first_reversal(motor, &next, conduction) else {
             motor.state = next;
             return volt_seconds + v * rest;
@@ -49,7 +49,7 @@ pub(crate) fn step<M: MachineModel>(
             blocked[phase] = true;
             continue;
         }
-        let (state, v) = motor.stepped(&terminals(conduction, vdc), done);
+        let (state, v) = advanced(motor, conduction, vdc, done);
         motor.state = state;
         volt_seconds += v * done;
         let i = without(motor.state.electrical.current(), phase);
@@ -58,7 +58,7 @@ pub(crate) fn step<M: MachineModel>(
     }
     // Rounding keeps the conduction changing: the currents are practically zero.
     confine(motor, Complex::ZERO);
-    let (state, v) = motor.stepped(&Terminals::<Complex>::None, rest);
+    let (state, v) = motor.stepped(&Open, rest);
     motor.state = state;
     volt_seconds + v * rest
 }
@@ -76,7 +76,7 @@ fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 
         // One floats: does its potential leave the range between the rails?
         2 => {
             let k = flow.iter().position(|&f| f == 0).unwrap_or(0);
-            let (_, v) = motor.rates(&terminals(flow, vdc));
+            let (_, v) = motor.rates(&Without(k, diodes(flow, vdc)));
             // v_k = 2/3 leg_k - 1/3 (sum of the others), and the others are on opposite rails.
             let leg = 0.5 * vdc + 1.5 * phases(v)[k];
             if !blocked[k] {
@@ -85,7 +85,7 @@ fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 
         }
         // All float: does the back-emf between two of them exceed the link?
         0 => {
-            let emf = phases(motor.rates(&terminals(flow, vdc)).1);
+            let emf = phases(motor.rates(&Open).1);
             let highest = (0..3).fold(0, |m, k| if emf[k] > emf[m] { k } else { m });
             let lowest = (0..3).fold(0, |m, k| if emf[k] < emf[m] { k } else { m });
             if emf[highest] - emf[lowest] > vdc && !blocked[highest] && !blocked[lowest] {
@@ -102,15 +102,24 @@ fn sign(i: f64) -> i8 {
     i8::from(i > NO_CURRENT) - i8::from(i < -NO_CURRENT)
 }
 
-/// What the terminals are connected to with this conduction.
-fn terminals(flow: Conduction, vdc: f64) -> Terminals<Complex> {
-    // Legs of opposite sign about the middle of the link; the common part has no space vector.
-    let v = clarke(flow.map(|f| -0.5 * vdc * f64::from(f)));
+/// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
+fn advanced<M: MachineModel>(
+    motor: &MotorModel<M>,
+    flow: Conduction,
+    vdc: f64,
+    h: f64,
+) -> (MotorState<M::State>, Complex) {
     match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
-        (3, _) => Terminals::All(v),
-        (2, Some(k)) => Terminals::Without(k, v),
-        _ => Terminals::None,
+        (3, _) => motor.stepped(&All(diodes(flow, vdc)), h),
+        (2, Some(k)) => motor.stepped(&Without(k, diodes(flow, vdc)), h),
+        _ => motor.stepped(&Open, h),
     }
+}
+
+/// The voltage at the terminals that conduct: legs of opposite sign about the middle of the link; their common
+/// part has no space vector.
+fn diodes(flow: Conduction, vdc: f64) -> Complex {
+    clarke(flow.map(|f| -0.5 * vdc * f64::from(f)))
 }
 
 /// The phase whose current first goes against its diode, and at which fraction of the step.

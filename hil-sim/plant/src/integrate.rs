@@ -4,7 +4,7 @@ use crate::complex::Complex;
 use crate::machine::Machine;
 use crate::mechanics::Mechanics;
 use crate::model::{ElectricalState as _, MachineModel, Rate};
-use crate::terminals::{Source, Terminals};
+use crate::terminals::{All, Terminals};
 
 /// State of a machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,7 +47,7 @@ impl<M: MachineModel> MotorModel<M> {
     /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
         self.begin_step();
-        self.state = self.stepped(&Terminals::All(v), h).0;
+        self.state = self.stepped(&All(v), h).0;
         self.end_step(h);
     }
 
@@ -71,15 +71,15 @@ impl<M: MachineModel> MotorModel<M> {
 
     /// Derivative of the electrical state, and terminal voltage, now.
     #[inline(always)]
-    pub(crate) fn rates<S: Source>(&self, terminals: &Terminals<S>) -> (Rate<M>, Complex) {
+    pub(crate) fn rates(&self, terminals: &impl Terminals) -> (Rate<M>, Complex) {
         let w = self.machine.pole_pairs() * self.state.speed;
         terminals.rates(&self.machine, &self.state.electrical, w)
     }
 
     /// The state after `h` seconds, and the mean terminal voltage.
-    pub(crate) fn stepped<S: Source>(
+    pub(crate) fn stepped(
         &self,
-        terminals: &Terminals<S>,
+        terminals: &impl Terminals,
         h: f64,
     ) -> (MotorState<M::State>, Complex) {
         self.stepped_from(self.rates(terminals), terminals, h)
@@ -87,10 +87,10 @@ impl<M: MachineModel> MotorModel<M> {
 
     /// As [`Self::stepped`]; `first` are the rates at the present state.
     #[inline]
-    pub(crate) fn stepped_from<S: Source>(
+    pub(crate) fn stepped_from(
         &self,
         first: (Rate<M>, Complex),
-        terminals: &Terminals<S>,
+        terminals: &impl Terminals,
         h: f64,
     ) -> (MotorState<M::State>, Complex) {
         let (m, p) = (&self.machine, self.machine.pole_pairs());

@@ -2,13 +2,14 @@
 
 use drive_core::Compare;
 
+use crate::averaged::RealSwitches;
 use crate::complex::{Complex, clarke};
 use crate::integrate::MotorModel;
 use crate::inverter::Inverter;
 use crate::model::{ElectricalState as _, MachineModel};
 use crate::sensors::Sensors;
 use crate::switched::Legs;
-use crate::terminals::Terminals;
+use crate::terminals::{All, Terminals, Without};
 use crate::{averaged, freewheel, switched};
 
 /// Integration steps per period while the outputs are off: at most this fraction of the period.
@@ -60,6 +61,8 @@ impl Around {
         volt_seconds
     }
 
+    /// With the averages of the period as the source. An interrupted phase does not choose between ideal and
+    /// real switches.
     #[inline]
     fn averaged<M: MachineModel>(
         &mut self,
@@ -67,12 +70,25 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) -> Complex {
-        let terminals = Terminals::new(self.inverter.averaged(compare, period), self.open);
+        let source = self.inverter.averaged(compare, period);
+        match self.open {
+            None if source.ideal() => self.averaged_to(&All(source), motor, period),
+            None => self.averaged_to(&All(RealSwitches(source)), motor, period),
+            Some(open) => self.averaged_to(&Without(open, RealSwitches(source)), motor, period),
+        }
+    }
+
+    #[inline]
+    fn averaged_to<M: MachineModel>(
+        &mut self,
+        terminals: &impl Terminals,
+        motor: &mut MotorModel<M>,
+        period: f64,
+    ) -> Complex {
         let h = period / f64::from(self.substeps);
         let mut volt_seconds = Complex::ZERO;
         for n in 1..=self.substeps {
-            volt_seconds +=
-                self.seen(motor, h, |motor, _| averaged::step(&terminals, motor, h));
+            volt_seconds += self.seen(motor, h, |motor, _| averaged::step(terminals, motor, h));
             if 2 * n == self.substeps {
                 self.sensors.hold_middle();
             }
@@ -97,8 +113,11 @@ impl Around {
                 volt_seconds += self.seen(motor, h, |motor, inverter| {
                     let i = motor.state.electrical.current();
                     let legs = clarke(switched::leg_voltages(levels, i, inverter.vdc));
-                    let terminals = Terminals::new(Legs { legs, inverter }, open);
-                    let (state, v) = motor.stepped(&terminals, h);
+                    let source = Legs { legs, inverter };
+                    let (state, v) = match open {
+                        None => motor.stepped(&All(source), h),
+                        Some(open) => motor.stepped(&Without(open, source), h),
+                    };
                     motor.state = state;
                     v * h
                 });
@@ -113,9 +132,8 @@ impl Around {
         let h = period / f64::from(substeps);
         let mut volt_seconds = Complex::ZERO;
         for _ in 0..substeps {
-            volt_seconds += self.seen(motor, h, |motor, inverter| {
-                freewheel::step(motor, inverter.vdc, open, h)
-            });
+            volt_seconds += self
+                .seen(motor, h, |motor, inverter| freewheel::step(motor, inverter.vdc, open, h));
         }
         volt_seconds
     }

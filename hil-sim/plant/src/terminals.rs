@@ -24,58 +24,52 @@ impl Source for Complex {
     }
 }
 
-/// The phases that are connected to a source.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Terminals<S> {
-    /// All three.
-    All(S),
-    /// All but this one, 0 to 2, whose current is zero.
-    Without(usize, S),
-    /// None; the current is zero.
-    None,
-}
-
-impl<S: Source> Terminals<S> {
-    /// The source, with this phase interrupted.
-    #[inline]
-    pub(crate) fn new(source: S, open: Option<usize>) -> Self {
-        match open {
-            None => Self::All(source),
-            Some(phase) => Self::Without(phase, source),
-        }
-    }
-
+/// What the terminals are connected to. (A type each: the usual one pays nothing for the others.)
+pub(crate) trait Terminals {
     /// Derivative of the state, and terminal voltage.
-    #[inline(always)]
-    pub(crate) fn rates<M: MachineModel>(
-        &self,
-        machine: &M,
-        x: &M::State,
-        w: f64,
-    ) -> (Rate<M>, Complex) {
-        match self {
-            Self::All(source) => {
-                let v = source.voltage(x.current());
-                (machine.derivative(x, v, w), v)
-            }
-            Self::Without(phase, source) => {
-                // Along this axis the leg of the open phase has no part.
-                let axis = LINES[*phase];
-                machine.derivative_on_line(x, dot(source.voltage(x.current()), axis), axis, w)
-            }
-            Self::None => machine.derivative_open(x, w),
-        }
-    }
+    fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex);
 
     /// Takes what current the open phases have. At an interruption its energy goes into the arc; later it is
     /// an error of rounding.
-    pub(crate) fn confine<M: MachineModel>(&self, machine: &M, x: &mut M::State) {
-        let i = match self {
-            Self::All(_) => return,
-            Self::Without(phase, _) => without(x.current(), *phase),
-            Self::None => Complex::ZERO,
-        };
-        *x = machine.with_current(x, i);
+    fn confine<M: MachineModel>(&self, _: &M, _: &mut M::State) {}
+}
+
+/// All three phases are connected to a source.
+pub(crate) struct All<S>(pub S);
+
+/// All but this phase, 0 to 2.
+pub(crate) struct Without<S>(pub usize, pub S);
+
+/// None is.
+pub(crate) struct Open;
+
+impl<S: Source> Terminals for All<S> {
+    #[inline(always)]
+    fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex) {
+        let v = self.0.voltage(x.current());
+        (machine.derivative(x, v, w), v)
+    }
+}
+
+impl<S: Source> Terminals for Without<S> {
+    fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex) {
+        // Along this axis the leg of the open phase has no part.
+        let axis = LINES[self.0];
+        machine.derivative_on_line(x, dot(self.1.voltage(x.current()), axis), axis, w)
+    }
+
+    fn confine<M: MachineModel>(&self, machine: &M, x: &mut M::State) {
+        *x = machine.with_current(x, without(x.current(), self.0));
+    }
+}
+
+impl Terminals for Open {
+    fn rates<M: MachineModel>(&self, machine: &M, x: &M::State, w: f64) -> (Rate<M>, Complex) {
+        machine.derivative_open(x, w)
+    }
+
+    fn confine<M: MachineModel>(&self, machine: &M, x: &mut M::State) {
+        *x = machine.with_current(x, Complex::ZERO);
     }
 }
 
