@@ -34,6 +34,7 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) -> Complex {
+        self.sensors.begin_period(period);
         let volt_seconds = if !compare.enabled {
             self.freewheel(motor, period)
         } else if self.inverter.switched {
@@ -87,11 +88,8 @@ impl Around {
     ) -> Complex {
         let h = period / f64::from(self.substeps);
         let mut volt_seconds = Complex::ZERO;
-        for n in 1..=self.substeps {
+        for _ in 0..self.substeps {
             volt_seconds += self.seen(motor, h, |motor, _| averaged::step(terminals, motor, h));
-            if 2 * n == self.substeps {
-                self.sensors.hold_middle();
-            }
         }
         volt_seconds
     }
