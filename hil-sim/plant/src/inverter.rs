@@ -162,9 +162,9 @@ impl Inverter {
         let taken = |available: f64, duty: f64| {
             if duty > 0.0 && duty < 1.0 { self.vdc * dead.min(available) } else { 0.0 }
         };
-        let knee = self.capacitance * self.vdc / self.dead_time.max(1e-9);
+        let charge = self.capacitance * self.vdc;
         Averaged {
-            inverse_knee: if knee > 0.0 { 1.0 / knee } else { 0.0 },
+            inverse_knee: if charge > 0.0 { self.dead_time.max(1e-9) / charge } else { 0.0 },
             residual: self.residual,
             on_resistance: self.on_resistance,
             v: v * self.vdc,

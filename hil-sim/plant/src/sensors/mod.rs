@@ -16,7 +16,7 @@ mod settings;
 
 pub use settings::{CalibrationLine, MeasurementSettings};
 
-use rare::Rare;
+use rare::{CurrentErrors, VoltageErrors};
 use settings::FULL_SCALE;
 
 /// One of the two measured phases.
@@ -100,11 +100,8 @@ pub struct Sensors {
     corner: f64,
     filtered: Complex,
     /// None where all are zero.
-    rare: Option<Rare>,
-    dc_gain: f64,
-    dc_lag: f64,
-    dc_seen: f64,
-    dc_noise: f64,
+    rare: Option<CurrentErrors>,
+    rare_dc: Option<VoltageErrors>,
     /// Coefficients of the filter and the time step, s, they are for.
     step: f64,
     pole: f64,
@@ -130,11 +127,8 @@ impl Sensors {
             ],
             corner: TAU * s.filter_hz,
             filtered: Complex::ZERO,
-            rare: Rare::new(s),
-            dc_gain: 1.0 + s.dc_gain_error,
-            dc_lag: s.dc_lag_us * 1e-6,
-            dc_seen: f64::NAN,
-            dc_noise: s.dc_noise_v,
+            rare: CurrentErrors::new(s),
+            rare_dc: VoltageErrors::new(s),
             step: f64::NAN,
             pole: 0.0,
             from_old: 0.0,
@@ -214,21 +208,15 @@ impl Sensors {
     /// Follows the dc-link voltage, V, over `h` seconds at whose end it is `vdc`.
     #[inline]
     pub(crate) fn follow_dc_link(&mut self, vdc: f64, h: f64) {
-        if self.dc_lag > 0.0 {
-            let before = if self.dc_seen.is_nan() { vdc } else { self.dc_seen };
-            self.dc_seen = vdc + (before - vdc) * (-h / self.dc_lag).exp();
+        if let Some(rare) = &mut self.rare_dc {
+            rare.follow(vdc, h);
         }
     }
 
     /// The code of the dc-link voltage, which is `vdc`, V.
     #[inline]
     pub fn dc_link(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> u16 {
-        let lags = self.dc_lag > 0.0 && !self.dc_seen.is_nan();
-        let mut seen = self.dc_gain * if lags { self.dc_seen } else { vdc };
-        if self.dc_noise > 0.0 {
-            let unit: f64 = StandardNormal.sample(rng);
-            seen += unit * self.dc_noise;
-        }
+        let seen = self.rare_dc.as_ref().map_or(vdc, |rare| rare.reading(vdc, rng));
         ((seen * self.codes_per_v).clamp(0.0, FULL_SCALE) + 0.5) as u16
     }
 

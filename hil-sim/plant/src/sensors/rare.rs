@@ -1,10 +1,13 @@
-//! Errors of the measurement that most boards do not have.
+//! Errors of the measurement that most boards do not have, in a layer that costs those boards nothing.
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{MeasurementSettings, coefficients};
 
 /// The errors of channels A and B, with their state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rare {
+pub(super) struct CurrentErrors {
     /// Shares of the other phase.
     cross_talk: [f64; 2],
     /// 1/A^2.
@@ -27,10 +30,10 @@ pub(super) struct Rare {
     middle: Option<[f64; 2]>,
 }
 
-impl Rare {
+impl CurrentErrors {
     /// These errors; none where all are zero.
     pub(super) fn new(s: &MeasurementSettings) -> Option<Self> {
-        let rare = Self {
+        let errors = Self {
             cross_talk: [s.cross_talk_a, s.cross_talk_b],
             cubic: s.calibration().map(|line| s.cubic_error / (line.a_at_zero * line.a_at_zero)),
             drift: [s.drift_a, s.drift_b],
@@ -43,8 +46,9 @@ impl Rare {
             now: [0.0; 2],
             middle: s.both_zero_vectors.then_some([0.0; 2]),
         };
-        let sizes = [rare.cross_talk, rare.cubic, rare.drift, [rare.lag_b, 0.0]];
-        (rare.middle.is_some() || sizes.as_flattened().iter().any(|&size| size != 0.0)).then_some(rare)
+        let sizes = [errors.cross_talk, errors.cubic, errors.drift, [errors.lag_b, 0.0]];
+        let acts = errors.middle.is_some() || *sizes.as_flattened() != [0.0; 8];
+        acts.then_some(errors)
     }
 
     /// Begins a period.
@@ -86,5 +90,48 @@ impl Rare {
     /// Offsets by drift, A.
     pub(super) fn offsets(&self) -> [f64; 2] {
         self.drift.map(|drift| drift * self.time)
+    }
+}
+
+/// The errors of the dc-link voltage, with their state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct VoltageErrors {
+    gain: f64,
+    /// Time constant of the lag, s; 0 is none.
+    lag: f64,
+    /// What is behind the lag, V; not a number before the first period.
+    seen: f64,
+    /// V rms.
+    noise: f64,
+}
+
+impl VoltageErrors {
+    /// These errors; none where all are zero.
+    pub(super) fn new(s: &MeasurementSettings) -> Option<Self> {
+        let acts = s.dc_gain_error != 0.0 || s.dc_lag_us > 0.0 || s.dc_noise_v > 0.0;
+        acts.then_some(Self {
+            gain: 1.0 + s.dc_gain_error,
+            lag: s.dc_lag_us * 1e-6,
+            seen: f64::NAN,
+            noise: s.dc_noise_v,
+        })
+    }
+
+    /// Follows the voltage, V, over `h` seconds at whose end it is `vdc`.
+    pub(super) fn follow(&mut self, vdc: f64, h: f64) {
+        if self.lag > 0.0 {
+            let before = if self.seen.is_nan() { vdc } else { self.seen };
+            self.seen = vdc + (before - vdc) * (-h / self.lag).exp();
+        }
+    }
+
+    /// Reading of the voltage, which is `vdc`, V.
+    pub(super) fn reading(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
+        let seen = self.gain * if self.seen.is_nan() { vdc } else { self.seen };
+        if self.noise == 0.0 {
+            return seen;
+        }
+        let unit: f64 = StandardNormal.sample(rng);
+        seen + unit * self.noise
     }
 }
