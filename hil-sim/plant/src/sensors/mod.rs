@@ -183,6 +183,12 @@ impl Sensors {
             let [a, b, _] = phases(self.filtered);
             return self.converted([a, b], [0.0; 2], rng);
         };
+        self.mean_codes(rare, rng)
+    }
+
+    /// Codes with the rare errors.
+    #[cold]
+    fn mean_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
         let codes = rare.currents().map(|seen| self.converted(seen, rare.offsets(), rng));
         let (count, sum) = codes.fold((0, [0; 2]), |(count, sum), [a, b]| {
             (count + 1, [sum[0] + u32::from(a), sum[1] + u32::from(b)])
