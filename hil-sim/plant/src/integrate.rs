@@ -77,6 +77,7 @@ impl<M: MachineModel> MotorModel<M> {
     }
 
     /// The state after `h` seconds, and the mean terminal voltage.
+    #[inline]
     pub(crate) fn stepped(
         &self,
         terminals: &impl Terminals,

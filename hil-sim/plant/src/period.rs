@@ -3,7 +3,7 @@
 use drive_core::Compare;
 
 use crate::averaged::RealSwitches;
-use crate::complex::{Complex, clarke};
+use crate::complex::Complex;
 use crate::integrate::MotorModel;
 use crate::inverter::Inverter;
 use crate::model::{ElectricalState as _, MachineModel};
@@ -38,7 +38,12 @@ impl Around {
         let volt_seconds = if !compare.enabled {
             self.freewheel(motor, period)
         } else if self.inverter.switched {
-            self.switched(motor, compare, period)
+            match self.open {
+                None => self.switched(All, motor, compare, period),
+                Some(open) => {
+                    self.switched(|legs| Without(open, legs), motor, compare, period)
+                }
+            }
         } else {
             self.averaged(motor, compare, period)
         };
@@ -94,14 +99,15 @@ impl Around {
         volt_seconds
     }
 
-    fn switched<M: MachineModel>(
+    /// With the legs between their edges as the source.
+    fn switched<M: MachineModel, T: Terminals>(
         &mut self,
+        terminals: impl Fn(Legs) -> T,
         motor: &mut MotorModel<M>,
         compare: &Compare,
         period: f64,
     ) -> Complex {
         let pattern = switched::Pattern::new(&self.inverter, compare, period);
-        let open = self.open;
         let longest = period / f64::from(self.substeps);
         let mut volt_seconds = Complex::ZERO;
         for (duration, levels) in pattern.pieces() {
@@ -109,13 +115,8 @@ impl Around {
             let h = duration / steps;
             for _ in 0..steps as u32 {
                 volt_seconds += self.seen(motor, h, |motor, inverter| {
-                    let i = motor.state.electrical.current();
-                    let legs = clarke(switched::leg_voltages(levels, i, inverter.vdc));
-                    let source = Legs { legs, inverter };
-                    let (state, v) = match open {
-                        None => motor.stepped(&All(source), h),
-                        Some(open) => motor.stepped(&Without(open, source), h),
-                    };
+                    let legs = Legs::new(inverter, levels, motor.state.electrical.current());
+                    let (state, v) = motor.stepped(&terminals(legs), h);
                     motor.state = state;
                     v * h
                 });

@@ -137,7 +137,7 @@ impl Pattern {
 }
 
 /// Leg voltages at these levels and this stator current.
-pub(crate) fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
+fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
     let currents = phases(i);
     std::array::from_fn(|k| match levels[k] {
         Level::Low => 0.0,
@@ -150,16 +150,28 @@ pub(crate) fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3]
 
 /// The legs with the drops of the switches that conduct.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Legs<'a> {
+pub(crate) struct Legs {
     /// Leg voltages as a space vector, V.
-    pub legs: Complex,
-    pub inverter: &'a Inverter,
+    v: Complex,
+    residual: f64,
+    on_resistance: f64,
 }
 
-impl Source for Legs<'_> {
+impl Legs {
+    /// At these levels; the direction of the stator current `i` counts.
+    pub(crate) fn new(inverter: &Inverter, levels: [Level; 3], i: Complex) -> Self {
+        Self {
+            v: clarke(leg_voltages(levels, i, inverter.vdc)),
+            residual: inverter.residual,
+            on_resistance: inverter.on_resistance,
+        }
+    }
+}
+
+impl Source for Legs {
     #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
         let signs = phases(i).map(smooth_sign);
-        self.legs - clarke(signs) * self.inverter.residual - i * self.inverter.on_resistance
+        self.v - clarke(signs) * self.residual - i * self.on_resistance
     }
 }
