@@ -48,8 +48,8 @@ impl Averaged {
 /// leg swings linearly it is `y/2`, and `1 - 1/(2 y)` where it arrives before the end.
 #[inline]
 fn swung(y: f64) -> f64 {
-    let size = y.abs();
-    if size < 1.0 { 0.5 * y } else { (1.0 - 0.5 / size).copysign(y) }
+    let inverse = 1.0 / y.abs().max(1.0);
+    y * inverse * (1.0 - 0.5 * inverse)
 }
 
 impl Source for Averaged {
@@ -76,14 +76,11 @@ impl Source for RealSwitches {
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
             let size = if sign > 0.0 { legs.lost[k] } else { legs.gained[k] };
-            let share = if legs.inverse_knee == 0.0 {
-                sign
-            } else {
-                swung(currents[k] * legs.inverse_knee)
-            };
+            let share =
+                if legs.inverse_knee == 0.0 { sign } else { swung(currents[k] * legs.inverse_knee) };
             share * (size - legs.residual) + sign * legs.residual
         };
-        legs.v - clarke([error(0), error(1), error(2)]) - i * legs.on_resistance
+        legs.v - i * legs.on_resistance - clarke([error(0), error(1), error(2)])
     }
 }
 

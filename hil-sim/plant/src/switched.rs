@@ -69,6 +69,7 @@ impl Leg {
     }
 
     /// At `time`, with the edges already delayed by `delay`.
+    #[inline]
     fn level(&self, time: f64, delay: f64, dead_time: f64) -> Level {
         let edges = &self.edges[..self.count];
         let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| edge + delay <= time) else {
@@ -159,6 +160,7 @@ pub(crate) struct Legs {
 
 impl Legs {
     /// At these levels; the direction of the stator current `i` counts.
+    #[inline]
     pub(crate) fn new(inverter: &Inverter, levels: [Level; 3], i: Complex) -> Self {
         Self {
             v: clarke(leg_voltages(levels, i, inverter.vdc)),
@@ -172,6 +174,6 @@ impl Source for Legs {
     #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
         let signs = phases(i).map(smooth_sign);
-        self.v - clarke(signs) * self.residual - i * self.on_resistance
+        self.v - i * self.on_resistance - clarke(signs) * self.residual
     }
 }
