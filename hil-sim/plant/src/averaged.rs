@@ -76,8 +76,11 @@ impl Source for RealSwitches {
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
             let size = if sign > 0.0 { legs.lost[k] } else { legs.gained[k] };
-            let share =
-                if legs.inverse_knee == 0.0 { sign } else { swung(currents[k] * legs.inverse_knee) };
+            let share = if legs.inverse_knee == 0.0 {
+                sign
+            } else {
+                swung(currents[k] * legs.inverse_knee)
+            };
             share * (size - legs.residual) + sign * legs.residual
         };
         legs.v - i * legs.on_resistance - clarke([error(0), error(1), error(2)])

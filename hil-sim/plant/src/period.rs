@@ -40,9 +40,7 @@ impl Around {
         } else if self.inverter.switched {
             match self.open {
                 None => self.switched(All, motor, compare, period),
-                Some(open) => {
-                    self.switched(|legs| Without(open, legs), motor, compare, period)
-                }
+                Some(open) => self.switched(|legs| Without(open, legs), motor, compare, period),
             }
         } else {
             self.averaged(motor, compare, period)

@@ -15,9 +15,9 @@
 //! make energy. The exception is a tooth term that does not follow `m`: it is added to the stator
 //! current alone, and the balance of power does not hold to its size (see `IronSettings::conservative`).
 //!
-//! A derivative of a complex function f(u) has two parts, `df = f_u du + f_v du*`.
+//! A derivative of a complex function is a real matrix, kept by its columns.
 
-use crate::complex::{Complex, square};
+use crate::complex::{Complex, dot, square};
 
 /// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
 /// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
@@ -27,34 +27,49 @@ const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
 const NO_FLUX: f64 = 1e-12;
 
-/// The two parts of the derivative of a complex function.
+/// The derivative of a complex function, by the real and by the imaginary part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slope {
-    direct: Complex,
-    conjugate: Complex,
+    re: Complex,
+    im: Complex,
 }
 
 impl Slope {
+    /// Of `df = direct du + conjugate du*`.
+    #[inline]
+    fn new(direct: f64, conjugate: Complex) -> Self {
+        let Complex { re, im } = conjugate;
+        Self { re: Complex::new(direct + re, im), im: Complex::new(im, direct - re) }
+    }
+
     #[inline]
     pub(crate) fn times(&self, d: Complex) -> Complex {
-        self.direct * d + self.conjugate * d.conj()
+        self.re * d.re + self.im * d.im
     }
 
     /// The slope of the inverse function.
     #[inline]
     fn inverse(&self) -> Self {
-        let scale = 1.0 / (square(self.direct) - square(self.conjugate));
-        Self { direct: self.direct.conj() * scale, conjugate: self.conjugate * -scale }
+        let scale = 1.0 / (self.re.re * self.im.im - self.re.im * self.im.re);
+        Self {
+            re: Complex::new(self.im.im, -self.re.im) * scale,
+            im: Complex::new(-self.im.re, self.re.re) * scale,
+        }
+    }
+
+    #[inline]
+    fn transposed(&self) -> Self {
+        Self { re: Complex::new(self.re.re, self.im.re), im: Complex::new(self.re.im, self.im.im) }
     }
 
     #[inline]
     fn plus(self, other: Self) -> Self {
-        Self { direct: self.direct + other.direct, conjugate: self.conjugate + other.conjugate }
+        Self { re: self.re + other.re, im: self.im + other.im }
     }
 
     #[inline]
     fn minus(self, other: Self) -> Self {
-        Self { direct: self.direct - other.direct, conjugate: self.conjugate - other.conjugate }
+        Self { re: self.re - other.re, im: self.im - other.im }
     }
 }
 
@@ -90,14 +105,13 @@ impl Leakage {
     #[inline]
     fn current(&self, x: Complex) -> (Complex, Slope) {
         if self.saturation == 0.0 {
-            let direct = self.inverse.into();
-            return (x * self.inverse, Slope { direct, conjugate: Complex::ZERO });
+            return (x * self.inverse, Slope::new(self.inverse, Complex::ZERO));
         }
         let length = square(x).sqrt();
         let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
         let conjugate = if length > NO_FLUX { x * x * (half / length) } else { Complex::ZERO };
-        let direct = (self.inverse * (1.0 + 1.5 * bent)).into();
-        (x * (self.inverse * (1.0 + bent)), Slope { direct, conjugate })
+        let slope = Slope::new(self.inverse * (1.0 + 1.5 * bent), conjugate);
+        (x * (self.inverse * (1.0 + bent)), slope)
     }
 }
 
@@ -115,8 +129,7 @@ impl MainFlux {
     #[inline]
     pub(crate) fn current(&self, m: Complex) -> (Complex, Slope) {
         if self.inverse_knee == 0.0 {
-            let direct = self.inverse.into();
-            return (m * self.inverse, Slope { direct, conjugate: Complex::ZERO });
+            return (m * self.inverse, Slope::new(self.inverse, Complex::ZERO));
         }
         let knee_squared = self.inverse_knee * self.inverse_knee;
         let y = square(m) * knee_squared;
@@ -128,7 +141,7 @@ impl MainFlux {
         let half = 0.5 * f64::from(self.exponent) * self.inverse * power;
         let straight = self.inverse * (1.0 + power * y);
         let conjugate = m * m * (half * knee_squared);
-        (m * straight, Slope { direct: (straight + half * y).into(), conjugate })
+        (m * straight, Slope::new(straight + half * y, conjugate))
     }
 }
 
@@ -225,49 +238,51 @@ impl Magnetics {
         let m = found.m;
         let x = s - m;
         let geometric = self.fixed + found.slots;
-        let (mut i, mut stator_x) = self.stator.current(x);
+        let (mut i, leakage) = self.stator.current(x);
         i += geometric * x.conj();
-        stator_x.conjugate += geometric;
+        let mut stator_x = leakage.plus(Slope::new(0.0, geometric));
         let (i_r, rotor) = self.rotor.current(r - m);
         let (i_m, main) = self.main.current(m);
-        let mut stator_m = Slope::default();
         let mut residual = i_m - i_r;
-        let mut residual_s = Slope::default();
         let mut residual_m = main.plus(rotor);
+        // Of the gradient by m, by x.
+        let mut by_x = Slope::default();
+        let mut stator_m = Slope::default();
         if let Some(t) = &self.teeth {
             let turn = t.turned();
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
-            let (ff, z, length) = (f * f, f.conj() * x, square(f));
+            let (ff, length) = (f * f, square(f));
             let d = 1.0 / (t.knee_squared + length);
             let (once, twice) = (t.twice * d, t.twice * d * d);
             // The gradient by x, 2c x* f^2/D, and its slopes.
             i += x.conj() * ff * once;
-            stator_x.conjugate += ff * once;
-            let along = 2.0 * once - twice * length;
-            let by_f = Slope { direct: z.conj() * along, conjugate: -(z.conj() * ff) * twice };
+            stator_x = stator_x.plus(Slope::new(0.0, ff * once));
+            let by_f = |direction: Complex| {
+                let along = 2.0 * twice * dot(f, direction);
+                x.conj() * (f * direction * (2.0 * once) - ff * along)
+            };
             if t.conservative {
-                stator_m = by_f;
+                stator_m = Slope { re: by_f(Complex::ONE), im: by_f(Complex::I) };
+                by_x = stator_m.transposed();
                 // The gradient by m, 2c (m* x^2/D - q m/D^2) with q = Re(x^2 m*^2), and its slopes.
-                let (xx, q) = (x * x, (z * z).re);
-                residual += z * x * once - m * (q * twice);
-                residual_m.direct += q * twice * (2.0 * length * d - 3.0);
-                residual_m.conjugate +=
-                    xx * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
-                let by_x = Slope { direct: z * along, conjugate: by_f.conjugate };
-                residual_s = Slope::default().minus(by_x);
-                residual_m = residual_m.minus(by_x);
+                let xx = x * x;
+                let q = dot(xx, ff);
+                residual += xx * m.conj() * once - m * (q * twice);
+                residual_m = residual_m.plus(Slope::new(
+                    q * twice * (2.0 * length * d - 3.0),
+                    xx * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d),
+                ));
             } else {
-                let f_m = turn * t.gap;
-                stator_m =
-                    Slope { direct: by_f.direct * f_m, conjugate: by_f.conjugate * f_m.conj() };
+                let by_m = turn * t.gap;
+                stator_m = Slope { re: by_f(by_m), im: by_f(Complex::I * by_m) };
             }
         }
         residual -= i;
-        residual_s = residual_s.plus(stator_x);
-        residual_m = residual_m.plus(stator_x).minus(stator_m);
+        let residual_s = stator_x.minus(by_x);
+        residual_m = residual_m.plus(residual_s).minus(stator_m);
         if self.eddy != 0.0 {
             residual -= (e - m) * self.eddy;
-            residual_m.direct += self.eddy;
+            residual_m = residual_m.plus(Slope::new(self.eddy, Complex::ZERO));
         }
         found.i = i;
         found.i_r = i_r;
