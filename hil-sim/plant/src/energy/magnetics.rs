@@ -17,7 +17,7 @@
 //!
 //! A derivative of a complex function is a real matrix, kept by its columns.
 
-use crate::complex::{Complex, dot, square};
+use crate::complex::{Complex, square};
 
 /// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
 /// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
@@ -27,6 +27,25 @@ const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
 const NO_FLUX: f64 = 1e-12;
 
+/// A symmetric slope, `df = direct du + conjugate du*`: that of a gradient by its own flux.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Curvature {
+    direct: f64,
+    conjugate: Complex,
+}
+
+impl std::ops::Add for Curvature {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self {
+            direct: self.direct + other.direct,
+            conjugate: self.conjugate + other.conjugate,
+        }
+    }
+}
+
 /// The derivative of a complex function, by the real and by the imaginary part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slope {
@@ -34,17 +53,33 @@ pub(crate) struct Slope {
     im: Complex,
 }
 
-impl Slope {
-    /// Of `df = direct du + conjugate du*`.
+impl From<Curvature> for Slope {
     #[inline]
-    fn new(direct: f64, conjugate: Complex) -> Self {
-        let Complex { re, im } = conjugate;
-        Self { re: Complex::new(direct + re, im), im: Complex::new(im, direct - re) }
+    fn from(c: Curvature) -> Self {
+        let Complex { re, im } = c.conjugate;
+        Self { re: Complex::new(c.direct + re, im), im: Complex::new(im, c.direct - re) }
     }
+}
 
+impl std::ops::Sub for Slope {
+    type Output = Self;
+
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self { re: self.re - other.re, im: self.im - other.im }
+    }
+}
+
+impl Slope {
     #[inline]
     pub(crate) fn times(&self, d: Complex) -> Complex {
         self.re * d.re + self.im * d.im
+    }
+
+    /// The slope of the function of `by u`.
+    #[inline]
+    fn after(&self, by: Complex) -> Self {
+        Self { re: self.times(by), im: self.times(by * Complex::I) }
     }
 
     /// The slope of the inverse function.
@@ -59,17 +94,10 @@ impl Slope {
 
     #[inline]
     fn transposed(&self) -> Self {
-        Self { re: Complex::new(self.re.re, self.im.re), im: Complex::new(self.re.im, self.im.im) }
-    }
-
-    #[inline]
-    fn plus(self, other: Self) -> Self {
-        Self { re: self.re + other.re, im: self.im + other.im }
-    }
-
-    #[inline]
-    fn minus(self, other: Self) -> Self {
-        Self { re: self.re - other.re, im: self.im - other.im }
+        Self {
+            re: Complex::new(self.re.re, self.im.re),
+            im: Complex::new(self.re.im, self.im.im),
+        }
     }
 }
 
@@ -103,15 +131,15 @@ impl Leakage {
     }
 
     #[inline]
-    fn current(&self, x: Complex) -> (Complex, Slope) {
+    fn current(&self, x: Complex) -> (Complex, Curvature) {
         if self.saturation == 0.0 {
-            return (x * self.inverse, Slope::new(self.inverse, Complex::ZERO));
+            return (x * self.inverse, Curvature { direct: self.inverse, conjugate: Complex::ZERO });
         }
         let length = square(x).sqrt();
         let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
         let conjugate = if length > NO_FLUX { x * x * (half / length) } else { Complex::ZERO };
-        let slope = Slope::new(self.inverse * (1.0 + 1.5 * bent), conjugate);
-        (x * (self.inverse * (1.0 + bent)), slope)
+        let direct = self.inverse * (1.0 + 1.5 * bent);
+        (x * (self.inverse * (1.0 + bent)), Curvature { direct, conjugate })
     }
 }
 
@@ -127,9 +155,9 @@ pub(crate) struct MainFlux {
 
 impl MainFlux {
     #[inline]
-    pub(crate) fn current(&self, m: Complex) -> (Complex, Slope) {
+    fn current(&self, m: Complex) -> (Complex, Curvature) {
         if self.inverse_knee == 0.0 {
-            return (m * self.inverse, Slope::new(self.inverse, Complex::ZERO));
+            return (m * self.inverse, Curvature { direct: self.inverse, conjugate: Complex::ZERO });
         }
         let knee_squared = self.inverse_knee * self.inverse_knee;
         let y = square(m) * knee_squared;
@@ -141,7 +169,7 @@ impl MainFlux {
         let half = 0.5 * f64::from(self.exponent) * self.inverse * power;
         let straight = self.inverse * (1.0 + power * y);
         let conjugate = m * m * (half * knee_squared);
-        (m * straight, Slope::new(straight + half * y, conjugate))
+        (m * straight, Curvature { direct: straight + half * y, conjugate })
     }
 }
 
@@ -238,56 +266,54 @@ impl Magnetics {
         let m = found.m;
         let x = s - m;
         let geometric = self.fixed + found.slots;
-        let (mut i, leakage) = self.stator.current(x);
+        let (mut i, mut stator_x) = self.stator.current(x);
         i += geometric * x.conj();
-        let mut stator_x = leakage.plus(Slope::new(0.0, geometric));
+        stator_x.conjugate += geometric;
         let (i_r, rotor) = self.rotor.current(r - m);
         let (i_m, main) = self.main.current(m);
         let mut residual = i_m - i_r;
-        let mut residual_m = main.plus(rotor);
-        // Of the gradient by m, by x.
-        let mut by_x = Slope::default();
-        let mut stator_m = Slope::default();
+        let mut own = main + rotor;
+        // Of the stator current by m, and of the gradient by m by x.
+        let (mut stator_m, mut m_stator) = (Slope::default(), Slope::default());
         if let Some(t) = &self.teeth {
             let turn = t.turned();
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
-            let (ff, length) = (f * f, square(f));
+            let length = square(f);
             let d = 1.0 / (t.knee_squared + length);
             let (once, twice) = (t.twice * d, t.twice * d * d);
             // The gradient by x, 2c x* f^2/D, and its slopes.
-            i += x.conj() * ff * once;
-            stator_x = stator_x.plus(Slope::new(0.0, ff * once));
-            let by_f = |direction: Complex| {
-                let along = 2.0 * twice * dot(f, direction);
-                x.conj() * (f * direction * (2.0 * once) - ff * along)
+            let (ff, xf) = (f * f, x.conj() * f);
+            let xff = xf * f;
+            i += xff * once;
+            stator_x.conjugate += ff * once;
+            let (straight, bent) = (xf * (2.0 * once), xff * (2.0 * twice));
+            let by_f = Slope {
+                re: straight - bent * f.re,
+                im: Complex::new(-straight.im, straight.re) - bent * f.im,
             };
             if t.conservative {
-                stator_m = Slope { re: by_f(Complex::ONE), im: by_f(Complex::I) };
-                by_x = stator_m.transposed();
+                (stator_m, m_stator) = (by_f, by_f.transposed());
                 // The gradient by m, 2c (m* x^2/D - q m/D^2) with q = Re(x^2 m*^2), and its slopes.
-                let xx = x * x;
-                let q = dot(xx, ff);
-                residual += xx * m.conj() * once - m * (q * twice);
-                residual_m = residual_m.plus(Slope::new(
-                    q * twice * (2.0 * length * d - 3.0),
-                    xx * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d),
-                ));
+                let q = xf.re * xf.re - xf.im * xf.im;
+                residual += xf.conj() * x * once - m * (q * twice);
+                own.direct += q * twice * (2.0 * length * d - 3.0);
+                own.conjugate +=
+                    x * x * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
             } else {
-                let by_m = turn * t.gap;
-                stator_m = Slope { re: by_f(by_m), im: by_f(Complex::I * by_m) };
+                stator_m = by_f.after(turn * t.gap);
             }
         }
-        residual -= i;
-        let residual_s = stator_x.minus(by_x);
-        residual_m = residual_m.plus(residual_s).minus(stator_m);
-        if self.eddy != 0.0 {
-            residual -= (e - m) * self.eddy;
-            residual_m = residual_m.plus(Slope::new(self.eddy, Complex::ZERO));
-        }
+        residual -= i + (e - m) * self.eddy;
+        own.direct += self.eddy;
         found.i = i;
         found.i_r = i_r;
-        found.slopes =
-            Slopes { stator_x, stator_m, rotor, residual_s, by_residual: residual_m.inverse() };
+        found.slopes = Slopes {
+            stator_x: stator_x.into(),
+            stator_m,
+            rotor: rotor.into(),
+            residual_s: Slope::from(stator_x) - m_stator,
+            by_residual: (Slope::from(own + stator_x) - m_stator - stator_m).inverse(),
+        };
         residual
     }
 
