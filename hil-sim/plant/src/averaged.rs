@@ -104,9 +104,7 @@ pub(crate) fn step<M: MachineModel>(
             None => rest,
             Some(time) => time.max(SHORTEST * h).min(rest),
         };
-        let (state, v) = motor.stepped_from(first, terminals, part);
-        motor.state = state;
-        volt_seconds += v * part;
+        volt_seconds += motor.advance_from(first, terminals, part) * part;
         if part >= rest {
             return volt_seconds;
         }

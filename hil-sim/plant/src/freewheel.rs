@@ -39,28 +39,25 @@ pub(crate) fn step<M: MachineModel>(
     }
     for _ in 0..CHANGES {
         let conduction = conduction(motor, vdc, blocked);
-        let (next, v) = advanced(motor, conduction, vdc, rest);
-        let Some((phase, fraction)) = first_reversal(motor, &next, conduction) else {
-            motor.state = next;
+        let before = motor.state;
+        let v = advance(motor, conduction, vdc, rest);
+        let Some((phase, fraction)) = first_reversal(motor, &before, conduction) else {
             return volt_seconds + v * rest;
         };
         let done = rest * fraction;
+        motor.state = before;
         if phases(motor.state.electrical.current())[phase].abs() <= NO_CURRENT {
             blocked[phase] = true;
             continue;
         }
-        let (state, v) = advanced(motor, conduction, vdc, done);
-        motor.state = state;
-        volt_seconds += v * done;
+        volt_seconds += advance(motor, conduction, vdc, done) * done;
         let i = without(motor.state.electrical.current(), phase);
         confine(motor, if square(i).sqrt() <= NO_CURRENT { Complex::ZERO } else { i });
         rest -= done;
     }
     // Rounding keeps the conduction changing: the currents are practically zero.
     confine(motor, Complex::ZERO);
-    let (state, v) = motor.stepped(&Open, rest);
-    motor.state = state;
-    volt_seconds + v * rest
+    volt_seconds + motor.advance(&Open, rest) * rest
 }
 
 /// Sets the current.
@@ -102,17 +99,17 @@ fn sign(i: f64) -> i8 {
     i8::from(i > NO_CURRENT) - i8::from(i < -NO_CURRENT)
 }
 
-/// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
-fn advanced<M: MachineModel>(
-    motor: &MotorModel<M>,
+/// Integrates over `h` seconds with this conduction throughout; returns the mean terminal voltage.
+fn advance<M: MachineModel>(
+    motor: &mut MotorModel<M>,
     flow: Conduction,
     vdc: f64,
     h: f64,
-) -> (MotorState<M::State>, Complex) {
+) -> Complex {
     match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
-        (3, _) => motor.stepped(&All(diodes(flow, vdc)), h),
-        (2, Some(k)) => motor.stepped(&Without(k, diodes(flow, vdc)), h),
-        _ => motor.stepped(&Open, h),
+        (3, _) => motor.advance(&All(diodes(flow, vdc)), h),
+        (2, Some(k)) => motor.advance(&Without(k, diodes(flow, vdc)), h),
+        _ => motor.advance(&Open, h),
     }
 }
 
@@ -125,11 +122,11 @@ fn diodes(flow: Conduction, vdc: f64) -> Complex {
 /// The phase whose current first goes against its diode, and at which fraction of the step.
 fn first_reversal<M: MachineModel>(
     motor: &MotorModel<M>,
-    next: &MotorState<M::State>,
+    before: &MotorState<M::State>,
     flow: Conduction,
 ) -> Option<(usize, f64)> {
     let (before, after) =
-        (phases(motor.state.electrical.current()), phases(next.electrical.current()));
+        (phases(before.electrical.current()), phases(motor.state.electrical.current()));
     (0..3)
         .filter(|&k| f64::from(flow[k]) * after[k] < 0.0)
         .map(|k| (k, (before[k] / (before[k] - after[k])).clamp(0.0, 1.0)))

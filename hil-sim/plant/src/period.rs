@@ -114,9 +114,7 @@ impl Around {
             for _ in 0..steps as u32 {
                 volt_seconds += self.seen(motor, h, |motor, inverter| {
                     let legs = Legs::new(inverter, levels, motor.state.electrical.current());
-                    let (state, v) = motor.stepped(&terminals(legs), h);
-                    motor.state = state;
-                    v * h
+                    motor.advance(&terminals(legs), h) * h
                 });
             }
         }
