@@ -64,7 +64,7 @@ impl<M: MachineModel> MotorModel<M> {
     #[inline]
     pub(crate) fn end_step(&mut self, h: f64) {
         if self.mechanics.has_extras() {
-            self.mechanics.end(self.state.angle, self.state.speed, h);
+            self.mechanics.end(self.state.speed, h);
         }
         self.machine.after_step(&self.state.electrical, h);
     }

@@ -197,8 +197,14 @@ impl Teeth {
         if self.turn == 0.0 && self.turn_per_a == 0.0 {
             return Complex::new(1.0, 0.0);
         }
-        Complex::cis(self.turn + self.turn_per_a * self.load)
+        cis(self.turn + self.turn_per_a * self.load)
     }
+}
+
+/// A unit vector. (Out of line: sine and cosine would be taken where they are not needed, too.)
+#[cold]
+fn cis(angle: f64) -> Complex {
+    Complex::cis(angle)
 }
 
 /// The magnetic circuit.
@@ -234,17 +240,16 @@ pub(crate) struct Solution {
 impl Magnetics {
     /// Saliency of the stator leakage by slots at the electrical rotor angle `theta`, times 1/Ll.
     #[inline]
-    fn slot_vector(&self, theta: f64) -> Complex {
+    pub(crate) fn slot_vector(&self, theta: f64) -> Complex {
         if self.slots == 0.0 {
             return Complex::ZERO;
         }
-        Complex::cis(self.bars * theta) * self.slots
+        cis(self.bars * theta) * self.slots
     }
 
     /// Finds the currents for the fluxes `s`, `r`, `e`; `found` is the first guess.
     #[inline]
-    pub(crate) fn solve(&self, fluxes: [Complex; 3], theta: f64, found: &mut Solution) {
-        found.slots = self.slot_vector(theta);
+    pub(crate) fn solve(&self, fluxes: [Complex; 3], found: &mut Solution) {
         for _ in 0..LIMIT {
             let residual = self.evaluate(fluxes, found);
             let step = -found.slopes.by_residual.times(residual);

@@ -195,6 +195,7 @@ impl EnergyMachine {
             },
             psi_iron: (x.solution.m - x.psi_iron) * self.eddy_rate,
             theta: w,
+            slots: turning(x.solution.slots) * self.magnetics.bars,
             ..EnergyRate::default()
         }
     }
@@ -303,6 +304,13 @@ impl MachineModel for EnergyMachine {
 
     #[inline]
     fn settle(&self, x: &mut EnergyState) {
-        self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], x.theta, &mut x.solution);
+        x.solution.slots = self.magnetics.slot_vector(x.theta);
+        self.correct(x);
+    }
+
+    /// Takes the slots where they were integrated to: one sine and cosine a step.
+    #[inline]
+    fn correct(&self, x: &mut EnergyState) {
+        self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
     }
 }
