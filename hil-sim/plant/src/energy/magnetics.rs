@@ -107,6 +107,8 @@ pub(crate) struct Slopes {
     /// Stator current by `x` and, at fixed `x`, by `m`.
     stator_x: Slope,
     stator_m: Slope,
+    /// Stator current by `r`, where the teeth follow it.
+    stator_r: Slope,
     /// Rotor current by `y`.
     pub rotor: Slope,
     /// Negative residual by `s` at fixed `m`.
@@ -267,7 +269,7 @@ impl Magnetics {
 
     /// Currents and slopes at `found.m`; returns the gradient of the energy by `m`.
     #[inline]
-    fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
+    pub(crate) fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
         let m = found.m;
         let x = s - m;
         let geometric = self.fixed + found.slots;
@@ -278,8 +280,8 @@ impl Magnetics {
         let (i_m, main) = self.main.current(m);
         let mut residual = i_m - i_r;
         let mut own = main + rotor;
-        // Of the stator current by m, and of the gradient by m by x.
-        let (mut stator_m, mut m_stator) = (Slope::default(), Slope::default());
+        // Of the stator current by m and r, and of the gradient by m by x.
+        let [mut stator_m, mut stator_r, mut m_stator] = [Slope::default(); 3];
         if let Some(t) = &self.teeth {
             let turn = t.turned();
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
@@ -306,6 +308,7 @@ impl Magnetics {
                     x * x * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
             } else {
                 stator_m = by_f.after(turn * t.gap);
+                stator_r = by_f.after(turn * (1.0 - t.gap));
             }
         }
         residual -= i + (e - m) * self.eddy;
@@ -315,6 +318,7 @@ impl Magnetics {
         found.slopes = Slopes {
             stator_x: stator_x.into(),
             stator_m,
+            stator_r,
             rotor: rotor.into(),
             residual_s: Slope::from(stator_x) - m_stator,
             by_residual: (Slope::from(own + stator_x) - m_stator - stator_m).inverse(),
@@ -322,12 +326,19 @@ impl Magnetics {
         residual
     }
 
-    /// Rates of main flux and stator current at these rates of the fluxes.
+    /// Rates of main flux and stator current at these rates of the fluxes; `turned` is that of the stator current
+    /// alone, by the turning of the slots.
     #[inline(always)]
-    pub(crate) fn rates(&self, k: &Slopes, [s, r, e]: [Complex; 3]) -> (Complex, Complex) {
-        let pull = k.residual_s.times(s) + k.rotor.times(r) + e * self.eddy;
+    pub(crate) fn rates(
+        &self,
+        k: &Slopes,
+        [s, r, e]: [Complex; 3],
+        turned: Complex,
+    ) -> (Complex, Complex) {
+        let own = k.stator_r.times(r) + turned;
+        let pull = k.residual_s.times(s) + k.rotor.times(r) + e * self.eddy + own;
         let m = k.by_residual.times(pull);
-        (m, k.stator_x.times(s - m) + k.stator_m.times(m))
+        (m, k.stator_x.times(s - m) + k.stator_m.times(m) + own)
     }
 
     /// The energy in Wb A; times 3/2 it is in J. Without the tooth term unless that is a gradient.
