@@ -39,10 +39,7 @@ impl std::ops::Add for Curvature {
 
     #[inline]
     fn add(self, other: Self) -> Self {
-        Self {
-            direct: self.direct + other.direct,
-            conjugate: self.conjugate + other.conjugate,
-        }
+        Self { direct: self.direct + other.direct, conjugate: self.conjugate + other.conjugate }
     }
 }
 
@@ -94,10 +91,7 @@ impl Slope {
 
     #[inline]
     fn transposed(&self) -> Self {
-        Self {
-            re: Complex::new(self.re.re, self.im.re),
-            im: Complex::new(self.re.im, self.im.im),
-        }
+        Self { re: Complex::new(self.re.re, self.im.re), im: Complex::new(self.re.im, self.im.im) }
     }
 }
 
@@ -135,11 +129,16 @@ impl Leakage {
     #[inline]
     fn current(&self, x: Complex) -> (Complex, Curvature) {
         if self.saturation == 0.0 {
-            return (x * self.inverse, Curvature { direct: self.inverse, conjugate: Complex::ZERO });
+            return (
+                x * self.inverse,
+                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
+            );
         }
-        let length = square(x).sqrt();
+        let squared = square(x);
+        let length = squared.sqrt();
         let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
-        let conjugate = if length > NO_FLUX { x * x * (half / length) } else { Complex::ZERO };
+        // Root and quotient side by side.
+        let conjugate = x * x * (half * length * (1.0 / squared.max(NO_FLUX * NO_FLUX)));
         let direct = self.inverse * (1.0 + 1.5 * bent);
         (x * (self.inverse * (1.0 + bent)), Curvature { direct, conjugate })
     }
@@ -159,7 +158,10 @@ impl MainFlux {
     #[inline]
     fn current(&self, m: Complex) -> (Complex, Curvature) {
         if self.inverse_knee == 0.0 {
-            return (m * self.inverse, Curvature { direct: self.inverse, conjugate: Complex::ZERO });
+            return (
+                m * self.inverse,
+                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
+            );
         }
         let knee_squared = self.inverse_knee * self.inverse_knee;
         let y = square(m) * knee_squared;
@@ -250,7 +252,6 @@ impl Magnetics {
     }
 
     /// Finds the currents for the fluxes `s`, `r`, `e`; `found` is the first guess.
-    #[inline]
     pub(crate) fn solve(&self, fluxes: [Complex; 3], found: &mut Solution) {
         for _ in 0..LIMIT {
             let residual = self.evaluate(fluxes, found);
@@ -268,7 +269,7 @@ impl Magnetics {
     }
 
     /// Currents and slopes at `found.m`; returns the gradient of the energy by `m`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
         let m = found.m;
         let x = s - m;
@@ -283,7 +284,7 @@ impl Magnetics {
         // Of the stator current by m and r, and of the gradient by m by x.
         let [mut stator_m, mut stator_r, mut m_stator] = [Slope::default(); 3];
         if let Some(t) = &self.teeth {
-            let turn = t.turned();
+            let turn = if t.conservative { Complex::ONE } else { t.turned() };
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
             let length = square(f);
             let d = 1.0 / (t.knee_squared + length);
@@ -304,8 +305,7 @@ impl Magnetics {
                 let q = xf.re * xf.re - xf.im * xf.im;
                 residual += xf.conj() * x * once - m * (q * twice);
                 own.direct += q * twice * (2.0 * length * d - 3.0);
-                own.conjugate +=
-                    x * x * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
+                own.conjugate += x * x * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
             } else {
                 stator_m = by_f.after(turn * t.gap);
                 stator_r = by_f.after(turn * (1.0 - t.gap));
