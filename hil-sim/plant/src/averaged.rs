@@ -6,8 +6,8 @@
 
 use crate::complex::{Complex, clarke, phases};
 use crate::integrate::MotorModel;
-use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel, Rate};
-use crate::open_phase::OpenPhase;
+use crate::model::{ElectricalRate as _, ElectricalState as _, MachineModel};
+use crate::terminals::{Source, Terminals};
 
 /// Current, A, beyond which the sign of a phase current counts fully.
 const KINK: f64 = 0.020;
@@ -37,21 +37,24 @@ pub(crate) struct Averaged {
     pub on_resistance: f64,
 }
 
+impl Averaged {
+    /// Whether the switches have neither capacitance nor resistance.
+    pub(crate) fn ideal(&self) -> bool {
+        self.inverse_knee == 0.0 && self.on_resistance == 0.0
+    }
+}
+
 /// Share of the dead-time error of a current, in units of that which just swings the leg: while the
 /// leg swings linearly it is `y/2`, and `1 - 1/(2 y)` where it arrives before the end.
 #[inline]
 fn swung(y: f64) -> f64 {
-    let size = y.abs();
-    if size < 1.0 { 0.5 * y } else { (1.0 - 0.5 / size).copysign(y) }
+    let inverse = 1.0 / y.abs().max(1.0);
+    y * inverse * (1.0 - 0.5 * inverse)
 }
 
-impl Averaged {
-    /// Line-to-neutral voltage at the stator current `i`.
+impl Source for Averaged {
     #[inline(always)]
     fn voltage(&self, i: Complex) -> Complex {
-        if self.inverse_knee != 0.0 || self.on_resistance != 0.0 {
-            return self.voltage_of_real_switches(i);
-        }
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
@@ -59,72 +62,53 @@ impl Averaged {
         };
         self.v - clarke([error(0), error(1), error(2)])
     }
+}
 
-    /// The same with capacitance at the nodes and resistance of the switches.
-    #[inline(never)]
-    fn voltage_of_real_switches(&self, i: Complex) -> Complex {
+/// The same with capacitance at the nodes and resistance of the switches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RealSwitches(pub Averaged);
+
+impl Source for RealSwitches {
+    #[inline(always)]
+    fn voltage(&self, i: Complex) -> Complex {
+        let legs = &self.0;
         let currents = phases(i);
         let error = |k: usize| {
             let sign = smooth_sign(currents[k]);
-            let size = if sign > 0.0 { self.lost[k] } else { self.gained[k] };
-            let share = if self.inverse_knee == 0.0 {
+            let size = if sign > 0.0 { legs.lost[k] } else { legs.gained[k] };
+            let share = if legs.inverse_knee == 0.0 {
                 sign
             } else {
-                swung(currents[k] * self.inverse_knee)
+                swung(currents[k] * legs.inverse_knee)
             };
-            share * (size - self.residual) + sign * self.residual
+            share * (size - legs.residual) + sign * legs.residual
         };
-        self.v - clarke([error(0), error(1), error(2)]) - i * self.on_resistance
+        legs.v - i * legs.on_resistance - clarke([error(0), error(1), error(2)])
     }
+}
 
-    /// Integrates over `h` seconds; returns the terminal voltage integrated over them, V s.
-    #[inline]
-    pub(crate) fn step<M: MachineModel>(
-        &self,
-        motor: &mut MotorModel<M>,
-        open: Option<OpenPhase>,
-        h: f64,
-    ) -> Complex {
-        let p = motor.machine.pole_pairs();
-        let Some(open) = open else {
-            return self.cut(motor, h, p, |machine, x, w| {
-                let v = self.voltage(x.current());
-                (machine.derivative(x, v, w), v)
-            });
+/// Integrates over `h` seconds, in parts between the kinks; returns the terminal voltage integrated over
+/// them, V s.
+#[inline]
+pub(crate) fn step<M: MachineModel>(
+    terminals: &impl Terminals,
+    motor: &mut MotorModel<M>,
+    h: f64,
+) -> Complex {
+    let mut rest = h;
+    let mut volt_seconds = Complex::ZERO;
+    loop {
+        let first = motor.rates(terminals);
+        let i = motor.state.electrical.current();
+        let part = match until_kink(i, first.0.current_rate(), rest) {
+            None => rest,
+            Some(time) => time.max(SHORTEST * h).min(rest),
         };
-        let volt_seconds = self
-            .cut(motor, h, p, |machine, x, w| open.rates(machine, x, self.voltage(x.current()), w));
-        open.confine(motor);
-        volt_seconds
-    }
-
-    /// Integrates in parts between the kinks.
-    #[inline]
-    fn cut<M: MachineModel>(
-        &self,
-        motor: &mut MotorModel<M>,
-        h: f64,
-        p: f64,
-        rates: impl Fn(&M, &M::State, f64) -> (Rate<M>, Complex),
-    ) -> Complex {
-        let mut rest = h;
-        let mut volt_seconds = Complex::ZERO;
-        loop {
-            let rates = |x: &M::State, w| rates(&motor.machine, x, w);
-            let x = &motor.state.electrical;
-            let first = rates(x, p * motor.state.speed);
-            let part = match until_kink(x.current(), first.0.current_rate(), rest) {
-                None => rest,
-                Some(time) => time.max(SHORTEST * h).min(rest),
-            };
-            let (state, v) = motor.stepped_from(first, part, rates);
-            motor.state = state;
-            volt_seconds += v * part;
-            if part >= rest {
-                return volt_seconds;
-            }
-            rest -= part;
+        volt_seconds += motor.advance_from(first, terminals, part) * part;
+        if part >= rest {
+            return volt_seconds;
         }
+        rest -= part;
     }
 }
 

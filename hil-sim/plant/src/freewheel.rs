@@ -5,10 +5,10 @@
 //! current, exactly, unless its potential leaves the range between the rails. When all three float
 //! the terminals show the back-emf of the decaying rotor flux, which turns with the rotor.
 
-use crate::complex::{Complex, clarke, dot, phases};
+use crate::complex::{Complex, clarke, phases, square};
 use crate::integrate::{MotorModel, MotorState};
 use crate::model::{ElectricalState as _, MachineModel};
-use crate::open_phase::{LINES, OpenPhase};
+use crate::terminals::{All, Open, Without, without};
 
 /// Current below which a phase counts as without, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -24,7 +24,7 @@ type Conduction = [i8; 3];
 pub(crate) fn step<M: MachineModel>(
     motor: &mut MotorModel<M>,
     vdc: f64,
-    open: Option<OpenPhase>,
+    open: Option<usize>,
     h: f64,
 ) -> Complex {
     let mut rest = h;
@@ -32,34 +32,32 @@ pub(crate) fn step<M: MachineModel>(
     // Phases that began to conduct and were found not to: they float for the rest of the step.
     let mut blocked = [false; 3];
     if let Some(open) = open {
-        blocked[open.0] = true;
-        if phases(motor.state.electrical.current())[open.0] != 0.0 {
-            open.confine(motor);
+        blocked[open] = true;
+        if phases(motor.state.electrical.current())[open] != 0.0 {
+            confine(motor, without(motor.state.electrical.current(), open));
         }
     }
     for _ in 0..CHANGES {
         let conduction = conduction(motor, vdc, blocked);
-        let (next, v) = advanced(motor, conduction, vdc, rest);
-        let Some((phase, fraction)) = first_reversal(motor, &next, conduction) else {
-            motor.state = next;
+        let before = motor.state;
+        let v = advance(motor, conduction, vdc, rest);
+        let Some((phase, fraction)) = first_reversal(motor, &before, conduction) else {
             return volt_seconds + v * rest;
         };
         let done = rest * fraction;
+        motor.state = before;
         if phases(motor.state.electrical.current())[phase].abs() <= NO_CURRENT {
             blocked[phase] = true;
             continue;
         }
-        let (state, v) = advanced(motor, conduction, vdc, done);
-        motor.state = state;
-        volt_seconds += v * done;
-        confine(motor, without(motor.state.electrical.current(), phase));
+        volt_seconds += advance(motor, conduction, vdc, done) * done;
+        let i = without(motor.state.electrical.current(), phase);
+        confine(motor, if square(i).sqrt() <= NO_CURRENT { Complex::ZERO } else { i });
         rest -= done;
     }
     // Rounding keeps the conduction changing: the currents are practically zero.
     confine(motor, Complex::ZERO);
-    let (state, v) = advanced(motor, [0; 3], vdc, rest);
-    motor.state = state;
-    volt_seconds + v * rest
+    volt_seconds + motor.advance(&Open, rest) * rest
 }
 
 /// Sets the current.
@@ -69,16 +67,13 @@ fn confine<M: MachineModel>(motor: &mut MotorModel<M>, i: Complex) {
 
 /// Which diodes conduct in the present state.
 fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 3]) -> Conduction {
-    let x = &motor.state.electrical;
-    let w = motor.machine.pole_pairs() * motor.state.speed;
-    let mut flow = phases(x.current()).map(sign);
+    let mut flow = phases(motor.state.electrical.current()).map(sign);
     let conducting = flow.iter().filter(|&&f| f != 0).count();
     match conducting {
         // One floats: does its potential leave the range between the rails?
         2 => {
             let k = flow.iter().position(|&f| f == 0).unwrap_or(0);
-            let (axis, v_axis) = line(k, flow, vdc);
-            let (_, v) = motor.machine.derivative_on_line(x, v_axis, axis, w);
+            let (_, v) = motor.rates(&Without(k, diodes(flow, vdc)));
             // v_k = 2/3 leg_k - 1/3 (sum of the others), and the others are on opposite rails.
             let leg = 0.5 * vdc + 1.5 * phases(v)[k];
             if !blocked[k] {
@@ -87,7 +82,7 @@ fn conduction<M: MachineModel>(motor: &MotorModel<M>, vdc: f64, blocked: [bool; 
         }
         // All float: does the back-emf between two of them exceed the link?
         0 => {
-            let emf = phases(motor.machine.derivative_open(x, w).1);
+            let emf = phases(motor.rates(&Open).1);
             let highest = (0..3).fold(0, |m, k| if emf[k] > emf[m] { k } else { m });
             let lowest = (0..3).fold(0, |m, k| if emf[k] < emf[m] { k } else { m });
             if emf[highest] - emf[lowest] > vdc && !blocked[highest] && !blocked[lowest] {
@@ -104,60 +99,36 @@ fn sign(i: f64) -> i8 {
     i8::from(i > NO_CURRENT) - i8::from(i < -NO_CURRENT)
 }
 
-/// The line on which the current lies while phase `k` floats, and the terminal voltage along it.
-fn line(k: usize, flow: Conduction, vdc: f64) -> (Complex, f64) {
-    let axis = LINES[k];
-    // Legs of opposite sign about the middle of the link; the common part has no space vector.
-    let legs = flow.map(|f| -0.5 * vdc * f64::from(f));
-    (axis, dot(clarke(legs), axis))
-}
-
-/// State after `h` seconds with this conduction throughout, and the mean terminal voltage.
-fn advanced<M: MachineModel>(
-    motor: &MotorModel<M>,
+/// Integrates over `h` seconds with this conduction throughout; returns the mean terminal voltage.
+fn advance<M: MachineModel>(
+    motor: &mut MotorModel<M>,
     flow: Conduction,
     vdc: f64,
     h: f64,
-) -> (MotorState<M::State>, Complex) {
-    let machine = &motor.machine;
+) -> Complex {
     match (flow.iter().filter(|&&f| f != 0).count(), flow.iter().position(|&f| f == 0)) {
-        (3, _) => {
-            let v = clarke(flow.map(|f| -0.5 * vdc * f64::from(f)));
-            motor.stepped(h, |x, w| (machine.derivative(x, v, w), v))
-        }
-        (2, Some(k)) => {
-            let (axis, v_axis) = line(k, flow, vdc);
-            let (mut state, v) =
-                motor.stepped(h, |x, w| machine.derivative_on_line(x, v_axis, axis, w));
-            let i = axis * dot(state.electrical.current(), axis);
-            state.electrical = machine.with_current(&state.electrical, i);
-            (state, v)
-        }
-        _ => {
-            let (mut state, v) = motor.stepped(h, |x, w| machine.derivative_open(x, w));
-            state.electrical = machine.with_current(&state.electrical, Complex::ZERO);
-            (state, v)
-        }
+        (3, _) => motor.advance(&All(diodes(flow, vdc)), h),
+        (2, Some(k)) => motor.advance(&Without(k, diodes(flow, vdc)), h),
+        _ => motor.advance(&Open, h),
     }
+}
+
+/// The voltage at the terminals that conduct: legs of opposite sign about the middle of the link; their common
+/// part has no space vector.
+fn diodes(flow: Conduction, vdc: f64) -> Complex {
+    clarke(flow.map(|f| -0.5 * vdc * f64::from(f)))
 }
 
 /// The phase whose current first goes against its diode, and at which fraction of the step.
 fn first_reversal<M: MachineModel>(
     motor: &MotorModel<M>,
-    next: &MotorState<M::State>,
+    before: &MotorState<M::State>,
     flow: Conduction,
 ) -> Option<(usize, f64)> {
     let (before, after) =
-        (phases(motor.state.electrical.current()), phases(next.electrical.current()));
+        (phases(before.electrical.current()), phases(motor.state.electrical.current()));
     (0..3)
         .filter(|&k| f64::from(flow[k]) * after[k] < 0.0)
         .map(|k| (k, (before[k] / (before[k] - after[k])).clamp(0.0, 1.0)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// The current with that of phase `k` removed.
-fn without(i: Complex, k: usize) -> Complex {
-    let axis = LINES[k];
-    let length = dot(i, axis);
-    if length.abs() <= NO_CURRENT { Complex::ZERO } else { axis * length }
 }

@@ -4,6 +4,7 @@ use crate::complex::Complex;
 use crate::machine::Machine;
 use crate::mechanics::Mechanics;
 use crate::model::{ElectricalState as _, MachineModel, Rate};
+use crate::terminals::{All, Terminals};
 
 /// State of a machine and its shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,7 +47,7 @@ impl<M: MachineModel> MotorModel<M> {
     /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
         self.begin_step();
-        self.state = self.stepped(h, |x, w| (self.machine.derivative(x, v, w), v)).0;
+        self.advance(&All(v), h);
         self.end_step(h);
     }
 
@@ -63,64 +64,63 @@ impl<M: MachineModel> MotorModel<M> {
     #[inline]
     pub(crate) fn end_step(&mut self, h: f64) {
         if self.mechanics.has_extras() {
-            self.mechanics.end(self.state.angle, self.state.speed, h);
+            self.mechanics.end(self.state.speed, h);
         }
         self.machine.after_step(&self.state.electrical, h);
     }
 
-    /// The state after `h` seconds, and the mean terminal voltage. `rates` gives the derivative of
-    /// the electrical state and the terminal voltage at a state and an electrical speed.
-    #[inline]
-    pub(crate) fn stepped(
-        &self,
-        h: f64,
-        rates: impl Fn(&M::State, f64) -> (Rate<M>, Complex),
-    ) -> (MotorState<M::State>, Complex) {
+    /// Derivative of the electrical state, and terminal voltage, now.
+    #[inline(always)]
+    pub(crate) fn rates(&self, terminals: &impl Terminals) -> (Rate<M>, Complex) {
         let w = self.machine.pole_pairs() * self.state.speed;
-        self.stepped_from(rates(&self.state.electrical, w), h, rates)
+        terminals.rates(&self.machine, &self.state.electrical, w)
     }
 
-    /// As [`Self::stepped`]; `first` is the value of `rates` at the present state.
+    /// Integrates over `h` seconds; returns the mean terminal voltage.
     #[inline]
-    pub(crate) fn stepped_from(
-        &self,
+    pub(crate) fn advance(&mut self, terminals: &impl Terminals, h: f64) -> Complex {
+        self.advance_from(self.rates(terminals), terminals, h)
+    }
+
+    /// As [`Self::advance`]; `first` are the rates at the present state.
+    #[inline]
+    pub(crate) fn advance_from(
+        &mut self,
         first: (Rate<M>, Complex),
+        terminals: &impl Terminals,
         h: f64,
-        rates: impl Fn(&M::State, f64) -> (Rate<M>, Complex),
-    ) -> (MotorState<M::State>, Complex) {
+    ) -> Complex {
         let (m, p) = (&self.machine, self.machine.pole_pairs());
         let (x0, n0) = (self.state.electrical, self.state.speed);
+        let x = &mut self.state.electrical;
         let accelerate = |x: &M::State, n: f64| self.mechanics.acceleration(m.torque(x), n);
 
         let (k1, v1) = first;
-        let a1 = accelerate(&x0, n0);
+        let a1 = accelerate(x, n0);
         let half = 0.5 * h;
-        let (mut x, n1) = (x0, n0 + a1 * half);
+        let n1 = n0 + a1 * half;
         x.set_moved(&x0, &k1, half);
-        m.settle(&mut x);
-        let (k2, v2) = rates(&x, p * n1);
-        let a2 = accelerate(&x, n1);
+        m.correct(x);
+        let (k2, v2) = terminals.rates(m, x, p * n1);
+        let a2 = accelerate(x, n1);
         let n2 = n0 + a2 * half;
         x.set_moved(&x0, &k2, half);
-        m.settle(&mut x);
-        let (k3, v3) = rates(&x, p * n2);
-        let a3 = accelerate(&x, n2);
+        m.correct(x);
+        let (k3, v3) = terminals.rates(m, x, p * n2);
+        let a3 = accelerate(x, n2);
         let n3 = n0 + a3 * h;
         x.set_moved(&x0, &k3, h);
-        m.settle(&mut x);
-        let (k4, v4) = rates(&x, p * n3);
-        let a4 = accelerate(&x, n3);
+        m.correct(x);
+        let (k4, v4) = terminals.rates(m, x, p * n3);
+        let a4 = accelerate(x, n3);
 
         let sixth = h * (1.0 / 6.0);
         let mean_f = |a: f64, b: f64, c: f64, d: f64| (a + d + (b + c) * 2.0) * sixth;
         x.set_advanced(&x0, [&k1, &k2, &k3, &k4], h);
-        m.settle(&mut x);
-        let state = MotorState {
-            electrical: x,
-            speed: n0 + mean_f(a1, a2, a3, a4),
-            angle: self.state.angle + mean_f(n0, n1, n2, n3),
-        };
-        let voltage: Complex = (v1 + v4 + (v2 + v3) * 2.0) * (1.0 / 6.0);
-        (state, voltage)
+        m.settle(x);
+        terminals.confine(m, x);
+        self.state.speed = n0 + mean_f(a1, a2, a3, a4);
+        self.state.angle += mean_f(n0, n1, n2, n3);
+        (v1 + v4 + (v2 + v3) * 2.0) * (1.0 / 6.0)
     }
 }

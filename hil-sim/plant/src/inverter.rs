@@ -13,8 +13,8 @@
 use drive_core::Compare;
 use serde::{Deserialize, Serialize};
 
-use crate::averaged::{Averaged, smooth_sign};
-use crate::complex::{Complex, clarke, phases};
+use crate::averaged::Averaged;
+use crate::complex::clarke;
 use crate::error::{PlantError, check};
 
 /// Settings of the inverter.
@@ -162,20 +162,14 @@ impl Inverter {
         let taken = |available: f64, duty: f64| {
             if duty > 0.0 && duty < 1.0 { self.vdc * dead.min(available) } else { 0.0 }
         };
-        let knee = self.capacitance * self.vdc / self.dead_time.max(1e-9);
+        let charge = self.capacitance * self.vdc;
         Averaged {
-            inverse_knee: if knee > 0.0 { 1.0 / knee } else { 0.0 },
+            inverse_knee: if charge > 0.0 { self.dead_time.max(1e-9) / charge } else { 0.0 },
             residual: self.residual,
             on_resistance: self.on_resistance,
             v: v * self.vdc,
             lost: duties.map(|d| taken(d, d) + self.residual),
             gained: duties.map(|d| taken(1.0 - d, d) + self.residual),
         }
-    }
-
-    /// The leg voltages `legs` less the drops of the switches, as a space vector.
-    pub(crate) fn dropped(&self, legs: [f64; 3], i: Complex) -> Complex {
-        let signs = phases(i).map(smooth_sign);
-        clarke(legs) - clarke(signs) * self.residual - i * self.on_resistance
     }
 }

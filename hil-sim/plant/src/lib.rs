@@ -33,16 +33,15 @@ mod machine;
 mod mechanics;
 mod model;
 mod motor;
-mod open_phase;
 mod period;
 mod sensors;
 mod switched;
+mod terminals;
 mod warming;
 
 use dc_link::DcLink;
 use drive_core::{Compare, Hardware, Sample};
 use motor::{Motor, whichever};
-use open_phase::OpenPhase;
 use period::Around;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -370,7 +369,7 @@ impl Plant {
         if let Some(phase) = phase {
             error::check("open phase", phase as f64, 0.0..=2.0, "")?;
         }
-        self.around.open = phase.map(OpenPhase);
+        self.around.open = phase;
         Ok(())
     }
 

@@ -305,7 +305,7 @@ impl MachineModel for Machine {
         self.torque_factor * (x.psi.re * x.i.im - x.psi.im * x.i.re)
     }
 
-    #[inline]
+    #[inline(always)]
     fn derivative(&self, x: &MachineState, v: Complex, w: f64) -> MachineState {
         let decay = self.decay(x.psi, w);
         let y = v + self.drive_voltage(x, decay);

@@ -80,6 +80,8 @@ struct Extras {
     static_torque: f64,
     once_torque: f64,
     coupling: Option<Coupling>,
+    /// Torque of the load in this step.
+    at_load: f64,
     /// Speed at the start of the step; 0 also while friction holds the shaft.
     speed: f64,
 }
@@ -128,6 +130,7 @@ impl Mechanics {
             static_torque: s.static_torque,
             once_torque: s.once_torque,
             coupling,
+            at_load: 0.0,
             speed: 0.0,
         };
         let mut mechanics = Self {
@@ -201,8 +204,8 @@ impl Mechanics {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        let at_load = load + extras.once_torque * angle.cos();
-        let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
+        extras.at_load = load + extras.once_torque * angle.cos();
+        let against = extras.coupling.as_mut().map_or(extras.at_load, |coupling| {
             coupling.torque =
                 coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
             coupling.torque
@@ -226,14 +229,11 @@ impl Mechanics {
     }
 
     /// Ends an integration step of `h` seconds: the inertia behind the coupling follows.
-    #[inline(never)]
-    pub(crate) fn end(&mut self, angle: f64, speed: f64, h: f64) {
-        let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
-            return;
-        };
-        let at_load = load + extras.once_torque * angle.cos();
-        if let Some(coupling) = &mut extras.coupling {
-            coupling.speed += h * (coupling.torque - at_load) / coupling.inertia;
+    pub(crate) fn end(&mut self, speed: f64, h: f64) {
+        if let (Load::Free { .. }, Some(Extras { at_load, coupling: Some(coupling), .. })) =
+            (self.load, &mut self.extras)
+        {
+            coupling.speed += h * (coupling.torque - *at_load) / coupling.inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }

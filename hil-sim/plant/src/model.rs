@@ -45,6 +45,13 @@ pub trait MachineModel: Copy {
     /// Makes the dependent quantities of a state match the integrated ones.
     #[inline]
     fn settle(&self, _: &mut Self::State) {}
+
+    /// As [`Self::settle`] within an integration step, where what depends on the angle of the rotor may be
+    /// integrated like the rest.
+    #[inline]
+    fn correct(&self, x: &mut Self::State) {
+        self.settle(x);
+    }
 }
 
 /// Time derivative of the state of a model.

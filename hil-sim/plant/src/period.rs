@@ -2,13 +2,15 @@
 
 use drive_core::Compare;
 
+use crate::averaged::RealSwitches;
 use crate::complex::Complex;
 use crate::integrate::MotorModel;
 use crate::inverter::Inverter;
 use crate::model::{ElectricalState as _, MachineModel};
-use crate::open_phase::OpenPhase;
 use crate::sensors::Sensors;
-use crate::{freewheel, switched};
+use crate::switched::Legs;
+use crate::terminals::{All, Terminals, Without};
+use crate::{averaged, freewheel, switched};
 
 /// Integration steps per period while the outputs are off: at most this fraction of the period.
 const FREEWHEEL_SUBSTEPS: u32 = 8;
@@ -19,7 +21,8 @@ pub(crate) struct Around {
     pub inverter: Inverter,
     pub sensors: Sensors,
     pub substeps: u32,
-    pub open: Option<OpenPhase>,
+    /// The interrupted phase, 0 to 2.
+    pub open: Option<usize>,
 }
 
 impl Around {
@@ -31,10 +34,14 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) -> Complex {
+        self.sensors.begin_period(period);
         let volt_seconds = if !compare.enabled {
             self.freewheel(motor, period)
         } else if self.inverter.switched {
-            self.switched(motor, compare, period)
+            match self.open {
+                None => self.switched(All, motor, compare, period),
+                Some(open) => self.switched(|legs| Without(open, legs), motor, compare, period),
+            }
         } else {
             self.averaged(motor, compare, period)
         };
@@ -42,6 +49,24 @@ impl Around {
         volt_seconds
     }
 
+    /// One integration step of `h` seconds, done by `step`, with the shaft and the sensors.
+    #[inline]
+    fn seen<M: MachineModel>(
+        &mut self,
+        motor: &mut MotorModel<M>,
+        h: f64,
+        step: impl FnOnce(&mut MotorModel<M>, &Inverter) -> Complex,
+    ) -> Complex {
+        let before = motor.state.electrical.current();
+        motor.begin_step();
+        let volt_seconds = step(motor, &self.inverter);
+        motor.end_step(h);
+        self.sensors.follow(before, motor.state.electrical.current(), h);
+        volt_seconds
+    }
+
+    /// With the averages of the period as the source. An interrupted phase does not choose between ideal and
+    /// real switches.
     #[inline]
     fn averaged<M: MachineModel>(
         &mut self,
@@ -49,24 +74,33 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) -> Complex {
-        let averaged = self.inverter.averaged(compare, period);
+        let source = self.inverter.averaged(compare, period);
+        match self.open {
+            None if source.ideal() => self.averaged_to(&All(source), motor, period),
+            None => self.averaged_to(&All(RealSwitches(source)), motor, period),
+            Some(open) => self.averaged_to(&Without(open, RealSwitches(source)), motor, period),
+        }
+    }
+
+    #[inline]
+    fn averaged_to<M: MachineModel>(
+        &mut self,
+        terminals: &impl Terminals,
+        motor: &mut MotorModel<M>,
+        period: f64,
+    ) -> Complex {
         let h = period / f64::from(self.substeps);
         let mut volt_seconds = Complex::ZERO;
-        for n in 1..=self.substeps {
-            let before = motor.state.electrical.current();
-            motor.begin_step();
-            volt_seconds += averaged.step(motor, self.open, h);
-            motor.end_step(h);
-            self.sensors.follow(before, motor.state.electrical.current(), h);
-            if 2 * n == self.substeps {
-                self.sensors.hold_middle();
-            }
+        for _ in 0..self.substeps {
+            volt_seconds += self.seen(motor, h, |motor, _| averaged::step(terminals, motor, h));
         }
         volt_seconds
     }
 
-    fn switched<M: MachineModel>(
+    /// With the legs between their edges as the source.
+    fn switched<M: MachineModel, T: Terminals>(
         &mut self,
+        terminals: impl Fn(Legs) -> T,
         motor: &mut MotorModel<M>,
         compare: &Compare,
         period: f64,
@@ -78,39 +112,23 @@ impl Around {
             let steps = (duration / longest).ceil().max(1.0);
             let h = duration / steps;
             for _ in 0..steps as u32 {
-                motor.begin_step();
-                let (machine, inverter, open) = (&motor.machine, &self.inverter, self.open);
-                let i = motor.state.electrical.current();
-                let legs = switched::leg_voltages(levels, i, inverter.vdc);
-                let (state, v) = motor.stepped(h, |x, w| {
-                    let v = inverter.dropped(legs, x.current());
-                    match open {
-                        None => (machine.derivative(x, v, w), v),
-                        Some(open) => open.rates(machine, x, v, w),
-                    }
+                volt_seconds += self.seen(motor, h, |motor, inverter| {
+                    let legs = Legs::new(inverter, levels, motor.state.electrical.current());
+                    motor.advance(&terminals(legs), h) * h
                 });
-                volt_seconds += v * h;
-                motor.state = state;
-                if let Some(open) = open {
-                    open.confine(motor);
-                }
-                motor.end_step(h);
-                self.sensors.follow(i, motor.state.electrical.current(), h);
             }
         }
         volt_seconds
     }
 
     fn freewheel<M: MachineModel>(&mut self, motor: &mut MotorModel<M>, period: f64) -> Complex {
+        let open = self.open;
         let substeps = self.substeps.max(FREEWHEEL_SUBSTEPS);
         let h = period / f64::from(substeps);
         let mut volt_seconds = Complex::ZERO;
         for _ in 0..substeps {
-            let before = motor.state.electrical.current();
-            motor.begin_step();
-            volt_seconds += freewheel::step(motor, self.inverter.vdc, self.open, h);
-            motor.end_step(h);
-            self.sensors.follow(before, motor.state.electrical.current(), h);
+            volt_seconds += self
+                .seen(motor, h, |motor, inverter| freewheel::step(motor, inverter.vdc, open, h));
         }
         volt_seconds
     }

@@ -9,8 +9,10 @@
 
 use drive_core::Compare;
 
-use crate::complex::{Complex, phases};
+use crate::averaged::smooth_sign;
+use crate::complex::{Complex, clarke, phases};
 use crate::inverter::Inverter;
+use crate::terminals::Source;
 
 /// Current below which a leg without a switch on has no defined level, A.
 const NO_CURRENT: f64 = 1e-9;
@@ -67,6 +69,7 @@ impl Leg {
     }
 
     /// At `time`, with the edges already delayed by `delay`.
+    #[inline]
     fn level(&self, time: f64, delay: f64, dead_time: f64) -> Level {
         let edges = &self.edges[..self.count];
         let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| edge + delay <= time) else {
@@ -135,7 +138,7 @@ impl Pattern {
 }
 
 /// Leg voltages at these levels and this stator current.
-pub(crate) fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
+fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
     let currents = phases(i);
     std::array::from_fn(|k| match levels[k] {
         Level::Low => 0.0,
@@ -144,4 +147,33 @@ pub(crate) fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3]
         Level::Off if currents[k] < -NO_CURRENT => vdc,
         Level::Off => 0.5 * vdc,
     })
+}
+
+/// The legs with the drops of the switches that conduct.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Legs {
+    /// Leg voltages as a space vector, V.
+    v: Complex,
+    residual: f64,
+    on_resistance: f64,
+}
+
+impl Legs {
+    /// At these levels; the direction of the stator current `i` counts.
+    #[inline]
+    pub(crate) fn new(inverter: &Inverter, levels: [Level; 3], i: Complex) -> Self {
+        Self {
+            v: clarke(leg_voltages(levels, i, inverter.vdc)),
+            residual: inverter.residual,
+            on_resistance: inverter.on_resistance,
+        }
+    }
+}
+
+impl Source for Legs {
+    #[inline(always)]
+    fn voltage(&self, i: Complex) -> Complex {
+        let signs = phases(i).map(smooth_sign);
+        self.v - i * self.on_resistance - clarke(signs) * self.residual
+    }
 }

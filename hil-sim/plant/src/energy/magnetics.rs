@@ -15,7 +15,7 @@
 //! make energy. The exception is a tooth term that does not follow `m`: it is added to the stator
 //! current alone, and the balance of power does not hold to its size (see `IronSettings::conservative`).
 //!
-//! A derivative of a complex function f(u) has two parts, `df = f_u du + f_v du*`.
+//! A derivative of a complex function is a real matrix, kept by its columns.
 
 use crate::complex::{Complex, square};
 
@@ -27,34 +27,71 @@ const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
 const NO_FLUX: f64 = 1e-12;
 
-/// The two parts of the derivative of a complex function.
+/// A symmetric slope, `df = direct du + conjugate du*`: that of a gradient by its own flux.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Curvature {
+    direct: f64,
+    conjugate: Complex,
+}
+
+impl std::ops::Add for Curvature {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { direct: self.direct + other.direct, conjugate: self.conjugate + other.conjugate }
+    }
+}
+
+/// The derivative of a complex function, by the real and by the imaginary part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slope {
-    direct: Complex,
-    conjugate: Complex,
+    re: Complex,
+    im: Complex,
+}
+
+impl From<Curvature> for Slope {
+    #[inline]
+    fn from(c: Curvature) -> Self {
+        let Complex { re, im } = c.conjugate;
+        Self { re: Complex::new(c.direct + re, im), im: Complex::new(im, c.direct - re) }
+    }
+}
+
+impl std::ops::Sub for Slope {
+    type Output = Self;
+
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self { re: self.re - other.re, im: self.im - other.im }
+    }
 }
 
 impl Slope {
     #[inline]
     pub(crate) fn times(&self, d: Complex) -> Complex {
-        self.direct * d + self.conjugate * d.conj()
+        self.re * d.re + self.im * d.im
+    }
+
+    /// The slope of the function of `by u`.
+    #[inline]
+    fn after(&self, by: Complex) -> Self {
+        Self { re: self.times(by), im: self.times(by * Complex::I) }
     }
 
     /// The slope of the inverse function.
     #[inline]
     fn inverse(&self) -> Self {
-        let scale = 1.0 / (square(self.direct) - square(self.conjugate));
-        Self { direct: self.direct.conj() * scale, conjugate: self.conjugate * -scale }
+        let scale = 1.0 / (self.re.re * self.im.im - self.re.im * self.im.re);
+        Self {
+            re: Complex::new(self.im.im, -self.re.im) * scale,
+            im: Complex::new(-self.im.re, self.re.re) * scale,
+        }
     }
 
     #[inline]
-    fn plus(self, other: Self) -> Self {
-        Self { direct: self.direct + other.direct, conjugate: self.conjugate + other.conjugate }
-    }
-
-    #[inline]
-    fn minus(self, other: Self) -> Self {
-        Self { direct: self.direct - other.direct, conjugate: self.conjugate - other.conjugate }
+    fn transposed(&self) -> Self {
+        Self { re: Complex::new(self.re.re, self.im.re), im: Complex::new(self.re.im, self.im.im) }
     }
 }
 
@@ -64,6 +101,8 @@ pub(crate) struct Slopes {
     /// Stator current by `x` and, at fixed `x`, by `m`.
     stator_x: Slope,
     stator_m: Slope,
+    /// Stator current by `r`, where the teeth follow it.
+    stator_r: Slope,
     /// Rotor current by `y`.
     pub rotor: Slope,
     /// Negative residual by `s` at fixed `m`.
@@ -88,16 +127,20 @@ impl Leakage {
     }
 
     #[inline]
-    fn current(&self, x: Complex) -> (Complex, Slope) {
+    fn current(&self, x: Complex) -> (Complex, Curvature) {
         if self.saturation == 0.0 {
-            let direct = self.inverse.into();
-            return (x * self.inverse, Slope { direct, conjugate: Complex::ZERO });
+            return (
+                x * self.inverse,
+                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
+            );
         }
-        let length = square(x).sqrt();
+        let squared = square(x);
+        let length = squared.sqrt();
         let (bent, half) = (self.saturation * length, 0.5 * self.inverse * self.saturation);
-        let conjugate = if length > NO_FLUX { x * x * (half / length) } else { Complex::ZERO };
-        let direct = (self.inverse * (1.0 + 1.5 * bent)).into();
-        (x * (self.inverse * (1.0 + bent)), Slope { direct, conjugate })
+        // Root and quotient side by side.
+        let conjugate = x * x * (half * length * (1.0 / squared.max(NO_FLUX * NO_FLUX)));
+        let direct = self.inverse * (1.0 + 1.5 * bent);
+        (x * (self.inverse * (1.0 + bent)), Curvature { direct, conjugate })
     }
 }
 
@@ -113,10 +156,12 @@ pub(crate) struct MainFlux {
 
 impl MainFlux {
     #[inline]
-    pub(crate) fn current(&self, m: Complex) -> (Complex, Slope) {
+    fn current(&self, m: Complex) -> (Complex, Curvature) {
         if self.inverse_knee == 0.0 {
-            let direct = self.inverse.into();
-            return (m * self.inverse, Slope { direct, conjugate: Complex::ZERO });
+            return (
+                m * self.inverse,
+                Curvature { direct: self.inverse, conjugate: Complex::ZERO },
+            );
         }
         let knee_squared = self.inverse_knee * self.inverse_knee;
         let y = square(m) * knee_squared;
@@ -128,7 +173,7 @@ impl MainFlux {
         let half = 0.5 * f64::from(self.exponent) * self.inverse * power;
         let straight = self.inverse * (1.0 + power * y);
         let conjugate = m * m * (half * knee_squared);
-        (m * straight, Slope { direct: (straight + half * y).into(), conjugate })
+        (m * straight, Curvature { direct: straight + half * y, conjugate })
     }
 }
 
@@ -156,8 +201,14 @@ impl Teeth {
         if self.turn == 0.0 && self.turn_per_a == 0.0 {
             return Complex::new(1.0, 0.0);
         }
-        Complex::cis(self.turn + self.turn_per_a * self.load)
+        cis(self.turn + self.turn_per_a * self.load)
     }
+}
+
+/// A unit vector. (Out of line: sine and cosine would be taken where they are not needed, too.)
+#[cold]
+fn cis(angle: f64) -> Complex {
+    Complex::cis(angle)
 }
 
 /// The magnetic circuit.
@@ -193,17 +244,15 @@ pub(crate) struct Solution {
 impl Magnetics {
     /// Saliency of the stator leakage by slots at the electrical rotor angle `theta`, times 1/Ll.
     #[inline]
-    fn slot_vector(&self, theta: f64) -> Complex {
+    pub(crate) fn slot_vector(&self, theta: f64) -> Complex {
         if self.slots == 0.0 {
             return Complex::ZERO;
         }
-        Complex::cis(self.bars * theta) * self.slots
+        cis(self.bars * theta) * self.slots
     }
 
     /// Finds the currents for the fluxes `s`, `r`, `e`; `found` is the first guess.
-    #[inline]
-    pub(crate) fn solve(&self, fluxes: [Complex; 3], theta: f64, found: &mut Solution) {
-        found.slots = self.slot_vector(theta);
+    pub(crate) fn solve(&self, fluxes: [Complex; 3], found: &mut Solution) {
         for _ in 0..LIMIT {
             let residual = self.evaluate(fluxes, found);
             let step = -found.slopes.by_residual.times(residual);
@@ -220,8 +269,8 @@ impl Magnetics {
     }
 
     /// Currents and slopes at `found.m`; returns the gradient of the energy by `m`.
-    #[inline]
-    fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
+    #[inline(always)]
+    pub(crate) fn evaluate(&self, [s, r, e]: [Complex; 3], found: &mut Solution) -> Complex {
         let m = found.m;
         let x = s - m;
         let geometric = self.fixed + found.slots;
@@ -230,58 +279,66 @@ impl Magnetics {
         stator_x.conjugate += geometric;
         let (i_r, rotor) = self.rotor.current(r - m);
         let (i_m, main) = self.main.current(m);
-        let mut stator_m = Slope::default();
         let mut residual = i_m - i_r;
-        let mut residual_s = Slope::default();
-        let mut residual_m = main.plus(rotor);
+        let mut own = main + rotor;
+        // Of the stator current by m and r, and of the gradient by m by x.
+        let [mut stator_m, mut stator_r, mut m_stator] = [Slope::default(); 3];
         if let Some(t) = &self.teeth {
-            let turn = t.turned();
+            let turn = if t.conservative { Complex::ONE } else { t.turned() };
             let f = if t.conservative { m } else { (r * (1.0 - t.gap) + m * t.gap) * turn };
-            let (ff, z, length) = (f * f, f.conj() * x, square(f));
+            let length = square(f);
             let d = 1.0 / (t.knee_squared + length);
             let (once, twice) = (t.twice * d, t.twice * d * d);
             // The gradient by x, 2c x* f^2/D, and its slopes.
-            i += x.conj() * ff * once;
+            let (ff, xf) = (f * f, x.conj() * f);
+            let xff = xf * f;
+            i += xff * once;
             stator_x.conjugate += ff * once;
-            let along = 2.0 * once - twice * length;
-            let by_f = Slope { direct: z.conj() * along, conjugate: -(z.conj() * ff) * twice };
+            let (straight, bent) = (xf * (2.0 * once), xff * (2.0 * twice));
+            let by_f = Slope {
+                re: straight - bent * f.re,
+                im: Complex::new(-straight.im, straight.re) - bent * f.im,
+            };
             if t.conservative {
-                stator_m = by_f;
+                (stator_m, m_stator) = (by_f, by_f.transposed());
                 // The gradient by m, 2c (m* x^2/D - q m/D^2) with q = Re(x^2 m*^2), and its slopes.
-                let (xx, q) = (x * x, (z * z).re);
-                residual += z * x * once - m * (q * twice);
-                residual_m.direct += q * twice * (2.0 * length * d - 3.0);
-                residual_m.conjugate +=
-                    xx * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
-                let by_x = Slope { direct: z * along, conjugate: by_f.conjugate };
-                residual_s = Slope::default().minus(by_x);
-                residual_m = residual_m.minus(by_x);
+                let q = xf.re * xf.re - xf.im * xf.im;
+                residual += xf.conj() * x * once - m * (q * twice);
+                own.direct += q * twice * (2.0 * length * d - 3.0);
+                own.conjugate += x * x * (once - 2.0 * twice * length) + ff * (2.0 * q * twice * d);
             } else {
-                let f_m = turn * t.gap;
-                stator_m =
-                    Slope { direct: by_f.direct * f_m, conjugate: by_f.conjugate * f_m.conj() };
+                stator_m = by_f.after(turn * t.gap);
+                stator_r = by_f.after(turn * (1.0 - t.gap));
             }
         }
-        residual -= i;
-        residual_s = residual_s.plus(stator_x);
-        residual_m = residual_m.plus(stator_x).minus(stator_m);
-        if self.eddy != 0.0 {
-            residual -= (e - m) * self.eddy;
-            residual_m.direct += self.eddy;
-        }
+        residual -= i + (e - m) * self.eddy;
+        own.direct += self.eddy;
         found.i = i;
         found.i_r = i_r;
-        found.slopes =
-            Slopes { stator_x, stator_m, rotor, residual_s, by_residual: residual_m.inverse() };
+        found.slopes = Slopes {
+            stator_x: stator_x.into(),
+            stator_m,
+            stator_r,
+            rotor: rotor.into(),
+            residual_s: Slope::from(stator_x) - m_stator,
+            by_residual: (Slope::from(own + stator_x) - m_stator - stator_m).inverse(),
+        };
         residual
     }
 
-    /// Rates of main flux and stator current at these rates of the fluxes.
+    /// Rates of main flux and stator current at these rates of the fluxes; `turned` is that of the stator current
+    /// alone, by the turning of the slots.
     #[inline(always)]
-    pub(crate) fn rates(&self, k: &Slopes, [s, r, e]: [Complex; 3]) -> (Complex, Complex) {
-        let pull = k.residual_s.times(s) + k.rotor.times(r) + e * self.eddy;
+    pub(crate) fn rates(
+        &self,
+        k: &Slopes,
+        [s, r, e]: [Complex; 3],
+        turned: Complex,
+    ) -> (Complex, Complex) {
+        let own = k.stator_r.times(r) + turned;
+        let pull = k.residual_s.times(s) + k.rotor.times(r) + e * self.eddy + own;
         let m = k.by_residual.times(pull);
-        (m, k.stator_x.times(s - m) + k.stator_m.times(m))
+        (m, k.stator_x.times(s - m) + k.stator_m.times(m) + own)
     }
 
     /// The energy in Wb A; times 3/2 it is in J. Without the tooth term unless that is a gradient.

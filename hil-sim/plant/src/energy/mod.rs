@@ -195,6 +195,7 @@ impl EnergyMachine {
             },
             psi_iron: (x.solution.m - x.psi_iron) * self.eddy_rate,
             theta: w,
+            slots: turning(x.solution.slots) * self.magnetics.bars,
             ..EnergyRate::default()
         }
     }
@@ -202,15 +203,16 @@ impl EnergyMachine {
     /// Adds the rates of main flux and current to those of the fluxes.
     #[inline(always)]
     fn completed(&self, x: &EnergyState, mut k: EnergyRate) -> EnergyRate {
-        let rates = [k.psi_s, k.psi_r, k.psi_iron];
-        (k.m, k.i) = self.magnetics.rates(&x.solution.slopes, rates);
+        let fluxes = [k.psi_s, k.psi_r, k.psi_iron];
+        let turned = k.slots * (x.psi_s - x.solution.m).conj();
+        (k.m, k.i) = self.magnetics.rates(&x.solution.slopes, fluxes, turned);
         k
     }
 
     /// Change of the current by a change of the stator flux, everything else constant.
     #[inline]
     fn current_by_flux(&self, x: &EnergyState, d: Complex) -> Complex {
-        self.magnetics.rates(&x.solution.slopes, [d, Complex::ZERO, Complex::ZERO]).1
+        self.magnetics.rates(&x.solution.slopes, [d, Complex::ZERO, Complex::ZERO], Complex::ZERO).1
     }
 
     /// The change of the stator flux that changes the current by `d`.
@@ -303,6 +305,15 @@ impl MachineModel for EnergyMachine {
 
     #[inline]
     fn settle(&self, x: &mut EnergyState) {
-        self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], x.theta, &mut x.solution);
+        x.solution.slots = self.magnetics.slot_vector(x.theta);
+        self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
+    }
+
+    /// Takes the slots where they were integrated to: one sine and cosine a step.
+    #[inline]
+    fn correct(&self, x: &mut EnergyState) {
+        let i = x.solution.i;
+        self.magnetics.evaluate([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
+        x.solution.i = i;
     }
 }

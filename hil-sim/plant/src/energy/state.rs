@@ -50,6 +50,8 @@ pub struct EnergyRate {
     pub psi_iron: Complex,
     /// Electrical speed, rad/s.
     pub theta: f64,
+    /// Of the saliency of the rotor's slots.
+    pub(super) slots: Complex,
     /// Of main flux and stator current: a first guess at the next state.
     pub(super) m: Complex,
     pub(super) i: Complex,
@@ -82,6 +84,7 @@ impl ElectricalState for EnergyState {
         self.psi_deep = x.psi_deep + k.psi_deep * h;
         self.psi_iron = x.psi_iron + k.psi_iron * h;
         self.theta = x.theta + k.theta * h;
+        self.solution.slots = x.solution.slots + k.slots * h;
         // First guesses; slopes are left to the solution.
         self.solution.m = x.solution.m + k.m * h;
         self.solution.i = x.solution.i + k.i * h;

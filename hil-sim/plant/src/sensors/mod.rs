@@ -1,0 +1,238 @@
+//! The current sensors and the converter.
+//!
+//! Section 3.2: two phases are measured, each through an analog first-order filter (Eq. 3.3), and
+//! converted to a code along the line of Eq. 3.5.
+
+use std::f64::consts::TAU;
+
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::complex::{Complex, phases};
+use crate::error::PlantError;
+
+mod rare;
+mod settings;
+
+pub use settings::{CalibrationLine, MeasurementSettings};
+
+use rare::{CurrentErrors, VoltageErrors};
+use settings::FULL_SCALE;
+
+/// One of the two measured phases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Phase a.
+    A,
+    /// Phase b.
+    B,
+}
+
+/// Fault of a current channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurrentFault {
+    /// No fault.
+    #[default]
+    None,
+    /// The code does not change.
+    Stuck(u16),
+    /// The sensor reads no current (noise and offset stay).
+    Open,
+    /// The largest code.
+    SaturatedHigh,
+    /// Code zero.
+    SaturatedLow,
+}
+
+/// One channel, current to code.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct CurrentChannel {
+    gain: f64,
+    offset: f64,
+    codes_per_a: f64,
+    zero: f64,
+    full_scale: f64,
+    fault: CurrentFault,
+}
+
+impl CurrentChannel {
+    fn new(line: &CalibrationLine, gain_error: f64, offset: f64) -> Self {
+        Self {
+            gain: 1.0 + gain_error,
+            offset,
+            codes_per_a: 1.0 / line.a_per_code,
+            zero: line.a_at_zero,
+            full_scale: f64::from(line.full_scale),
+            fault: CurrentFault::None,
+        }
+    }
+
+    #[inline]
+    fn code(&self, current: f64, noise: f64) -> u16 {
+        let current = match self.fault {
+            CurrentFault::None => current,
+            CurrentFault::Open => 0.0,
+            CurrentFault::Stuck(code) => return code.min(self.full_scale as u16),
+            CurrentFault::SaturatedHigh => return self.full_scale as u16,
+            CurrentFault::SaturatedLow => return 0,
+        };
+        let measured = current * self.gain + self.offset + noise;
+        let code = (measured - self.zero) * self.codes_per_a;
+        // Rounds half up; the cast of a number that is not negative rounds down.
+        (code.clamp(0.0, self.full_scale) + 0.5) as u16
+    }
+}
+
+/// Pole, and weights of old and new input, of a first-order lag over a step of `x` time constants in which
+/// the input is straight.
+fn coefficients(x: f64) -> [f64; 3] {
+    let pole = (-x).exp();
+    // Mean of the impulse response over the step.
+    let mean = -(-x).exp_m1() / x;
+    [pole, mean - pole, 1.0 - mean]
+}
+
+/// The two current sensors with their filters and converters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensors {
+    noise: f64,
+    channels: [CurrentChannel; 2],
+    corner: f64,
+    filtered: Complex,
+    /// None where all are zero.
+    rare: Option<CurrentErrors>,
+    rare_dc: Option<VoltageErrors>,
+    /// Coefficients of the filter and the time step, s, they are for.
+    step: f64,
+    pole: f64,
+    from_old: f64,
+    from_new: f64,
+    codes_per_v: f64,
+    heat_sink: u16,
+}
+
+impl Sensors {
+    /// The sensors with these settings, at zero current.
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`].
+    pub fn new(s: &MeasurementSettings) -> Result<Self, PlantError> {
+        s.check()?;
+        let [a, b] = s.calibration();
+        Ok(Self {
+            noise: s.noise_a,
+            channels: [
+                CurrentChannel::new(&a, s.gain_error_a, s.offset_a),
+                CurrentChannel::new(&b, s.gain_error_b, s.offset_b),
+            ],
+            corner: TAU * s.filter_hz,
+            filtered: Complex::ZERO,
+            rare: CurrentErrors::new(s),
+            rare_dc: VoltageErrors::new(s),
+            step: f64::NAN,
+            pole: 0.0,
+            from_old: 0.0,
+            from_new: 1.0,
+            codes_per_v: 1.0 / s.dc_link_v,
+            heat_sink: s.heat_sink_code,
+        })
+    }
+
+    /// Begins a PWM period of `period` seconds.
+    #[inline]
+    pub(crate) fn begin_period(&mut self, period: f64) {
+        if let Some(rare) = &mut self.rare {
+            rare.begin(period);
+        }
+    }
+
+    /// Follows the current over `h` seconds, in which it goes linearly from `old` to `new`. Both
+    /// channels have the same filter, so it filters the space vector.
+    #[inline]
+    pub fn follow(&mut self, old: Complex, new: Complex, h: f64) {
+        if h != self.step {
+            self.prepare(h);
+        }
+        self.filtered = self.filtered * self.pole + old * self.from_old + new * self.from_new;
+        if let Some(rare) = &mut self.rare {
+            let [a, b, _] = phases(self.filtered);
+            rare.follow([a, b], h);
+        }
+    }
+
+    #[cold]
+    fn prepare(&mut self, h: f64) {
+        self.step = h;
+        if let Some(rare) = &mut self.rare {
+            rare.prepare(h);
+        }
+        if self.corner > 0.0 {
+            [self.pole, self.from_old, self.from_new] = coefficients(self.corner * h);
+        }
+    }
+
+    /// Sets the fault of a channel.
+    pub fn set_fault(&mut self, channel: Channel, fault: CurrentFault) {
+        self.channels[channel as usize].fault = fault;
+    }
+
+    /// The codes of channels A and B now.
+    #[inline]
+    pub fn currents(&self, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
+        let Some(rare) = &self.rare else {
+            let [a, b, _] = phases(self.filtered);
+            return self.converted([a, b], [0.0; 2], rng);
+        };
+        self.mean_codes(rare, rng)
+    }
+
+    /// Codes with the rare errors.
+    #[cold]
+    fn mean_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
+        let codes = rare.currents().map(|seen| self.converted(seen, rare.offsets(), rng));
+        let (count, sum) = codes.fold((0, [0; 2]), |(count, sum), [a, b]| {
+            (count + 1, [sum[0] + u32::from(a), sum[1] + u32::from(b)])
+        });
+        sum.map(|sum| sum.div_ceil(count) as u16)
+    }
+
+    /// The codes at these currents and further offsets, A.
+    #[inline]
+    fn converted(&self, i: [f64; 2], offsets: [f64; 2], rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
+        let code = |k: usize, noise: f64| self.channels[k].code(i[k], noise + offsets[k]);
+        if self.noise == 0.0 {
+            return [code(0, 0.0), code(1, 0.0)];
+        }
+        let mut noise = || -> f64 {
+            let unit: f64 = StandardNormal.sample(rng);
+            unit * self.noise
+        };
+        let (a, b) = (noise(), noise());
+        [code(0, a), code(1, b)]
+    }
+
+    /// Follows the dc-link voltage, V, over `h` seconds at whose end it is `vdc`.
+    #[inline]
+    pub(crate) fn follow_dc_link(&mut self, vdc: f64, h: f64) {
+        if let Some(rare) = &mut self.rare_dc {
+            rare.follow(vdc, h);
+        }
+    }
+
+    /// The code of the dc-link voltage, which is `vdc`, V.
+    #[inline]
+    pub fn dc_link(&self, vdc: f64, rng: &mut Xoshiro256PlusPlus) -> u16 {
+        let seen = self.rare_dc.as_ref().map_or(vdc, |rare| rare.reading(vdc, rng));
+        ((seen * self.codes_per_v).clamp(0.0, FULL_SCALE) + 0.5) as u16
+    }
+
+    /// The code of the heat-sink temperature.
+    pub fn heat_sink(&self) -> u16 {
+        self.heat_sink
+    }
+
+    /// Changes the code of the heat-sink temperature.
+    pub fn set_heat_sink(&mut self, code: u16) {
+        self.heat_sink = code;
+    }
+}
