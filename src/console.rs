@@ -106,8 +106,8 @@ impl Console {
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
             self.settings.note(|settings| settings.learn(result));
-            self.unsaved |= result.accepted;
-            self.unbelievable = Some(*result).filter(|result| !result.accepted);
+            self.unsaved |= result.verdict.is_accepted();
+            self.unbelievable = Some(*result).filter(|result| !result.verdict.is_accepted());
             self.ended = true;
         });
         if port.take_damage() {

@@ -64,7 +64,7 @@ impl FirmwareSettings {
 
     /// Takes the result of a learning, if it was accepted.
     pub fn learn(&mut self, result: &Learned) {
-        if result.accepted {
+        if result.verdict.is_accepted() {
             self.learned = Some(result.on_top_of(self.learned.as_ref()));
         }
     }

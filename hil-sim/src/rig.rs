@@ -128,7 +128,9 @@ impl Rig {
                 (State::Off, Some(learned)) => return Ok(*learned),
                 (State::Fault(fault), learned) => {
                     let found = learned.map_or(String::new(), |learned| format!(": {learned}"));
-                    return Err(Error::Refused(format!("the drive does not learn: {fault}{found}")));
+                    return Err(Error::Refused(format!(
+                        "the drive does not learn: {fault}{found}"
+                    )));
                 }
                 _ => {}
             }

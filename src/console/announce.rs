@@ -126,10 +126,10 @@ impl fmt::Display for News {
 /// The announcement of a learning's result.
 pub fn outcome(result: &Learned) -> impl fmt::Display {
     fmt::from_fn(move |f| {
-        let Learned { asymmetry, gain_mismatch, current_saliency, .. } = result;
-        f.write_str(if result.accepted { "learned: " } else { "refused: not believable: " })?;
-        write!(f, "asymmetry {asymmetry:.5}, gain mismatch {:.5}", gain_mismatch.value)?;
-        write!(f, ", current saliency {:.5}", current_saliency.value)?;
-        f.write_str(if result.accepted { "; `save` keeps it" } else { "; nothing was changed" })
+        if result.verdict.is_accepted() {
+            write!(f, "learned: {result}; `save` keeps it")
+        } else {
+            write!(f, "refused: {result}")
+        }
     })
 }

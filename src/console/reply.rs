@@ -184,13 +184,14 @@ pub fn learned(result: &Learned, believable: bool, i: u16) -> Option<impl fmt::D
     let line = usize::from(i);
     (line < lines).then_some(fmt::from_fn(move |f| match line {
         0 => {
-            f.write_str(if believable { "" } else { "not believable, not used: " })?;
-            write!(f, "asymmetry {:.5}; ", result.asymmetry)?;
+            f.write_str(if believable { "" } else { "not used: " })?;
+            write!(f, "{result}; spread {:.5}; ", result.spread)?;
+            write!(f, "asymmetry {:.5}; ", result.asymmetry.size())?;
             fitted(f, "gain mismatch", &result.gain_mismatch)?;
             fitted(f, "current saliency", &result.current_saliency)?;
             write!(f, "flux saliency {:.5}", result.flux_saliency)
         }
-        1 => f.write_str("i_q,reference,carrier"),
+        1 => f.write_str("i_q,reference,slope,carrier"),
         _ => point(f, result, line - 2),
     }))
 }
@@ -204,10 +205,15 @@ fn fitted(f: &mut fmt::Formatter<'_>, name: &str, fitted: &Fitted) -> fmt::Resul
 /// Writes a row of the table.
 fn point(f: &mut fmt::Formatter<'_>, result: &Learned, index: usize) -> fmt::Result {
     let reference = result.reference.points()[index];
-    write!(f, "{:.2},{reference:.5},", result.reference.grid().current(index))?;
-    match &result.carrier {
-        Some(table) => write!(f, "{:.5}", table.points()[index]),
-        // Not learned: the setting holds.
-        None => Ok(()),
+    write!(f, "{:.2},{reference:.5}", result.reference.grid().current(index))?;
+    // Not learned: empty, the setting holds.
+    let tables =
+        [result.slope.map(|table| *table.points()), result.carrier.map(|table| *table.points())];
+    for table in tables {
+        match table {
+            Some(points) => write!(f, ",{:.5}", points[index])?,
+            None => f.write_str(",")?,
+        }
     }
+    Ok(())
 }

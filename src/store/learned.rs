@@ -4,24 +4,32 @@
 //! |---|---|
 //! | 0 to 14 | reference at the currents of its table, except at zero |
 //! | 15 to 29 | carrier current at the same, 0 where it was not learned |
-//! | 30 | asymmetry of the reference |
+//! | 30 | spread of the even part of the reference |
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope |
 //! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
+//! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
+//! | 54 | largest torque current, A |
+//! | 55 to 57 | asymmetry: constant, sine, cosine |
 //!
-//! All but number 36 are in single precision.
+//! All but number 36 are in single precision. An earlier firmware had none from 38 on; a drive with such a record has to learn
+//! again before it starts without an encoder.
 
-use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable};
+use drive_core::carrier::asymmetry::Asymmetry;
+use drive_core::identify::learning::{Fitted, Learned, Verdict};
+use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
 
 use crate::hash;
 
 /// Number of values.
-pub const WORDS: usize = STEP + 1;
+pub const WORDS: usize = ASYMMETRY + 3;
 /// A bit for each value that every firmware writes.
 const NEEDED: u64 = (1 << STEP) - 1;
+/// The same of those that wrote the distance of the points, and of all.
+const WITH_STEP: u64 = (1 << SLOPE) - 1;
+const ALL: u64 = (1 << WORDS) - 1;
 /// The name that their ids derive from, and that a rejection states.
 pub const NAME: &str = "learned";
 
@@ -30,10 +38,14 @@ const CARRIER: usize = REFERENCE + POINTS - 1;
 const FITS: usize = CARRIER + POINTS - 1;
 const FLAGS: usize = FITS + 6;
 const STEP: usize = FLAGS + 1;
+const SLOPE: usize = STEP + 1;
+const LIMIT: usize = SLOPE + POINTS;
+const ASYMMETRY: usize = LIMIT + 1;
 
 const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
 const HAS_CARRIER: u32 = 1 << 10;
+const HAS_SLOPE: u32 = 1 << 11;
 
 /// The id of a value: the hash of the name plus its index.
 pub fn id(index: usize) -> u32 {
@@ -50,7 +62,7 @@ pub fn index(id: u32) -> Option<usize> {
 pub fn to_words(learned: &Learned) -> [u32; WORDS] {
     let (gains, current) = (learned.gain_mismatch, learned.current_saliency);
     let fits = [
-        learned.asymmetry,
+        learned.spread,
         gains.value,
         gains.misfit,
         current.value,
@@ -68,17 +80,26 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
     words[FLAGS] = learned.points as u32
         | flag(gains.accepted, HAS_GAINS)
         | flag(current.accepted, HAS_CURRENT)
-        | flag(learned.carrier.is_some(), HAS_CARRIER);
-    words[STEP] = learned.reference.grid().step_a().to_bits();
+        | flag(learned.carrier.is_some(), HAS_CARRIER)
+        | flag(learned.slope.is_some(), HAS_SLOPE);
+    let slope = learned.slope.map_or([0.0; POINTS], |table| *table.points());
+    let Asymmetry { constant, sin, cos } = learned.asymmetry;
+    let step = [learned.reference.grid().step_a()];
+    let rest = step.iter().chain(&slope).chain([&learned.limit_a, &constant, &sin, &cos]);
+    for (word, value) in words[STEP..].iter_mut().zip(rest) {
+        *word = value.to_bits();
+    }
     words
 }
 
 /// The result with these values, if it is one that a learning accepts. `present` has a bit for each value that was
 /// read.
 pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
-    let grid = match present {
-        NEEDED => Grid::REFERENCE,
-        _ if present == NEEDED | 1 << STEP => Grid::of_step(f32::from_bits(words[STEP]))?,
+    let step = || Grid::of_step(f32::from_bits(words[STEP]));
+    let (grid, has_slope) = match present {
+        NEEDED => (Grid::REFERENCE, false),
+        WITH_STEP => (step()?, false),
+        ALL => (step()?, true),
         _ => return None,
     };
     let carrier = CarrierTable::from_points(grid, table(words, CARRIER, 1.0));
@@ -89,15 +110,30 @@ pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
         misfit: value(index + 1),
         accepted: flags & bit != 0,
     };
+    let points = (flags & 0xff) as usize;
+    let slope = match flags & HAS_SLOPE != 0 {
+        true if has_slope => {
+            Some(SlopeTable::from_points(grid, core::array::from_fn(|n| value(SLOPE + n)))?)
+        }
+        true => return None,
+        false => None,
+    };
+    let slope_at_rest = slope.map_or(0.0, |slope| slope.at_rest());
+    let [constant, sin, cos] =
+        [0, 1, 2].map(|n| if has_slope { value(ASYMMETRY + n) } else { 0.0 });
     let learned = Learned {
         reference: ReferenceTable::from_points(grid, table(words, REFERENCE, 0.0))?,
         carrier: carrier.filter(|_| flags & HAS_CARRIER != 0),
-        points: (flags & 0xff) as usize,
-        asymmetry: value(FITS),
+        points,
+        slope,
+        slope_at_rest,
+        limit_a: if has_slope { value(LIMIT) } else { grid.current(points) },
+        spread: value(FITS),
+        asymmetry: Asymmetry { constant, sin, cos },
         gain_mismatch: fitted(FITS + 1, HAS_GAINS),
         current_saliency: fitted(FITS + 3, HAS_CURRENT),
         flux_saliency: value(FITS + 5),
-        accepted: true,
+        verdict: slope.map_or(Verdict::Sound, |slope| Verdict::of_slope(slope.at_rest())),
     };
     let whole = learned.carrier.is_some() || flags & HAS_CARRIER == 0;
     (whole && learned.is_believable()).then_some(learned)

@@ -109,7 +109,8 @@ impl LinearModel {
             speed: built.motion_design,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
             share: here.share.into(),
-            apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference)) / 0.25,
+            apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference))
+                / 0.25,
         })
     }
 
