@@ -242,9 +242,9 @@ impl MachineModel for EnergyMachine {
         if self.magnetics.slots == 0.0 {
             return 1.5 * torque;
         }
-        let y = x.psi_s - x.solution.m;
-        let slots = x.solution.slots * y.conj() * y.conj();
-        1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots.im)
+        let leakage = x.psi_s - x.solution.m;
+        let slots = cross(leakage * leakage, x.solution.slots);
+        1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots)
     }
 
     #[inline(always)]
@@ -304,12 +304,16 @@ impl MachineModel for EnergyMachine {
     }
 
     #[inline]
-    fn settle(&self, x: &mut EnergyState) {
+    fn turn(&self, x: &mut EnergyState) {
         x.solution.slots = self.magnetics.slot_vector(x.theta);
+    }
+
+    #[inline]
+    fn finish(&self, x: &mut EnergyState) {
         self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
     }
 
-    /// Takes the slots where they were integrated to: one sine and cosine a step.
+    /// Main flux and current are as integrated.
     #[inline]
     fn correct(&self, x: &mut EnergyState) {
         let i = x.solution.i;

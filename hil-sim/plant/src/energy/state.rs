@@ -98,6 +98,7 @@ impl ElectricalState for EnergyState {
         self.psi_deep = x.psi_deep + increment(k.map(|k| k.psi_deep), sixth);
         self.psi_iron = x.psi_iron + increment(k.map(|k| k.psi_iron), sixth);
         self.theta = x.theta + (k[0].theta + k[3].theta + (k[1].theta + k[2].theta) * 2.0) * sixth;
+        self.solution.slots = x.solution.slots + increment(k.map(|k| k.slots), sixth);
         self.solution.m = x.solution.m + increment(k.map(|k| k.m), sixth);
         self.solution.i = x.solution.i + increment(k.map(|k| k.i), sixth);
     }

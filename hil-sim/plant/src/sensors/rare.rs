@@ -83,10 +83,10 @@ impl CurrentErrors {
         }
     }
 
-    /// Currents of the conversions, A, the first that of now.
-    pub(super) fn currents(&self) -> impl Iterator<Item = [f64; 2]> {
+    /// What the channels read now, A, and in the middle of the period where that is converted too.
+    pub(super) fn currents(&self) -> ([f64; 2], Option<[f64; 2]>) {
         let bent = |seen: [f64; 2]| [0, 1].map(|k| seen[k] + self.cubic[k] * seen[k].powi(3));
-        std::iter::once(self.now).chain(self.middle).map(bent)
+        (bent(self.now), self.middle.map(bent))
     }
 
     /// Offsets by drift, A.
