@@ -85,6 +85,7 @@ impl CurrentChannel {
 
 /// Pole, and weights of old and new input, of a first-order lag over a step of `x` time constants in which
 /// the input is straight.
+#[inline]
 fn coefficients(x: f64) -> [f64; 3] {
     let pole = (-x).exp();
     // Mean of the impulse response over the step.
