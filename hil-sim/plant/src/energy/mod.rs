@@ -16,6 +16,9 @@
 //! Without skin effect there is `dr/dt = -rr i_r + j w r` alone. The eddy currents have a leakage
 //! `Le = Re 100 us`: iron loss follows the square of the frequency up to 1.6 kHz. Hysteresis, space
 //! harmonics and the ripple of the PWM edges in the iron are absent.
+//!
+//! Within an integration step main flux, current and the axis of the slots are integrated by their exact rates. At its
+//! end main flux and current are solved for; at the start of a period the slots are set to the angle of the rotor.
 
 mod family;
 mod magnetics;

@@ -52,7 +52,7 @@ pub struct EnergyRate {
     pub theta: f64,
     /// Of the saliency of the rotor's slots.
     pub(super) slots: Complex,
-    /// Of main flux and stator current: a first guess at the next state.
+    /// Of main flux and stator current.
     pub(super) m: Complex,
     pub(super) i: Complex,
 }
@@ -85,7 +85,7 @@ impl ElectricalState for EnergyState {
         self.psi_iron = x.psi_iron + k.psi_iron * h;
         self.theta = x.theta + k.theta * h;
         self.solution.slots = x.solution.slots + k.slots * h;
-        // First guesses; slopes are left to the solution.
+        // Rotor current and slopes are left to `correct`.
         self.solution.m = x.solution.m + k.m * h;
         self.solution.i = x.solution.i + k.i * h;
     }
