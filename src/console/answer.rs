@@ -4,6 +4,7 @@ use core::fmt;
 
 use drive_core::settings::entry::Change;
 use drive_core::{Accepted, Command, Mode, State};
+use thiserror::Error;
 
 use super::grammar::Request;
 use super::handle::DriveHandle;
@@ -355,17 +356,9 @@ impl Console {
 }
 
 /// Settings of another board.
+#[derive(Debug, Error)]
+#[error("these lines belong to the board {0}, this is {1}; `revert` drops them")]
 struct WrongBoard(&'static str, &'static str);
-
-impl fmt::Display for WrongBoard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "these lines belong to the board {}, this is {}; `revert` drops them",
-            self.0, self.1
-        )
-    }
-}
 
 const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed: do the bench steps that `board` lists, then `confirm board`";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
