@@ -71,6 +71,7 @@ fn short(name: &str) -> Config {
     let mut config = Config::default();
     // The battery needs a run of each of its kinds.
     config.extent.runs = Some(if name == "battery" { 12 } else { 3 });
+    (config.record.minutes, config.record.reversal_s) = (0.05, 1.0);
     config.extent.seconds = Some(match name {
         "demodulators" => 1.0,
         "speed-profile" | "position-step" | "torque-reversal" => 3.0,
