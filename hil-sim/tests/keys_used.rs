@@ -96,7 +96,7 @@ const BESIDE: [&[&str]; 11] = [
 ];
 
 /// Keys that are used although a short undisturbed run does not show it.
-const QUIET: [(&[&str], &str); 10] = [
+const QUIET: [(&[&str], &str); 12] = [
     (&["nameplate."], "the plate of the motor, whole; the rules take some of its numbers"),
     (&["limits."], "protections: without effect until they act"),
     (&["scales.ntc."], "the simulated thermistor and the drive's are the same"),
@@ -122,6 +122,8 @@ const QUIET: [(&[&str], &str); 10] = [
         ],
         "of other demodulators than the default",
     ),
+    (&["scales.current_c.", "scales.shunt_settle_s"], "of a board with three shunts"),
+    (&["measurement.dc_lag_us"], "acts where the dc link moves"),
     (&["sequence.stop_a_per_s"], "acts at a stop"),
     (&["battery.relearn"], "acts from the second dozen of runs on, with prepare.learn"),
     (
