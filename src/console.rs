@@ -105,7 +105,7 @@ impl Console {
         self.watch_silence(drive, now_ms);
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
-            self.settings.note(|settings| settings.learn(result));
+            self.settings.learned(result);
             self.unsaved |= result.verdict.is_accepted();
             self.unbelievable = Some(*result).filter(|result| !result.verdict.is_accepted());
             self.ended = true;
@@ -176,7 +176,9 @@ impl Console {
             if let Some(result) = self.unbelievable.as_ref().or(learned) {
                 self.out.line(format_args!("{}", announce::outcome(result)));
             }
-        } else if let Some(news) = self.announcer.next(&status, now_ms) {
+        } else if let Some(news) =
+            self.announcer.next(&status, &self.settings.in_force().drive, now_ms)
+        {
             self.out.line(format_args!("{news}"));
         } else if self.armed && !drive.tracing() {
             self.armed = false;

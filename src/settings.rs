@@ -62,10 +62,12 @@ impl FirmwareSettings {
         self.command.confirmed = self.board.confirmation();
     }
 
-    /// Takes the result of a learning, if it was accepted.
-    pub fn learn(&mut self, result: &Learned) {
+    /// Takes the result of a learning, if it was accepted: instead of what was learned before, or, where it was learned `again`
+    /// with that in force, on top of it.
+    pub fn learn(&mut self, result: &Learned, again: bool) {
         if result.verdict.is_accepted() {
-            self.learned = Some(result.on_top_of(self.learned.as_ref()));
+            let before = self.learned.filter(|_| again);
+            self.learned = Some(before.map_or(*result, |before| result.on_top_of(&before)));
         }
     }
 

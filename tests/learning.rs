@@ -13,7 +13,7 @@ use hil_sim::rig::Rig;
 fn learned(changes: &[&str], seed: u64) -> Learned {
     let learned = learning::learned(&config(changes), seed).unwrap();
     println!("{changes:?}: {learned:?}");
-    assert!(learned.accepted);
+    assert!(learned.verdict.is_accepted());
     learned
 }
 

@@ -21,6 +21,8 @@ fn replay(name: &str, magnetise_s: Option<f32>) -> (Vec<u64>, usize) {
     let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.sequence.magnetise_s = magnetise_s;
+    // The image that was recorded started without an encoder though it had not learned.
+    settings.drive.injection.synchronous.allow_unlearned = true;
     let mut drive = Drive::new(settings.build().unwrap());
 
     let mut compares = Vec::new();

@@ -66,7 +66,7 @@ fuzz_target!(|bytes: &[u8]| {
 /// Settings, and what may have been learned with them.
 fn full() -> FirmwareSettings {
     let mut settings = FirmwareSettings::of_the_board();
-    settings.learn(&found());
+    settings.learn(&found(), false);
     settings
 }
 

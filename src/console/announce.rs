@@ -3,7 +3,7 @@
 use core::fmt;
 
 use drive_core::identify::learning::Learned;
-use drive_core::{Fault, State};
+use drive_core::{Fault, Settings, State};
 
 use crate::link::Status;
 
@@ -25,8 +25,11 @@ pub const ANNOUNCEMENTS: [&str; 10] = [
 /// Longest silence while the drive learns, ms.
 const PROGRESS_MS: u32 = 5000;
 
+/// Asymmetry that no gain mismatch explains from which on a second rotor position is advised.
+const UNEXPLAINED: f32 = 0.002;
+
 /// An announcement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum News {
     /// The drive is in a fault.
     Fault(Fault),
@@ -34,8 +37,15 @@ pub enum News {
     Running(State),
     /// The outputs are off, for this reason.
     Off(&'static str),
-    /// It learns: point, and number of points.
-    Learning(usize, usize),
+    /// It learns.
+    Learning {
+        /// The point that is being measured, from 1 on.
+        point: usize,
+        /// Number of points.
+        points: usize,
+        /// Expected time until the end, s.
+        left_s: f32,
+    },
 }
 
 /// Follows the state of the drive.
@@ -61,12 +71,12 @@ impl Announcer {
         self.stopped = true;
     }
 
-    /// The news of a report, if there are any. `now_ms` wraps.
-    pub fn next(&mut self, status: &Status, now_ms: u32) -> Option<News> {
+    /// The news of a report, if there are any, of a drive with these settings. `now_ms` wraps.
+    pub fn next(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
         let state = status.state;
         let before = self.state.replace(state);
         if before == Some(state) {
-            return self.learning(status, now_ms);
+            return self.learning(status, settings, now_ms);
         }
         let was = self.active;
         if state != State::Stopping {
@@ -90,20 +100,20 @@ impl Announcer {
             }
             State::Learning => {
                 self.progress = None;
-                self.learning(status, now_ms)
+                self.learning(status, settings, now_ms)
             }
             _ => None,
         }
     }
 
-    fn learning(&mut self, status: &Status, now_ms: u32) -> Option<News> {
+    fn learning(&mut self, status: &Status, settings: &Settings, now_ms: u32) -> Option<News> {
         let (point, points) = status.learning?;
         let late = now_ms.wrapping_sub(self.told_ms) >= PROGRESS_MS;
         if self.progress == status.learning && !late {
             return None;
         }
         (self.progress, self.told_ms) = (status.learning, now_ms);
-        Some(News::Learning(point, points))
+        Some(News::Learning { point, points, left_s: settings.learning().seconds_left(point) })
     }
 }
 
@@ -118,7 +128,9 @@ impl fmt::Display for News {
             Self::Running(State::Position) => f.write_str("running: position"),
             Self::Running(_) => f.write_str("running: torque"),
             Self::Off(why) => write!(f, "off: {why}"),
-            Self::Learning(point, points) => write!(f, "learning: point {point} of {points}"),
+            Self::Learning { point, points, left_s } => {
+                write!(f, "learning: point {point} of {points}, {left_s:.0} s left")
+            }
         }
     }
 }
@@ -127,7 +139,14 @@ impl fmt::Display for News {
 pub fn outcome(result: &Learned) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         if result.verdict.is_accepted() {
-            write!(f, "learned: {result}; `save` keeps it")
+            write!(f, "learned: {result}; ")?;
+            let tracks = result.slope.is_some();
+            if tracks && result.positions == 1 && result.gain_mismatch.misfit > UNEXPLAINED {
+                f.write_str(
+                    "one rotor position: `learn again` at another tells slots from the stator; ",
+                )?;
+            }
+            f.write_str("`save` keeps it")
         } else {
             write!(f, "refused: {result}")
         }

@@ -2,12 +2,13 @@
 
 use core::fmt;
 
+use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
 use drive_core::{Accepted, Command, Mode, State};
 use thiserror::Error;
 
 use super::grammar::Request;
-use super::handle::DriveHandle;
+use super::handle::{CommandError, DriveHandle};
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
@@ -22,6 +23,8 @@ pub(super) enum Task {
     Apply,
     /// The same, then start.
     Start(Mode),
+    /// The same, then learn: anew, or again at another rotor position.
+    Learn { again: bool },
     /// The same, then save.
     Save,
     /// Reset the chip this long after the answer, since this time, ms.
@@ -39,6 +42,7 @@ impl Console {
             Request::Help => self.begin(ListKind::Help),
             Request::Status => self.status(drive),
             Request::Start(mode) => self.design_for(Task::Start(mode), drive),
+            Request::Learn { again } => self.design_for(Task::Learn { again }, drive),
             Request::Stop => {
                 self.announcer.stopping();
                 self.give(Command::Stop, "", drive);
@@ -209,17 +213,20 @@ impl Console {
     /// Performs a task that needs the staged settings in force. The design of the controllers takes more than a moment:
     /// the console says so first, and does it when that is on its way.
     fn design_for(&mut self, task: Task, drive: &mut impl DriveHandle) {
+        let in_force = self.settings.in_force();
+        let anew = matches!(task, Task::Learn { again: false }) && in_force.learned.is_some();
         match task {
             // The drive says why it does not start.
             Task::Start(mode) if !drive.is_off() => self.start(mode, drive),
+            Task::Learn { .. } if !drive.is_off() => self.start(Mode::Learning, drive),
             _ if !drive.is_off() => self.error(&MUST_BE_OFF),
             _ if let Some(other) = self.foreign => {
-                self.error(&WrongBoard(other, self.settings.in_force().board.name));
+                self.error(&WrongBoard(other, in_force.board.name));
             }
-            Task::Start(_) if !self.settings.in_force().board_is_confirmed() => {
+            Task::Start(_) | Task::Learn { .. } if !in_force.board_is_confirmed() => {
                 self.error(&NOT_CONFIRMED);
             }
-            _ if self.settings.needs_design() && drive.status().is_some() => {
+            _ if (anew || self.settings.needs_design()) && drive.status().is_some() => {
                 self.out.line(format_args!("designing..."));
                 self.task = Some(task);
             }
@@ -250,6 +257,7 @@ impl Console {
         }
         match task {
             Task::Start(mode) => self.start(mode, drive),
+            Task::Learn { again } => self.learn(again, drive),
             _ => self.save(drive),
         }
     }
@@ -270,18 +278,9 @@ impl Console {
     fn apply(&mut self, drive: &mut impl DriveHandle) -> Option<Applied> {
         let designs = self.settings.needs_design();
         let Some(settings) = self.settings.prepare() else { return Some(Applied::default()) };
-        if designs {
-            let taken = match drive.build(settings) {
-                Ok(coefficients) => drive.command(Command::Configure(coefficients)),
-                Err(why) => {
-                    self.error(&format_args!("{why}; not in force, still staged"));
-                    return None;
-                }
-            };
-            if let Err(why) = taken {
-                self.error(&why);
-                return None;
-            }
+        if designs && let Err(why) = configure(drive, settings) {
+            self.error(&why);
+            return None;
         }
         let applied = self.settings.adopt();
         self.unsaved = true;
@@ -303,6 +302,17 @@ impl Console {
                 self.checking = began;
                 self.out.line(format_args!("ok: the wiring is checked first"));
             }
+            Err(why) => self.error(&why),
+        }
+    }
+
+    /// Lets the drive learn: anew, or again on top of what it has learned.
+    fn learn(&mut self, again: bool, drive: &mut impl DriveHandle) {
+        if again && self.settings.in_force().learned.is_none() {
+            return self.error(&"nothing is learned with these settings: `learn` first");
+        }
+        match self.settings.begin_learning(again, |settings| configure(drive, settings)) {
+            Ok(()) => self.start(Mode::Learning, drive),
             Err(why) => self.error(&why),
         }
     }
@@ -353,6 +363,27 @@ impl Console {
             self.task = Some(Task::Reboot(None));
         }
     }
+}
+
+/// Reason why the drive has not taken settings.
+enum NotTaken {
+    Design(SettingsError),
+    Command(CommandError),
+}
+
+impl fmt::Display for NotTaken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Design(why) => write!(f, "{why}; not in force, still staged"),
+            Self::Command(why) => why.fmt(f),
+        }
+    }
+}
+
+/// Designs the controllers for settings, and gives them to the drive.
+fn configure(drive: &mut impl DriveHandle, settings: &FirmwareSettings) -> Result<(), NotTaken> {
+    let coefficients = drive.build(settings).map_err(NotTaken::Design)?;
+    drive.command(Command::Configure(coefficients)).map(|_| ()).map_err(NotTaken::Command)
 }
 
 /// Settings of another board.

@@ -35,8 +35,13 @@ pub enum Request {
     Help,
     /// Show the state of the drive.
     Status,
-    /// Put the staged settings in force, then start in a mode.
+    /// Put the staged settings in force, then start in a mode; to learn it is [`Learn`](Self::Learn).
     Start(Mode),
+    /// Learn on the motor: anew, or again at another rotor position on top of what is learned.
+    Learn {
+        /// On top of it.
+        again: bool,
+    },
     /// Torque to zero, then off.
     Stop,
     /// Magnetise again and check that the flux is tracked.
@@ -122,9 +127,9 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 29] = [
-    "help", "status", "start", "stop", "relock", "torque", "speed", "position", "angle", "get",
-    "describe", "set", "apply", "revert", "save", "defaults", "backup", "learned", "faults",
+pub const COMMANDS: [&str; 30] = [
+    "help", "status", "start", "learn", "stop", "relock", "torque", "speed", "position", "angle",
+    "get", "describe", "set", "apply", "revert", "save", "defaults", "backup", "learned", "faults",
     "clear", "trace", "log", "echo", "reboot", "board", "confirm", "version", "h", "?",
 ];
 
@@ -167,16 +172,21 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
     let request = match words.next("a command")? {
         "help" | "h" | "?" => Request::Help,
         "status" => Request::Status,
-        "start" => Request::Start(match words.optional() {
-            None | Some("torque") => Mode::Torque,
-            Some("speed") => Mode::Speed,
-            Some("position") => Mode::Position,
-            Some("learning") => Mode::Learning,
+        "start" => match words.optional() {
+            None | Some("torque") => Request::Start(Mode::Torque),
+            Some("speed") => Request::Start(Mode::Speed),
+            Some("position") => Request::Start(Mode::Position),
+            Some("learning") => Request::Learn { again: false },
             Some(word) => {
                 let all = "torque speed position learning";
                 return Err(ParseError::OneOf { what: "the mode", word, all });
             }
-        }),
+        },
+        "learn" => match words.optional() {
+            None => Request::Learn { again: false },
+            Some("again") => Request::Learn { again: true },
+            Some(word) => return Err(ParseError::TooMuch(word)),
+        },
         "stop" => Request::Stop,
         "relock" => Request::Relock,
         "torque" => Request::Torque(words.number("the current, A")?),

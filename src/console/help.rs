@@ -1,10 +1,11 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 31] = [
+pub const HELP: [&str; 32] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
-    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position, or learn",
+    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
+    "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",
     "stop                      torque to zero, then off",
     "relock                    no torque, magnetise again, verify the lock, go on",
     "torque A                  current on the quadrature axis, A peak",

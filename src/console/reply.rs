@@ -186,7 +186,12 @@ pub fn learned(result: &Learned, believable: bool, i: u16) -> Option<impl fmt::D
         0 => {
             f.write_str(if believable { "" } else { "not used: " })?;
             write!(f, "{result}; spread {:.5}; ", result.spread)?;
-            write!(f, "asymmetry {:.5}; ", result.asymmetry.size())?;
+            write!(
+                f,
+                "rotor positions {}; asymmetry {:.5}; ",
+                result.positions,
+                result.asymmetry.size()
+            )?;
             fitted(f, "gain mismatch", &result.gain_mismatch)?;
             fitted(f, "current saliency", &result.current_saliency)?;
             write!(f, "flux saliency {:.5}", result.flux_saliency)

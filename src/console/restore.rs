@@ -1,7 +1,8 @@
 //! Learned values as lines of text, which `backup` prints and a paste restores.
 //!
 //! `learned INDEX WORD ...` gives up to eight of the words of [`crate::store::learned`], from an index on, in
-//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them.
+//! hexadecimal; `learned check WORD` gives the CRC-32 of Ethernet over all words, little-endian, and completes them. Earlier
+//! firmware had fewer words.
 
 use core::fmt;
 
@@ -13,7 +14,6 @@ use super::grammar::WORDS_IN_LINE;
 use crate::store::learned::{self, WORDS};
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
-const ALL: u64 = (1 << WORDS) - 1;
 
 /// Words that have come in so far.
 pub struct Restore {
@@ -39,7 +39,7 @@ pub enum RestoreError {
     Unbelievable,
 }
 
-fn checksum(words: &[u32; WORDS]) -> u32 {
+fn checksum(words: &[u32]) -> u32 {
     let mut digest = CRC.digest();
     words.iter().for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
@@ -68,10 +68,11 @@ impl Restore {
     /// Words are missing or damaged, or make no result.
     pub fn finish(&mut self, check: u32) -> Result<Learned, RestoreError> {
         let Self { words, present } = core::mem::replace(self, Self::new());
-        if present != ALL {
-            return Err(RestoreError::Missing(present.trailing_ones() as usize));
+        let count = present.trailing_ones() as usize;
+        if !learned::is_whole(present) {
+            return Err(RestoreError::Missing(count));
         }
-        let right = checksum(&words);
+        let right = checksum(words.get(..count).unwrap_or_default());
         if right != check {
             return Err(RestoreError::Checksum(right));
         }

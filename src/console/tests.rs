@@ -1,11 +1,13 @@
 mod announcements;
 mod doubles;
+mod learning;
 mod lists;
 mod staging;
 mod typing;
 mod wrong;
 
 use crate::boards;
+use drive_core::identify::learning::Verdict;
 use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
 use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State};
@@ -31,6 +33,12 @@ impl Talk {
         let mut settings = FirmwareSettings::of_the_board();
         settings.command.wiring_checked = true;
         settings.confirm_board();
+        // Most of these tests start without an encoder.
+        settings.drive.injection.synchronous.allow_unlearned = true;
+        Self::with(settings)
+    }
+
+    fn with(settings: FirmwareSettings) -> Self {
         Self {
             console: Console::new(settings),
             drive: FakeDrive::new(Drive::new(settings.build().unwrap())),
@@ -120,6 +128,7 @@ fn in_force(setting: &str) -> String {
 fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("defaults"), "ok: staged");
+    assert_eq!(talk.ask("set injection.allow_unlearned yes"), "ok: staged");
     assert_eq!(talk.ask("apply"), "ok");
     assert!(talk.ask("get wiring_checked").starts_with("wiring_checked = no (one of: no yes)"));
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
@@ -150,6 +159,7 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
 fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     let mut settings = FirmwareSettings::of_the_board();
     settings.confirm_board();
+    settings.drive.injection.synchronous.allow_unlearned = true;
     // The simulated converter is calibrated for its own reference.
     settings.drive.scales = drive_core::settings::Scales::default();
     let mut talk = Talk::new();
@@ -315,12 +325,41 @@ fn commands_reach_the_drive_as_they_were_given() {
 #[test]
 fn what_is_not_believable_is_shown_and_not_used() {
     let mut talk = Talk::new();
-    talk.drive.found = Some(Learned { accepted: false, asymmetry: 0.02, ..found() });
-    let list = talk.say("learned\n");
-    assert!(list[0].starts_with("refused: not believable: asymmetry 0.02000"), "{list:?}");
-    assert!(list[1].starts_with("not believable, not used: asymmetry 0.02000; "), "{list:?}");
-    assert_eq!(talk.ask("save"), "ok");
-    assert_eq!(talk.drive.saved.unwrap().learned, None);
+    let (refused, spread) = (Learned { slope: None, ..found() }, 0.02);
+    for (result, why) in [
+        (
+            Learned { verdict: Verdict::Uneven, spread, ..refused },
+            "even part of the reference spreads by 0.02000, more than 0.005",
+        ),
+        (
+            Learned { verdict: Verdict::SlopeTooSmall, slope_at_rest: -0.0123, ..refused },
+            "slope -0.0123 /rad, which must be 0.02 at least",
+        ),
+        (
+            Learned { verdict: Verdict::SlopeTooSmall, slope_at_rest: 0.0301, ..refused },
+            "slope 0.0301 /rad, which must be 0.035 at least",
+        ),
+        (
+            Learned {
+                verdict: Verdict::LimitTooLow,
+                slope_at_rest: -0.03,
+                limit_a: 0.75,
+                ..refused
+            },
+            "slope -0.0300 /rad is lost above 0.75 A of torque current, less than 1.00 A",
+        ),
+        (Learned { verdict: Verdict::OutOfRange, ..refused }, "a value is out of its range"),
+    ] {
+        talk.drive.found = Some(result);
+        let list = talk.say("learned\n");
+        assert_eq!(list[0], format!("refused: {why}; nothing was changed"));
+        assert!(
+            list[1].starts_with(&format!("not used: {why}; nothing was changed; ")),
+            "{list:?}"
+        );
+        assert_eq!(talk.ask("save"), "ok");
+        assert_eq!(talk.drive.saved.unwrap().learned, None);
+    }
 }
 
 proptest! {

@@ -23,6 +23,10 @@ pub type Assignments = Vec<(Key, Value), MOST>;
 pub struct Staging {
     in_force: FirmwareSettings,
     staged: Option<Staged>,
+    /// Whether the present or last learning is on top of what was learned before.
+    again: bool,
+    /// Whether the drive learned since it was given the settings in force, so that it may have other learned values.
+    outdated: bool,
 }
 
 struct Staged {
@@ -76,7 +80,7 @@ impl fmt::Display for Applied {
 impl Staging {
     /// These settings in force, none staged.
     pub const fn new(in_force: FirmwareSettings) -> Self {
-        Self { in_force, staged: None }
+        Self { in_force, staged: None, again: false, outdated: false }
     }
 
     /// The settings in force.
@@ -157,16 +161,20 @@ impl Staging {
         self.staged = None;
     }
 
-    /// Whether the controllers have to be designed anew for the staged settings.
+    /// Whether the controllers have to be designed anew, for the staged settings or since the drive has learned.
     pub fn needs_design(&self) -> bool {
-        self.staged.as_ref().is_some_and(|Staged { settings, .. }| {
+        let differs = self.staged.as_ref().is_some_and(|Staged { settings, .. }| {
             settings.drive != self.in_force.drive || settings.learned != self.in_force.learned
-        })
+        });
+        differs || self.outdated
     }
 
-    /// The staged settings with the learned values that hold for them, to be designed for; `None` if none are staged.
+    /// The settings to be put in force: the staged ones with the learned values that hold for them, or those in force once the
+    /// drive has learned; `None` if nothing is to be done.
     pub fn prepare(&mut self) -> Option<&FirmwareSettings> {
-        let Staged { settings, learned } = self.staged.as_mut()?;
+        let Some(Staged { settings, learned }) = &mut self.staged else {
+            return self.outdated.then_some(&self.in_force);
+        };
         if !*learned {
             settings.learned = self.in_force.learned;
             settings.forget_unless_as(&self.in_force);
@@ -176,6 +184,7 @@ impl Staging {
 
     /// Takes the [prepared](Self::prepare) settings as those in force.
     pub fn adopt(&mut self) -> Applied {
+        self.outdated = false;
         let Some(Staged { settings, .. }) = &self.staged else { return Applied::default() };
         let (old, new) = (&self.in_force.drive, &settings.drive);
         let applied = Applied {
@@ -187,6 +196,34 @@ impl Staging {
         self.in_force = *settings;
         self.staged = None;
         applied
+    }
+
+    /// Begins a learning: `again` at another rotor position, on top of what is learned, or anew. If something is learned that
+    /// must not act meanwhile, `configure` is to give the drive the settings without it.
+    ///
+    /// # Errors
+    /// That of `configure`.
+    pub fn begin_learning<E>(
+        &mut self,
+        again: bool,
+        configure: impl FnOnce(&FirmwareSettings) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.again = again;
+        let Some(learned) = self.in_force.learned else { return Ok(()) };
+        self.outdated = true;
+        if again {
+            return Ok(());
+        }
+        self.in_force.learned = None;
+        let configured = configure(&self.in_force);
+        self.in_force.learned = Some(learned);
+        configured
+    }
+
+    /// Takes the result of the learning that was begun last, if it was accepted.
+    pub fn learned(&mut self, result: &Learned) {
+        let again = self.again;
+        self.note(|settings| settings.learn(result, again));
     }
 
     /// Changes the settings in force and the staged ones alike: for what the firmware itself finds out.

@@ -8,7 +8,7 @@
 //! | 31, 32 | gain mismatch, its misfit |
 //! | 33, 34 | saliency of the current, its misfit |
 //! | 35 | saliency of the flux |
-//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope |
+//! | 36 | points in the lowest byte, then a bit each: gains, saliency of the current, carrier, slope; rotor positions in the third byte, 0 counts as 1 |
 //! | 37 | distance of the points, A; 0.25 where a record of an earlier firmware lacks it |
 //! | 38 to 53 | slope of the saliency at the currents of its table, 0 where it was not learned |
 //! | 54 | largest torque current, A |
@@ -42,6 +42,8 @@ const SLOPE: usize = STEP + 1;
 const LIMIT: usize = SLOPE + POINTS;
 const ASYMMETRY: usize = LIMIT + 1;
 
+/// Place of the rotor positions in their word.
+const POSITIONS: u32 = 16;
 const HAS_GAINS: u32 = 1 << 8;
 const HAS_CURRENT: u32 = 1 << 9;
 const HAS_CARRIER: u32 = 1 << 10;
@@ -56,6 +58,11 @@ pub fn id(index: usize) -> u32 {
 pub fn index(id: u32) -> Option<usize> {
     let index = id.wrapping_sub(hash::of(NAME.bytes())) as usize;
     (index < WORDS).then_some(index)
+}
+
+/// Whether these values, a bit for each, are all that this or an earlier firmware writes.
+pub fn is_whole(present: u64) -> bool {
+    [NEEDED, WITH_STEP, ALL].contains(&present)
 }
 
 /// The values of a result.
@@ -78,6 +85,7 @@ pub fn to_words(learned: &Learned) -> [u32; WORDS] {
     }
     let flag = |set: bool, bit: u32| if set { bit } else { 0 };
     words[FLAGS] = learned.points as u32
+        | u32::from(learned.positions) << POSITIONS
         | flag(gains.accepted, HAS_GAINS)
         | flag(current.accepted, HAS_CURRENT)
         | flag(learned.carrier.is_some(), HAS_CARRIER)
@@ -130,6 +138,7 @@ pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
         limit_a: if has_slope { value(LIMIT) } else { grid.current(points) },
         spread: value(FITS),
         asymmetry: Asymmetry { constant, sin, cos },
+        positions: ((flags >> POSITIONS) as u8).max(1),
         gain_mismatch: fitted(FITS + 1, HAS_GAINS),
         current_saliency: fitted(FITS + 3, HAS_CURRENT),
         flux_saliency: value(FITS + 5),

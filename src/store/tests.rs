@@ -1,6 +1,6 @@
-use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::settings::table::CarrierTable;
-use drive_core::settings::table::{Grid, POINTS, ReferenceTable};
+use drive_core::carrier::asymmetry::Asymmetry;
+use drive_core::identify::learning::{Fitted, Learned, Verdict};
+use drive_core::settings::table::{CarrierTable, Grid, POINTS, ReferenceTable, SlopeTable};
 use drive_core::settings::value::Value;
 use proptest::prelude::*;
 
@@ -95,8 +95,12 @@ fn with_r_s(r_s: f32) -> FirmwareSettings {
     settings
 }
 
-/// Something that a learning can have found, of 16 numbers from -1 to 1.
+/// Something that a learning can have found, of 16 numbers from -1 to 1; without a slope, of a current difference.
 fn learned(random: [f32; POINTS]) -> Learned {
+    let sign = if random[7] < 0.0 { -1.0 } else { 1.0 };
+    let slope = random.map(|x| sign * (0.3 + 0.26 * x));
+    let slope = SlopeTable::from_points(Grid::REFERENCE, slope).filter(|_| random[8] > -0.5);
+    let slope_at_rest = slope.map_or(0.0, |slope| slope.at_rest());
     let mut reference = random.map(|x| 0.3 * x);
     let mut carrier = random.map(|x| 1.25 + 0.75 * x);
     (reference[0], carrier[0]) = (0.0, 1.0);
@@ -104,11 +108,20 @@ fn learned(random: [f32; POINTS]) -> Learned {
         reference: ReferenceTable::from_points(Grid::REFERENCE, reference).unwrap(),
         carrier: CarrierTable::from_points(Grid::REFERENCE, carrier).filter(|_| random[1] > -0.5),
         points: 13,
-        asymmetry: 0.005 * random[2].abs(),
+        slope,
+        slope_at_rest,
+        limit_a: 2.5 + 1.4 * random[9],
+        spread: 0.005 * random[2].abs(),
+        asymmetry: Asymmetry {
+            constant: 0.05 * random[10],
+            sin: 0.05 * random[11],
+            cos: 0.05 * random[12],
+        },
+        positions: 1 + (random[13].abs() * 254.0) as u8,
         gain_mismatch: Fitted { value: 0.1 * random[3], misfit: random[4], accepted: true },
         current_saliency: Fitted { value: random[5], misfit: 1.0, accepted: random[5].abs() < 0.3 },
         flux_saliency: 0.05 * random[6],
-        accepted: true,
+        verdict: slope.map_or(Verdict::Sound, |slope| Verdict::of_slope(slope.at_rest())),
     }
 }
 

@@ -216,7 +216,6 @@ impl Settings {
         let inj = &self.injection;
         let motion_design = self.motion_design()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
-        let synchronous = inj.demodulator == DemodulatorKind::Synchronous;
         let carrier_v = self.carrier_v();
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
         let (injection_turn, injection_axis) = match inj.demodulator {
@@ -299,7 +298,7 @@ impl Settings {
                 motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
                 inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
             },
-            learning: Learning::new(m, i_d, current_limit, synchronous),
+            learning: self.learning(),
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {
                 let allowed_v = self.unexplained_v();
@@ -325,6 +324,12 @@ impl Settings {
             designs,
             motion_design,
         })
+    }
+
+    /// The learning with these settings; they must be [valid](Self::check).
+    pub fn learning(&self) -> Learning {
+        let synchronous = self.injection.demodulator == DemodulatorKind::Synchronous;
+        Learning::new(&self.motor, self.i_d(), self.current_limit_a(), synchronous)
     }
 
     /// The choice of the phases, with three shunts.

@@ -75,6 +75,8 @@ pub struct Learning {
     lead: f32,
     /// Direct current, A.
     i_d: f32,
+    /// Rotor time constant, s.
+    tau_r: f32,
     /// sigma L_s, H.
     leakage: f32,
     /// L_m^2 / L_r, H.
@@ -199,6 +201,7 @@ impl Learning {
             normalised,
             lead: libm::atanf(tan_lead),
             i_d,
+            tau_r: motor.tau_r(),
             leakage: motor.l_ls + motor.l_m - coupled,
             coupled,
             rad_per_s: TAU / PERIOD_S,
@@ -213,6 +216,23 @@ impl Learning {
     /// The point that is being measured, from 1 on, and the number of points.
     pub fn progress(&self, state: &LearningState) -> (usize, usize) {
         (self.points().min(state.point + 1), self.points())
+    }
+
+    /// Expected time, s, from the beginning of a point, from 1 on, to the end of the learning. The flux rotates at slip
+    /// frequency, and a point ends at a completed half turn: points of small torque current take seconds.
+    pub fn seconds_left(&self, point: usize) -> f32 {
+        let least_s = self.average.0 as f32 * PERIOD_S;
+        let settle_s = self.settle as f32 * PERIOD_S;
+        let seconds = |number| {
+            let Point { n, lead, .. } = self.point(number);
+            let lead = LEADS.get(lead).map_or(0.0, |lead| lead * self.lead);
+            let UnitVector { cos, sin } = Angle::from_radians(lead).unit_vector();
+            let i_q = self.grid.current(n);
+            let (d, q) = (self.i_d * cos + i_q * sin, i_q * cos - self.i_d * sin);
+            let half_turn_s = PI * self.tau_r * (d / q).abs();
+            settle_s + half_turn_s * libm::ceilf(least_s / half_turn_s)
+        };
+        (point.max(1) - 1..self.points()).map(seconds).sum()
     }
 
     /// The point with this number. Pairs without lead come first, in the order of the currents.

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Drive, Settings, State};
+use drive_core::{Command, Drive, Mode, Settings, State};
 
 use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
@@ -59,10 +59,16 @@ impl Shadow {
         let order = match grammar::parse(line) {
             Ok(Request::Start(mode)) => {
                 self.apply()?;
-                if !self.settings.in_force().command.wiring_checked {
-                    self.orders.push_back(Command::CheckWiring);
-                }
-                Command::Start(mode)
+                self.start(mode)
+            }
+            Ok(Request::Learn { again }) => {
+                self.apply()?;
+                let Self { settings, orders, dead_time_s, .. } = self;
+                settings.begin_learning(again, |settings| -> Result<()> {
+                    orders.push_back(Command::Configure(settings.build_for(*dead_time_s)?));
+                    Ok(())
+                })?;
+                self.start(Mode::Learning)
             }
             Ok(Request::Stop) => Command::Stop,
             Ok(Request::Relock) => Command::Relock,
@@ -88,6 +94,14 @@ impl Shadow {
         };
         self.orders.push_back(order);
         Ok(())
+    }
+
+    /// The start in a mode; a check of the wiring comes before the first.
+    fn start(&mut self, mode: Mode) -> Command {
+        if !self.settings.in_force().command.wiring_checked {
+            self.orders.push_back(Command::CheckWiring);
+        }
+        Command::Start(mode)
     }
 
     /// Puts the staged settings in force, as the firmware's console does.
@@ -129,7 +143,7 @@ impl Shadow {
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()
         {
-            self.settings.note(|settings| settings.learn(found));
+            self.settings.learned(found);
         }
         if compare != period.compare {
             bail!(

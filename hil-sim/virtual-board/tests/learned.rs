@@ -6,8 +6,8 @@ use hil_sim::Config;
 use virtual_board::periph::Reset;
 use virtual_board::{Counting, Image, Options, Pair};
 
-/// Longest that learning takes, periods: two minutes.
-const LEARNING: u64 = 720_000;
+/// Longest that learning takes, periods: ten minutes.
+const LEARNING: u64 = 3_600_000;
 /// Longest from a reset to the greeting, and of a list, periods.
 const LISTED: u64 = 30_000;
 
@@ -42,7 +42,7 @@ fn what_is_learned_is_there_after_the_power_was_off() -> Result<()> {
     // Points every 0.107 A, a fourteenth of the limit.
     pair.order("set speed.i_q_limit_a 1")?;
     pair.order("set limits.current_a 1.5")?;
-    pair.order("start learning")?;
+    pair.order("learn")?;
     pair.until_state(State::Learning)?;
     pair.until("the end of learning", LEARNING, |_, state| state == State::Off)?;
     // The console hears of it with the report.

@@ -39,7 +39,9 @@ fn commands_are_understood() {
         ("  status\t", Request::Status),
         ("start", Request::Start(Mode::Torque)),
         ("start position", Request::Start(Mode::Position)),
-        ("start learning", Request::Start(Mode::Learning)),
+        ("start learning", Request::Learn { again: false }),
+        ("learn", Request::Learn { again: false }),
+        ("learn again", Request::Learn { again: true }),
         ("stop", Request::Stop),
         ("relock", Request::Relock),
         ("torque -1.5", Request::Torque(-1.5)),
@@ -122,8 +124,8 @@ fn what_is_half_wrong_is_refused_whole() {
         ("trace 5 on i_q_a over 1", "above or below = over: not one of: above below"),
         ("trace 5 on i_q_a above x", "not a number: x (the level)"),
         ("trace 5 on fault now", "too many words, from `now` on"),
-        ("faults 41", "the fault = 41: not a whole number from 1 to 40"),
-        ("learned 38 00000000", "the index = 38: not a whole number from 0 to 37"),
+        ("faults 43", "the fault = 43: not a whole number from 1 to 42"),
+        ("learned 58 00000000", "the index = 58: not a whole number from 0 to 57"),
         ("learned 0 12", "not eight hexadecimal digits: 12"),
         ("learned 0 +1234567", "not eight hexadecimal digits: +1234567"),
         ("learned 0", "a word is missing"),
@@ -131,6 +133,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("log loud", "the level = loud: not one of: off error warn info debug"),
         ("echo loud", "on or off = loud: not one of: on off"),
         ("reboot later", "too many words, from `later` on"),
+        ("learn twice", "too many words, from `twice` on"),
     ];
     for (line, why) in table {
         assert_eq!(parse(line).unwrap_err().to_string(), why, "{line}");

@@ -169,7 +169,10 @@ fn a_learning_tells_its_progress_and_its_end() {
     let mut talk = Talk::new();
     let mut rig = in_state(State::Learning);
     talk.drive.drive = rig.drive.clone();
-    assert_eq!(talk.say(""), ["learning: point 1 of 26"]);
+    let first = talk.say("");
+    let seconds = first[0].strip_prefix("learning: point 1 of 80, ").unwrap();
+    let expected: f64 = seconds.strip_suffix(" s left").unwrap().parse().unwrap();
+    let began = rig.time();
     let mut told = 0;
     // 80 ms at a time.
     while rig.drive.state() == State::Learning {
@@ -180,18 +183,18 @@ fn a_learning_tells_its_progress_and_its_end() {
         told = if lines.is_empty() { told + 80 } else { 0 };
         assert!(told < 10_000, "silent for {told} ms");
     }
-    assert!(talk.now_ms > 20_000, "{} ms", talk.now_ms);
+    // The flux turns a little slower at first at every point.
+    let took = rig.time() - began;
+    println!("{took} s, {expected} s were expected");
+    assert!((took / expected - 1.0).abs() < 0.05, "{took} s, {expected} s were expected");
     talk.drive.found = rig.drive.learned().copied();
-    assert!(talk.say("")[0].starts_with("learned: asymmetry 0.00"));
+    assert!(talk.say("")[0].starts_with("learned: slope -0.0"));
     while rig.drive.state() != State::Off {
         rig.step();
         talk.drive.drive = rig.drive.clone();
         talk.poll();
     }
     assert_eq!(talk.say(""), ["off: the learning has ended"]);
-    // A result that is not believable.
-    talk.drive.found = Some(Learned { accepted: false, ..found() });
-    assert!(talk.say("")[0].starts_with("refused: not believable: asymmetry"));
 }
 
 #[test]
@@ -203,11 +206,11 @@ fn every_announcement_begins_as_programs_expect() {
         announce::News::Fault(Fault::Break),
         announce::News::Running(State::Torque),
         announce::News::Off("stopped"),
-        announce::News::Learning(1, 26),
+        announce::News::Learning { point: 1, points: 26, left_s: 130.0 },
     ] {
         words(news.to_string());
     }
-    for accepted in [true, false] {
-        words(announce::outcome(&Learned { accepted, ..found() }).to_string());
+    for verdict in [Verdict::Sound, Verdict::Weak, Verdict::Uneven] {
+        words(announce::outcome(&Learned { verdict, ..found() }).to_string());
     }
 }

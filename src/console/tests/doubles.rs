@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
-use drive_core::identify::learning::{Fitted, Learned};
+use drive_core::carrier::asymmetry::Asymmetry;
+use drive_core::identify::learning::{Fitted, Learned, Verdict};
 use drive_core::settings::SettingsError;
-use drive_core::settings::table::{CarrierTable, ReferenceTable};
+use drive_core::settings::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State};
 use induction_drive::board;
 use induction_drive::console::grammar::Level;
@@ -146,15 +147,21 @@ impl DriveHandle for FakeDrive {
 
 /// An accepted result of a learning.
 pub fn found() -> Learned {
+    let slope = SlopeTable::of_flux_saliency(Grid::REFERENCE, -0.035);
     Learned {
         reference: ReferenceTable::default(),
+        slope: Some(slope),
+        slope_at_rest: slope.at_rest(),
+        limit_a: 2.75,
         carrier: Some(CarrierTable::default()),
         points: 13,
-        asymmetry: 0.001,
+        spread: 0.001,
+        asymmetry: Asymmetry { constant: 0.0004, sin: -0.0003, cos: 0.0 },
+        positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0002, accepted: true },
         current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
         flux_saliency: -0.035,
-        accepted: true,
+        verdict: Verdict::Sound,
     }
 }
 

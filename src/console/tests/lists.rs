@@ -137,17 +137,17 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_eq!(talk.ask("learned"), "ok: nothing learned with these settings");
     talk.drive.found = Some(found());
     let list = talk.say("learned\n");
-    let list = list.strip_prefix(&[
-        "learned: asymmetry 0.00100, gain mismatch 0.01000, current saliency 0.03000; `save` keeps it".to_owned(),
-    ]).unwrap();
+    let told = "slope -0.0700 /rad, torque current up to 2.75 A";
+    let list = list.strip_prefix(&[format!("learned: {told}; `save` keeps it")]).unwrap();
     assert_eq!(
         list[..4],
         [
-            "asymmetry 0.00100; gain mismatch 0.01000 (misfit 0.00020); \
+            "slope -0.0700 /rad, torque current up to 2.75 A; spread 0.00100; rotor positions 1; \
+             asymmetry 0.00050; gain mismatch 0.01000 (misfit 0.00020); \
              current saliency 0.03000 (misfit 0.02000); flux saliency -0.03500",
-            "i_q,reference,carrier",
-            "0.00,0.00000,1.00000",
-            "0.25,0.01617,1.00233",
+            "i_q,reference,slope,carrier",
+            "0.00,0.00000,-0.07000,1.00000",
+            "0.25,0.01617,-0.07000,1.00233",
         ]
     );
     assert_eq!((list.len(), list.last().unwrap().as_str()), (2 + 14 + 1, "ok"));
@@ -161,7 +161,7 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.limits.dc_over_v = Some(390.0);
     assert_ne!(*with, settings.build().unwrap());
-    settings.learn(&found());
+    settings.learn(&found(), false);
     assert_eq!(*with, settings.build().unwrap());
     // What was refused leaves it too.
     assert!(talk.ask("set motor.r_r 0").starts_with("error"));

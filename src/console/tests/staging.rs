@@ -1,3 +1,7 @@
+use drive_core::carrier::asymmetry::Asymmetry;
+use drive_core::identify::learning::Learned;
+use drive_core::settings::table::Grid;
+
 use super::*;
 
 /// A console whose settings in force and staged are these, by name.
@@ -154,7 +158,8 @@ fn a_start_after_a_design_is_not_stopped_for_silence() {
 #[test]
 fn a_backup_restores_settings_and_what_was_learned() {
     let mut talk = Talk::new();
-    assert_eq!(talk.say("backup\n"), ["board reference", "defaults", "apply", "ok"]);
+    let allow = "set injection.allow_unlearned yes";
+    assert_eq!(talk.say("backup\n"), ["board reference", "defaults", allow, "apply", "ok"]);
     for line in [
         "set scales.current_a.gain 0.001 scales.current_a.offset -2 limits.dc_over_v 371.3",
         "set scales.current_b.gain 0.001 scales.current_b.offset -2",
@@ -171,7 +176,7 @@ fn a_backup_restores_settings_and_what_was_learned() {
     let backup = talk.say("backup\n");
     let (end, lines) = backup.split_last().unwrap();
     assert_eq!((end.as_str(), lines[0].as_str()), ("ok", "board reference"));
-    assert_eq!(lines.iter().filter(|line| line.starts_with("set ")).count(), 9);
+    assert_eq!(lines.iter().filter(|line| line.starts_with("set ")).count(), 10);
     assert!(lines.iter().all(|line| line.len() <= line::LONGEST));
 
     let mut other = Talk::new();
@@ -204,8 +209,8 @@ fn damaged_learned_values_are_refused() {
     lines[0].push(if last == '0' { '1' } else { '0' });
     assert!(say(&lines).starts_with("error: learned: the checksum of these words is "));
     assert_eq!(
-        say(&["learned 37 00000000 00000000".to_owned()]),
-        "error: learned: more than 38 words"
+        say(&["learned 57 00000000 00000000".to_owned()]),
+        "error: learned: more than 58 words"
     );
     assert!(!other.console.settings.is_staged());
     // Whole, but then other settings.
@@ -214,6 +219,40 @@ fn damaged_learned_values_are_refused() {
     assert_eq!(other.ask("set motor.r_s 5"), dropped);
     assert_eq!(other.ask("apply"), "ok");
     assert_eq!(other.console.settings.in_force().learned, None);
+}
+
+/// Earlier firmware printed fewer words; its result is restored, and has to be learned again for a start without encoder.
+#[test]
+fn a_backup_of_earlier_firmware_is_restored() {
+    let old = Learned {
+        slope: None,
+        slope_at_rest: 0.0,
+        limit_a: Grid::REFERENCE.current(13),
+        asymmetry: Asymmetry::default(),
+        ..found()
+    };
+    for count in [37, 38] {
+        let mut words = crate::store::learned::to_words(&old);
+        // It had one rotor position.
+        words[36] &= 0xffff;
+        let words = &words[..count];
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let check = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&bytes);
+        let mut text = String::new();
+        for (line, words) in words.chunks(8).enumerate() {
+            let words: Vec<String> = words.iter().map(|word| format!("{word:08x}")).collect();
+            text += &format!("learned {} {}\n", 8 * line, words.join(" "));
+        }
+        let mut talk = Talk::new();
+        let restored = talk.say(format!("{text}learned check {check:08x}\napply\n"));
+        assert_eq!(restored.last().unwrap(), "ok", "{restored:?}");
+        assert_eq!(talk.console.settings.in_force().learned, Some(old));
+        // A line less is no result.
+        let all = text.lines().count();
+        let short: String = text.lines().take(all - 1).map(|line| format!("{line}\n")).collect();
+        let refused = talk.say(format!("{short}learned check {check:08x}\n"));
+        assert_eq!(refused.last().unwrap(), "error: learned: word 32 is missing");
+    }
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Records that older firmware has saved.
 
+use drive_core::settings::AngleSource;
+use drive_core::{Command, Drive, Mode, Refused};
+
 use super::*;
 
 /// The flash of a board that runs commit 1abee12 and has saved this record.
@@ -23,6 +26,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         ("injection.full_reference_iq_a", "1"),
         ("injection.current_saliency", "0.0338"),
         ("injection.tracked_rpm", "700"),
+        ("injection.loss_s", "0.08"),
         ("limits.current_a", "3.5"),
         ("limits.trip_a", "4.3"),
         ("limits.dc_over_v", "400"),
@@ -51,15 +55,62 @@ fn records_saved_by_commit_1abee12_are_read() {
         key.set(&mut expected, key.parse(value).unwrap());
     }
     let fitted = |value, misfit| Fitted { value, misfit, accepted: true };
+    // No slope and no asymmetry yet: without an encoder the drive has to learn again.
     expected.learned = Some(Learned {
         reference: ReferenceTable::default(),
+        slope: None,
+        slope_at_rest: 0.0,
+        limit_a: Grid::REFERENCE.current(13),
         carrier: Some(CarrierTable::default()),
         points: 13,
-        asymmetry: 0.001,
+        spread: 0.001,
+        asymmetry: Asymmetry::default(),
+        positions: 1,
         gain_mismatch: fitted(0.01, 0.0002),
         current_saliency: fitted(0.03, 0.02),
         flux_saliency: -0.035,
-        accepted: true,
+        verdict: Verdict::Sound,
     });
     assert_eq!(load(&mut board_of_1abee12(changed)), Loaded::Settings(expected));
+}
+
+/// Later firmware wrote the distance of the points, too, but no slope yet.
+#[test]
+fn records_without_a_slope_are_read_and_the_drive_has_to_learn_again() {
+    /// Values of a learned result that were written first.
+    const WITH_STEP: usize = 38;
+    let mut new = with_learned();
+    let learned = new.learned.as_mut().unwrap();
+    (learned.slope, learned.slope_at_rest, learned.verdict) = (None, 0.0, Verdict::Sound);
+    let mut record = codec::record(&new, 3);
+    let missing = (learned_words::WORDS - WITH_STEP) as u64;
+    record[codec::WORDS - missing as usize..].fill(u64::MAX);
+    record[0] -= missing << 48;
+    // That firmware had one rotor position.
+    let flags = 2 + keys::COUNT + 36;
+    record[flags] &= !(0xff << 48);
+    let mut fake = Fake::new();
+    fake.hold(0, resealed(record));
+    let learned = new.learned.as_mut().unwrap();
+    (learned.limit_a, learned.asymmetry, learned.positions) =
+        (Grid::REFERENCE.current(13), Asymmetry::default(), 1);
+    let Loaded::Settings(loaded) = load(&mut fake) else { panic!("not loaded") };
+    assert_eq!(loaded, new);
+    let mut drive = Drive::new(loaded.build().unwrap());
+    let start = Command::Start(Mode::Torque);
+    assert_eq!(drive.command(&start), Err(Refused::NotLearned));
+    // With the encoder nothing has to be learned.
+    let mut loaded = loaded;
+    loaded.drive.angle_source = AngleSource::Encoder;
+    assert!(Drive::new(loaded.build().unwrap()).command(&start).is_ok());
+    // One value less than that is no result.
+    record[flags + 1] = u64::MAX;
+    record[0] -= 1 << 48;
+    let mut fake = Fake::new();
+    fake.hold(0, resealed(record));
+    assert!(matches!(load(&mut fake), Loaded::Settings(_)), "as commit 1abee12 wrote it");
+    record[flags] = u64::MAX;
+    record[0] -= 1 << 48;
+    fake.hold(0, resealed(record));
+    assert_eq!(load(&mut fake), Loaded::Rejected(Rejected::Value("learned")));
 }

@@ -77,6 +77,7 @@ impl Learning {
             spread,
             gain_mismatch,
             asymmetry,
+            positions: 1,
             current_saliency,
             flux_saliency: start.per_looked * looked,
             verdict,

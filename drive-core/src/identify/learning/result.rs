@@ -98,6 +98,9 @@ pub struct Learned {
     pub gain_mismatch: Fitted,
     /// Asymmetry that is taken out of the demodulated signals: what the gain mismatch, where it is accepted, leaves.
     pub asymmetry: Asymmetry,
+    /// Number of rotor positions, 1 or more, whose mean gain mismatch and asymmetry are. The slots of the rotor have an
+    /// asymmetry that changes with its position, sensors and stator have not.
+    pub positions: u8,
     /// Saliency per ampere of stator current, 1/A, within ±0.075 at one step of the table: least squares of the reference on
     /// 2 i_d i_q/|i|. Misfit: rms of the residual relative to that of the reference, at most 0.35.
     pub current_saliency: Fitted,
@@ -157,34 +160,47 @@ impl Learned {
         };
         let step = self.reference.grid().step_a();
         let slope = self.slope.map_or(0.0, |slope| slope.at_rest());
+        let least_limit_a = if self.slope.is_some() { self.least_limit_a() } else { step };
         self.verdict.is_accepted()
             && self.spread <= SPREAD
             && (1..POINTS).contains(&self.points)
+            && self.positions > 0
             && self.asymmetry.size() <= LARGEST_ASYMMETRY
             && self.slope_at_rest == slope
-            && (self.least_limit_a()..=POINTS as f32 * step).contains(&self.limit_a)
+            && (least_limit_a..=POINTS as f32 * step).contains(&self.limit_a)
             && within(&self.gain_mismatch, LARGEST_MISMATCH)
             && within(&self.current_saliency, CURRENT_SALIENCY.0 / step)
             && self.flux_saliency.is_finite()
     }
 
-    /// Combines this result with the result `before` that was in use during the learning. Values not
-    /// accepted keep their previous state; gain mismatch and asymmetry add to those already corrected.
-    pub fn on_top_of(&self, before: Option<&Self>) -> Self {
-        let mut learned = *self;
-        if let Some(before) = before {
-            let gains = before.gain_mismatch;
-            if !self.gain_mismatch.accepted {
-                learned.gain_mismatch = gains;
-            } else if gains.accepted {
-                learned.gain_mismatch.value += gains.value;
-            }
-            learned.asymmetry = before.asymmetry.plus(&self.asymmetry, 1.0);
-            if !self.current_saliency.accepted {
-                learned.current_saliency = before.current_saliency;
-            }
-            learned.carrier = self.carrier.or(before.carrier);
+    /// This result, found at another rotor position with the coefficients of `before`, on top of it: gain mismatch and
+    /// asymmetry are the means of all positions, so what was found now, a difference, counts as one of them. The other values
+    /// are those of this result; where it did not accept one, that of `before`.
+    ///
+    /// The drive itself [takes](crate::Coefficients::take) a result as if it were the first: build the coefficients anew.
+    pub fn on_top_of(&self, before: &Self) -> Self {
+        let positions = before.positions.saturating_add(1);
+        let share = 1.0 / f32::from(positions);
+        let mut gains = self.gain_mismatch;
+        if gains.accepted {
+            let corrected =
+                if before.gain_mismatch.accepted { before.gain_mismatch.value } else { 0.0 };
+            gains.value = corrected + share * gains.value;
+        } else {
+            gains = before.gain_mismatch;
         }
-        learned
+        let current_saliency = if self.current_saliency.accepted {
+            self.current_saliency
+        } else {
+            before.current_saliency
+        };
+        Self {
+            gain_mismatch: gains,
+            asymmetry: before.asymmetry.plus(&self.asymmetry, share),
+            positions,
+            current_saliency,
+            carrier: self.carrier.or(before.carrier),
+            ..*self
+        }
     }
 }

@@ -230,6 +230,7 @@ fn found() -> Learned {
         points: 13,
         spread: 0.001,
         asymmetry: Asymmetry { constant: 0.001, sin: 0.002, cos: -0.003 },
+        positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0, accepted: true },
         current_saliency: Fitted { value: 0.03, misfit: 0.02, accepted: true },
         flux_saliency: -0.035,
@@ -240,16 +241,27 @@ fn found() -> Learned {
 #[test]
 fn a_second_learning_adds_to_the_gains_and_keeps_what_it_does_not_find() {
     let first = found();
-    assert_eq!(first.on_top_of(None), first);
     let mut second = found();
     second.gain_mismatch.value = -0.002;
     second.current_saliency.accepted = false;
-    let both = second.on_top_of(Some(&first));
-    assert!((both.gain_mismatch.value - 0.008).abs() < 1e-6);
-    assert_eq!(both.asymmetry, Asymmetry { constant: 0.002, sin: 0.004, cos: -0.006 });
+    second.asymmetry = Asymmetry { constant: 0.002, sin: -0.004, cos: 0.0 };
+    // What the second finds is what the correction by the first leaves: half of it counts.
+    let both = second.on_top_of(&first);
+    assert!((both.gain_mismatch.value - 0.009).abs() < 1e-6);
+    let off = both.asymmetry.plus(&Asymmetry { constant: 0.002, sin: 0.0, cos: -0.003 }, -1.0);
+    assert!(off.size() < 1e-7 && both.positions == 2, "{both:?}");
+    // A third that finds nothing changes nothing.
+    second.gain_mismatch.value = 0.0;
+    second.asymmetry = Asymmetry::default();
+    let third = second.on_top_of(&both);
+    assert_eq!(
+        (third.asymmetry, third.gain_mismatch.value),
+        (both.asymmetry, both.gain_mismatch.value)
+    );
+    assert_eq!(third.positions, 3);
     assert_eq!(both.current_saliency, first.current_saliency);
     second.gain_mismatch.accepted = false;
-    assert_eq!(second.on_top_of(Some(&first)).gain_mismatch, first.gain_mismatch);
+    assert_eq!(second.on_top_of(&first).gain_mismatch, first.gain_mismatch);
 }
 
 #[test]

@@ -20,7 +20,8 @@ pub struct Options {
     pub counting: Counting,
     /// Whether its bench steps were done and confirmed; otherwise the flash is erased, and the firmware does not start.
     pub confirmed: bool,
-    /// The drive's settings that are saved with the confirmation: by default those that the image starts with.
+    /// The drive's settings that are saved with the confirmation: by default those that the image starts with, and whether
+    /// a drive that has not learned starts as the configuration says.
     pub saved: Settings,
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
@@ -60,6 +61,8 @@ impl Options {
         wanted.inverter.top = image.inverter.top;
         wanted.inverter.dead_time_s = image.inverter.dead_time_s;
         wanted.scales.full_scale = image.scales.full_scale;
+        // Saved already.
+        wanted.injection.synchronous.allow_unlearned = image.injection.synchronous.allow_unlearned;
         let in_line = stage.sensors == Sensors::InLine;
         // The sensors of the reference board are those of the configuration.
         let may_differ =
@@ -98,12 +101,15 @@ impl Options {
     /// A board with this power stage and the motor of a configuration; [`PowerStage::config`] gives one that suits it.
     pub fn on(power_stage: &'static PowerStage, config: &Config, seed: u64) -> Self {
         let plant = Self::plant(power_stage, config);
+        let mut saved = power_stage.firmware_settings();
+        saved.injection.synchronous.allow_unlearned =
+            config.drive.injection.synchronous.allow_unlearned;
         Self {
             plant,
             seed,
             counting: Counting { cycles: true, every_instruction: false },
             confirmed: true,
-            saved: power_stage.firmware_settings(),
+            saved,
             power_stage,
         }
     }

@@ -25,8 +25,8 @@ const SPEEDS: [f64; 2] = [31.4, 94.2];
 const SETTLING: u64 = 1200;
 /// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
-/// Longest that learning takes, periods: two minutes.
-const LEARNING: u64 = 720_000;
+/// Longest that learning takes, periods: ten minutes.
+const LEARNING: u64 = 3_600_000;
 /// A setting that is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
@@ -113,7 +113,7 @@ impl Scene {
         let mut pair = Pair::new(image, Options::on(stage, &config, 1).set_up(&config)?)?;
         pair.order("set wiring_checked yes")?;
         if config.prepare.learn {
-            pair.order("start learning")?;
+            pair.order("learn")?;
             pair.until_state(State::Learning)?;
             pair.until("the end of learning", LEARNING, |_, state| state == State::Off)?;
         }
