@@ -35,6 +35,7 @@ use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::noise_watch::NoiseWatchState;
 use crate::protect::plausibility::{CarrierWatch, PredictionState};
 use crate::protect::saliency_check::SaliencyCheckState;
+use crate::protect::thermal::ThermalLoads;
 use crate::protect::wiring_check::WiringCheckState;
 use crate::settings::AngleSource;
 
@@ -78,6 +79,7 @@ pub struct Drive {
     wiring_unchecked: bool,
     wiring: WiringCheckState,
     learned: Option<Learned>,
+    thermal: ThermalLoads,
 }
 
 /// References of the running mode.
@@ -159,6 +161,7 @@ impl Drive {
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
             learned: None,
+            thermal: ThermalLoads::default(),
         }
     }
 
@@ -181,6 +184,7 @@ impl Drive {
         let result =
             if self.state.has_current() { self.regulate(sample) } else { self.prepare(sample) };
         self.elapsed = self.elapsed.wrapping_add(1);
+        let result = result.and_then(|compare| self.watch_load().map(|()| compare));
         let compare = result.unwrap_or_else(|off| {
             self.enter(off);
             Compare::OFF

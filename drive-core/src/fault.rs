@@ -259,6 +259,18 @@ faults! {
             "a motor without enough saliency, or one whose sign changes with the load",
         ],
         "learned shows the slope and what is needed; raise sequence.i_d and learn again, or use the encoder";
+    MotorOverload = 43, "the motor has carried too much current for too long",
+        &[
+            "more torque, or more flux, than the motor bears for ever",
+            "limits.motor_a or limits.motor_s not those of the motor",
+        ],
+        "let the motor cool; reduce the torque, or sequence.i_d";
+    InverterOverload = 44, "the inverter has carried too much current for too long",
+        &[
+            "more current than the power stage bears for ever",
+            "limits.inverter_a or limits.inverter_s not those of the power stage",
+        ],
+        "let it cool; reduce the torque, or sequence.i_d";
 }
 
 impl Fault {

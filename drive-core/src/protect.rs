@@ -4,4 +4,5 @@ pub mod lock_monitor;
 pub mod noise_watch;
 pub mod plausibility;
 pub mod saliency_check;
+pub mod thermal;
 pub mod wiring_check;

@@ -71,6 +71,18 @@ pub struct CurrentPlant {
     pub q: IdentifiedPlant,
 }
 
+/// The flux that the drive magnetises the motor with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Flux {
+    /// That of the dissertation: 15 % of the rated flux of its motor.
+    #[default]
+    Low,
+    /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
+    /// where it hardly has a saliency at the low one.
+    High,
+}
+
+words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
 words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
 words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });
 
@@ -89,6 +101,14 @@ pub struct Limits {
     pub speed_rpm: Option<f32>,
     /// Largest voltage that the model of the motor does not explain at standstill, V.
     pub unexplained_v: Option<f32>,
+    /// Current that the motor carries for any time at standstill, A peak.
+    pub motor_a: Option<f32>,
+    /// Thermal time constant of its windings, s.
+    pub motor_s: f32,
+    /// Current that the inverter carries for any time, A peak.
+    pub inverter_a: Option<f32>,
+    /// Thermal time constant of its switches to the heat sink, s.
+    pub inverter_s: f32,
     /// Temperature of the heat sink that trips, °C.
     pub heat_sink_c: f32,
 }
@@ -103,6 +123,10 @@ impl Default for Limits {
             dc_under_v: None,
             speed_rpm: None,
             unexplained_v: None,
+            motor_a: None,
+            motor_s: 300.0,
+            inverter_a: None,
+            inverter_s: 5.0,
             heat_sink_c: 85.0,
         }
     }
@@ -117,6 +141,8 @@ pub struct Sequence {
     pub precharge_s: f32,
     /// Time with current on the direct axis alone, s.
     pub magnetise_s: Option<f32>,
+    /// Flux that the rule for the direct current aims at.
+    pub flux: Flux,
     /// Current on the direct axis, A peak.
     pub i_d: Option<f32>,
     /// Slope of the torque current at a stop, A/s.
@@ -129,6 +155,7 @@ impl Default for Sequence {
             calibrate_s: 0.1,
             precharge_s: 0.010,
             magnetise_s: None,
+            flux: Flux::Low,
             i_d: None,
             stop_a_per_s: None,
         }

@@ -13,6 +13,7 @@ mod keys;
 pub mod motors;
 mod plant;
 mod value;
+mod words;
 
 use std::path::Path;
 

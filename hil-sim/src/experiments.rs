@@ -33,6 +33,7 @@ mod pi_design;
 mod plant_identification;
 mod position;
 mod profile;
+mod record;
 mod reversal;
 pub mod saliency;
 mod saliency_check;
@@ -232,6 +233,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     battery::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
+    record::EXPERIMENT,
     tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,

@@ -71,6 +71,7 @@ fn short(name: &str) -> Config {
     let mut config = Config::default();
     // The battery needs a run of each of its kinds.
     config.extent.runs = Some(if name == "battery" { 12 } else { 3 });
+    (config.record.minutes, config.record.reversal_s) = (0.05, 1.0);
     config.extent.seconds = Some(match name {
         "demodulators" => 1.0,
         "speed-profile" | "position-step" | "torque-reversal" => 3.0,
@@ -95,7 +96,7 @@ const BESIDE: [&[&str]; 11] = [
 ];
 
 /// Keys that are used although a short undisturbed run does not show it.
-const QUIET: [(&[&str], &str); 10] = [
+const QUIET: [(&[&str], &str); 12] = [
     (&["nameplate."], "the plate of the motor, whole; the rules take some of its numbers"),
     (&["limits."], "protections: without effect until they act"),
     (&["scales.ntc."], "the simulated thermistor and the drive's are the same"),
@@ -121,6 +122,8 @@ const QUIET: [(&[&str], &str); 10] = [
         ],
         "of other demodulators than the default",
     ),
+    (&["scales.current_c.", "scales.shunt_settle_s"], "of a board with three shunts"),
+    (&["measurement.dc_lag_us"], "acts where the dc link moves"),
     (&["sequence.stop_a_per_s"], "acts at a stop"),
     (&["battery.relearn"], "acts from the second dozen of runs on, with prepare.learn"),
     (

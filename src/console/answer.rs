@@ -5,6 +5,7 @@ use core::fmt;
 use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
 use drive_core::{Accepted, Command, Mode, State};
+use thiserror::Error;
 
 use super::grammar::Request;
 use super::handle::{CommandError, DriveHandle};
@@ -365,18 +366,12 @@ impl Console {
 }
 
 /// Reason why the drive has not taken settings.
+#[derive(Error, Debug)]
 enum NotTaken {
+    #[error("{0}; not in force, still staged")]
     Design(SettingsError),
+    #[error(transparent)]
     Command(CommandError),
-}
-
-impl fmt::Display for NotTaken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Design(why) => write!(f, "{why}; not in force, still staged"),
-            Self::Command(why) => why.fmt(f),
-        }
-    }
 }
 
 /// Designs the controllers for settings, and gives them to the drive.
@@ -386,17 +381,9 @@ fn configure(drive: &mut impl DriveHandle, settings: &FirmwareSettings) -> Resul
 }
 
 /// Settings of another board.
+#[derive(Debug, Error)]
+#[error("these lines belong to the board {0}, this is {1}; `revert` drops them")]
 struct WrongBoard(&'static str, &'static str);
-
-impl fmt::Display for WrongBoard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "these lines belong to the board {}, this is {}; `revert` drops them",
-            self.0, self.1
-        )
-    }
-}
 
 const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed: do the bench steps that `board` lists, then `confirm board`";
 const MUST_BE_OFF: &str = "the drive must be off: `stop` first";

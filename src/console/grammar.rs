@@ -304,8 +304,9 @@ fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
     let last = Fault::ALL.last().map_or(0, |fault| fault.code());
     let code = whole("the fault", word, 1, last.into())?;
     let found = Fault::ALL.iter().find(|fault| u16::from(fault.code()) == code);
-    let max = last.into();
-    found.copied().ok_or(ParseError::Whole { what: "the fault", word, min: 1, max })
+    // A number that is not in use any more.
+    let all = "the numbers that `docs/faults.md` lists";
+    found.copied().ok_or(ParseError::OneOf { what: "the fault", word, all })
 }
 
 /// The trace with this number of records.

@@ -5,6 +5,7 @@ use core::fmt::{self, Write};
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Accepted, Coefficients, Command, Refused};
+use thiserror::Error;
 
 use super::grammar::Level;
 use crate::link::Status;
@@ -14,24 +15,17 @@ use crate::settings::FirmwareSettings;
 use crate::store::FlashError;
 
 /// Reason why a command was not carried out.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum CommandError {
     /// The drive refuses it.
+    #[error("{0}")]
     Refused(Refused),
     /// The control interrupt does not run.
+    #[error("the control does not run")]
     NoAnswer,
     /// It was not started, for this reason.
+    #[error("the control does not run: {0}")]
     NotStarted(&'static str),
-}
-
-impl fmt::Display for CommandError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Refused(why) => why.fmt(f),
-            Self::NoAnswer => f.write_str("the control does not run"),
-            Self::NotStarted(why) => write!(f, "the control does not run: {why}"),
-        }
-    }
 }
 
 /// Access of the console to the drive and to the rest of the firmware.

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use heapless::String;
+use thiserror::Error;
 
 /// Longest line that is taken, characters without its end.
 pub const LONGEST: usize = 120;
@@ -16,27 +17,20 @@ const ESCAPE: u8 = 0x1b;
 const DELETE: u8 = 0x7f;
 
 /// Reason why a line was not taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum LineError {
     /// Longer than [`LONGEST`].
+    #[error("the line is longer than {LONGEST} characters")]
     TooLong,
     /// Not printable text.
+    #[error("the line is not plain text")]
     NotText,
     /// Characters came faster than they were read, or damaged.
+    #[error("characters were lost or damaged")]
     Lost,
     /// Its end did not come in time.
+    #[error("the line was not finished")]
     Unfinished,
-}
-
-impl fmt::Display for LineError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::TooLong => write!(f, "the line is longer than {LONGEST} characters"),
-            Self::NotText => f.write_str("the line is not plain text"),
-            Self::Lost => f.write_str("characters were lost or damaged"),
-            Self::Unfinished => f.write_str("the line was not finished"),
-        }
-    }
 }
 
 /// Place in an escape sequence of a terminal.

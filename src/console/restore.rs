@@ -8,6 +8,7 @@ use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use drive_core::identify::learning::Learned;
+use thiserror::Error;
 
 use super::grammar::WORDS_IN_LINE;
 use crate::store::learned::{self, WORDS};
@@ -22,29 +23,20 @@ pub struct Restore {
 }
 
 /// Reason why learned values were not restored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum RestoreError {
     /// Words behind the last.
+    #[error("learned: more than {WORDS} words")]
     Behind,
     /// The word with this index has not come.
+    #[error("learned: word {0} is missing")]
     Missing(usize),
     /// The checksum of the words is another.
+    #[error("learned: the checksum of these words is {0:08x}")]
     Checksum(u32),
     /// No result that a learning accepts.
+    #[error("learned: no result that a learning accepts")]
     Unbelievable,
-}
-
-impl fmt::Display for RestoreError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Behind => write!(f, "learned: more than {WORDS} words"),
-            Self::Missing(index) => write!(f, "learned: word {index} is missing"),
-            Self::Checksum(right) => {
-                write!(f, "learned: the checksum of these words is {right:08x}")
-            }
-            Self::Unbelievable => f.write_str("learned: no result that a learning accepts"),
-        }
-    }
 }
 
 fn checksum(words: &[u32]) -> u32 {

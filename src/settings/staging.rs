@@ -7,6 +7,7 @@ use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
 use drive_core::settings::value::Value;
 use heapless::Vec;
+use thiserror::Error;
 
 use super::FirmwareSettings;
 use super::keys::{self, Key};
@@ -36,23 +37,14 @@ struct Staged {
 }
 
 /// Reason why values were not staged.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum SetError {
     /// The setting belongs to the board.
+    #[error("{} belongs to the board and is no setting of the console", .0.name())]
     Board(Key),
     /// A value out of range.
+    #[error("{0}")]
     Range(SettingsError),
-}
-
-impl fmt::Display for SetError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Board(key) => {
-                write!(f, "{} belongs to the board and is no setting of the console", key.name())
-            }
-            Self::Range(why) => why.fmt(f),
-        }
-    }
 }
 
 /// What the user has to know of settings that are in force now.

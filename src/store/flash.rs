@@ -1,6 +1,6 @@
 //! The flash behind the settings, and its errors.
 
-use core::fmt;
+use thiserror::Error;
 
 use crate::board;
 
@@ -26,22 +26,15 @@ pub trait Flash {
 }
 
 /// A failed operation of the flash.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FlashError {
     /// An erasure failed, with this status register.
+    #[error("the flash was not erased, status {0:#x}")]
     Erase(u32),
     /// Programming failed, with this status register.
+    #[error("the flash was not programmed, status {0:#x}")]
     Program(u32),
     /// This double word reads back differently than programmed.
+    #[error("double word {0} is read back differently")]
     Verify(usize),
-}
-
-impl fmt::Display for FlashError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Erase(status) => write!(f, "the flash was not erased, status {status:#x}"),
-            Self::Program(status) => write!(f, "the flash was not programmed, status {status:#x}"),
-            Self::Verify(word) => write!(f, "double word {word} is read back differently"),
-        }
-    }
 }

@@ -26,6 +26,7 @@ use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
 use crate::protect::plausibility::Prediction;
 use crate::protect::saliency_check::SaliencyCheck;
+use crate::protect::thermal::{Body, Thermal};
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
@@ -39,6 +40,9 @@ const BPF_GROUP_DELAY: f32 = 8.83;
 const VERIFY_S: f32 = 0.3;
 /// Electrical speed up to which the shaft counts as standing when the lock is verified, turns/s: 30 rpm of four poles.
 const STANDING_HZ: f32 = 1.0;
+/// Control periods between two steps of the thermal loads, and the time, s.
+pub(super) const THERMAL_EVERY: u32 = 60;
+const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
 /// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
 /// dissertation's motor.
 const UNEXPLAINED_MEAN: f32 = 0.5;
@@ -102,6 +106,7 @@ pub struct Coefficients {
     pub(crate) largest_test_v: f32,
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
+    pub(crate) thermal: Thermal,
     /// Whether a start without encoder is refused until the drive has learned.
     pub(crate) unlearned: bool,
     /// Result of the design of the current controllers, d and q.
@@ -285,6 +290,10 @@ impl Settings {
                 DeadTime::NONE
             },
             inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit),
+            thermal: Thermal {
+                motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
+                inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
+            },
             learning: self.learning(),
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {

@@ -2,7 +2,8 @@
 
 use super::Drive;
 use crate::current::sensing::{Measured, SensingState};
-use crate::drive::coefficients::Coefficients;
+use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
+use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::io::{Hardware, Sample};
 
@@ -39,6 +40,20 @@ impl Coefficients {
 }
 
 impl Drive {
+    /// Adds the current of the last periods to the thermal loads, in every state.
+    pub(super) fn watch_load(&mut self) -> Result<(), State> {
+        if !self.elapsed.is_multiple_of(THERMAL_EVERY) {
+            return Ok(());
+        }
+        let current = match self.state.has_current() {
+            true => self.control.seen.current.length_squared(),
+            false => 0.0,
+        };
+        let borne = self.c.thermal.step(&mut self.thermal, current);
+        // Off it cools, and is not judged.
+        if self.state.has_current() { Ok(borne?) } else { Ok(()) }
+    }
+
     /// The fault when a result is not finite: settings, references or state, whichever is not.
     pub(super) fn not_finite(&self) -> Option<Fault> {
         let r = &self.control.references;

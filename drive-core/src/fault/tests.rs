@@ -45,6 +45,8 @@ fn codes_never_change() {
         (40, Fault::CurrentSum),
         (41, Fault::FluxNotAsPredicted),
         (42, Fault::SlopeTooSmall),
+        (43, Fault::MotorOverload),
+        (44, Fault::InverterOverload),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

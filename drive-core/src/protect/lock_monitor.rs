@@ -138,7 +138,7 @@ const LEAST_CARRIER: f32 = 0.5;
 const WEAK_PERIODS: u8 = 8;
 
 /// Allowed negative loss, with a negative and with a positive slope.
-const ALLOWED_GAIN: [f32; 2] = [0.6, 0.35];
+const ALLOWED_GAIN: [f32; 2] = [0.6, 0.3];
 /// Largest unit relative to that without torque current.
 const MOST_UNIT: f32 = 2.5;
 /// Carrier periods of rest after a move.
@@ -320,8 +320,8 @@ mod tests {
         for (a, loss, periods) in [
             (-0.035, -1.0, Some(66.0)),
             (-0.035, -0.55, None),
-            (0.035, -1.0, Some(31.0)),
-            (0.035, -0.45, Some(108.0)),
+            (0.035, -1.0, Some(25.7)),
+            (0.035, -0.45, Some(79.0)),
             (0.035, 1.0, Some(57.5)),
             (0.035, 0.5, None),
         ] {

@@ -5,7 +5,7 @@
 
 use super::entry::{Access, Change, Entry, auto, number, whole, word};
 use super::value::Words;
-use super::{AngleSource, CurrentSensors, Line, PlantSource, Settings};
+use super::{AngleSource, CurrentSensors, Flux, Line, PlantSource, Settings};
 use crate::carrier::DemodulatorKind;
 use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
 use crate::io::PERIOD_S;
@@ -86,11 +86,16 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     auto!("limits.dc_under_v", limits.dc_under_v, Settings::dc_under_v, "V", "dc link below which it trips while the outputs are on").beside(|s| (5.0, s.dc_over_v())),
     auto!("limits.speed_rpm", limits.speed_rpm, Settings::speed_trip_rpm, "rpm", "speed of the shaft that trips").from_to(1.0, 20_000.0),
     auto!("limits.unexplained_v", limits.unexplained_v, Settings::unexplained_v, "V", "largest voltage that the motor model does not explain at standstill").from_to(0.01, 1000.0),
+    auto!("limits.motor_a", limits.motor_a, Settings::motor_a, "A", "current that the motor carries for any time at standstill, peak").beside(|s| (0.01, 3.0 * s.rated_a())),
+    number!("limits.motor_s", limits.motor_s, "s", "thermal time constant of its windings").from_to(1.0, 10_000.0),
+    auto!("limits.inverter_a", limits.inverter_a, Settings::inverter_a, "A", "current that the inverter carries for any time, peak").beside(|s| (0.01, s.trip_a())),
+    number!("limits.inverter_s", limits.inverter_s, "s", "thermal time constant of its switches to the heat sink").from_to(0.1, 1000.0),
     number!("limits.heat_sink_c", limits.heat_sink_c, "degC", "temperature of the heat sink that trips").from_to(0.0, 150.0),
 
     number!("sequence.calibrate_s", sequence.calibrate_s, "s", "time of the offset calibration").from_to(0.001, 10.0),
     number!("sequence.precharge_s", sequence.precharge_s, "s", "time with the low sides on").from_to(0.0, 10.0),
     auto!("sequence.magnetise_s", sequence.magnetise_s, Settings::magnetise_s, "s", "time with direct current alone").beside(magnetise_range),
+    word!("sequence.flux", sequence.flux: Flux, "flux that the rule for the direct current aims at: low as in the dissertation, or high").learned(),
     auto!("sequence.i_d", sequence.i_d, Settings::i_d, "A", "direct (magnetising) current, peak").beside(|s| (0.01, s.current_limit_a())).learned(),
     auto!("sequence.stop_a_per_s", sequence.stop_a_per_s, Settings::stop_a_per_s, "A/s", "slope of the torque current at a stop").from_to(0.1, 1e5),
 

@@ -9,7 +9,9 @@
 //! | `limits.trip_a` | 4.3 A | rated current; at most 0.962 of the sensors' range |
 //! | `limits.current_a` | 3.5 A | rated current; at most 0.814 of the trip |
 //! | `speed.i_q_limit_a` | 3 A | `limits.current_a` |
-//! | `sequence.i_d` | 0.7 A | rated current |
+//! | `sequence.i_d` | 0.7 A | rated current; with `sequence.flux` high see [`Settings::i_d`]: 1.991 A |
+//! | `limits.motor_a` | 3.62 A | rated current |
+//! | `limits.inverter_a` | 3.5 A | `limits.current_a` |
 //! | `sequence.stop_a_per_s` | 30 A/s | rated current |
 //! | `sequence.magnetise_s` | 0.93 s | rotor time constant: five of them, 0.8 s at least |
 //! | `inverter.full_compensation_a` | 30 mA | the sensors' range |
@@ -27,7 +29,7 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use super::Settings;
 use super::table::{CarrierTable, ReferenceTable, SlopeTable};
-use super::{CurrentSensors, IdentifiedPlant, Line, Motor, Nameplate};
+use super::{CurrentSensors, Flux, IdentifiedPlant, Line, Motor, Nameplate};
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
@@ -41,6 +43,10 @@ const POLE_PAIRS: f32 = 2.0;
 const DC_LINK_V: f32 = 311.0;
 /// End of the range of its current sensors, A.
 const RANGE_A: f32 = -Line::CHANNEL_A.offset;
+/// Carrier current per direct current.
+const CARRIER_OF_I_D: f32 = 0.368_07;
+/// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
+const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Frequency of the carrier, Hz.
 const CARRIER_HZ: f32 = 600.0;
 
@@ -114,9 +120,30 @@ impl Settings {
     }
 
     /// Direct (magnetising) current, A peak. 0.7 A is that of section 3.10.
+    ///
+    /// With high flux it is that of the rated flux or, where it is smaller, 0.55 times the rated current; and where the
+    /// current limit is small, 4/7 of that, which leaves 0.82 of it for the torque.
     pub fn i_d(&self) -> f32 {
-        let rule = || f32::min(self.share_of_rated(0.7), self.current_limit_a());
+        let plate = &self.nameplate;
+        let rule = || match self.sequence.flux {
+            Flux::Low => f32::min(self.share_of_rated(0.7), self.current_limit_a()),
+            Flux::High => {
+                let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
+                let of_flux = rated_flux / self.motor.l_m;
+                f32::min(of_flux, 0.55 * self.rated_a()).min(4.0 / 7.0 * self.current_limit_a())
+            }
+        };
         or_rule(self.sequence.i_d, rule)
+    }
+
+    /// Current that the motor carries for any time at standstill, A peak.
+    pub fn motor_a(&self) -> f32 {
+        or_rule(self.limits.motor_a, || self.rated_a())
+    }
+
+    /// Current that the inverter carries for any time, A peak.
+    pub fn inverter_a(&self) -> f32 {
+        or_rule(self.limits.inverter_a, || self.current_limit_a())
     }
 
     /// Slope of the torque current at a stop, A/s.
@@ -137,14 +164,16 @@ impl Settings {
 
     /// Peak of the injected voltage, V, from the reactance X = ω σL_s of the leakage at the carrier.
     ///
-    /// The angle error is noise over saliency and carrier current, so the rule asks for a current, 0.26 A of the
-    /// dissertation's motor. The remainder of the dead time asks for a voltage, 50 V at 311 V. The larger of both is
+    /// The angle error is noise over saliency and carrier current, so the rule asks for a current: 0.368 of the direct
+    /// current, 0.26 A of the dissertation's motor at 0.7 A, and at most 0.46 A of it, which the trip leaves room for (family
+    /// R at 2 A: 2.9° rms with 0.26 A, 1.7° with 0.46 A). The remainder of the dead time asks for a voltage, 50 V at 311 V. The larger of both is
     /// taken, but not more than the voltage that drives half the direct current: beyond, phases b and c would cross zero
     /// at a start, where the drop of the inverter is uncertain. The voltage is between 20 and 110 V at 311 V.
     pub fn carrier_v(&self) -> f32 {
         let rule = || {
             let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
-            let by_noise = self.share_of_rated(0.257_65) * reactance;
+            let of_i_d = CARRIER_OF_I_D * self.i_d();
+            let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
             let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
             let most = 0.5 * self.i_d() * reactance;
             f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))

@@ -73,15 +73,14 @@ impl Source for RealSwitches {
     fn voltage(&self, i: Complex) -> Complex {
         let legs = &self.0;
         let currents = phases(i);
+        let signs = currents.map(smooth_sign);
+        let shares = match legs.inverse_knee {
+            0.0 => signs,
+            inverse_knee => currents.map(|i| swung(i * inverse_knee)),
+        };
         let error = |k: usize| {
-            let sign = smooth_sign(currents[k]);
-            let size = if sign > 0.0 { legs.lost[k] } else { legs.gained[k] };
-            let share = if legs.inverse_knee == 0.0 {
-                sign
-            } else {
-                swung(currents[k] * legs.inverse_knee)
-            };
-            share * (size - legs.residual) + sign * legs.residual
+            let size = if signs[k] > 0.0 { legs.lost[k] } else { legs.gained[k] };
+            shares[k] * (size - legs.residual) + signs[k] * legs.residual
         };
         legs.v - i * legs.on_resistance - clarke([error(0), error(1), error(2)])
     }

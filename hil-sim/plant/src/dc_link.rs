@@ -120,8 +120,9 @@ impl DcLink {
         if since >= 0.0 && since < s.outage {
             return 0.0;
         }
-        let angle = TAU * s.mains_hz * self.time;
         let sector = if s.pulses == 2 { PI } else { FRAC_PI_3 };
-        self.nominal * ((angle + 0.5 * sector).rem_euclid(sector) - 0.5 * sector).cos()
+        // Time is not negative.
+        let pulses = TAU * s.mains_hz * self.time / sector + 0.5;
+        self.nominal * (sector * (pulses.fract() - 0.5)).cos()
     }
 }

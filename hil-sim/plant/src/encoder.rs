@@ -59,7 +59,6 @@ impl Encoder {
     }
 
     /// Follows the rotor to this mechanical angle, rad, not wrapped.
-    #[inline]
     pub fn follow(&mut self, angle: f64) {
         let position = angle * self.counts_per_radian;
         match self.fault {
@@ -73,7 +72,6 @@ impl Encoder {
     }
 
     /// The counter, wrapping.
-    #[inline]
     pub fn count(&self) -> u32 {
         let seen = self.position - self.lost;
         let towards_zero = seen as i64;

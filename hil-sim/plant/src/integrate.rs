@@ -46,9 +46,17 @@ impl<M: MachineModel> MotorModel<M> {
 
     /// Integrates over `h` seconds at the constant terminal voltage `v` (V).
     pub fn step(&mut self, v: Complex, h: f64) {
+        self.begin_period();
         self.begin_step();
         self.advance(&All(v), h);
         self.end_step(h);
+    }
+
+    /// Fixes for a period what depends on the angle of the rotor.
+    #[inline]
+    pub(crate) fn begin_period(&mut self) {
+        self.mechanics.begin_period(self.state.angle);
+        self.machine.turn(&mut self.state.electrical);
     }
 
     /// Fixes the torques on the shaft for an integration step.
@@ -56,7 +64,7 @@ impl<M: MachineModel> MotorModel<M> {
     pub(crate) fn begin_step(&mut self) {
         if self.mechanics.has_extras() {
             let torque = self.machine.torque(&self.state.electrical);
-            self.state.speed = self.mechanics.begin(self.state.angle, self.state.speed, torque);
+            self.state.speed = self.mechanics.begin(self.state.speed, torque);
         }
     }
 
@@ -117,7 +125,7 @@ impl<M: MachineModel> MotorModel<M> {
         let sixth = h * (1.0 / 6.0);
         let mean_f = |a: f64, b: f64, c: f64, d: f64| (a + d + (b + c) * 2.0) * sixth;
         x.set_advanced(&x0, [&k1, &k2, &k3, &k4], h);
-        m.settle(x);
+        m.finish(x);
         terminals.confine(m, x);
         self.state.speed = n0 + mean_f(a1, a2, a3, a4);
         self.state.angle += mean_f(n0, n1, n2, n3);

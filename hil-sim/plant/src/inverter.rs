@@ -142,14 +142,12 @@ impl Inverter {
     }
 
     /// Fraction of the period for which each leg is commanded high.
-    #[inline]
     fn duties(&self, compare: &Compare) -> [f64; 3] {
         let inverse = 1.0 / self.top;
         [compare.a, compare.b, compare.c].map(|c| (f64::from(c) * inverse).min(1.0))
     }
 
     /// The averages of a period of `period` seconds with these compare values, outputs on.
-    #[inline]
     pub(crate) fn averaged(&self, compare: &Compare, period: f64) -> Averaged {
         let duties = self.duties(compare);
         let mut v = clarke(duties);

@@ -20,6 +20,10 @@
 //! # Ok::<(), motor_plant::PlantError>(())
 //! ```
 
+// Hints to inline are where they were measured, in nanoseconds a period: without those of machine, model and mechanics
+// model A takes 339 in place of 279, without those here and in model 284; without those of the energy model and the
+// switched edges all effects take 780 in place of 731. They are `always` where a plain hint was not followed (the
+// derivative of model A: 2330 in place of 2170 with switched edges).
 mod averaged;
 mod complex;
 mod dc_link;

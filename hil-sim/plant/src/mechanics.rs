@@ -1,7 +1,7 @@
 //! The shaft: inertia, friction and load; with an elastic coupling, a second inertia.
 //!
-//! Static friction, a torque once a turn and the coupling are constant within an integration step, so the shaft is of first
-//! order in it with them.
+//! Static friction and the torque of the coupling are constant within an integration step, a torque once a turn within a
+//! PWM period, so the shaft is of first order in them.
 
 use serde::{Deserialize, Serialize};
 
@@ -80,8 +80,8 @@ struct Extras {
     static_torque: f64,
     once_torque: f64,
     coupling: Option<Coupling>,
-    /// Torque of the load in this step.
-    at_load: f64,
+    /// Torque once a turn in this period.
+    once: f64,
     /// Speed at the start of the step; 0 also while friction holds the shaft.
     speed: f64,
 }
@@ -130,7 +130,7 @@ impl Mechanics {
             static_torque: s.static_torque,
             once_torque: s.once_torque,
             coupling,
-            at_load: 0.0,
+            once: 0.0,
             speed: 0.0,
         };
         let mut mechanics = Self {
@@ -197,15 +197,23 @@ impl Mechanics {
         self.extras.is_some()
     }
 
-    /// Fixes the torques of an integration step that begins at this rotor angle, speed and electromagnetic torque.
+    /// Fixes the torque once a turn for a period that begins at this rotor angle.
+    #[inline]
+    pub(crate) fn begin_period(&mut self, angle: f64) {
+        if let Some(extras) = &mut self.extras {
+            extras.once = extras.once_torque * angle.cos();
+        }
+    }
+
+    /// Fixes the torques of an integration step that begins at this speed and electromagnetic torque.
     /// Returns the speed, zero where friction holds the shaft.
     #[inline(never)]
-    pub(crate) fn begin(&mut self, angle: f64, speed: f64, torque: f64) -> f64 {
+    pub(crate) fn begin(&mut self, speed: f64, torque: f64) -> f64 {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        extras.at_load = load + extras.once_torque * angle.cos();
-        let against = extras.coupling.as_mut().map_or(extras.at_load, |coupling| {
+        let at_load = load + extras.once;
+        let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
             coupling.torque =
                 coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
             coupling.torque
@@ -230,10 +238,11 @@ impl Mechanics {
 
     /// Ends an integration step of `h` seconds: the inertia behind the coupling follows.
     pub(crate) fn end(&mut self, speed: f64, h: f64) {
-        if let (Load::Free { .. }, Some(Extras { at_load, coupling: Some(coupling), .. })) =
-            (self.load, &mut self.extras)
-        {
-            coupling.speed += h * (coupling.torque - *at_load) / coupling.inertia;
+        let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
+            return;
+        };
+        if let Some(coupling) = &mut extras.coupling {
+            coupling.speed += h * (coupling.torque - load - extras.once) / coupling.inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }

@@ -43,15 +43,22 @@ pub trait MachineModel: Copy {
     fn after_step(&mut self, _: &Self::State, _h: f64) {}
 
     /// Makes the dependent quantities of a state match the integrated ones.
-    #[inline]
-    fn settle(&self, _: &mut Self::State) {}
-
-    /// As [`Self::settle`] within an integration step, where what depends on the angle of the rotor may be
-    /// integrated like the rest.
-    #[inline]
-    fn correct(&self, x: &mut Self::State) {
-        self.settle(x);
+    fn settle(&self, x: &mut Self::State) {
+        self.turn(x);
+        self.finish(x);
     }
+
+    /// Sets what turns with the rotor to its angle. Once a period is enough: between, it is integrated.
+    #[inline]
+    fn turn(&self, _: &mut Self::State) {}
+
+    /// Takes the slopes at a stage of an integration step.
+    #[inline]
+    fn correct(&self, _: &mut Self::State) {}
+
+    /// Takes the error of an integration step off what depends on the integrated quantities.
+    #[inline]
+    fn finish(&self, _: &mut Self::State) {}
 }
 
 /// Time derivative of the state of a model.

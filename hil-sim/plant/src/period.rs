@@ -34,6 +34,7 @@ impl Around {
         compare: &Compare,
         period: f64,
     ) -> Complex {
+        motor.begin_period();
         self.sensors.begin_period(period);
         let volt_seconds = if !compare.enabled {
             self.freewheel(motor, period)

@@ -36,13 +36,13 @@ pub(crate) enum Level {
 /// Commanded edges of one leg, in order of time.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
-    /// Instant (s from the start of the period) and whether the leg goes high.
+    /// Instant at which it takes effect (s from the start of the period) and whether the leg goes high.
     edges: [(f64, bool); EDGES],
     count: usize,
 }
 
 impl Leg {
-    fn new(before: f64, now: f64, period: f64) -> Self {
+    fn new(before: f64, now: f64, period: f64, delay: f64) -> Self {
         let mut leg = Self { edges: [(0.0, false); EDGES], count: 0 };
         leg.pulse(before, -period, period);
         if (before >= 1.0) != (now >= 1.0) {
@@ -52,6 +52,9 @@ impl Leg {
         if leg.count == 0 {
             // Long ago.
             leg.push(f64::NEG_INFINITY, now >= 1.0);
+        }
+        for (time, _) in &mut leg.edges {
+            *time += delay;
         }
         leg
     }
@@ -68,15 +71,15 @@ impl Leg {
         }
     }
 
-    /// At `time`, with the edges already delayed by `delay`.
+    /// At `time`.
     #[inline]
-    fn level(&self, time: f64, delay: f64, dead_time: f64) -> Level {
+    fn level(&self, time: f64, dead_time: f64) -> Level {
         let edges = &self.edges[..self.count];
-        let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| edge + delay <= time) else {
+        let Some(&(edge, high)) = edges.iter().rev().find(|(edge, _)| *edge <= time) else {
             // Before the first edge.
             return if edges[0].1 { Level::Low } else { Level::High };
         };
-        match (time - (edge + delay) < dead_time, high) {
+        match (time - edge < dead_time, high) {
             (true, _) => Level::Off,
             (false, true) => Level::High,
             (false, false) => Level::Low,
@@ -90,7 +93,6 @@ pub(crate) struct Pattern {
     legs: [Leg; 3],
     instants: [f64; INSTANTS],
     count: usize,
-    delay: f64,
     dead_time: f64,
 }
 
@@ -102,13 +104,12 @@ impl Pattern {
             if inverter.previous.enabled { inverter.previous } else { Compare::LOW_SIDES_ON };
         let duty = |c: u16| f64::from(c) / inverter.top;
         let legs = [(before.a, compare.a), (before.b, compare.b), (before.c, compare.c)]
-            .map(|(before, now)| Leg::new(duty(before), duty(now), period));
+            .map(|(before, now)| Leg::new(duty(before), duty(now), period, inverter.propagation));
         let mut instants = [0.0; INSTANTS];
         let mut count = 0;
         for leg in &legs {
-            for (edge, _) in &leg.edges[..leg.count] {
-                let acts = edge + inverter.propagation;
-                for instant in [acts, acts + inverter.dead_time] {
+            for &(edge, _) in &leg.edges[..leg.count] {
+                for instant in [edge, edge + inverter.dead_time] {
                     if instant > 0.0 && instant < period {
                         instants[count] = instant;
                         count += 1;
@@ -119,7 +120,7 @@ impl Pattern {
         instants[count] = period;
         count += 1;
         instants[..count].sort_unstable_by(f64::total_cmp);
-        Self { legs, instants, count, delay: inverter.propagation, dead_time: inverter.dead_time }
+        Self { legs, instants, count, dead_time: inverter.dead_time }
     }
 
     /// The pieces of the period: duration (s), and the state of the legs.
@@ -130,7 +131,7 @@ impl Pattern {
             let middle = 0.5 * (start + end);
             start = end;
             (duration > 0.0).then(|| {
-                let levels = self.legs.map(|leg| leg.level(middle, self.delay, self.dead_time));
+                let levels = self.legs.each_ref().map(|leg| leg.level(middle, self.dead_time));
                 (duration, levels)
             })
         })
@@ -138,6 +139,7 @@ impl Pattern {
 }
 
 /// Leg voltages at these levels and this stator current.
+#[inline]
 fn leg_voltages(levels: [Level; 3], i: Complex, vdc: f64) -> [f64; 3] {
     let currents = phases(i);
     std::array::from_fn(|k| match levels[k] {

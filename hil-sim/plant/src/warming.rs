@@ -54,9 +54,12 @@ impl Warming {
 
     /// Resistances of stator and rotor after so many periods, ohm, where they are to be changed.
     pub(crate) fn resistances(&self, periods: u64, period_s: f64) -> Option<(f64, f64)> {
+        if !periods.is_multiple_of(PERIODS) {
+            return None;
+        }
         let share = -(-(periods as f64) * period_s / self.law.time_constant).exp_m1();
         let warm = |cold: f64, rise: f64| cold * (1.0 + rise * share);
         let (rs, rr) = self.cold;
-        periods.is_multiple_of(PERIODS).then(|| (warm(rs, self.law.rs), warm(rr, self.law.rr)))
+        Some((warm(rs, self.law.rs), warm(rr, self.law.rr)))
     }
 }

@@ -185,22 +185,27 @@ fn linear_iron_is_model_a_without_saliency() {
 
 #[test]
 fn two_steps_a_period_are_enough() {
-    let settings = PlantSettings {
-        iron: Some(ALL),
-        inverter: InverterSettings::IDEAL,
-        measurement: MeasurementSettings::IDEAL,
-        ..Default::default()
-    };
-    // While the outputs are on; off, the instants at which diodes stop count.
-    let on = |substeps| {
-        let mut currents = run(&PlantSettings { substeps, ..settings }, 1200);
-        currents.truncate(960);
-        currents
-    };
-    let exact = on(64);
-    let errors = [2, 4, 8].map(|substeps| worst(&on(substeps), &exact));
-    println!("2, 4, 8 steps: {errors:?} A from 64");
-    assert!(errors[0] < 5e-5 && errors[2] < 0.1 * errors[0], "{errors:?}");
+    // Teeth on the rotor flux are not a gradient, and have rates of their own.
+    let r = FAMILIES.iter().find(|family| family.name == "r").expect("r").iron;
+    for iron in [ALL, r] {
+        let settings = PlantSettings {
+            iron: Some(iron),
+            inverter: InverterSettings::IDEAL,
+            measurement: MeasurementSettings::IDEAL,
+            ..Default::default()
+        };
+        // While the outputs are on; off, the instants at which diodes stop count.
+        let on = |substeps| {
+            let mut currents = run(&PlantSettings { substeps, ..settings }, 1200);
+            currents.truncate(960);
+            currents
+        };
+        let exact = on(64);
+        let errors = [2, 4, 8].map(|substeps| worst(&on(substeps), &exact));
+        println!("2, 4, 8 steps: {errors:?} A from 64");
+        // Order four leaves 1/256 of the error; with a rate missing it is of order one, a quarter.
+        assert!(errors[0] < 5e-5 && errors[2] < 0.02 * errors[0], "{errors:?}");
+    }
 }
 
 #[test]

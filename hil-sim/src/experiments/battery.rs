@@ -15,7 +15,7 @@ mod trial;
 use std::sync::OnceLock;
 
 pub use drive::{Condition, DriveUnderTest, Purpose};
-pub use kind::{KINDS, Kind, nominal_limit_a};
+pub use kind::{KINDS, Kind, nominal_limit_a, torque_nm};
 pub use summary::Summary;
 pub use trial::{Trial, learned, trial};
 

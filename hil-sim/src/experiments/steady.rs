@@ -84,8 +84,11 @@ pub fn prepared(drive: &Settings, config: &Config, seed: u64) -> Result<Rig, Err
     Rig::from_config(&config, seed)
 }
 
-/// Starts a drive and brings it up to speed without torque; it may have stopped itself on the way.
-fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
+/// Starts a drive and brings it up to speed, rpm, without torque; it may have stopped itself on the way.
+///
+/// # Errors
+/// When the drive does not start.
+pub fn bring_up(rig: &mut Rig, rpm: f64) -> Result<(), Error> {
     rig.start(Mode::Torque)?;
     let steps = (rpm.abs() / RAMP_RPM_PER_S / 0.01).ceil() as u32;
     for n in 1..=steps {

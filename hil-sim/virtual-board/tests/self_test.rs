@@ -1,4 +1,4 @@
-//! The self-test of the over-voltage protection at start, on every board: what it finds is said, `start` is refused for
+//! The self-test of the over-voltage protection at start: what it finds is said, `start` is refused for
 //! it, and no driver switches until it is mended.
 
 use anyhow::{Result, bail, ensure};
@@ -67,8 +67,8 @@ fn refused(stage: &'static PowerStage, why: &str, broken: impl Fn(&mut Board, bo
     bail!("{}: it does not switch on: {}", stage.name, board.take_console())
 }
 
-fn damaged(damage: Damage, why: &str) -> Result<()> {
-    ALL.into_iter().try_for_each(|stage| {
+fn damaged(stages: &[&'static PowerStage], damage: Damage, why: &str) -> Result<()> {
+    stages.iter().try_for_each(|stage| {
         refused(stage, why, |board, broken| board.chip().damage = broken.then_some(damage))
     })
 }
@@ -95,22 +95,22 @@ fn a_dc_link_above_the_level_is_not_started() -> Result<()> {
 /// DAC3 gives nothing: the comparator trips at every level.
 #[test]
 fn a_level_that_stays_at_zero_is_not_started() -> Result<()> {
-    damaged(Damage::Level(0), TRIPS_ALWAYS)
+    damaged(&[&REFERENCE], Damage::Level(0), TRIPS_ALWAYS)
 }
 
 /// A comparator whose output stays low, or whose level stays at the top: neither would ever trip.
 #[test]
 fn a_comparator_that_does_not_trip_is_not_started() -> Result<()> {
     let why = "the over-voltage comparator does not trip at the level zero";
-    damaged(Damage::Comparator, why)?;
-    damaged(Damage::Level(4095), why)
+    damaged(&ALL, Damage::Comparator, why)?;
+    damaged(&[&REFERENCE], Damage::Level(4095), why)
 }
 
 /// The comparator trips, and the timer does not see it; a break flag that the fault input left at start does not hide it.
 #[test]
 fn a_comparator_that_does_not_reach_the_timer_is_not_started() -> Result<()> {
     let why = "the over-voltage comparator does not reach the break of TIM1";
-    damaged(Damage::Break, why)?;
+    damaged(&ALL, Damage::Break, why)?;
     refused(&REFERENCE, why, |board, broken| {
         board.chip().damage = broken.then_some(Damage::Break);
         board.set_fault_pin(!broken);

@@ -3,14 +3,16 @@
 use core::fmt;
 
 use drive_core::settings::value::ValueError;
+use thiserror::Error;
 
 use crate::link::trace::SIGNALS;
 use crate::settings::keys::Key;
 
 /// Reason why a line is invalid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ParseError<'a> {
     /// No such command.
+    #[error("no such command: {word}; {}`help` lists them", Meant(*.near))]
     Command {
         /// The word.
         word: &'a str,
@@ -18,10 +20,13 @@ pub enum ParseError<'a> {
         near: Option<&'static str>,
     },
     /// This word is missing.
+    #[error("{0} is missing")]
     Missing(&'static str),
     /// A word more than the command takes.
+    #[error("too many words, from `{0}` on")]
     TooMuch(&'a str),
     /// More of these than this number.
+    #[error("more than {most} {what}")]
     TooMany {
         /// The things that are counted.
         what: &'static str,
@@ -29,6 +34,7 @@ pub enum ParseError<'a> {
         most: usize,
     },
     /// Not a finite number.
+    #[error("not a number: {word} ({what})")]
     Number {
         /// What it stands for, with its unit.
         what: &'static str,
@@ -36,6 +42,7 @@ pub enum ParseError<'a> {
         word: &'a str,
     },
     /// Not one of these words.
+    #[error("{what} = {word}: not one of: {all}")]
     OneOf {
         /// What it stands for.
         what: &'static str,
@@ -45,6 +52,7 @@ pub enum ParseError<'a> {
         all: &'static str,
     },
     /// Not a whole number in this range.
+    #[error("{what} = {word}: not a whole number from {min} to {max}")]
     Whole {
         /// What it stands for.
         what: &'static str,
@@ -56,8 +64,10 @@ pub enum ParseError<'a> {
         max: u16,
     },
     /// Not eight hexadecimal digits.
+    #[error("not eight hexadecimal digits: {0}")]
     Hexadecimal(&'a str),
     /// No such signal.
+    #[error("no such signal: {word}; {}there are:{}", Meant(*.near), Signals)]
     Signal {
         /// The word.
         word: &'a str,
@@ -65,6 +75,7 @@ pub enum ParseError<'a> {
         near: Option<&'static str>,
     },
     /// No such setting.
+    #[error("no such setting: {word}; {}`get` lists them", Meant(*.near))]
     Key {
         /// The word.
         word: &'a str,
@@ -72,6 +83,7 @@ pub enum ParseError<'a> {
         near: Option<&'static str>,
     },
     /// Not a value of the setting.
+    #[error("{} = {word}: {why}", .key.name())]
     Value {
         /// The setting.
         key: Key,
@@ -82,42 +94,20 @@ pub enum ParseError<'a> {
     },
 }
 
-impl fmt::Display for ParseError<'_> {
+/// The word that may have been meant.
+struct Meant(Option<&'static str>);
+
+impl fmt::Display for Meant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Command { word, near } => {
-                write!(f, "no such command: {word}; ")?;
-                meant(f, *near)?;
-                f.write_str("`help` lists them")
-            }
-            Self::Missing(what) => write!(f, "{what} is missing"),
-            Self::TooMuch(word) => write!(f, "too many words, from `{word}` on"),
-            Self::TooMany { what, most } => write!(f, "more than {most} {what}"),
-            Self::Number { what, word } => write!(f, "not a number: {word} ({what})"),
-            Self::OneOf { what, word, all } => {
-                write!(f, "{what} = {word}: not one of: {all}")
-            }
-            Self::Whole { what, word, min, max } => {
-                write!(f, "{what} = {word}: not a whole number from {min} to {max}")
-            }
-            Self::Hexadecimal(word) => write!(f, "not eight hexadecimal digits: {word}"),
-            Self::Signal { word, near } => {
-                write!(f, "no such signal: {word}; ")?;
-                meant(f, *near)?;
-                f.write_str("there are:")?;
-                SIGNALS.iter().try_for_each(|signal| write!(f, " {}", signal.name))
-            }
-            Self::Key { word, near } => {
-                write!(f, "no such setting: {word}; ")?;
-                meant(f, *near)?;
-                f.write_str("`get` lists them")
-            }
-            Self::Value { key, word, why } => write!(f, "{} = {word}: {why}", key.name()),
-        }
+        self.0.map_or(Ok(()), |near| write!(f, "did you mean `{near}`? "))
     }
 }
 
-/// Writes the word that may have been meant.
-fn meant(f: &mut fmt::Formatter<'_>, near: Option<&str>) -> fmt::Result {
-    near.map_or(Ok(()), |near| write!(f, "did you mean `{near}`? "))
+/// The names of all signals.
+struct Signals;
+
+impl fmt::Display for Signals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        SIGNALS.iter().try_for_each(|signal| write!(f, " {}", signal.name))
+    }
 }

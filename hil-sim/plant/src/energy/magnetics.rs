@@ -22,7 +22,7 @@ use crate::complex::{Complex, square};
 /// Residual, A per ampere of current, below which one more linear correction ends the iteration. The correction is of
 /// second order: it leaves some 1e-7 of the current, a hundredth of the error of two integration steps a period.
 const CLOSE: f64 = 1e-3;
-/// Most iterations; two are usual, some ten after a jump of the flux.
+/// Most iterations; one is usual, some ten after a jump of the flux.
 const LIMIT: u32 = 60;
 /// Below this, Wb, a flux has no direction.
 const NO_FLUX: f64 = 1e-12;

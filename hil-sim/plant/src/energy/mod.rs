@@ -16,6 +16,9 @@
 //! Without skin effect there is `dr/dt = -rr i_r + j w r` alone. The eddy currents have a leakage
 //! `Le = Re 100 us`: iron loss follows the square of the frequency up to 1.6 kHz. Hysteresis, space
 //! harmonics and the ripple of the PWM edges in the iron are absent.
+//!
+//! Within an integration step main flux, current and the axis of the slots are integrated by their exact rates. At its
+//! end main flux and current are solved for; at the start of a period the slots are set to the angle of the rotor.
 
 mod family;
 mod magnetics;
@@ -242,9 +245,9 @@ impl MachineModel for EnergyMachine {
         if self.magnetics.slots == 0.0 {
             return 1.5 * torque;
         }
-        let y = x.psi_s - x.solution.m;
-        let slots = x.solution.slots * y.conj() * y.conj();
-        1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots.im)
+        let leakage = x.psi_s - x.solution.m;
+        let slots = cross(leakage * leakage, x.solution.slots);
+        1.5 * (torque + 0.5 * self.magnetics.bars * self.pole_pairs * slots)
     }
 
     #[inline(always)]
@@ -304,12 +307,16 @@ impl MachineModel for EnergyMachine {
     }
 
     #[inline]
-    fn settle(&self, x: &mut EnergyState) {
+    fn turn(&self, x: &mut EnergyState) {
         x.solution.slots = self.magnetics.slot_vector(x.theta);
+    }
+
+    #[inline]
+    fn finish(&self, x: &mut EnergyState) {
         self.magnetics.solve([x.psi_s, x.psi_r, x.psi_iron], &mut x.solution);
     }
 
-    /// Takes the slots where they were integrated to: one sine and cosine a step.
+    /// Main flux and current are as integrated.
     #[inline]
     fn correct(&self, x: &mut EnergyState) {
         let i = x.solution.i;

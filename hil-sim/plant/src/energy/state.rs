@@ -52,7 +52,7 @@ pub struct EnergyRate {
     pub theta: f64,
     /// Of the saliency of the rotor's slots.
     pub(super) slots: Complex,
-    /// Of main flux and stator current: a first guess at the next state.
+    /// Of main flux and stator current.
     pub(super) m: Complex,
     pub(super) i: Complex,
 }
@@ -85,7 +85,7 @@ impl ElectricalState for EnergyState {
         self.psi_iron = x.psi_iron + k.psi_iron * h;
         self.theta = x.theta + k.theta * h;
         self.solution.slots = x.solution.slots + k.slots * h;
-        // First guesses; slopes are left to the solution.
+        // Rotor current and slopes are left to `correct`.
         self.solution.m = x.solution.m + k.m * h;
         self.solution.i = x.solution.i + k.i * h;
     }
@@ -98,6 +98,7 @@ impl ElectricalState for EnergyState {
         self.psi_deep = x.psi_deep + increment(k.map(|k| k.psi_deep), sixth);
         self.psi_iron = x.psi_iron + increment(k.map(|k| k.psi_iron), sixth);
         self.theta = x.theta + (k[0].theta + k[3].theta + (k[1].theta + k[2].theta) * 2.0) * sixth;
+        self.solution.slots = x.solution.slots + increment(k.map(|k| k.slots), sixth);
         self.solution.m = x.solution.m + increment(k.map(|k| k.m), sixth);
         self.solution.i = x.solution.i + increment(k.map(|k| k.i), sixth);
     }

@@ -85,6 +85,7 @@ impl CurrentChannel {
 
 /// Pole, and weights of old and new input, of a first-order lag over a step of `x` time constants in which
 /// the input is straight.
+#[inline]
 fn coefficients(x: f64) -> [f64; 3] {
     let pole = (-x).exp();
     // Mean of the impulse response over the step.
@@ -189,11 +190,11 @@ impl Sensors {
     /// Codes with the rare errors.
     #[cold]
     fn mean_codes(&self, rare: &CurrentErrors, rng: &mut Xoshiro256PlusPlus) -> [u16; 2] {
-        let codes = rare.currents().map(|seen| self.converted(seen, rare.offsets(), rng));
-        let (count, sum) = codes.fold((0, [0; 2]), |(count, sum), [a, b]| {
-            (count + 1, [sum[0] + u32::from(a), sum[1] + u32::from(b)])
-        });
-        sum.map(|sum| sum.div_ceil(count) as u16)
+        let (now, middle) = rare.currents();
+        let now = self.converted(now, rare.offsets(), rng);
+        let Some(middle) = middle else { return now };
+        let middle = self.converted(middle, rare.offsets(), rng);
+        [0, 1].map(|k| (u32::from(now[k]) + u32::from(middle[k])).div_ceil(2) as u16)
     }
 
     /// The codes at these currents and further offsets, A.

@@ -83,10 +83,10 @@ impl CurrentErrors {
         }
     }
 
-    /// Currents of the conversions, A, the first that of now.
-    pub(super) fn currents(&self) -> impl Iterator<Item = [f64; 2]> {
+    /// What the channels read now, A, and in the middle of the period where that is converted too.
+    pub(super) fn currents(&self) -> ([f64; 2], Option<[f64; 2]>) {
         let bent = |seen: [f64; 2]| [0, 1].map(|k| seen[k] + self.cubic[k] * seen[k].powi(3));
-        std::iter::once(self.now).chain(self.middle).map(bent)
+        (bent(self.now), self.middle.map(bent))
     }
 
     /// Offsets by drift, A.
@@ -101,6 +101,9 @@ pub(super) struct VoltageErrors {
     gain: f64,
     /// Time constant of the lag, s; 0 is none.
     lag: f64,
+    /// Pole of the lag and the time step, s, it is for.
+    pole: f64,
+    step: f64,
     /// What is behind the lag, V; not a number before the first period.
     seen: f64,
     /// V rms.
@@ -114,6 +117,8 @@ impl VoltageErrors {
         acts.then_some(Self {
             gain: 1.0 + s.dc_gain_error,
             lag: s.dc_lag_us * 1e-6,
+            pole: 0.0,
+            step: f64::NAN,
             seen: f64::NAN,
             noise: s.dc_noise_v,
         })
@@ -122,8 +127,11 @@ impl VoltageErrors {
     /// Follows the voltage, V, over `h` seconds at whose end it is `vdc`.
     pub(super) fn follow(&mut self, vdc: f64, h: f64) {
         if self.lag > 0.0 {
+            if h != self.step {
+                (self.step, self.pole) = (h, (-h / self.lag).exp());
+            }
             let before = if self.seen.is_nan() { vdc } else { self.seen };
-            self.seen = vdc + (before - vdc) * (-h / self.lag).exp();
+            self.seen = vdc + (before - vdc) * self.pole;
         }
     }
 

@@ -1,0 +1,47 @@
+//! What the tests of the effects share.
+
+use drive_core::Compare;
+use motor_plant::{
+    Complex, InverterSettings, IronSettings, Load, MeasurementSettings, Plant, PlantSettings,
+    phases,
+};
+
+/// A PWM period, s.
+pub const T: f64 = 1.0 / 6000.0;
+
+/// Linear iron, ideal inverter and sensors, a locked shaft.
+pub fn settings() -> PlantSettings {
+    let mut settings = PlantSettings {
+        iron: Some(IronSettings::LINEAR),
+        inverter: InverterSettings::IDEAL,
+        measurement: MeasurementSettings::IDEAL,
+        ..PlantSettings::default()
+    };
+    settings.mechanics.load = Load::Locked;
+    settings
+}
+
+/// The plant with these settings.
+pub fn plant(settings: &PlantSettings) -> Plant {
+    Plant::new(settings, 7).expect("plant")
+}
+
+/// Duties that give the voltage `v`, V, at 311 V.
+pub fn compare(v: Complex) -> Compare {
+    let [a, b, c] = phases(v).map(|v| ((0.5 + v / 311.0) * 14_167.0).round() as u16);
+    Compare { a, b, c, enabled: true }
+}
+
+/// The plant after `seconds` of a constant voltage.
+pub fn held(settings: &PlantSettings, v: Complex, seconds: f64) -> Plant {
+    let mut plant = plant(settings);
+    for _ in 0..(seconds / T) as u32 {
+        plant.advance(&compare(v), T);
+    }
+    plant
+}
+
+/// Within a tolerance.
+pub fn near(found: f64, expected: f64, tolerance: f64) {
+    assert!((found - expected).abs() <= tolerance, "{found}, expected {expected} ± {tolerance}");
+}

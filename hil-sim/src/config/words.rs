@@ -1,0 +1,83 @@
+//! The words that keys of the bench may have as values.
+
+use super::value::words;
+
+words! {
+    /// Load on the shaft.
+    LoadMode {
+        /// Shaft blocked.
+        Locked = "locked",
+        /// Turns freely against `load.torque_nm`.
+        Free = "free",
+        /// A dynamometer holds `load.speed_rpm`.
+        Speed = "speed",
+    }
+}
+
+words! {
+    /// Model of the motor: model A with its assumed saliency, or a family of iron from which saliency emerges.
+    PlantModel {
+        /// Model A.
+        A = "a",
+        /// Energy model, linear iron.
+        Linear = "linear",
+        /// Teeth fixed to the rotor flux, -3.5 %.
+        R = "r",
+        /// Teeth fixed to the rotor flux, -5 %.
+        R5 = "r5",
+        /// Teeth fixed to the air-gap flux, -3.5 %.
+        G = "g",
+        /// Teeth fixed to the air-gap flux, -7 %.
+        G7 = "g7",
+        /// Main flux, n = 4.
+        M4 = "m4",
+        /// Main flux, n = 6.
+        M6 = "m6",
+        /// Main flux, n = 4, and stator leakage.
+        M4b = "m4b",
+        /// Main flux, n = 6, and stator leakage.
+        M6b = "m6b",
+        /// Teeth, main flux, leakages and skin effect.
+        F = "f",
+    }
+}
+
+words! {
+    /// Flux at which the numbers of a family hold.
+    FluxLevel {
+        /// That of a direct current of 0.7 A with the dissertation's motor, in proportion to the rated current.
+        Low = "low",
+        /// The smaller of the rated flux and that of 0.55 times the peak of the rated current.
+        High = "high",
+    }
+}
+
+words! {
+    /// Which runs the battery consists of.
+    BatteryRuns {
+        /// The twelve kinds.
+        Kinds = "kinds",
+        /// Load steps of battery.load_share.
+        Load = "load",
+        /// Torque near its largest at rest.
+        Hold = "hold",
+        /// The flux turned at once.
+        Forced = "forced",
+        /// Torque commands that never rest.
+        Restless = "restless",
+    }
+}
+
+words! {
+    /// A phase that is interrupted between inverter and motor.
+    OpenPhase {
+        /// None.
+        None = "none",
+        /// Phase a.
+        A = "a",
+        /// Phase b.
+        B = "b",
+        /// Phase c.
+        C = "c",
+    }
+}

@@ -1,0 +1,241 @@
+//! The record: full torque at zero stator frequency for minutes, a slow reversal of the speed under full torque, and how
+//! fast the torque follows.
+
+mod held;
+mod step;
+
+use drive_core::{Accepted, Command, Mode};
+
+use self::held::{Held, Standstill, reversing};
+use self::step::{CurrentLoop, PARTS, Response, measured};
+use super::battery::{nominal_limit_a, torque_nm};
+use super::steady::{bring_up, prepared};
+use super::torque::assumptions;
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
+use crate::config::Config;
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::rig::{RATE_HZ, Rig};
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "record",
+    stands_for: "what section 5.2 leaves open",
+    about: "A drive that has learned: full torque at zero stator frequency for `record.minutes`, a reversal of the speed \
+            under full torque, and a torque step with what takes its time.",
+    uses: &[BENCH, DRIVE, &["record."]],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
+    run,
+};
+
+/// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
+const SETTLING_S: f64 = 5.0;
+/// Speed from which, and to whose opposite, the shaft goes, rpm on four poles.
+const REVERSAL_RPM: f64 = 150.0;
+
+/// What is done with full torque, of either sign.
+#[derive(Clone, Copy, PartialEq)]
+enum Course {
+    Standstill,
+    Reversal,
+}
+
+const COURSES: [(Course, f64); 4] = [
+    (Course::Standstill, 1.0),
+    (Course::Standstill, -1.0),
+    (Course::Reversal, 1.0),
+    (Course::Reversal, -1.0),
+];
+
+impl Course {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Standstill => "zero stator frequency",
+            Self::Reversal => "reversal of the speed",
+        }
+    }
+
+    fn key(self) -> &'static str {
+        match self {
+            Self::Standstill => "hold",
+            Self::Reversal => "reversal",
+        }
+    }
+}
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let mut config = context.config.clone();
+    config.prepare.learn = true;
+    let rig = prepared(&config.drive, &config, context.seed)?;
+    let nominal = nominal_limit_a(&config);
+    let limit = limit_a(&rig, nominal)?;
+    let held = context.in_parallel("record", &COURSES, |_, &(course, sign)| {
+        hold(&config, rig.clone(), course, sign * limit)
+    })?;
+    let mut outcome = Outcome::default();
+    let m = &mut outcome.metrics;
+    m.set("limit_a", limit);
+    m.set("limit_pct", 100.0 * limit / nominal);
+    m.set("limit_nm", torque_nm(&config, limit));
+    for course in [Course::Standstill, Course::Reversal] {
+        let of = || COURSES.iter().zip(&held).filter(|((known, _), _)| *known == course);
+        let worst = |value: &dyn Fn(&Held) -> f64| {
+            of().map(|(_, held)| value(held).abs()).fold(0.0, f64::max)
+        };
+        let key = course.key();
+        m.set(format!("{key}_error_mean_deg"), worst(&|held| held.error.mean()));
+        m.set(format!("{key}_error_rms_deg"), worst(&|held| held.error.rms()));
+        m.set(format!("{key}_error_max_deg"), worst(&|held| held.error.largest()));
+        if course == Course::Standstill {
+            m.set("hold_drift_deg", worst(&Held::drift_deg));
+            m.set("hold_speed_rpm", worst(&|held| held.speed.mean()));
+            m.set("hold_flux_travel_deg", worst(&|held| held.travel_deg));
+        }
+        let lost = of().any(|(_, held)| held.is_lost());
+        m.set(format!("{key}_lost"), f64::from(u8::from(lost)));
+    }
+    for ((course, sign), held) in COURSES.iter().zip(&held) {
+        let name = || format!("{} at {:+.0} % torque", course.name(), 100.0 * sign);
+        if let Some(fault) = &held.fault {
+            outcome.faults.push(format!("{}: {fault}", name()));
+        } else if held.is_lost() {
+            outcome.faults.push(format!("{}: angle lost", name()));
+        }
+    }
+    outcome.tables.push(held_table(&config, &held, limit));
+    for course in [Course::Standstill, Course::Reversal] {
+        outcome.figures.push(held_figure(course, &held));
+    }
+    steps(&config, &rig, limit, &mut outcome)?;
+    outcome.remarks = assumptions(&config);
+    outcome.remarks.push(format!(
+        "Full torque is that of the largest torque current that the drive accepts, {limit:.3} A of nominally {nominal:.3} A. \
+         Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux stands at record.flux_deg from phase a."
+    ));
+    Ok(outcome)
+}
+
+/// The largest torque current that the drive accepts, A.
+fn limit_a(rig: &Rig, nominal: f64) -> Result<f64, Error> {
+    let mut rig = rig.clone();
+    rig.command(&Command::Start(Mode::Torque))?;
+    Ok(match rig.command(&Command::Torque(nominal as f32))? {
+        Accepted::Limited(taken) => taken.into(),
+        Accepted::AsGiven => nominal,
+    })
+}
+
+/// Starts the drive, gives it its torque, and watches.
+fn hold(config: &Config, mut rig: Rig, course: Course, i_q: f64) -> Result<Held, Error> {
+    let rpm = config.rpm(REVERSAL_RPM);
+    bring_up(&mut rig, if course == Course::Reversal { rpm } else { 0.0 })?;
+    if rig.fault().is_none() {
+        rig.command(&Command::Torque(i_q as f32))?;
+    }
+    match course {
+        Course::Standstill => {
+            let mut dynamometer = Standstill::new(config);
+            let at = dynamometer.at;
+            let mut speed = |_: f64, plant: &_| dynamometer.speed(plant);
+            Held::watch(&mut rig, SETTLING_S, at, &mut speed)?;
+            Held::watch(&mut rig, 60.0 * config.record.minutes, at, speed)
+        }
+        Course::Reversal => {
+            let seconds = config.record.reversal_s;
+            Held::watch(&mut rig, SETTLING_S, 0.0, |_, plant| reversing(rpm, seconds)(0.0, plant))?;
+            Held::watch(&mut rig, seconds, 0.0, reversing(rpm, seconds))
+        }
+    }
+}
+
+fn held_table(config: &Config, all: &[Held], limit: f64) -> Table {
+    let mut table = Table::new("Full torque held", &[]).note(
+        "First and last: means over the first and the last tenth of the time. Torque: mean in relation to that of the \
+         current; it includes the shape of the error.",
+    );
+    for ((course, sign), held) in COURSES.iter().zip(all) {
+        let degrees = |value: f64| Cell::fixed(value, 2);
+        table.record([
+            ("course", Cell::from(course.name())),
+            ("torque (%)", Cell::fixed(100.0 * sign, 0)),
+            ("mean error (°)", degrees(held.error.mean())),
+            ("first (°)", degrees(held.first.mean())),
+            ("last (°)", degrees(held.last.mean())),
+            ("rms (°)", degrees(held.error.rms())),
+            ("largest (°)", degrees(held.error.largest())),
+            (
+                "torque of the command (%)",
+                Cell::fixed(100.0 * held.torque.mean() / torque_nm(config, sign * limit), 2),
+            ),
+            ("speed (rpm)", Cell::fixed(held.speed.mean(), 2)),
+            ("end", Cell::from(held.fault.clone().unwrap_or_else(|| "regulates".to_owned()))),
+        ]);
+    }
+    table
+}
+
+fn held_figure(course: Course, all: &[Held]) -> Figure {
+    let x = "time (s)";
+    let labels = ["angle error (° electrical)", "torque (Nm)", "speed (rpm)"];
+    let mut figure = Figure::new(course.key(), format!("Full torque, {}", course.name()), "");
+    for (n, label) in labels.into_iter().enumerate() {
+        let of = COURSES.iter().zip(all).filter(|((known, _), _)| *known == course);
+        let panel = of.fold(Panel::new(x, label), |panel, ((_, sign), held)| {
+            let name = format!("{:+.0} %", 100.0 * sign);
+            panel.with(Series::line(name, held.lines[n].clone()))
+        });
+        figure = figure.panel(panel);
+    }
+    figure
+}
+
+/// The step to full torque at rest.
+fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Result<(), Error> {
+    let mut rig = rig.clone();
+    bring_up(&mut rig, 0.0)?;
+    let [torque, reference] = measured(&rig, limit)?;
+    let whole = CurrentLoop::new(config)?;
+    let linear = whole.response();
+    let ms = |response: &Response| response.time_ms(0.9);
+    let m = &mut outcome.metrics;
+    m.set("step_90_ms", ms(&torque));
+    m.set("step_overshoot_pct", 100.0 * torque.overshoot());
+    m.set("step_reference_90_ms", ms(&reference));
+    m.set("step_linear_90_ms", ms(&linear));
+    let mut table = Table::new("Torque step to 90 %", &[]).note(
+        "Motor: the torque of the simulated motor, mean over steps at all samples of a carrier period. Loop: the linear \
+         current loop, whole and without one of its parts beside the same controller; what the part costs is the \
+         difference.",
+    );
+    let mut row = |name: String, response: &Response, cost: Option<f64>| {
+        table.record([
+            ("", Cell::from(name)),
+            ("90 % after (ms)", Cell::fixed(ms(response), 2)),
+            ("within 2 % after (ms)", Cell::fixed(response.settled_ms(), 2)),
+            ("overshoot (%)", Cell::fixed(100.0 * response.overshoot(), 1)),
+            ("cost to 90 % (ms)", cost.map_or(Cell::from("-"), |cost| Cell::fixed(cost, 2))),
+        ]);
+    };
+    row("motor, torque".to_owned(), &torque, None);
+    row("drive, filtered reference".to_owned(), &reference, None);
+    row("loop, whole".to_owned(), &linear, None);
+    let mut lines = Panel::new("time after the command (ms)", "share of the final value")
+        .with(share("torque of the motor", &torque))
+        .with(share("filtered reference", &reference));
+    for (part, name) in PARTS.into_iter().enumerate() {
+        let without = whole.without(part).response();
+        let cost = ms(&linear) - ms(&without);
+        m.set(format!("step_cost_{}_ms", ["reference_filter", "low_pass", "delay"][part]), cost);
+        row(format!("loop, without {name}"), &without, Some(cost));
+        lines = lines.with(share(&format!("loop without {name}"), &without));
+    }
+    outcome.tables.push(table);
+    outcome.figures.push(Figure::new("step", "Step to full torque at rest", "").panel(lines));
+    Ok(())
+}
+
+fn share(name: &str, response: &Response) -> Series {
+    let end = response.end();
+    let points = response.0.iter().enumerate();
+    Series::line(name, points.map(|(k, value)| (1e3 * k as f64 / RATE_HZ, value / end)).collect())
+}

@@ -1,0 +1,54 @@
+//! The record: torque at zero stator frequency, a slow reversal and a step, against the equations of the motor.
+
+use hil_sim::outcome::Metrics;
+use hil_sim::{Config, experiments};
+
+fn record(set: &[&str]) -> Metrics {
+    let short = ["record.minutes=0.1", "record.reversal_s=5"];
+    let set: Vec<String> = short.iter().chain(set).map(|&set| set.to_owned()).collect();
+    let config = Config::load(None, None, &set).expect("allowed settings");
+    experiments::run("record", &config, 3).expect("a record").metrics
+}
+
+/// The slip at i_d = 0.7 A and i_q = 3 A is 3/0.7 r_r/L_r = 23.03 rad/s, 110.0 rpm on four poles: so fast the shaft turns
+/// against it while the flux stands. Sound angles change the slip by 2 % at most.
+#[test]
+fn full_torque_is_held_at_zero_stator_frequency() {
+    for at in ["record.flux_deg=0", "record.flux_deg=100"] {
+        let metrics = record(&[at]);
+        let get = |name: &str| metrics.get(name).expect(name);
+        assert!((get("hold_speed_rpm") - 110.0).abs() < 2.5, "{}", get("hold_speed_rpm"));
+        // The noise of the estimated angle moves the flux; turning it would pass 180 degrees.
+        assert!(get("hold_flux_travel_deg") < 40.0, "{}", get("hold_flux_travel_deg"));
+        assert!((get("limit_a") - 3.0).abs() < 1e-6 && (get("limit_nm") - 0.9653).abs() < 1e-3);
+        for key in ["hold", "reversal"] {
+            assert_eq!(get(&format!("{key}_lost")), 0.0);
+            assert!(get(&format!("{key}_error_mean_deg")) < 1.5, "{key}: {metrics:?}");
+            assert!(get(&format!("{key}_error_max_deg")) < 13.0, "{key}: {metrics:?}");
+        }
+    }
+}
+
+/// With an encoder and a rotor resistance believed twice too large the drive imposes twice the slip, 220 rpm, and the flux
+/// stands at atan(i_q/i_d) - atan(2 i_q/i_d) = -6.48 degrees from where the drive believes it, held or not.
+#[test]
+fn a_wrong_slip_shows_as_speed_and_angle() {
+    let metrics = record(&["angle_source=encoder", "drive.motor.r_r=2.2"]);
+    let get = |name: &str| metrics.get(name).expect(name);
+    assert!((get("hold_speed_rpm") - 219.9).abs() < 2.0, "{}", get("hold_speed_rpm"));
+    for name in ["hold_error_mean_deg", "reversal_error_mean_deg"] {
+        assert!((get(name) - 6.48).abs() < 0.4, "{name}: {}", get(name));
+    }
+    assert!(get("hold_drift_deg") < 0.2, "{}", get("hold_drift_deg"));
+}
+
+/// Without saturation the torque follows as the linear loop does: its reference filter alone takes 90 % after
+/// ln(0.1)/ln(p_f) periods, and is what costs the time.
+#[test]
+fn the_step_is_that_of_the_linear_loop() {
+    let metrics = record(&["saliency.b1=0"]);
+    let get = |name: &str| metrics.get(name).expect(name);
+    let (motor, linear) = (get("step_90_ms"), get("step_linear_90_ms"));
+    assert!((motor - linear).abs() < 0.5, "{motor} {linear}");
+    assert!(get("step_cost_reference_filter_ms") > 0.7 * linear, "{metrics:?}");
+}
