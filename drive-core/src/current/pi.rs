@@ -102,14 +102,20 @@ impl DqPiState {
     }
 }
 
-/// First-order reference filter, Eq. 3.40: F_ref(z) = (1 - p_f)/(z - p_f). Unit gain at dc.
+/// First-order reference filter, Eq. 3.40: F_ref(z) = (1 - p_f)/(z - p_f), beside a direct share s of the reference:
 ///
-/// Strictly proper as printed: the output depends on the references up to the previous step.
-/// With `p_f` = `z_c` it cancels the zero of the controller in the response to the reference.
+/// ```text
+/// F(z) = s + (1 - s) (1 - p_f)/(z - p_f)
+/// ```
+///
+/// Unit gain at dc. As printed, without a direct share, it is strictly proper: the output depends on the references up to
+/// the previous step. With `p_f` = `z_c` it cancels the zero of the controller in the response to the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceFilter {
     /// 1 - p_f, in (0, 1].
     pub one_minus_p: f32,
+    /// Direct share, 0 to 1.
+    pub direct: f32,
 }
 
 /// State of a [`ReferenceFilter`]: its next output.
@@ -119,15 +125,21 @@ pub struct ReferenceState {
 }
 
 impl ReferenceFilter {
-    /// Filter with its pole at `p_f`, in [0, 1).
+    /// Filter with its pole at `p_f`, in [0, 1), as printed.
     pub const fn new(p_f: f64) -> Self {
-        Self { one_minus_p: (1.0 - p_f) as f32 }
+        Self { one_minus_p: (1.0 - p_f) as f32, direct: 0.0 }
+    }
+
+    /// The same with a `direct` share of the reference, 0 to 1.
+    pub const fn with_direct(self, direct: f32) -> Self {
+        Self { direct, ..self }
     }
 
     /// Filters one sample, any unit.
     pub fn step(&self, state: &mut ReferenceState, reference: f32) -> f32 {
-        let output = state.next;
-        state.next += self.one_minus_p * (reference - output);
+        let rest = reference - state.next;
+        let output = state.next + self.direct * rest;
+        state.next += self.one_minus_p * rest;
         output
     }
 }
