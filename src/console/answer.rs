@@ -374,10 +374,14 @@ enum NotTaken {
     Command(CommandError),
 }
 
-/// Designs the controllers for settings, and gives them to the drive.
+/// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
+#[inline(never)]
 fn configure(drive: &mut impl DriveHandle, settings: &FirmwareSettings) -> Result<(), NotTaken> {
-    let coefficients = drive.build(settings).map_err(NotTaken::Design)?;
-    drive.command(Command::Configure(coefficients)).map(|_| ()).map_err(NotTaken::Command)
+    let taken = match drive.build(settings) {
+        Ok(coefficients) => drive.command(Command::Configure(coefficients)),
+        Err(why) => return Err(NotTaken::Design(why)),
+    };
+    taken.map(|_| ()).map_err(NotTaken::Command)
 }
 
 /// Settings of another board.
