@@ -366,24 +366,22 @@ impl Console {
 }
 
 /// Reason why the drive has not taken settings.
+#[derive(Error, Debug)]
 enum NotTaken {
+    #[error("{0}; not in force, still staged")]
     Design(SettingsError),
+    #[error(transparent)]
     Command(CommandError),
 }
 
-impl fmt::Display for NotTaken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Design(why) => write!(f, "{why}; not in force, still staged"),
-            Self::Command(why) => why.fmt(f),
-        }
-    }
-}
-
-/// Designs the controllers for settings, and gives them to the drive.
+/// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
+#[inline(never)]
 fn configure(drive: &mut impl DriveHandle, settings: &FirmwareSettings) -> Result<(), NotTaken> {
-    let coefficients = drive.build(settings).map_err(NotTaken::Design)?;
-    drive.command(Command::Configure(coefficients)).map(|_| ()).map_err(NotTaken::Command)
+    let taken = match drive.build(settings) {
+        Ok(coefficients) => drive.command(Command::Configure(coefficients)),
+        Err(why) => return Err(NotTaken::Design(why)),
+    };
+    taken.map(|_| ()).map_err(NotTaken::Command)
 }
 
 /// Settings of another board.

@@ -138,7 +138,8 @@ impl Learning {
         let at_rest = ahead[0] * per_lead;
         let mut k = [at_rest; POINTS];
         let mut last = 0;
-        for n in 1..=self.points {
+        // The bound is known, but not to the compiler: without it a panic would be reachable.
+        for n in 1..=self.points.min(POINTS - 1) {
             let sides = [ahead[n] - without[n], without[n] - behind[n]].map(|q| q * per_lead);
             let enough = |side: f32| {
                 side / at_rest >= LEAST_SLOPE_UNDER_LOAD.0 && side.abs() >= LEAST_SLOPE_UNDER_LOAD.1
