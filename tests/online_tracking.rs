@@ -60,12 +60,13 @@ fn with_the_encoder_the_angle_stays_right_while_the_rotor_warms_up() {
 
 #[test]
 fn without_a_sensor_it_takes_a_flux_that_moves() {
-    // The lock monitor knows one direct current: with it the drive refuses another.
-    let config = config(&["inverter.residual_v=0.82", "injection.monitor=no"]);
-    let still = run(&config, &WarmingCase { used: false, ..CASE }, 3).unwrap();
+    let residual = "inverter.residual_v=0.82";
+    let still = run(&config(&[residual]), &WarmingCase { used: false, ..CASE }, 3).unwrap();
     for moment in &still {
         assert!(moment.estimate.is_err(), "speed and tau_r cannot be told apart: {moment:?}");
     }
+    // The lock monitor knows one direct current: with it the drive refuses another.
+    let config = config(&[residual, "injection.monitor=no"]);
     let moved =
         run(&config, &WarmingCase { used: false, excitation: (0.1, 2.0), ..CASE }, 3).unwrap();
     let (error, count, _) = end(&moved);
