@@ -4,7 +4,7 @@
 
 use std::sync::{LazyLock, OnceLock};
 
-use drive_core::identify::learning::Learned;
+use drive_core::identify::learning::{Learned, Verdict};
 use drive_core::{Drive, Sample, State};
 use induction_drive::console::Console;
 use induction_drive::console::announce::ANNOUNCEMENTS;
@@ -76,7 +76,7 @@ fn words() -> Vec<&'static str> {
     let levels = LEVELS.iter().map(|(name, _)| *name);
     let signals = SIGNALS.iter().map(|signal| signal.name);
     let others = [
-        "encoder", "injection", "learning", "yes", "no", "synchronous", "rectified", "motor", "auto", "on",
+        "encoder", "injection", "learning", "again", "yes", "no", "synchronous", "rectified", "motor", "auto", "on",
         "above", "fault", "now", "check", "00000000",
     ];
     let words: Vec<_> =
@@ -91,5 +91,5 @@ fn doubtful() -> Learned {
     found.carrier = None;
     found.gain_mismatch.accepted = false;
     found.current_saliency.accepted = false;
-    Learned { accepted: false, ..found }
+    Learned { slope: None, verdict: Verdict::Uneven, ..found }
 }
