@@ -258,6 +258,7 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<battery::Battery>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
     Statistical::of::<saliency_check::SaliencyCheck>(),
+    Statistical::of::<smallest_slope::SmallestSlope>(),
 ];
 
 /// The runs of the experiment with this name.

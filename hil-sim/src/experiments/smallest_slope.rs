@@ -3,7 +3,7 @@
 
 use super::battery::{Battery, Summary, Trial};
 use super::saliency::Probe;
-use super::statistics::Study;
+use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
 use crate::config::{Config, plant_settings};
@@ -18,7 +18,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "The battery with ever weaker saliency of the motor: slope dq/de and what the drive does; `runs` at each.",
     uses: &[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]],
     not: &[],
-    run,
+    run: whole::<SmallestSlope>,
 };
 
 /// The shares of the saliency's source, from the strongest on.
@@ -43,18 +43,62 @@ impl Step {
     }
 }
 
-fn run(context: &Context<'_>) -> Result<Outcome, Error> {
-    let shares: Vec<f64> = (0..STEPS)
-        .map(|n| 1.0 - (1.0 - LEAST_SHARE) * f64::from(n) / f64::from(STEPS - 1))
-        .collect();
-    let one = |_, &share: &f64| step(context, share);
-    let steps = context.in_parallel("smallest-slope", &shares, one)?;
+/// The runs of all steps, one step after the other.
+pub struct SmallestSlope {
+    shares: Vec<f64>,
+    /// The configuration and the battery of each step.
+    steps: Vec<(Config, Battery)>,
+    /// Runs of each step.
+    each: usize,
+}
+
+impl Study for SmallestSlope {
+    type Record = Trial;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let share = |n| 1.0 - (1.0 - LEAST_SHARE) * f64::from(n) / f64::from(STEPS - 1);
+        let shares: Vec<f64> = (0..STEPS).map(share).collect();
+        let each = context.config.extent.runs.unwrap_or(RUNS);
+        let step = |&share: &f64| {
+            let mut config = weakened(context.config, share);
+            config.prepare.learn = true;
+            config.extent.runs = Some(each);
+            let context = Context { config: &config, progress: Progress::hidden(), ..*context };
+            let battery = Battery::new(&context)?;
+            Ok((config, battery))
+        };
+        let steps = shares.iter().map(step).collect::<Result<_, Error>>()?;
+        Ok(Self { shares, steps, each: each as usize })
+    }
+
+    fn runs(&self) -> usize {
+        self.steps.len() * self.each
+    }
+
+    fn run(&self, number: usize) -> Result<Trial, Error> {
+        self.steps[number / self.each].1.run(number % self.each)
+    }
+
+    fn outcome(&self, context: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
+        let parts = self.shares.iter().zip(&self.steps).zip(trials.chunks(self.each));
+        let step = |((&share, (config, _)), trials): ((&f64, &(Config, Battery)), &[Trial])| {
+            let slope = Probe::new(config)?.slope(config.drive.i_d().into(), 0.0);
+            Ok(Step { share, slope, summary: Summary::of(trials) })
+        };
+        let steps = parts.map(step).collect::<Result<Vec<_>, Error>>()?;
+        Ok(judged(&steps, context.config))
+    }
+}
+
+/// The outcome of all steps.
+fn judged(steps: &[Step], config: &Config) -> Outcome {
     let mut outcome = Outcome::default();
     let mut table = Table::new("Ever weaker saliency", &[]).note(
         "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
          of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
     );
-    for step in &steps {
+    for step in steps {
         let slope = step.slope.map_or(Cell::from("-"), |slope| Cell::fixed(slope, 4));
         let works = if step.works() { "yes" } else { "no" };
         let limit = step.summary.limit_share;
@@ -89,21 +133,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 .with(Series::points("rms", line(|s| s.error.rms()))),
         ),
     );
-    outcome.remarks = assumptions(context.config);
-    Ok(outcome)
-}
-
-/// Learns and does the runs.
-fn step(context: &Context<'_>, share: f64) -> Result<Step, Error> {
-    let mut config = weakened(context.config, share);
-    config.prepare.learn = true;
-    config.extent.runs = Some(context.config.extent.runs.unwrap_or(RUNS));
-    let slope = Probe::new(&config)?.slope(config.drive.i_d().into(), 0.0);
-    let context = Context { config: &config, progress: Progress::hidden(), ..*context };
-    let battery = Battery::new(&context)?;
-    let trials: Vec<Trial> =
-        (0..battery.runs()).map(|number| battery.run(number)).collect::<Result<_, _>>()?;
-    Ok(Step { share, slope, summary: Summary::of(&trials) })
+    outcome.remarks = assumptions(config);
+    outcome
 }
 
 /// The same motor with a share of what its saliency comes from.
