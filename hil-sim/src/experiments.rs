@@ -38,6 +38,7 @@ mod reversal;
 pub mod saliency;
 mod saliency_check;
 mod sensorless_position;
+mod smallest_slope;
 mod speed_profile;
 pub mod statistics;
 mod steady;
@@ -234,6 +235,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     record::EXPERIMENT,
+    smallest_slope::EXPERIMENT,
     tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
@@ -256,6 +258,7 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<battery::Battery>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
     Statistical::of::<saliency_check::SaliencyCheck>(),
+    Statistical::of::<smallest_slope::SmallestSlope>(),
 ];
 
 /// The runs of the experiment with this name.

@@ -18,8 +18,10 @@ fn full_torque_is_held_at_zero_stator_frequency() {
         let metrics = record(&[at]);
         let get = |name: &str| metrics.get(name).expect(name);
         assert!((get("hold_speed_rpm") - 110.0).abs() < 2.5, "{}", get("hold_speed_rpm"));
+        // In 6 s the flux does not get further than its travel: a turn would be 0.17 Hz.
+        assert!(get("hold_stator_hz") < 0.05, "{}", get("hold_stator_hz"));
         // The noise of the estimated angle moves the flux; turning it would pass 180 degrees.
-        assert!(get("hold_flux_travel_deg") < 40.0, "{}", get("hold_flux_travel_deg"));
+        assert!(get("hold_flux_travel_deg") < 90.0, "{}", get("hold_flux_travel_deg"));
         assert!((get("limit_a") - 3.0).abs() < 1e-6 && (get("limit_nm") - 0.9653).abs() < 1e-3);
         for key in ["hold", "reversal"] {
             assert_eq!(get(&format!("{key}_lost")), 0.0);

@@ -9,7 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 6] = [
+const SMALL: [(&str, &[&str]); 7] = [
     ("speed-torque-sweep", &["--seconds", "0.2"]),
     (
         "monte-carlo",
@@ -31,6 +31,7 @@ const SMALL: [(&str, &[&str]); 6] = [
     ),
     ("lock-monitor", &["--set", "runs=1"]),
     ("saliency-check", &["--set", "runs=2"]),
+    ("smallest-slope", &["--set", "runs=1"]),
 ];
 
 /// A small run whose outcome depends on every record.

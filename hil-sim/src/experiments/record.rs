@@ -29,7 +29,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 /// Time after the torque command that is not judged, s: flux, angle and dynamometer settle.
-const SETTLING_S: f64 = 5.0;
+const SETTLING_S: f64 = 12.0;
 /// Speed from which, and to whose opposite, the shaft goes, rpm on four poles.
 const REVERSAL_RPM: f64 = 150.0;
 
@@ -89,6 +89,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         if course == Course::Standstill {
             m.set("hold_drift_deg", worst(&Held::drift_deg));
             m.set("hold_speed_rpm", worst(&|held| held.speed.mean()));
+            m.set("hold_stator_hz", worst(&|held| held.stator_hz));
             m.set("hold_flux_travel_deg", worst(&|held| held.travel_deg));
         }
         let lost = of().any(|(_, held)| held.is_lost());

@@ -13,9 +13,10 @@ use crate::stats::Stats;
 const PACE_S: f64 = 0.001;
 const SHOWN_S: f64 = 0.5;
 /// Time constant of its filter of the slip, s; its gain from the angle of the flux to the electrical speed, 1/s, and the
-/// largest part that this has, rad/s; its largest electrical acceleration, rad/s^2, 200 rpm/s on four poles.
-const SLIP_S: f64 = 0.5;
-const ANGLE_GAIN: f64 = 4.0;
+/// largest part that this has, rad/s; its largest electrical acceleration, rad/s^2, 200 rpm/s on four poles. It is slow
+/// against the drive: a faster one answers the noise of the angle with acceleration.
+const SLIP_S: f64 = 2.0;
+const ANGLE_GAIN: f64 = 3.0;
 const ANGLE_MOST: f64 = 4.0;
 const ACCELERATION: f64 = 42.0;
 
@@ -32,6 +33,8 @@ pub struct Held {
     pub torque: Stats,
     /// Largest angle of the rotor flux from where the dynamometer is to hold it, electrical degrees.
     pub travel_deg: f64,
+    /// Mean stator frequency: that of the rotor flux, electrical Hz.
+    pub stator_hz: f64,
     /// Speed of the rotor, rpm.
     pub speed: Stats,
     /// Means of angle error, degrees, torque, Nm, and speed, rpm, at their times, s.
@@ -66,6 +69,7 @@ impl Held {
         let mut shown = [Stats::default(), Stats::default(), Stats::default()];
         let steps = (seconds / PACE_S).round() as u64;
         let each = (SHOWN_S / PACE_S).min(seconds / PACE_S / 50.0).max(1.0) as u64;
+        let (mut turned, mut before) = (0.0, rig.plant.rotor_flux_angle());
         for n in 1..=steps {
             let t = rig.time() - start;
             let turns = speed(t, &rig.plant) / rig.plant.pole_pairs();
@@ -82,8 +86,10 @@ impl Held {
                 let values = [point.angle_error_deg, point.torque, point.speed_rpm];
                 shown.iter_mut().zip(values).for_each(|(mean, value)| mean.push(value));
             });
-            let travel = rig.plant.rotor_flux_angle() - at;
-            held.travel_deg = held.travel_deg.max(wrapped_degrees(travel).abs());
+            let angle = rig.plant.rotor_flux_angle();
+            turned += wrapped_degrees(angle - std::mem::replace(&mut before, angle));
+            held.stator_hz = turned / 360.0 / (t + PACE_S);
+            held.travel_deg = held.travel_deg.max(wrapped_degrees(angle - at).abs());
             if n % each == 0 {
                 for (line, mean) in held.lines.iter_mut().zip(&mut shown) {
                     line.push((t, std::mem::take(mean).mean()));

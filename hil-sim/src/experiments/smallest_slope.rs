@@ -1,0 +1,176 @@
+//! The smallest slope of the saliency signal at which a drive that has learned still works: the source of the motor's
+//! saliency is weakened step by step, and the battery runs at each.
+
+use super::battery::{Battery, Summary, Trial};
+use super::saliency::Probe;
+use super::statistics::{Study, whole};
+use super::torque::assumptions;
+use super::{BENCH, Context, DRIVE, Experiment};
+use crate::config::{Config, plant_settings};
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::progress::Progress;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "smallest-slope",
+    stands_for: "what section 5.2 leaves open",
+    about: "The battery with ever weaker saliency of the motor: slope dq/de and what the drive does; `runs` at each.",
+    uses: &[BENCH, DRIVE, &["battery.", "disturbed.", "after.", "runs"]],
+    not: &[],
+    run: whole::<SmallestSlope>,
+};
+
+/// The shares of the saliency's source, from the strongest on.
+const STEPS: u32 = 20;
+const LEAST_SHARE: f64 = 0.05;
+/// Runs at each, unless `runs` says otherwise: two of each kind.
+const RUNS: u32 = 24;
+
+/// What a motor does whose saliency has this share of its source.
+struct Step {
+    share: f64,
+    /// Slope dq/de without load at the drive's magnetising current, 1/rad.
+    slope: Option<f64>,
+    summary: Summary,
+}
+
+impl Step {
+    /// Whether each run was accepted, and none was lost, silently wrong or stopped.
+    fn works(&self) -> bool {
+        let s = &self.summary;
+        s.refused.is_empty() && s.trips.is_empty() && s.lost == 0 && s.silent == 0
+    }
+}
+
+/// The runs of all steps, one step after the other.
+pub struct SmallestSlope {
+    shares: Vec<f64>,
+    /// The configuration and the battery of each step.
+    steps: Vec<(Config, Battery)>,
+    /// Runs of each step.
+    each: usize,
+}
+
+impl Study for SmallestSlope {
+    type Record = Trial;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let share = |n| 1.0 - (1.0 - LEAST_SHARE) * f64::from(n) / f64::from(STEPS - 1);
+        let shares: Vec<f64> = (0..STEPS).map(share).collect();
+        let each = context.config.extent.runs.unwrap_or(RUNS);
+        let step = |&share: &f64| {
+            let mut config = weakened(context.config, share);
+            config.prepare.learn = true;
+            config.extent.runs = Some(each);
+            let context = Context { config: &config, progress: Progress::hidden(), ..*context };
+            let battery = Battery::new(&context)?;
+            Ok((config, battery))
+        };
+        let steps = shares.iter().map(step).collect::<Result<_, Error>>()?;
+        Ok(Self { shares, steps, each: each as usize })
+    }
+
+    fn runs(&self) -> usize {
+        self.steps.len() * self.each
+    }
+
+    fn run(&self, number: usize) -> Result<Trial, Error> {
+        self.steps[number / self.each].1.run(number % self.each)
+    }
+
+    fn outcome(&self, context: &Context<'_>, trials: Vec<Trial>) -> Result<Outcome, Error> {
+        let parts = self.shares.iter().zip(&self.steps).zip(trials.chunks(self.each));
+        let step = |((&share, (config, _)), trials): ((&f64, &(Config, Battery)), &[Trial])| {
+            let slope = Probe::new(config)?.slope(config.drive.i_d().into(), 0.0);
+            Ok(Step { share, slope, summary: Summary::of(trials) })
+        };
+        let steps = parts.map(step).collect::<Result<Vec<_>, Error>>()?;
+        Ok(judged(&steps, context.config))
+    }
+}
+
+/// The outcome of all steps.
+fn judged(steps: &[Step], config: &Config) -> Outcome {
+    let mut outcome = Outcome::default();
+    let mut table = Table::new("Ever weaker saliency", &[]).note(
+        "Share: of the saturation of the main flux and of the teeth; with plant a, of saliency.a_psi. Slope: dq/de without load, \
+         of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
+    );
+    for step in steps {
+        let slope = step.slope.map_or(Cell::from("-"), |slope| Cell::fixed(slope, 4));
+        let works = if step.works() { "yes" } else { "no" };
+        let limit = step.summary.limit_share;
+        let head = [
+            ("share", Cell::fixed(step.share, 2)),
+            ("slope (1/rad)", slope),
+            ("works", Cell::from(works)),
+            ("limit (%)", limit.map_or(Cell::from("-"), |share| Cell::fixed(100.0 * share, 0))),
+        ];
+        table.record(head.into_iter().chain(step.summary.cells()));
+    }
+    outcome.tables.push(table);
+    let m = &mut outcome.metrics;
+    let working = steps.iter().take_while(|step| step.works());
+    if let Some(last) = working.last() {
+        m.set("smallest_share", last.share);
+        if let Some(slope) = last.slope {
+            m.set("smallest_slope_per_rad", slope);
+        }
+    }
+    m.set("silent_runs", steps.iter().map(|step| step.summary.silent).sum::<usize>() as f64);
+    let line = |of: fn(&Summary) -> f64| {
+        let regulated = steps.iter().filter(|step| step.summary.error.count() > 0);
+        let points = regulated.filter_map(|step| Some((step.slope?, of(&step.summary))));
+        points.collect::<Vec<_>>()
+    };
+    outcome.figures.push(
+        Figure::new("slope", "Angle error over the slope of the saliency signal", "").panel(
+            Panel::new("slope dq/de (1/rad)", "angle error (°)")
+                .with(Series::points("largest", line(|s| s.error.largest())))
+                .with(Series::points("99 %", line(|s| s.p99_deg)))
+                .with(Series::points("rms", line(|s| s.error.rms()))),
+        ),
+    );
+    outcome.remarks = assumptions(config);
+    outcome
+}
+
+/// The same motor with a share of what its saliency comes from.
+fn weakened(config: &Config, share: f64) -> Config {
+    let (mut weaker, plant) = (config.clone(), plant_settings(config));
+    match plant.iron {
+        Some(iron) => {
+            weaker.iron.teeth = Some(share * iron.teeth);
+            weaker.iron.saturation = Some(1.0 + share * (iron.saturation - 1.0));
+        }
+        None => weaker.saliency.a_psi = share * plant.saliency.a_psi,
+    }
+    weaker
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Value;
+
+    /// The slope of model A at rest is twice its saliency; that of linear teeth and of the saturation goes down with its
+    /// source.
+    #[test]
+    fn a_weaker_source_is_a_smaller_slope() {
+        let slope = |plant: &str, share: f64| {
+            let mut config = Config::default();
+            config.set("plant", &Value::Word(plant.to_owned())).unwrap();
+            let probe = Probe::new(&weakened(&config, share)).unwrap();
+            probe.slope(probe.i_d, 0.0).unwrap()
+        };
+        for share in [1.0, 0.3] {
+            let expected = -2.0 * 0.035 * share;
+            assert!((slope("a", share) / expected - 1.0).abs() < 0.05, "{}", slope("a", share));
+        }
+        for plant in ["r", "g7", "m6"] {
+            assert!(slope(plant, 0.5).abs() < 0.8 * slope(plant, 1.0).abs(), "{plant}");
+        }
+    }
+}
