@@ -13,7 +13,7 @@ use anyhow::Result;
 use crate::{run, sources};
 
 /// Most lines of code without tests, in the whole repository.
-const LIMIT: usize = 41_000;
+const LIMIT: usize = 42_500;
 /// Most lines of code without tests in the control code: `drive-core` with all below it.
 const CONTROL_LIMIT: usize = 8_500;
 /// A longer file gives its reason in its head. A person reads the reason.

@@ -2,8 +2,11 @@
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 use core::f32::consts::TAU;
 
+use super::estimator::carrier_lag;
 use super::*;
 use crate::drive::axes::Axes;
+use crate::tuning::FirstOrder;
+use num_complex::Complex64;
 
 fn near(value: f32, expected: f32) {
     assert!((value / expected - 1.0).abs() < 1e-4, "{value}, not {expected}");
