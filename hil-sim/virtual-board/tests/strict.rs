@@ -49,9 +49,8 @@ fn our_image_breaks_no_rule() -> Result<()> {
     let mut board = exact(Image::built()?)?;
     board.run_periods(START)?;
     board.type_line("confirm board");
-    // Changed and changed back: there is something to save.
-    let allow = "set injection.allow_unlearned yes";
-    for line in ["set limits.current_a 5", "save", "defaults", "save", allow] {
+    // Changed and changed back, without a design: there is something to save.
+    for line in ["set command.timeout_s 3", "save", "set command.timeout_s 0", "save"] {
         board.type_line(line);
         board.run_periods(1200)?;
     }
