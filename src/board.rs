@@ -16,7 +16,7 @@ pub use flash::{SETTINGS_SLOT_BYTES, settings_address, settings_page};
 
 use drive_core::Settings;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::{CurrentSensors, Inverter, Line, Scales};
+use drive_core::settings::{CurrentSensors, Inverter, Line, Scales, Sequence};
 
 use crate::boards::{Board, Currents, SELECTED};
 
@@ -343,7 +343,8 @@ pub fn settings_of(board: &Board) -> Settings {
         current_delay_s: board.current_delay_s.value,
         ..defaults.scales
     };
-    Settings { inverter, scales, ..defaults }
+    let sequence = Sequence { flux: board.flux, ..defaults.sequence };
+    Settings { inverter, scales, sequence, ..defaults }
 }
 
 #[cfg(test)]

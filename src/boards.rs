@@ -15,7 +15,7 @@ mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
 mod reference;
 
-use drive_core::settings::{Line, Ntc};
+use drive_core::settings::{Flux, Line, Ntc};
 
 use pin::Pin;
 
@@ -183,6 +183,8 @@ pub struct Board {
     pub ntc: Stated<Ntc>,
     /// Nominal voltage of the dc link, V: the default of `inverter.dc_link_v`.
     pub dc_link_v: f32,
+    /// Flux of the motor: the default of `sequence.flux`.
+    pub flux: Flux,
     /// Highest voltage that the power stage stands, V.
     pub highest_dc_link_v: Stated<f32>,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.

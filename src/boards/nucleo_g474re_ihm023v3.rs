@@ -3,6 +3,8 @@
 //!
 //! A template: its sources are thin and nobody has tried it. Every step of the bench page comes before mains.
 
+use drive_core::settings::Flux;
+
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, Gates, Level, assumed, morpho, read};
 
@@ -26,6 +28,7 @@ pub const BOARD: Board = Board {
     heat_sink: morpho::HEAT_SINK,
     ntc: morpho::NTC,
     dc_link_v: 311.0,
+    flux: Flux::High,
     highest_dc_link_v: read(400.0, "STEVAL-IHM023V3, supply range"),
     pulls: morpho::PULLS,
 };

@@ -4,6 +4,8 @@
 //! Not tried with a motor yet. Set-up of the jumpers: JP1 and JP2 closed, J5 and J6 at three shunts, JP3 closed, J9 open
 //! above 12 V, C3, C5 and C7 removed, JP5 of the Nucleo at E5V.
 
+use drive_core::settings::Flux;
+
 use super::converter::{CODES, REFERENCE_V};
 use super::{Board, Gates, Level, assumed, morpho, read};
 
@@ -28,6 +30,7 @@ pub const BOARD: Board = Board {
     heat_sink: morpho::HEAT_SINK,
     ntc: morpho::NTC,
     dc_link_v: 48.0,
+    flux: Flux::High,
     highest_dc_link_v: read(60.0, "STL220N6F7 data sheet, drain to source"),
     pulls: morpho::PULLS,
 };

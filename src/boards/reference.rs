@@ -1,6 +1,6 @@
 //! The inverter of the dissertation on ST's morpho motor-control pins.
 
-use drive_core::settings::Line;
+use drive_core::settings::{Flux, Line};
 
 use super::converter::calibrated;
 use super::{Analog, Board, Currents, Gates, Level, assumed, morpho, read};
@@ -47,6 +47,7 @@ pub const BOARD: Board = Board {
     heat_sink: morpho::HEAT_SINK,
     ntc: morpho::NTC,
     dc_link_v: 311.0,
+    flux: Flux::Low,
     highest_dc_link_v: assumed(450.0, "the voltage of the capacitors and of the switches"),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };
