@@ -35,10 +35,10 @@ pub fn report(elf: &Path) -> Result<()> {
 
     let region = |name| regions.iter().find(|r| r.name == name).context("memory.x lacks a memory");
     let (flash, stack) = (region("FLASH")?, region("STACK")?);
-    // Three quarters of the flash that memory.x gives (174 of 232 KiB): a quarter is kept for work to come. The
+    // Four fifths of the flash that memory.x gives (185.6 of 232 KiB): a fifth is kept for work to come. The
     // code in CCM has memories of its own, CONTROL and CCM, which the linker checks.
     let flash_used = sum(&sections, |section| flash.takes(section));
-    run::limit("code and constants", flash_used, flash.length / 4 * 3, "bytes")?;
+    run::limit("code and constants", flash_used, flash.length / 5 * 4, "bytes")?;
     run::limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT, "bytes")?;
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
     let most = stack::worst_case(&image).context("stack")?.into();
