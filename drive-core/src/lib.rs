@@ -23,6 +23,7 @@
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`motion`] | speed and position loop |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
+//! | [`learned`] | what a learning has found |
 //! | [`identify`] | learning of the tracking reference; rotor time constant while running |
 //! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
 //! | `drive` | [`Drive`], its [`Coefficients`], states and commands |
@@ -49,6 +50,7 @@ pub mod filter;
 pub mod flux;
 pub mod identify;
 pub mod io;
+pub mod learned;
 pub mod math;
 pub mod motion;
 pub mod protect;

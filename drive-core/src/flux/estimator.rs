@@ -11,7 +11,7 @@ use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
-use crate::identify::learning::Learned;
+use crate::learned::Learned;
 use crate::math::angle::{Angle, UnitVector};
 use crate::settings::table::ReferenceTable;
 

@@ -22,7 +22,6 @@
 //! inverter drop.)
 
 mod evaluate;
-mod result;
 #[cfg(test)]
 mod tests;
 
@@ -34,8 +33,8 @@ use crate::math::frames::Dq;
 use crate::settings::Motor;
 use crate::settings::table::{Grid, POINTS};
 
+pub use crate::learned::{Fitted, LEAST_SLOPE, Learned, Verdict};
 pub use evaluate::Start;
-pub use result::{Fitted, LEAST_SLOPE, Learned, Verdict};
 
 /// Settling time of flux and averages at a point, in rotor time constants.
 const SETTLE_T: f32 = 2.0;

@@ -36,7 +36,7 @@
 
 use crate::carrier::Saliency;
 use crate::fault::Fault;
-use crate::identify::learning::Learned;
+use crate::learned::Learned;
 use crate::settings::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 
 /// Coefficients of the monitor.

@@ -8,8 +8,8 @@
 //! stage has the direction of the carrier. At 45° a drop of 1.6 V per phase looks like a saliency of
 //! 0.0135.) Then the flux is built up again.
 
-use crate::identify::learning::Learned;
 use crate::io::periods;
+use crate::learned::Learned;
 use crate::math::angle::UnitVector;
 use crate::math::frames::SQRT_3;
 

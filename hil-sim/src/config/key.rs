@@ -5,7 +5,7 @@ use drive_core::settings::entry::Entry;
 use drive_core::settings::value as drive;
 use drive_core::settings::{SETTINGS, find};
 
-use super::{Allowed, BENCH, BenchKey, Config, DRIVE, Value, after, after::After};
+use super::{After, Allowed, BENCH, BenchKey, Config, DRIVE, Value};
 use crate::error::{Error, nearest};
 
 /// A key of the bench or of the drive.
@@ -31,7 +31,7 @@ impl Key {
 
     /// The keys of the plant, as they are after the learning.
     pub fn after() -> impl Iterator<Item = Self> {
-        BENCH.iter().filter(|key| after::is_of_plant(key)).map(Self::After)
+        BENCH.iter().filter(|key| is_of_plant(key)).map(Self::After)
     }
 
     /// The keys that an assignment to `name` sets, one or two.
@@ -116,7 +116,7 @@ impl Key {
     pub fn get(self, config: &Config) -> Value {
         match self {
             Self::Bench(key) => (key.get)(config),
-            Self::After(key) => config.after.get(key),
+            Self::After(key) => config.after.get(key.name),
             Self::Drive(entry) => match entry.get(&config.drive) {
                 drive::Value::Number(value) => Value::of_single(value),
                 drive::Value::Whole(value) => Value::Number(value.into()),
@@ -133,7 +133,7 @@ impl Key {
     pub fn set(self, config: &mut Config, value: &Value) -> Result<(), &'static str> {
         match self {
             Self::Bench(key) => (key.set)(config, value),
-            Self::After(key) => After::set(config, key, value),
+            Self::After(key) => set_after(config, key, value),
             Self::Drive(entry) => {
                 let text = match value {
                     Value::Switch(on) => drive::Words::word(*on).to_owned(),
@@ -161,5 +161,45 @@ fn reason(error: drive::ValueError) -> &'static str {
         drive::ValueError::NumberOrAuto => "neither a finite number nor auto",
         drive::ValueError::Whole(_) => "not a whole number in the range",
         drive::ValueError::Word(_) => "not one of the words",
+    }
+}
+
+/// Groups of the keys of the plant; the model and its flux level stay.
+const PLANT: [&str; 8] =
+    ["motor.", "saliency.", "iron.", "warming.", "inverter.", "dc_link.", "measurement.", "shaft."];
+
+/// Whether a key is one of the plant, which may change after the learning.
+fn is_of_plant(key: &BenchKey) -> bool {
+    PLANT.iter().any(|group| key.name.starts_with(group))
+}
+
+/// Sets a key to what it is after the learning, within the range that it always has.
+fn set_after(config: &mut Config, key: &BenchKey, value: &Value) -> Result<(), &'static str> {
+    let taken = match value {
+        Value::Unset => Value::Unset,
+        value => {
+            let mut checked = config.clone();
+            (key.set)(&mut checked, value)?;
+            (key.get)(&checked)
+        }
+    };
+    config.after.set(key.name, taken);
+    Ok(())
+}
+
+impl Config {
+    /// The configuration after the learning: the bench has changed, the drive has not.
+    ///
+    /// # Errors
+    /// The reason why a value is not allowed; those that were taken are.
+    pub fn after_learning(&self) -> Result<Self, &'static str> {
+        let mut config = Self { after: After::default(), ..self.clone() };
+        for key in BENCH {
+            match self.after.get(key.name) {
+                Value::Unset => {}
+                value => (key.set)(&mut config, &value)?,
+            }
+        }
+        Ok(config)
     }
 }

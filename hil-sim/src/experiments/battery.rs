@@ -9,6 +9,7 @@ mod bench;
 mod disturbed;
 mod drive;
 mod kind;
+mod run;
 mod summary;
 mod trial;
 
@@ -16,8 +17,9 @@ use std::sync::OnceLock;
 
 pub use drive::{Condition, DriveUnderTest, Purpose};
 pub use kind::{KINDS, Kind, nominal_limit_a, torque_nm};
+pub use run::{learned, trial};
 pub use summary::Summary;
-pub use trial::{Trial, learned, trial};
+pub use trial::Trial;
 
 use drive_core::Drive;
 use drive_core::carrier::DemodulatorKind;

@@ -326,7 +326,8 @@ fn the_carrier_is_what_was_asked_for_and_stays_out_of_the_current_loop() {
             ripple = ripple.max((t.current.q - t.reference.q).abs());
             sum += t.carrier_squared.sqrt();
         }
-        let most = if dead_v > 0.0 { 0.012 } else { 0.003 };
+        // The direct share of the reference leaves the current behind for a moment whenever the speed loop moves it.
+        let most = if dead_v > 0.0 { 0.012 } else { 0.004 };
         assert!(ripple < most, "{dead_v} V: {ripple} A");
         *carrier = sum / 600.0;
     }

@@ -1,11 +1,11 @@
 //! From the sums of a learning to its result.
 
-use super::result::{
-    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, SPREAD, Verdict,
-};
 use super::{Fitted, Learned, Learning, LearningState};
 use crate::carrier::Saliency;
 use crate::carrier::asymmetry::Asymmetry;
+use crate::learned::{
+    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, SPREAD, Verdict,
+};
 use crate::math::angle::UnitVector;
 use crate::protect::saliency_check::SaliencyCheck;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};

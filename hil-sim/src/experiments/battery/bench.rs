@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use drive_core::Compare;
 
 use super::drive::{Condition, DriveUnderTest};
-use super::trial::{LARGEST_CLASS, Trial};
+use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::{Config, open_phase};
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
@@ -18,8 +18,6 @@ const WRONG_DEG: f64 = 30.0;
 const FLUX_OFF: (f64, f64) = (0.5, 2.0);
 /// A state lasts on over interruptions up to this, s: an angle that runs through has a sound one now and then.
 const GAP_S: f64 = 0.1;
-/// Classes of the histogram in a degree.
-pub const CLASSES_PER_DEG: f64 = 10.0;
 
 /// How long a state lasts at the longest.
 #[derive(Default)]

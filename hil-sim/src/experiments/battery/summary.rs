@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::bench::CLASSES_PER_DEG;
 use super::kind::Kind;
-use super::trial::Trial;
+use super::trial::{CLASSES_PER_DEG, Trial};
 use crate::outcome::{Cell, Figure, Metrics, Panel, Series, Table};
 use crate::stats::Stats;
 

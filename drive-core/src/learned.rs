@@ -1,4 +1,4 @@
-//! The result of a learning.
+//! The result of a [learning](crate::identify::learning): what it found, and whether the motor can be tracked with it.
 
 use core::fmt;
 
@@ -6,21 +6,21 @@ use crate::carrier::asymmetry::Asymmetry;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Largest accepted spread of the even part of the reference. Noise gives 0.001.
-pub(super) const SPREAD: f32 = 0.005;
+pub(crate) const SPREAD: f32 = 0.005;
 /// Largest accepted gain mismatch.
-pub(super) const LARGEST_MISMATCH: f32 = 0.1;
+pub(crate) const LARGEST_MISMATCH: f32 = 0.1;
 /// Largest accepted asymmetry: a gain mismatch of 10 % has 0.083.
-pub(super) const LARGEST_ASYMMETRY: f32 = 0.1;
+pub(crate) const LARGEST_ASYMMETRY: f32 = 0.1;
 /// Largest accepted current-dependent saliency at a current of one step of the table, and rms misfit of its law
 /// relative to the rms of the reference.
-pub(super) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
+pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
 /// Least magnitude of the slope without torque current, 1/rad, with negative and with positive sign: at 5 mA of sensor noise
 /// 5° rms.
 pub const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
 /// Up to this multiple of it the tracking is weak.
 const WEAK: f32 = 1.5;
 /// Least torque limit, in steps of the table: 1 A of 3.5 A.
-pub(super) const LEAST_LIMIT: usize = 4;
+pub(crate) const LEAST_LIMIT: usize = 4;
 
 /// A fitted value with its misfit and acceptance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
