@@ -124,8 +124,7 @@ fn sound_runs_that_are_stopped_are_told_from_others() {
     assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
 }
 
-/// The flux turned at once: the drive finds it again or stops. Without saliency and watches it stays wrong, most of
-/// the time to the end of the run.
+/// The flux turned at once: the drive finds it again or stops. Without saliency and lock monitor it stays wrong for seconds.
 #[test]
 fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     let (watched, faults) = battery(&["battery.runs=forced", "runs=27"]);
@@ -138,10 +137,10 @@ fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
         "saliency.a_psi=0",
         "injection.check=no",
         "injection.monitor=no",
-        "limits.unexplained_v=100",
     ];
     let (blind, _) = battery(&blind);
-    assert!(get(&blind, "silent_runs") >= 9.0 && get(&blind, "stuck_runs") >= 1.0, "{blind:?}");
+    let longest = get(&blind, "wrong_longest_s");
+    assert!(get(&blind, "silent_runs") >= 9.0 && longest > 2.0, "{blind:?}");
 }
 
 /// Commands that never rest neither hide a turned flux nor stop a sound drive: half of the runs turn it, and none of
