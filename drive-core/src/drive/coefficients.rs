@@ -33,10 +33,6 @@ use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
 const VERIFY_S: f32 = 0.3;
 /// Electrical speed up to which the shaft counts as standing when the lock is verified, turns/s: 30 rpm of four poles.
 const STANDING_HZ: f32 = 1.0;
-/// Direct share of the current reference, beside the printed filter. Alone the filter takes 7.3 ms to 90 % of a torque step;
-/// without it the zero of the controller makes 25 % of overshoot. A share of 0.8 would cancel the slow mode of the loop;
-/// 0.6 leaves a margin for other plants.
-const DIRECT_SHARE: f32 = 0.6;
 /// Control periods between two steps of the thermal loads, and the time, s.
 pub(super) const THERMAL_EVERY: u32 = 60;
 const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
@@ -259,8 +255,8 @@ impl Settings {
             ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
             reference_filter: [
-                ReferenceFilter::new(designs[0].p_f).with_direct(DIRECT_SHARE),
-                ReferenceFilter::new(designs[1].p_f).with_direct(DIRECT_SHARE),
+                ReferenceFilter::new(designs[0].p_f).with_direct(tuning::DIRECT_SHARE),
+                ReferenceFilter::new(designs[1].p_f).with_direct(tuning::DIRECT_SHARE),
             ],
             current_lag,
             lag_share,

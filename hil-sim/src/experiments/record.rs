@@ -226,7 +226,13 @@ fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Resul
     for (part, name) in PARTS.into_iter().enumerate() {
         let without = whole.without(part).response();
         let cost = ms(&linear) - ms(&without);
-        m.set(format!("step_cost_{}_ms", ["reference_filter", "low_pass", "delay"][part]), cost);
+        m.set(
+            format!(
+                "step_cost_{}_ms",
+                ["reference_filter", "direct_share", "low_pass", "delay"][part]
+            ),
+            cost,
+        );
         row(format!("loop, without {name}"), &without, Some(cost));
         lines = lines.with(share(&format!("loop without {name}"), &without));
     }

@@ -5,7 +5,9 @@ use drive_core::carrier::injection::CARRIER_SAMPLES;
 use drive_core::filter::dissertation::{LPF, LpfState};
 use drive_core::io::PERIOD_S;
 use drive_core::math::frames::AlphaBeta;
-use drive_core::tuning::{CurrentLoopDesign, EquivalentCircuit, FirstOrder, motor_plant};
+use drive_core::tuning::{
+    CurrentLoopDesign, DIRECT_SHARE, EquivalentCircuit, FirstOrder, motor_plant,
+};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -81,11 +83,12 @@ pub struct CurrentLoop {
     design: CurrentLoopDesign,
     plant: FirstOrder,
     /// Which parts are there: reference filter, low-pass filter, delay.
-    parts: [bool; 3],
+    parts: [bool; 4],
 }
 
 /// The parts of [`CurrentLoop`] that may be left out, in words.
-pub const PARTS: [&str; 3] = ["reference filter", "low-pass filter", "delay of a period"];
+pub const PARTS: [&str; 4] =
+    ["reference filter", "direct share of the reference", "low-pass filter", "delay of a period"];
 
 impl CurrentLoop {
     /// That of the configuration.
@@ -98,7 +101,7 @@ impl CurrentLoop {
             EquivalentCircuit { r_s: m.r_s, r_r: m.r_r, l_m: m.l_m, l_ls: m.l_ls, l_lr: m.l_lr };
         let plant = motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
         let design = config.drive.build().map_err(Error::refused)?.designs[1];
-        Ok(Self { design, plant, parts: [true; 3] })
+        Ok(Self { design, plant, parts: [true; 4] })
     }
 
     /// The same without one of its parts, and with the same controller.
@@ -109,14 +112,15 @@ impl CurrentLoop {
 
     /// The current after a unit step.
     pub fn response(&self) -> Response {
-        let (design, [filters, low_passes, delays]) = (&self.design, self.parts);
+        let (design, [filters, direct, low_passes, delays]) = (&self.design, self.parts);
         let mut low_pass = LpfState::default();
         let (mut filtered, mut current, mut voltage) = (0.0, 0.0, 0.0);
         let (mut error, mut acting) = (0.0, 0.0);
         let periods = 0..(RECORDED_S * RATE_HZ) as usize;
         let one = |_| {
             let seen = current;
-            let reference = if filters { filtered } else { 1.0 };
+            let share = if direct { f64::from(DIRECT_SHARE) } else { 0.0 };
+            let reference = if filters { share + (1.0 - share) * filtered } else { 1.0 };
             filtered += (1.0 - design.p_f) * (1.0 - filtered);
             let measured = match low_passes {
                 true => LPF.step(&mut low_pass, AlphaBeta::new(current as f32, 0.0)).alpha.into(),
@@ -160,7 +164,8 @@ mod tests {
         let (response, without) = (whole.response(), whole.without(0).response());
         assert!((response.end() - 1.0).abs() < 1e-3);
         // The pole of Eq. 3.40 alone takes ln(0.1)/ln(p_f) periods.
-        assert!(response.time_ms(0.9) > without.time_ms(0.9) + 2.0);
+        assert!(response.time_ms(0.9) > without.time_ms(0.9) + 0.5);
+        assert!(whole.without(1).response().time_ms(0.9) > response.time_ms(0.9) + 2.0);
         assert!(without.overshoot() > 0.2 && response.overshoot() < 0.1);
     }
 }
