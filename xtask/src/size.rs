@@ -95,9 +95,9 @@ mod tests {
                 ("FLASH", 0x0800_0000, 232),
                 ("CONTROL", 0x0803_a000, 24),
                 // Overflows where there is no memory.
-                ("STACK", 0x2000_0000, 24),
+                ("STACK", 0x2000_0000, 27),
                 // To 96, not 128: CCM is mapped again behind it.
-                ("RAM", 0x2000_6000, 72),
+                ("RAM", 0x2000_6c00, 69),
                 ("CCM", 0x1000_0000, 32),
             ]
         );
@@ -107,8 +107,8 @@ mod tests {
     fn contents_take_the_memory_that_they_are_loaded_from() {
         let regions = regions(&sources::read("memory.x").unwrap());
         let map = " 80001d8  80001d8     faa0     8 .text
-20006000  8012edc       48     4 .data
-20006048 20006048     9364     8 .bss
+20006c00  8012edc       48     4 .data
+20006c48 20006c48     9364     8 .bss
 10000000  803a000     5100     8 .ccm
 10000000  803a000      3ba     4         a.o:(.text.ADC1_2)
 10000000  803a000       a0     1                 .Lanon.8c1de73ce14781661d140f7ad80739f2.20
