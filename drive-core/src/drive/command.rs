@@ -65,6 +65,8 @@ pub enum Refused {
     NeedsEncoder,
     /// The injection is needed as angle source; to learn, with a demodulation that tracks.
     NeedsInjection,
+    /// The direct current is the one that tables and lock monitor are for.
+    FluxIsFixed,
     /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
     NotLearned,
     /// The settings do not want the rotor time constant tracked.
@@ -88,6 +90,12 @@ impl core::fmt::Display for Refused {
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::NeedsInjection => {
                 write!(f, "this needs the injection, demodulated by a way that tracks")
+            }
+            Self::FluxIsFixed => {
+                write!(
+                    f,
+                    "the direct current cannot change while the lock monitor watches the angle"
+                )
             }
             Self::NotLearned => {
                 write!(

@@ -71,7 +71,7 @@ impl Drive {
                 self.takes_references(self.mode, i_d)?;
                 // Tables and monitor are those of one direct current.
                 if self.c.lock_monitor.is_some() {
-                    return Err(Refused::NeedsEncoder);
+                    return Err(Refused::FluxIsFixed);
                 }
                 let i_q = self.control.references.current.q;
                 let min = 0.2 * self.c.sequence.i_d;

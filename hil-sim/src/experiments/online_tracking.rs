@@ -103,6 +103,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let (source, (speed_rpm, iq_a), excitation, share, used) = job;
         let mut config = context.config.clone();
         config.drive.angle_source = source;
+        // The monitor knows one direct current: with it the drive refuses the steps of another.
+        config.drive.injection.synchronous.monitor = false;
         config.inverter.residual_v = Some(residual(&config, share));
         let seconds = SECONDS;
         let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
