@@ -27,7 +27,7 @@ pub struct Asymmetry {
 }
 
 impl Asymmetry {
-    /// What a gain of sensor a higher by `mismatch`/2, and of b lower by as much, causes.
+    /// Asymmetry caused by a gain of sensor a higher by `mismatch`/2, and of b lower by as much.
     pub fn of_gain_mismatch(mismatch: f32) -> Self {
         let d = 0.5 * mismatch;
         Self { constant: -d / SQRT_3, sin: d, cos: -d / SQRT_3 }

@@ -130,7 +130,7 @@ impl ReferenceFilter {
         Self { one_minus_p: (1.0 - p_f) as f32, direct: 0.0 }
     }
 
-    /// The same with a `direct` share of the reference, 0 to 1.
+    /// This filter with a `direct` share of the reference, 0 to 1.
     pub const fn with_direct(self, direct: f32) -> Self {
         Self { direct, ..self }
     }

@@ -153,7 +153,7 @@ struct Point {
     mirrored: bool,
 }
 
-/// What the drive is to regulate.
+/// Operating point that the drive is to regulate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Operate {
     /// Torque current, A.

@@ -16,7 +16,7 @@ const UNEXPLAINED: (f32, f32) = (0.001, 0.25);
 /// Least slope up to the torque limit: share of that without torque current, and magnitude, 1/rad.
 const LEAST_SLOPE_UNDER_LOAD: (f32, f32) = (0.3, 0.016);
 
-/// What the drive saw while it magnetised, before the learning.
+/// Measurements of the drive while it magnetised, before the learning.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// Mean saliency that the saliency check saw along its axis; none without the check.

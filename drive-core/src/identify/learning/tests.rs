@@ -17,7 +17,7 @@ fn learning() -> Learning {
     Learning::new(&Motor::default(), 0.7, 3.5, true)
 }
 
-/// What the drive saw before: no check, and the carrier without torque current.
+/// Measurements before the learning: no check, and the carrier without torque current.
 fn start() -> Start {
     Start { looked: None, per_looked: 0.0, baseline: CARRIER * CARRIER }
 }
