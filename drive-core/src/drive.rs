@@ -28,7 +28,7 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::indirect::IndirectState;
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
-use crate::math::angle::UnitVector;
+use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::protect::lock_monitor::LockMonitorState;
@@ -94,8 +94,8 @@ struct References {
     test_voltage: Dq,
     /// Injection axis seen from the frame.
     injection_axis: UnitVector,
-    /// Lead of the flux before the frame, rad, and as a unit vector: 0 but while the drive learns.
-    lead: f32,
+    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
+    lead: Angle,
     lead_axis: UnitVector,
 }
 
@@ -107,8 +107,8 @@ impl Default for References {
             turns: 0.0,
             test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
-            lead: 0.0,
-            lead_axis: UnitVector { cos: 1.0, sin: 0.0 },
+            lead: Angle::ZERO,
+            lead_axis: UnitVector::default(),
         }
     }
 }

@@ -14,6 +14,7 @@
 
 use crate::carrier::Saliency;
 use crate::math::angle::UnitVector;
+use crate::math::frames::SQRT_3;
 
 /// The learned numbers, dimensionless; 0 without an asymmetry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,7 +39,7 @@ impl Asymmetry {
         1.2 * (self.sin - (self.cos + self.constant) / SQRT_3)
     }
 
-    /// Sum of both.
+    /// Sum of this one and a `share` of the other.
     pub fn plus(&self, other: &Self, share: f32) -> Self {
         Self {
             constant: self.constant + share * other.constant,
@@ -61,8 +62,6 @@ impl Asymmetry {
         saliency.carrier_squared *= 1.0 - 2.0 * along;
     }
 }
-
-const SQRT_3: f32 = crate::math::frames::SQRT_3;
 
 #[cfg(test)]
 mod tests {

@@ -34,7 +34,7 @@ impl Coefficients {
     /// Turns the axes for a flux of frequency `freq`, turns per period: back by the delays of the measured
     /// currents, ahead to the middle of the period in which the voltage acts.
     pub(super) fn turn(&self, axes: &mut Axes, freq: f32, injection: UnitVector) {
-        let along = UnitVector { cos: 1.0, sin: 0.0 };
+        let along = UnitVector::default();
         let lag = self.lag_share * (lpf_lag_samples(freq * TAU) + self.current_lag);
         *axes = Axes {
             injection,

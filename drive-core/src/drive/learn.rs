@@ -5,7 +5,6 @@ use crate::carrier::DemodulatorKind;
 use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
-use crate::flux::estimator::AngleLoop;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
 use crate::math::angle::Angle;
 use crate::math::limited;
@@ -28,14 +27,13 @@ impl Drive {
         self.c.inject && self.c.demodulate && !literal
     }
 
-    /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted result replaces the
-    /// settings, and the drive stops.
+    /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
+    /// result replaces the settings, and the drive stops.
     pub(super) fn learn(&mut self) -> Result<f32, Fault> {
         let (c, s) = (&self.c, &mut self.control);
         let t = s.seen;
-        let normalised = matches!(c.estimator.angle_loop, AngleLoop::Pll { .. });
         let saliency = *s.estimator.saliency();
-        let signal = if normalised { saliency.q } else { s.estimator.delta_i };
+        let signal = if c.learning.normalised { saliency.q } else { s.estimator.delta_i };
         let sample = LearningSample {
             signal,
             carrier_squared: saliency.carrier_squared,
@@ -45,10 +43,10 @@ impl Drive {
         };
         match c.learning.step(&mut s.learning, &sample) {
             LearningAction::Operate(Operate { i_q, lead }) => {
-                let r = &mut self.control.references;
-                if i_q != r.current.q || lead != r.lead {
-                    r.current.q = i_q;
-                    (r.lead, r.lead_axis) = (lead, Angle::from_radians(lead).unit_vector());
+                let (r, lead) = (&mut self.control.references, Angle::from_radians(lead));
+                r.current.q = i_q;
+                if lead != r.lead {
+                    (r.lead, r.lead_axis) = (lead, lead.unit_vector());
                 }
             }
             LearningAction::Moved | LearningAction::Stuck => return Err(Fault::ShaftNotLocked),

@@ -45,13 +45,11 @@ impl Drive {
         if !self.elapsed.is_multiple_of(THERMAL_EVERY) {
             return Ok(());
         }
-        let current = match self.state.has_current() {
-            true => self.control.seen.current.length_squared(),
-            false => 0.0,
-        };
-        let borne = self.c.thermal.step(&mut self.thermal, current);
+        let on = self.state.has_current();
+        let square = if on { self.control.seen.current.length_squared() } else { 0.0 };
+        let borne = self.c.thermal.step(&mut self.thermal, square);
         // Off it cools, and is not judged.
-        if self.state.has_current() { Ok(borne?) } else { Ok(()) }
+        if on { Ok(borne?) } else { Ok(()) }
     }
 
     /// The fault when a result is not finite: settings, references or state, whichever is not.

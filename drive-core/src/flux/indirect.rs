@@ -77,9 +77,9 @@ pub struct FluxAngle {
 }
 
 impl FluxAngle {
-    /// The angle less `lead`, rad: that of a frame that the flux leads.
-    pub fn less(self, lead: f32) -> Self {
-        Self { phi: self.phi - Angle::from_radians(lead), ..self }
+    /// The angle less `lead`: that of a frame that the flux leads.
+    pub fn less(self, lead: Angle) -> Self {
+        Self { phi: self.phi - lead, ..self }
     }
 }
 

@@ -69,7 +69,7 @@ pub struct Learning {
     /// Number of table points to learn, without zero.
     points: usize,
     /// Whether the signal is the saliency, so that its slope is learned, too. Otherwise it is a current difference.
-    normalised: bool,
+    pub(crate) normalised: bool,
     /// Lead x of the flux, rad.
     lead: f32,
     /// Direct current, A.
