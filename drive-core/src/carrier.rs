@@ -2,6 +2,7 @@
 
 pub mod asymmetry;
 pub mod demodulator;
+pub mod drift;
 pub mod injection;
 mod kind;
 mod sample;

@@ -137,6 +137,7 @@ pub fn from_words(words: &[u32; WORDS], present: u64) -> Option<Learned> {
         slope_at_rest,
         limit_a: if has_slope { value(LIMIT) } else { grid.current(points) },
         spread: value(FITS),
+        ripple: 0.0,
         asymmetry: Asymmetry { constant, sin, cos },
         positions: ((flags >> POSITIONS) as u8).max(1),
         gain_mismatch: fitted(FITS + 1, HAS_GAINS),

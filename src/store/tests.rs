@@ -41,6 +41,7 @@ fn learned(random: [f32; POINTS]) -> Learned {
         slope_at_rest,
         limit_a: 2.5 + 1.4 * random[9],
         spread: 0.005 * random[2].abs(),
+        ripple: 0.0,
         asymmetry: Asymmetry {
             constant: 0.05 * random[10],
             sin: 0.05 * random[11],

@@ -29,7 +29,7 @@ pub struct Asymmetry {
 
 impl Asymmetry {
     /// Asymmetry caused by a gain of sensor a higher by `mismatch`/2, and of b lower by as much.
-    pub fn of_gain_mismatch(mismatch: f32) -> Self {
+    pub const fn of_gain_mismatch(mismatch: f32) -> Self {
         let d = 0.5 * mismatch;
         Self { constant: -d / SQRT_3, sin: d, cos: -d / SQRT_3 }
     }
@@ -58,8 +58,12 @@ impl Asymmetry {
     pub fn take_out(&self, saliency: &mut Saliency, axis: UnitVector) {
         let twice = axis.turned_by(axis);
         saliency.q -= self.constant + self.sin * twice.sin + self.cos * twice.cos;
-        let along = self.sin * twice.cos - self.cos * twice.sin;
-        saliency.carrier_squared *= 1.0 - 2.0 * along;
+        saliency.carrier_squared *= 1.0 - 2.0 * self.along(twice);
+    }
+
+    /// Part of the relative carrier current along the injection axis, whose doubled angle is `twice`.
+    pub(crate) fn along(&self, twice: UnitVector) -> f32 {
+        self.sin * twice.cos - self.cos * twice.sin
     }
 }
 

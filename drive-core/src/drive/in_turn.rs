@@ -141,7 +141,12 @@ impl Coefficients {
                 if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
-                monitor.step(&mut s.lock, &seen, s.carrier.per_share_squared, step.held)
+                // A drift of the gains since the start is not in what the start measured.
+                let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
+                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, step.held)? {
+                    self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
+                }
+                Ok(())
             }
             _ => Ok(()),
         }

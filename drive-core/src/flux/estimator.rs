@@ -6,6 +6,7 @@
 
 use crate::carrier::asymmetry::Asymmetry;
 use crate::carrier::demodulator::{Demodulate, Demodulator};
+use crate::carrier::drift::GainDrift;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
 use crate::flux::indirect::FluxAngle;
@@ -76,6 +77,8 @@ pub enum AngleLoop {
         pll: Pll,
         /// Learned asymmetry of sensors and stator.
         asymmetry: Asymmetry,
+        /// Whether it was learned, so that its drift is followed.
+        follows_gains: bool,
     },
 }
 
@@ -114,6 +117,8 @@ pub struct EstimatorState {
     /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
     /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
     correction: PllCorrection,
+    /// Drift of the sensors' gains.
+    pub drift: GainDrift,
     demodulator: Demodulator,
 }
 
@@ -155,6 +160,7 @@ impl Estimator {
             delta_i,
             synchronous,
             correction,
+            drift,
         } = state;
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
         *tracker = TrackerState::default();
@@ -162,17 +168,18 @@ impl Estimator {
         demodulator.start(self.demodulator, self.rms_samples);
         (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
         (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
+        *drift = GainDrift::default();
     }
 
     /// Takes an accepted result of a learning.
     pub fn take(&mut self, learned: &Learned) {
         match &mut self.angle_loop {
             AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
-            AngleLoop::Pll { schedule, asymmetry, .. } => {
+            AngleLoop::Pll { schedule, asymmetry, follows_gains, .. } => {
                 let b = learned.current_saliency;
                 let b = b.accepted.then_some(b.value);
                 *schedule = schedule.with_learned(&learned.reference, learned.slope.as_ref(), b);
-                *asymmetry = learned.asymmetry;
+                (*asymmetry, *follows_gains) = (learned.asymmetry, true);
             }
         }
     }
@@ -194,7 +201,16 @@ impl Estimator {
             let synchronous = &mut state.synchronous;
             synchronous.update_saliency();
             let seen = axis.turned_slightly(-flux_freq * AVERAGES_LAG);
-            asymmetry.take_out(&mut synchronous.saliency, seen);
+            let present = state.drift.on_top_of(asymmetry, seen);
+            present.take_out(&mut synchronous.saliency, seen);
+        }
+    }
+
+    /// Takes the deviation of the squared carrier current from that of the tables, relative to it, into the drift of the
+    /// gains. `flux_freq` is the frequency of the flux, electrical turns per period.
+    pub fn follow_gains(&self, state: &mut EstimatorState, deviation: f32, flux_freq: f32) {
+        if let AngleLoop::Pll { follows_gains: true, .. } = self.angle_loop {
+            state.drift.step(deviation, flux_freq);
         }
     }
 

@@ -13,7 +13,8 @@
 //! The flux sees i_d' and i_q', which give its magnetising current and its slip. It does not slip where tan x = i_q/i_d, so
 //! tan x is an odd multiple of half a step of the table over i_d: 8.5° to 15°. Each point has a mirrored one, (-i_q, -e);
 //! q is odd. Components that repeat with every half turn average out; they are the
-//! [asymmetry](crate::carrier::asymmetry) of sensors and stator, with the part of q that is even.
+//! [asymmetry](crate::carrier::asymmetry) of sensors and stator, with the part of q that is even. A part that repeats four times
+//! in a turn comes from a current sensor that is not linear, and cannot be taken out: where it is large, learning refuses.
 //!
 //! Two checks detect a shaft that is not locked. A shaft turned from outside induces a quadrature voltage
 //! that is equal at both points of a pair, while all other components change sign. A
@@ -114,6 +115,8 @@ struct Sums {
     /// Parts in phase with the sine and the cosine of twice the angle of the injection axis.
     sin: f32,
     cos: f32,
+    /// The same of four times that angle.
+    twice: [f32; 2],
     voltage: Dq,
 }
 
@@ -132,6 +135,8 @@ pub struct LearningState {
     /// Sums over all points of the parts in phase with the sine and the cosine.
     sin: f32,
     cos: f32,
+    /// Largest square of the part that repeats four times in a turn, of all points.
+    ripple: f32,
     /// Mean squared carrier current over both signs of every current without lead, A^2.
     carrier: [f32; POINTS],
     /// At the first current: direct voltage without that of the leakage, V, and slip times torque current,
@@ -264,13 +269,17 @@ impl Learning {
             return self.operate(self.point(state.point));
         }
         let seen = sample.theta - Angle::within_turn(sample.flux_freq * LAG);
-        let UnitVector { cos, sin } = (seen + seen).unit_vector();
+        let twice = (seen + seen).unit_vector();
+        let UnitVector { cos, sin } = twice;
+        let four = twice.turned_by(twice);
         s.count += 1;
         s.turned += sample.flux_freq;
         s.signal += sample.signal;
         s.carrier += sample.carrier_squared;
         s.sin += sample.signal * sin;
         s.cos += sample.signal * cos;
+        s.twice[0] += sample.signal * four.sin;
+        s.twice[1] += sample.signal * four.cos;
         s.voltage += sample.voltage;
         if s.count > self.average.1 {
             return LearningAction::Stuck;
@@ -297,6 +306,11 @@ impl Learning {
         let (signal, voltage) = (s.signal * mean, s.voltage * mean);
         state.sin += 2.0 * s.sin * mean;
         state.cos += 2.0 * s.cos * mean;
+        let [sin, cos] = s.twice.map(|sum| 2.0 * sum * mean);
+        let ripple = sin * sin + cos * cos;
+        if ripple > state.ripple {
+            state.ripple = ripple;
+        }
         if let (0, Some(carrier)) = (point.lead, state.carrier.get_mut(point.n)) {
             *carrier += 0.5 * s.carrier * mean;
         }

@@ -75,7 +75,7 @@ const STEADY_GUESS: f32 = 12.0;
 const STEADY_CURRENT: f32 = 0.25;
 /// Largest number of consecutive missing samples.
 const MISSING: u32 = 75;
-/// Largest relative change of the rate in the last step of the fit for a published tau_r.
+/// Largest relative change of the rate and of the resistance in the last step of the fit for a published tau_r.
 const AT_REST: f32 = 0.04;
 /// Largest published relative uncertainty of tau_r. It covers the noise alone; where it is larger, the
 /// systematic error is larger still. At standstill with a slip below 0.3 Hz the error of tau_r was 80 % at

@@ -186,6 +186,8 @@ impl LockMonitor {
     /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held`
     /// (magnetisation, i_q = 0) the flux lies along it, and the baseline is measured.
     ///
+    /// Returns the relative deviation of the squared carrier current from the expected one, where it was judged.
+    ///
     /// # Errors
     /// [`Fault::CarrierWeak`] after eight consecutive carrier periods with too little carrier current at any
     /// angle; [`Fault::LostLock`] when the mean loss exceeds the allowed one.
@@ -195,7 +197,7 @@ impl LockMonitor {
         saliency: &Saliency,
         per_share_squared: f32,
         held: bool,
-    ) -> Result<(), Fault> {
+    ) -> Result<Option<f32>, Fault> {
         let carrier = saliency.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
         if state.weak >= WEAK_PERIODS {
@@ -211,22 +213,22 @@ impl LockMonitor {
                 allowance: ALLOWANCE.2,
                 ..LockMonitorState::default()
             };
-            return Ok(());
+            return Ok(None);
         }
         if state.per_baseline == 0.0 {
             state.per_baseline = 1.0 / state.baseline;
         }
         if self.rests(state, saliency.i_q) {
-            return Ok(());
+            return Ok(None);
         }
         let place = self.grid.place(saliency.i_q);
-        let relative = carrier * state.per_baseline * between(&self.inverse_square, place);
-        let loss = (1.0 - relative) * between(&self.per_change, place);
+        let deviation = carrier * state.per_baseline * between(&self.inverse_square, place) - 1.0;
+        let loss = -deviation * between(&self.per_change, place);
         state.loss += self.smoothing * (loss - state.loss);
         let least = -ALLOWED_GAIN[usize::from(self.is_positive)];
         // NaN fails the comparisons.
         let right = state.loss <= self.allowed && state.loss >= least;
-        if right { Ok(()) } else { Err(Fault::LostLock) }
+        if right { Ok(Some(deviation)) } else { Err(Fault::LostLock) }
     }
 
     /// Whether the torque current `i_q`, A, has just moved, so that the loss is not judged.
@@ -279,7 +281,7 @@ mod tests {
     fn ready(monitor: &LockMonitor) -> LockMonitorState {
         let mut state = LockMonitorState::default();
         for _ in 0..600 {
-            assert_eq!(monitor.step(&mut state, &seen(0.27, 0.0), 1.0, true), Ok(()));
+            assert_eq!(monitor.step(&mut state, &seen(0.27, 0.0), 1.0, true), Ok(None));
         }
         state
     }
@@ -303,7 +305,7 @@ mod tests {
             let mut state = ready(&monitor);
             for _ in 0..600 {
                 let right = monitor.step(&mut state, &seen(0.27 * ratio, i_q), 1.0, false);
-                assert_eq!(right, Ok(()));
+                assert!(right.unwrap().is_none_or(|deviation| deviation.abs() < 1e-3), "{right:?}");
             }
             assert!(state.loss.abs() < 0.02, "{i_q}: {}", state.loss);
             // Without flux: 120 ms ln(1 / 0.45) = 96 ms.
@@ -364,7 +366,9 @@ mod tests {
         let monitor = monitor();
         let mut state = ready(&monitor);
         for _ in 0..600 {
-            assert_eq!(monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 1.0 / 0.36, false), Ok(()));
+            let deviation =
+                monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 1.0 / 0.36, false).unwrap();
+            assert!(deviation.is_some_and(|deviation| deviation.abs() < 1e-4), "{deviation:?}");
         }
         assert!(state.loss.abs() < 1e-3, "{}", state.loss);
     }
@@ -373,9 +377,9 @@ mod tests {
     fn no_carrier_and_no_number_are_faults() {
         let monitor = monitor();
         let mut state = ready(&monitor);
-        let mut result = Ok(());
+        let mut result = Ok(None);
         for n in 0..WEAK_PERIODS {
-            assert_eq!(result, Ok(()), "{n}");
+            assert_eq!(result, Ok(None), "{n}");
             result = monitor.step(&mut state, &seen(0.12, 0.0), 1.0, true);
         }
         assert_eq!(result, Err(Fault::CarrierWeak));

@@ -69,6 +69,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let m = &mut outcome.metrics;
     m.set("spread", learned.spread.into());
+    m.set("ripple", learned.ripple.into());
     m.set("asymmetry", learned.asymmetry.size().into());
     m.set("slope_at_rest_per_rad", learned.slope_at_rest.into());
     m.set("limit_a", learned.limit_a.into());

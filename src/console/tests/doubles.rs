@@ -156,6 +156,7 @@ pub fn found() -> Learned {
         carrier: Some(CarrierTable::default()),
         points: 13,
         spread: 0.001,
+        ripple: 0.0,
         asymmetry: Asymmetry { constant: 0.0004, sin: -0.0003, cos: 0.0 },
         positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0002, accepted: true },

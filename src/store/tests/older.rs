@@ -64,6 +64,7 @@ fn records_saved_by_commit_1abee12_are_read() {
         carrier: Some(CarrierTable::default()),
         points: 13,
         spread: 0.001,
+        ripple: 0.0,
         asymmetry: Asymmetry::default(),
         positions: 1,
         gain_mismatch: fitted(0.01, 0.0002),

@@ -49,6 +49,7 @@ impl Settings {
                 ),
                 pll: Pll::new(t.bandwidth_hz),
                 asymmetry: Asymmetry::default(),
+                follows_gains: false,
             },
             _ => AngleLoop::Pii {
                 reference: match p.learned {

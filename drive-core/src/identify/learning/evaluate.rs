@@ -4,7 +4,7 @@ use super::{Fitted, Learned, Learning, LearningState};
 use crate::carrier::Saliency;
 use crate::carrier::asymmetry::Asymmetry;
 use crate::learned::{
-    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, SPREAD, Verdict,
+    CURRENT_SALIENCY, LARGEST_ASYMMETRY, LARGEST_MISMATCH, LEAST_LIMIT, RIPPLE, SPREAD, Verdict,
 };
 use crate::math::angle::UnitVector;
 use crate::protect::saliency_check::SaliencyCheck;
@@ -41,6 +41,7 @@ impl Learning {
         let (reference, current_saliency) = self.reference(state);
         let slope = self.slope(state);
         let limit_a = slope.limit_a;
+        let ripple = libm::sqrtf(state.ripple);
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
         } else if !(spread <= SPREAD && self.points > 0) {
@@ -49,6 +50,8 @@ impl Learning {
             Verdict::Sound
         } else if !Verdict::of_slope(slope.at_rest).is_accepted() {
             Verdict::SlopeTooSmall
+        } else if !(ripple <= RIPPLE * slope.at_rest.abs()) {
+            Verdict::Bent
         } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.table.is_none() {
             Verdict::LimitTooLow
         } else {
@@ -75,6 +78,7 @@ impl Learning {
             carrier: self.carrier(state, baseline),
             points: self.points,
             spread,
+            ripple,
             gain_mismatch,
             asymmetry,
             positions: 1,

@@ -168,6 +168,20 @@ fn what_does_not_fit_is_not_accepted() {
     assert!(!result(&|_| f64::NAN).verdict.is_accepted());
     let uneven = result(&|i_q| reference(i_q) + 0.002 * i_q * i_q);
     assert_eq!(uneven.verdict, Verdict::Uneven, "{uneven:?}");
+    // A sensor that is not linear: the signal repeats four times in a turn, here at large currents.
+    let bent = |size: f64| {
+        let q = |i_q: f64, lead: f64, theta: f64| {
+            let at = if i_q > 2.0 { size } else { 0.0 };
+            reference(i_q) + slope(i_q) * lead + at * (4.0 * theta + 0.3).sin()
+        };
+        learning().result(&learn(q, locked).1, &start())
+    };
+    let k = slope(0.0).abs();
+    let (sound, found) = (bent(0.14 * k), bent(0.16 * k));
+    assert!(sound.verdict.is_accepted() && found.verdict == Verdict::Bent, "{sound:?} {found:?}");
+    assert!((f64::from(found.ripple) / (0.16 * k) - 1.0).abs() < 0.01, "{}", found.ripple);
+    let text = found.to_string();
+    assert!(text.contains("four times") && text.contains("not linear"), "{text}");
     // A saliency that does not follow the law of the current.
     let learned = result(&|i_q: f64| 0.02 * (4.0 * i_q).sin());
     assert!(learned.verdict.is_accepted() && !learned.current_saliency.accepted, "{learned:?}");
@@ -229,6 +243,7 @@ fn found() -> Learned {
         carrier: None,
         points: 13,
         spread: 0.001,
+        ripple: 0.0,
         asymmetry: Asymmetry { constant: 0.001, sin: 0.002, cos: -0.003 },
         positions: 1,
         gain_mismatch: Fitted { value: 0.01, misfit: 0.0, accepted: true },

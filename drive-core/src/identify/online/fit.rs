@@ -35,7 +35,7 @@ pub struct Fit {
     pub unknowns: Unknowns,
     /// Relative standard deviation of the rate, from prediction error and excitation.
     pub uncertainty: f32,
-    /// Relative change of the rate in this step.
+    /// Relative change of the rate or of the resistance in this step, the larger of both.
     pub moved: f32,
 }
 
@@ -117,7 +117,9 @@ impl Machine {
         // The filtered prediction errors are correlated over about 1/corner samples.
         let noise = rls.error_square() / rls.settings().corner;
         let uncertainty = libm::sqrtf(noise / information);
-        let moved = (unknowns.rate / from.rate - 1.0).abs();
+        let rate_moved = (unknowns.rate / from.rate - 1.0).abs();
+        let r_s_moved = ((unknowns.r_s - from.r_s) / scale.r_s).abs();
+        let moved = if rate_moved > r_s_moved { rate_moved } else { r_s_moved };
         Some(Fit { unknowns, uncertainty, moved })
     }
 }
@@ -198,6 +200,21 @@ mod tests {
             // A few roundings, though two of the four are differences of numbers up to 30 000 times
             // as large.
             assert!(error < 1e-6 * libm::hypot(re, im), "{n}: {got:?} for {re} {im}");
+        }
+    }
+
+    /// An estimate is published at rest only, and the resistance travels long after the rate is right.
+    #[test]
+    fn a_resistance_that_travels_counts_as_a_move() {
+        let machine = Machine { sigma_l_s: 0.0515, coupled: 0.1532, period: 10.0 / 6000.0 };
+        let truth = Unknowns { r_s: 5.4, rate: 1.0 / 0.186, omega_m: 31.4 };
+        let settings = crate::settings::Settings::default();
+        let mut rls = crate::identify::online::Online::new(&settings).unwrap().rls().clone();
+        rls.begin_at(machine.coefficients(&truth));
+        for (r_s, at_least, at_most) in [(2.7, 0.29, 0.31), (5.4, 0.0, 0.001)] {
+            let fit = machine.step(&rls, &Unknowns { r_s, ..truth }, &truth, false).unwrap();
+            assert!((at_least..=at_most).contains(&fit.moved), "{r_s}: {fit:?}");
+            assert!((fit.unknowns.rate / truth.rate - 1.0).abs() < 0.04, "{r_s}: {fit:?}");
         }
     }
 }

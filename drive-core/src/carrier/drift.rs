@@ -1,0 +1,124 @@
+//! Drift of the gains of the current sensors since the learning.
+//!
+//! A gain mismatch m that was not there while the drive learned makes the carrier current swing with twice the angle theta of
+//! the injection axis, by [`Asymmetry`]:
+//!
+//! ```text
+//! |C|^2 / |C|_ref^2 = 1 + m h        h = cos 2 theta + sin 2 theta / sqrt3
+//! ```
+//!
+//! While the flux turns, m follows this ratio by least mean squares with a time constant of 2 s; the mean of the ratio over
+//! 1 s is taken out first, so that a load or an error of the angle does not count. What was found is taken out of the
+//! demodulated signals together with the learned asymmetry. At standstill of the flux nothing is seen, and m stays.
+//!
+//! A mismatch of 1 % that came after the learning costs 6.9° rms without this, 4.4° with it (family `r`, runs of 2 to 6 s from the
+//! start on).
+
+use crate::carrier::asymmetry::Asymmetry;
+use crate::io::PERIOD_S;
+use crate::math::angle::UnitVector;
+use crate::math::limited;
+
+/// Asymmetry per mismatch.
+const GAINS: Asymmetry = Asymmetry::of_gain_mismatch(1.0);
+/// Largest drift that is followed.
+const LARGEST: f32 = 0.015;
+/// Least frequency of the flux, electrical turns per period: 0.2 Hz.
+const LEAST_FREQ: f32 = 0.2 * PERIOD_S;
+/// Carrier period, s.
+const CARRIER_S: f32 = 10.0 * PERIOD_S;
+/// Share of the newest ratio in its mean: 1 s.
+const MEAN_SHARE: f32 = CARRIER_S;
+/// Step of m per deviation: 2 s, with a mean of h^2 of 2/3.
+const STEP: f32 = CARRIER_S / (2.0 * 2.0 / 3.0);
+
+/// State of the estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GainDrift {
+    /// The mismatch m.
+    pub mismatch: f32,
+    /// Mean deviation of the ratio from 1.
+    mean: f32,
+    /// The factor h of the latest saliency.
+    h: f32,
+}
+
+impl GainDrift {
+    /// `learned` with the drift, for a saliency that was seen with the injection along `axis`.
+    pub fn on_top_of(&mut self, learned: &Asymmetry, axis: UnitVector) -> Asymmetry {
+        self.h = 2.0 * GAINS.along(axis.turned_by(axis));
+        learned.plus(&GAINS, self.mismatch)
+    }
+
+    /// Takes the deviation of the ratio from 1 of the latest saliency, which this drift was taken out of. `flux_freq` is the
+    /// frequency of the flux, electrical turns per period.
+    pub fn step(&mut self, deviation: f32, flux_freq: f32) {
+        if flux_freq.abs() < LEAST_FREQ {
+            return;
+        }
+        let rest = deviation - self.mean;
+        self.mean += MEAN_SHARE * rest;
+        self.mismatch = limited(self.mismatch + STEP * self.h * rest, LARGEST);
+    }
+
+    /// The carrier current squared across phase a, where a start measures |C|_ref, relative to that without drift.
+    pub fn at_start(&self) -> f32 {
+        1.0 - self.mismatch
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
+    use super::*;
+    use crate::carrier::Saliency;
+    use crate::math::angle::Angle;
+    use core::f64::consts::TAU;
+
+    /// The estimate after `seconds` of a flux at `hz`, with sensors whose gains differ by `mismatch` and a ratio that is
+    /// off by `loss` beside. The sensors are those of the definition, in double precision.
+    fn followed(mismatch: f64, loss: f64, hz: f64, seconds: f64) -> GainDrift {
+        let mut drift = GainDrift::default();
+        // The reference was taken across phase a.
+        let along = |theta: f64| {
+            let (a, b) = (1.0 + 0.5 * mismatch, 1.0 - 0.5 * mismatch);
+            let (i_a, i_b) = (a * theta.cos(), b * (theta - TAU / 3.0).cos());
+            i_a * theta.cos() + (i_a + 2.0 * i_b) / 3.0_f64.sqrt() * theta.sin()
+        };
+        let reference = along(TAU / 4.0).powi(2);
+        for n in 0..(600.0 * seconds) as u32 {
+            let theta = TAU / 4.0 + TAU * hz * f64::from(n) / 600.0;
+            let axis = Angle::from_turns((theta / TAU % 1.0) as f32).unit_vector();
+            let square = along(theta).powi(2) / reference + loss;
+            let mut seen = Saliency { q: 0.0, carrier_squared: square as f32, i_q: 0.0 };
+            drift.on_top_of(&Asymmetry::default(), axis).take_out(&mut seen, axis);
+            drift.step(seen.carrier_squared * drift.at_start() - 1.0, (hz / 6000.0) as f32);
+        }
+        drift
+    }
+
+    #[test]
+    fn the_mismatch_is_found_while_the_flux_turns() {
+        for (mismatch, loss, hz) in [
+            (0.01, 0.0, 1.0),
+            (-0.01, 0.0, -10.0),
+            (0.005, 0.02, 0.5),
+            (-0.004, -0.02, 3.0),
+            (0.0, 0.02, 2.0),
+        ] {
+            let found = f64::from(followed(mismatch, loss, hz, 10.0).mismatch);
+            // After five time constants 0.7 % of it are left, and the ripple of the mean of a loss that came at once.
+            assert!((found - mismatch).abs() < 4e-4, "{mismatch} {loss} {hz}: {found}");
+        }
+        // 63 % after the time constant.
+        let found = f64::from(followed(0.01, 0.0, 5.0, 2.0).mismatch);
+        assert!((found / 0.01 - 0.63).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn standstill_shows_nothing_and_it_stays_within_its_limit() {
+        assert_eq!(followed(0.01, 0.02, 0.1, 5.0).mismatch, 0.0);
+        assert_eq!(followed(0.05, 0.0, 2.0, 20.0).mismatch, LARGEST);
+        assert_eq!(followed(-0.05, 0.0, 2.0, 20.0).mismatch, -LARGEST);
+    }
+}
