@@ -4,6 +4,8 @@ mod axes;
 mod coefficients;
 mod command;
 mod commands;
+mod excitation;
+mod excite;
 mod in_turn;
 mod layout;
 mod learn;
@@ -42,6 +44,8 @@ use crate::settings::AngleSource;
 use axes::Axes;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused};
+pub use excitation::{Excitation, Excited};
+use excite::ExcitationState;
 use in_turn::StepResults;
 pub use layout::Layout;
 use observed::Observed;
@@ -139,6 +143,7 @@ struct ControlState {
     /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
+    excitation: ExcitationState,
 }
 
 impl Drive {

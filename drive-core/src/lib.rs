@@ -24,6 +24,7 @@
 //! | [`motion`] | speed and position loop |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`] | what a learning has found |
+//! | [`commission`] | from the nameplate to the parameters of the motor |
 //! | [`identify`] | learning of the tracking reference; rotor time constant while running |
 //! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
 //! | `drive` | [`Drive`], its [`Coefficients`], states and commands |
@@ -43,6 +44,7 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod carrier;
+pub mod commission;
 pub mod current;
 mod drive;
 pub mod fault;
@@ -57,7 +59,10 @@ pub mod protect;
 pub mod settings;
 pub mod tuning;
 
-pub use drive::{Accepted, Coefficients, Command, Drive, Layout, Mode, Refused, State, Telemetry};
+pub use drive::{
+    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, State,
+    Telemetry,
+};
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};
 pub use math::angle::{Angle, UnitVector};

@@ -6,6 +6,7 @@ mod angle_identification;
 mod anti_windup;
 pub mod battery;
 mod bode;
+mod commission;
 mod current_step;
 mod dead_time;
 mod demodulators;
@@ -231,6 +232,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
+    commission::EXPERIMENT,
     battery::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
@@ -255,6 +257,7 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<sweep::Sweep>(),
     Statistical::of::<monte_carlo::MonteCarlo>(),
     Statistical::of::<machines::Machines>(),
+    Statistical::of::<commission::Commission>(),
     Statistical::of::<battery::Battery>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
     Statistical::of::<saliency_check::SaliencyCheck>(),

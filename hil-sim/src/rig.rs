@@ -265,6 +265,7 @@ fn words(command: &Command) -> String {
         Command::Start(mode) => format!("to start in {} mode", mode_word(*mode)),
         Command::Relock => "to magnetise and verify the angle again".into(),
         Command::CheckWiring => "to check the wiring".into(),
+        Command::Excite(_) => "to excite the motor at rest".into(),
         Command::Stop => "to stop".into(),
         Command::Clear => "to clear the fault".into(),
         Command::Torque(a) => format!("a torque current of {a} A"),
@@ -284,6 +285,7 @@ fn mode_word(mode: Mode) -> &'static str {
         Mode::Speed => "speed",
         Mode::Position => "position",
         Mode::Learning => "learning",
+        Mode::Commissioning => "commissioning",
     }
 }
 

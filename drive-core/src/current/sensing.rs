@@ -119,6 +119,12 @@ impl Sensing {
         [self.current_a, self.current_b, c]
     }
 
+    /// Offsets of a and b that were measured, A.
+    pub fn offsets(&self, state: &SensingState) -> [f32; 2] {
+        let [a, b, _] = state.zeros;
+        [self.current_a.offset - a, self.current_b.offset - b]
+    }
+
     /// Averages one sample with the outputs off; `Some` when the offsets are measured.
     ///
     /// # Errors

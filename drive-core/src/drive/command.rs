@@ -1,6 +1,7 @@
 //! The commands to the drive, and its answers.
 
 use crate::drive::coefficients::Coefficients;
+use crate::drive::excitation::Excitation;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
 use crate::math::frames::Dq;
@@ -18,7 +19,10 @@ pub enum Command {
     Relock,
     /// From off: the next start checks the wiring first; see [`crate::protect::wiring_check`].
     CheckWiring,
-    /// Take the torque to zero, then switch off.
+    /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
+    /// offsets and charges the bootstraps first. See [`crate::commission`].
+    Excite(Excitation),
+    /// Take the torque to zero, then switch off; while the motor at rest is excited, switch off.
     Stop,
     /// Forget the latched fault and be off.
     Clear,

@@ -31,10 +31,14 @@ impl Drive {
                 State::Fault(fault) => Err(Refused::Fault(fault)),
                 state => Err(Refused::State(state)),
             },
+            Command::Excite(excitation) => self.take_excitation(excitation),
             Command::Stop => {
                 match self.state {
                     State::Off | State::Fault(_) | State::Stopping => {}
-                    State::Calibrating | State::Precharge | State::CheckingWiring => {
+                    State::Calibrating
+                    | State::Precharge
+                    | State::CheckingWiring
+                    | State::Exciting => {
                         self.enter(State::Off);
                     }
                     _ => self.enter(State::Stopping),
@@ -130,13 +134,13 @@ impl Drive {
         self.changes = self.changes.wrapping_add(1);
     }
 
-    fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
+    pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
             (State::Off, Mode::Learning) if !self.can_learn() => {
                 return Err(Refused::NeedsInjection);
             }
-            (State::Off, Mode::Learning) => {}
+            (State::Off, Mode::Learning | Mode::Commissioning) => {}
             (State::Off, _) if self.c.unlearned => return Err(Refused::NotLearned),
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
@@ -158,6 +162,7 @@ impl Drive {
     fn relock(&mut self) -> Result<Accepted, Refused> {
         match self.state {
             State::Fault(fault) => return Err(Refused::Fault(fault)),
+            State::Exciting => return Err(Refused::State(self.state)),
             _ if self.c.source != AngleSource::Injection => return Err(Refused::NeedsInjection),
             state if state == State::of_mode(self.mode) => {}
             state => return Err(Refused::State(state)),
@@ -183,7 +188,7 @@ impl Drive {
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
             State::Off | State::Stopping => Err(Refused::State(self.state)),
-            _ if self.mode != mode || mode == Mode::Learning => {
+            _ if self.mode != mode || matches!(mode, Mode::Learning | Mode::Commissioning) => {
                 Err(Refused::State(State::of_mode(self.mode)))
             }
             _ if !value.is_finite() => Err(Refused::NotFinite),

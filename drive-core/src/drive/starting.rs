@@ -24,6 +24,7 @@ impl Drive {
         Ok(match self.state {
             State::Calibrating => self.calibrate(sample)?,
             State::Precharge => self.precharge(sample)?,
+            State::Exciting => self.excite(&measured)?,
             _ => self.check_wiring(sample, &measured)?,
         })
     }
@@ -41,7 +42,9 @@ impl Drive {
             self.c.sensing.calibrate_again(&mut self.control.sensing, sample)?;
         }
         if self.elapsed >= self.c.sequence.precharge {
-            if self.wiring_unchecked {
+            if self.mode == Mode::Commissioning {
+                self.excite_from_here();
+            } else if self.wiring_unchecked {
                 self.wiring = WiringCheckState::default();
                 self.enter(State::CheckingWiring);
             } else {
@@ -53,14 +56,20 @@ impl Drive {
 
     /// Short voltage pulses, without control.
     fn check_wiring(&mut self, sample: &Sample, measured: &Measured) -> Result<Compare, Fault> {
-        Ok(match self.c.wiring.step(&mut self.wiring, measured.phases)? {
+        let pulses = self.pulses();
+        Ok(match pulses.step(&mut self.wiring, measured.phases)? {
             WiringAction::Apply { voltage, current } => {
                 let signs = self.c.dead_time.signs(current.to_abc());
                 let compensation = self.c.dead_time.voltage(signs, measured.dc_link, 0.0);
                 let modulated = self.c.modulator.step(voltage, compensation, measured.dc_link);
                 Compare::on(modulated.compare)
             }
-            WiringAction::Passed => {
+            WiringAction::Ended if self.mode == Mode::Commissioning => {
+                self.end_train();
+                Compare::LOW_SIDES_ON
+            }
+            WiringAction::Ended => {
+                pulses.judge(&self.wiring.answers())?;
                 self.wiring_unchecked = false;
                 self.magnetising_from_here(sample);
                 Compare::LOW_SIDES_ON

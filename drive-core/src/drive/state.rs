@@ -16,6 +16,8 @@ pub enum Mode {
     /// Learning of the reference of the angle tracking with the shaft locked (see [`crate::identify::learning`]), then
     /// stops.
     Learning,
+    /// [Excitation](crate::Excitation) of the motor at rest, for the [commissioning](crate::commission).
+    Commissioning,
 }
 
 /// The state of the drive.
@@ -30,6 +32,8 @@ pub enum State {
     Precharge,
     /// Short voltage pulses show whether sensors and phases belong together.
     CheckingWiring,
+    /// Exciting the motor at rest, for the [commissioning](crate::commission).
+    Exciting,
     /// Current on the direct axis only, until the flux stands.
     Magnetising,
     /// Flux built up, tracking without torque: is it the flux that is tracked?
@@ -56,10 +60,11 @@ impl State {
             Mode::Speed => Self::Speed,
             Mode::Position => Self::Position,
             Mode::Learning => Self::Learning,
+            Mode::Commissioning => Self::Exciting,
         }
     }
 
-    /// Whether the current is regulated, for whatever purpose.
+    /// Whether the current is regulated in the frame of the flux, for whatever purpose.
     pub(crate) const fn has_current(self) -> bool {
         matches!(
             self,
@@ -92,6 +97,7 @@ impl fmt::Display for State {
             Self::Calibrating => "calibrating",
             Self::Precharge => "precharging",
             Self::CheckingWiring => "checking the wiring",
+            Self::Exciting => "exciting the motor at rest",
             Self::Magnetising => "magnetising",
             Self::Verifying => "verifying the lock",
             Self::Torque => "regulating torque",

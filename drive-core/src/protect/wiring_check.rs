@@ -75,8 +75,8 @@ pub enum WiringAction {
         /// Expected current in the stator frame, A peak, for the dead-time compensation.
         current: AlphaBeta,
     },
-    /// The wiring is correct; continue the start.
-    Passed,
+    /// All pulses have been applied: [judge](WiringCheck::judge) the answers.
+    Ended,
 }
 
 /// Unit vectors along phases a, b, c.
@@ -100,6 +100,13 @@ pub struct WiringSettings {
     pub highest_v: f32,
 }
 
+impl WiringCheckState {
+    /// Mean responses of sensors a and b to the pulses on phases a, b and c, A, once all pulses have been applied.
+    pub fn answers(&self) -> [[f32; 2]; 3] {
+        self.answers.map(|sensors| sensors.map(|sum| sum * (1.0 / (2 * ROUNDS) as f32)))
+    }
+}
+
 impl WiringCheck {
     /// Designs the pulses.
     pub fn new(s: &WiringSettings) -> Self {
@@ -114,9 +121,7 @@ impl WiringCheck {
     /// Processes one sample of the phase currents, A.
     ///
     /// # Errors
-    /// [`Fault::WiringCurrent`] when the current exceeds its bound; after the last pulse
-    /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
-    /// [`Fault::WiringPolarityB`].
+    /// [`Fault::WiringCurrent`] when the current exceeds its bound.
     pub fn step(&self, state: &mut WiringCheckState, phases: Abc) -> Result<WiringAction, Fault> {
         // The voltage computed in period n acts from sample n + 1 on and shows in sample n + 2.
         let risen = state.period.saturating_sub(1);
@@ -147,17 +152,21 @@ impl WiringCheck {
             state.period = 0;
             state.pulse += 1;
             if state.pulse >= PULSES_PER_ROUND * ROUNDS {
-                return self.judge(&state.answers).map_or(Ok(WiringAction::Passed), Err);
+                return Ok(WiringAction::Ended);
             }
         }
         let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
         Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
     }
 
-    /// Evaluates the responses; the fault, if any.
-    fn judge(&self, answers: &[[f32; 2]; 3]) -> Option<Fault> {
+    /// Evaluates the [answers](WiringCheckState::answers).
+    ///
+    /// # Errors
+    /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
+    /// [`Fault::WiringPolarityB`].
+    pub fn judge(&self, answers: &[[f32; 2]; 3]) -> Result<(), Fault> {
         let [a, b, c] = *answers;
-        let least = LEAST_SHARE * self.expected * (2 * ROUNDS) as f32;
+        let least = LEAST_SHARE * self.expected;
         // Responses of a sensor to its own phase and to the two others.
         let sensors = [
             ([a[0], b[0], c[0]], Fault::WiringPolarityA),
@@ -167,12 +176,13 @@ impl WiringCheck {
         let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
         let [(at_a, _), (at_b, _)] = sensors;
         if silent(at_a) || silent(at_b) {
-            return Some(Fault::WiringNoCurrent);
+            return Err(Fault::WiringNoCurrent);
         }
         if exchanged(at_a) || exchanged(at_b) {
-            return Some(Fault::WiringExchanged);
+            return Err(Fault::WiringExchanged);
         }
-        sensors.into_iter().find(|([own, ..], _)| *own < 0.0).map(|(_, fault)| fault)
+        let reversed = sensors.into_iter().find(|([own, ..], _)| *own < 0.0);
+        reversed.map_or(Ok(()), |(_, fault)| Err(fault))
     }
 }
 
@@ -243,7 +253,7 @@ mod tests {
                     let Abc { a, b, c } = current.to_abc();
                     largest = largest.max(a.abs()).max(b.abs()).max(c.abs());
                 }
-                Ok(WiringAction::Passed) => return (Ok(()), largest),
+                Ok(WiringAction::Ended) => return (check.judge(&state.answers()), largest),
                 Err(fault) => return (Err(fault), largest),
             }
         }

@@ -1,0 +1,227 @@
+//! Commissioning: from the nameplate to the parameters of the motor, at standstill, without a sensor on the shaft.
+//!
+//! [`Commissioning`] is a state machine for the main loop. It never touches the hardware: it asks for an
+//! [`Excitation`], the drive applies it in its interrupt, a [`Collector`] keeps sums of what the drive saw, and the
+//! commissioning evaluates them, step by step.
+//!
+//! ```no_run
+//! use drive_core::commission::{Collector, Commissioning, Next, Step};
+//! use drive_core::{Command, Drive, Settings};
+//!
+//! # fn one_period(drive: &mut Drive) {}
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = Settings::default();
+//! let (mut drive, mut collector) = (Drive::new(settings.build()?), Collector::default());
+//! let mut commissioning = Commissioning::new(&settings);
+//! commissioning.start(Step::Nameplate, Step::Leakage);
+//! loop {
+//!     one_period(&mut drive); // in the interrupt: `Drive::step`
+//!     if drive.excites() {
+//!         let seen = drive.telemetry();
+//!         collector.push(seen.measured, seen.realised, seen.dc_link);
+//!     }
+//!     match commissioning.poll(&drive.excited(), &mut collector) {
+//!         Next::Wait => {}
+//!         Next::Excite(excitation) => drop(drive.command(&Command::Excite(excitation))?),
+//!         Next::Stop => drop(drive.command(&Command::Stop)?),
+//!         Next::Report(report) => report.values.iter().flatten().for_each(|value| println!("{value}")),
+//!         Next::Done => break,
+//!     }
+//! }
+//! let found = commissioning.settings(&settings); // for `Command::Configure`
+//! # Ok(()) }
+//! ```
+//!
+//! The sensors' common gain error and that of the dc link cannot be seen: resistances and inductances carry them. Nor can
+//! two phases that are exchanged between sensors and motor: such a motor turns the other way.
+
+mod collector;
+mod found;
+mod leakage;
+mod levels;
+mod plate;
+mod report;
+mod steps;
+
+use crate::drive::{Excitation, Excited, State};
+use crate::settings::Settings;
+
+pub use collector::{BINS, Bin, Collector, Record};
+pub use found::Found;
+pub use report::{Meaning, Quantity, Refusal, Report, Step};
+
+use levels::{Fitted, Search};
+use plate::Plate;
+
+/// What the commissioning wants next.
+// A report is passed once a step.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Next {
+    /// Nothing: poll again, after a millisecond or so.
+    Wait,
+    /// Give the drive [`Command::Excite`](crate::Command::Excite).
+    Excite(Excitation),
+    /// Give the drive [`Command::Stop`](crate::Command::Stop).
+    Stop,
+    /// A step has ended.
+    Report(Report),
+    /// All steps have ended, or one was refused. The drive is off.
+    Done,
+}
+
+/// The commissioning: what it does, and what it has found.
+#[derive(Clone, Debug)]
+pub struct Commissioning {
+    setup: Setup,
+    found: Found,
+    /// The present step, and the last.
+    step: Step,
+    last: Step,
+    /// Part of the step, and the samples that it waits for.
+    part: u8,
+    until: u32,
+    progress: Progress,
+    /// Whether the drive has left the state off.
+    on: bool,
+    /// Pulses of the present train, and trains before it.
+    pulses: (f32, u32),
+    search: Option<Search>,
+    /// Fit of the levels, and gain mismatch, until the third level confirms them.
+    fitted: (Fitted, f32, Option<Report>),
+    /// Inductances along and across at each bias, H.
+    inductances: [[f32; 2]; 2],
+}
+
+/// What the settings say.
+#[derive(Clone, Copy, Debug)]
+struct Setup {
+    plate: Result<Plate, Refusal>,
+    /// Time constant of the analog filter of the currents, control periods.
+    filter: f32,
+    /// Margin for noise of the pulses, A, and their largest voltage, V.
+    pulse_noise: f32,
+    pulse_v: f32,
+    /// Nominal dc link, V.
+    dc_link: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    Steps,
+    /// Stop the drive.
+    Stop,
+    Stopping,
+    Ended,
+}
+
+impl Commissioning {
+    /// A commissioning of the motor with the nameplate, on the board, of these settings. Nothing is begun.
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            setup: Setup {
+                plate: Plate::new(settings),
+                filter: settings.scales.current_delay_s / crate::io::PERIOD_S,
+                pulse_noise: settings.share_of_range(0.05),
+                pulse_v: settings.share_of_dc_link(60.0),
+                dc_link: settings.inverter.dc_link_v,
+            },
+            found: Found::default(),
+            step: Step::Nameplate,
+            last: Step::Nameplate,
+            part: 0,
+            until: 0,
+            progress: Progress::Ended,
+            on: false,
+            pulses: (0.0, 0),
+            search: None,
+            fitted: (Fitted::default(), 0.0, None),
+            inductances: [[0.0; 2]; 2],
+        }
+    }
+
+    /// Begins the steps from `first` to `last`; the drive must be off. What earlier steps have found is kept until
+    /// they are repeated.
+    pub fn start(&mut self, first: Step, last: Step) {
+        (self.step, self.last, self.progress, self.on) = (first, last, Progress::Steps, false);
+        (self.part, self.until) = (0, 0);
+    }
+
+    /// Whether steps are being done.
+    pub fn is_running(&self) -> bool {
+        self.progress != Progress::Ended
+    }
+
+    /// The present step, or the last that was done.
+    pub fn step(&self) -> Step {
+        self.step
+    }
+
+    /// What has been found so far.
+    pub fn found(&self) -> &Found {
+        &self.found
+    }
+
+    /// The settings with what has been found in them; equal to `settings` where nothing has.
+    pub fn settings(&self, settings: &Settings) -> Settings {
+        let pole_pairs = self.setup.plate.map(|plate| plate.pole_pairs);
+        self.found.settings(settings, pole_pairs.unwrap_or(settings.motor.pole_pairs))
+    }
+
+    /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](crate::Drive::excited).
+    pub fn poll(&mut self, drive: &Excited, sums: &mut Collector) -> Next {
+        match self.progress {
+            Progress::Ended => return Next::Done,
+            Progress::Stop | Progress::Stopping => {
+                if matches!(drive.state, State::Off | State::Fault(_)) {
+                    self.progress = Progress::Ended;
+                    return Next::Done;
+                }
+                let first = self.progress == Progress::Stop;
+                self.progress = Progress::Stopping;
+                return if first { Next::Stop } else { Next::Wait };
+            }
+            Progress::Steps => {}
+        }
+        let excites = match drive.state {
+            State::Off => !self.on,
+            State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting => true,
+            _ => false,
+        };
+        self.on |= drive.state != State::Off;
+        let result = if !excites {
+            Err(Refusal::Drive(drive.state))
+        } else if sums.samples() < self.until {
+            return Next::Wait;
+        } else {
+            self.go_on(drive, sums)
+        };
+        match result {
+            Ok(Next::Report(report)) => {
+                if self.step < self.last {
+                    self.next_step();
+                } else {
+                    self.progress = Progress::Stop;
+                }
+                Next::Report(report)
+            }
+            Ok(next) => next,
+            Err(refusal) => {
+                self.progress = Progress::Stop;
+                Next::Report(Report { refusal: Some(refusal), ..Report::new(self.step, []) })
+            }
+        }
+    }
+
+    fn next_step(&mut self) {
+        self.step = match self.step {
+            Step::Nameplate => Step::Sensors,
+            Step::Sensors => Step::Wiring,
+            Step::Wiring => Step::Levels,
+            Step::Levels => Step::Leakage,
+            Step::Leakage => Step::Staircase,
+            Step::Staircase | Step::CurrentLoop => Step::CurrentLoop,
+        };
+        (self.part, self.until) = (0, 0);
+    }
+}

@@ -1,0 +1,142 @@
+//! Excitation of a motor at rest for the [commissioning](crate::commission).
+//!
+//! The current along phase a is regulated by one controller without knowledge of the motor but for its transient
+//! inductance, with an optional carrier; the voltage across it is the carrier alone, without control. The dead time is
+//! not compensated: the commissioning measures it.
+
+use super::Drive;
+use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
+use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
+use crate::current::sensing::Measured;
+use crate::drive::command::{Accepted, Refused};
+use crate::drive::excitation::{Excitation, Excited};
+use crate::drive::state::{Mode, State};
+use crate::fault::Fault;
+use crate::io::{Compare, PERIOD_S};
+use crate::math::frames::{Abc, AlphaBeta, Dq};
+use crate::math::limited;
+use crate::protect::wiring_check::{WiringCheck, WiringCheckState};
+
+/// Gain of the controller per transient inductance, rad/s: the crossover of the loop.
+const GAIN_RAD_PER_S: f32 = 500.0;
+/// Zero of the controller, rad/s.
+const ZERO_RAD_PER_S: f32 = 167.0;
+/// Control periods in which the carrier rises to its amplitude: twenty of its own.
+const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
+
+/// State of the excitation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ExcitationState {
+    wanted: Excitation,
+    regulator: PiState,
+    reference: ReferenceState,
+    /// Present amplitude of the carrier, V.
+    carrier: AlphaBeta,
+    /// Sample within the period of the carrier.
+    index: usize,
+    /// Pulse trains that have ended.
+    trains: u32,
+}
+
+impl Drive {
+    /// Whether [`Collector`](crate::commission::Collector) is to be given what the last step saw.
+    pub fn excites(&self) -> bool {
+        self.state == State::Exciting
+    }
+
+    /// What the commissioning needs of this drive.
+    pub fn excited(&self) -> Excited {
+        Excited {
+            state: self.state,
+            offsets: self.c.sensing.offsets(&self.control.sensing),
+            trains: self.control.excitation.trains,
+            answers: self.wiring.answers(),
+        }
+    }
+
+    /// Takes [`Command::Excite`](super::Command::Excite).
+    pub(super) fn take_excitation(&mut self, wanted: Excitation) -> Result<Accepted, Refused> {
+        if let Excitation::Current { amperes, inductance, carrier } = wanted {
+            let (max, sum) = (self.c.protection.trip_a, amperes + carrier.alpha + carrier.beta);
+            if !(sum + inductance).is_finite() {
+                return Err(Refused::NotFinite);
+            }
+            if amperes.abs() > max {
+                return Err(Refused::OutOfRange { min: -max, max });
+            }
+        }
+        match self.state {
+            State::Off => {
+                self.start(Mode::Commissioning)?;
+                self.control.excitation.wanted = wanted;
+            }
+            State::Exciting => {
+                self.control.excitation.wanted = wanted;
+                self.excite_from_here();
+            }
+            State::Fault(fault) => return Err(Refused::Fault(fault)),
+            state => return Err(Refused::State(state)),
+        }
+        Ok(Accepted::AsGiven)
+    }
+
+    /// Begins the wanted excitation.
+    pub(super) fn excite_from_here(&mut self) {
+        let pulses = matches!(self.control.excitation.wanted, Excitation::Pulses(_));
+        if pulses {
+            self.wiring = WiringCheckState::default();
+        }
+        self.enter(if pulses { State::CheckingWiring } else { State::Exciting });
+    }
+
+    /// The pulses in force: of the commissioning, or of a start.
+    pub(super) fn pulses(&self) -> WiringCheck {
+        match &self.control.excitation.wanted {
+            Excitation::Pulses(pulses) => WiringCheck::new(pulses),
+            _ => self.c.wiring,
+        }
+    }
+
+    /// Rests after a pulse train.
+    pub(super) fn end_train(&mut self) {
+        let s = &mut self.control.excitation;
+        *s = ExcitationState { trains: s.trains.wrapping_add(1), ..ExcitationState::default() };
+        self.enter(State::Exciting);
+    }
+
+    /// A step of the excitation.
+    #[inline(never)]
+    pub(super) fn excite(&mut self, measured: &Measured) -> Result<Compare, Fault> {
+        let s = &mut self.control.excitation;
+        let mut realised = AlphaBeta::ZERO;
+        let mut compare = Compare::LOW_SIDES_ON;
+        if let Excitation::Current { amperes, inductance, carrier } = s.wanted {
+            let z_c = 1.0 - ZERO_RAD_PER_S * PERIOD_S;
+            let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct: 0.0 };
+            let reference = filter.step(&mut s.reference, amperes);
+            let regulator = Pi { k_c: GAIN_RAD_PER_S * inductance, z_c };
+            let along = regulator.step(&mut s.regulator, reference - measured.current.alpha);
+            let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
+            s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
+            s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);
+            let cos = CARRIER_COS.get(s.index).copied().unwrap_or(0.0);
+            s.index = if s.index + 1 < CARRIER_SAMPLES { s.index + 1 } else { 0 };
+            let wanted = AlphaBeta::new(along, 0.0) + s.carrier * cos;
+            if !(wanted.alpha + wanted.beta).is_finite() {
+                return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
+            }
+            let modulated = self.c.modulator.step(wanted, Abc::ZERO, measured.dc_link);
+            if modulated.limited {
+                s.regulator.back_calculate(modulated.realised.alpha - wanted.alpha);
+            }
+            realised = modulated.realised;
+            compare = Compare::on(modulated.compare);
+        }
+        let seen = &mut self.control.seen;
+        (seen.measured, seen.realised) = (measured.current, realised);
+        seen.dc_link = measured.dc_link;
+        // For the thermal loads.
+        seen.current = Dq::new(measured.current.alpha, measured.current.beta);
+        Ok(compare)
+    }
+}

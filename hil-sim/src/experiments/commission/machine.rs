@@ -1,0 +1,84 @@
+//! Machines to be commissioned: the truth about them, and random ones.
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::config::{Config, LoadMode, PlantModel, plant_settings};
+
+/// Parameters of the inverse-Gamma circuit.
+#[derive(Clone, Copy, Debug)]
+pub struct Circuit {
+    /// Stator resistance, ohm.
+    pub r_s: f64,
+    /// Transient inductance, H.
+    pub leakage: f64,
+    /// Rotor resistance as the stator sees it, ohm.
+    pub r_r: f64,
+    /// Coupled magnetising inductance, H.
+    pub coupled: f64,
+}
+
+impl Circuit {
+    /// That of a T circuit.
+    pub fn of([r_s, r_r, l_ls, l_lr, l_m]: [f64; 5]) -> Self {
+        let k = l_m / (l_m + l_lr);
+        Self { r_s, leakage: l_ls + k * l_lr, r_r: k * k * r_r, coupled: k * l_m }
+    }
+
+    /// That of the simulated motor; with iron, at its nominal flux.
+    pub fn of_plant(config: &Config) -> Self {
+        let m = plant_settings(config).machine;
+        Self::of([m.rs, m.rr, m.lls, m.llr, m.lm])
+    }
+
+    /// Rotor time constant, s.
+    pub fn tau_r(&self) -> f64 {
+        self.coupled / self.r_r
+    }
+
+    /// Name, in the metrics, and value of each parameter.
+    pub fn values(&self) -> [(&'static str, f64); 5] {
+        [
+            ("r_s", self.r_s),
+            ("sigma_ls", self.leakage),
+            ("rr", self.r_r),
+            ("lm", self.coupled),
+            ("tau_r", self.tau_r()),
+        ]
+    }
+}
+
+/// A machine and a board around those of the configuration: each parameter and saliency times or over a factor up to
+/// `spread.machine` (2 unless set), free shaft, dead time 2 to 5 us, further drop 0.5 to 3 V at 311 V, gain errors up to
+/// 0.5 % and offsets up to 0.7 % of the range. The drive knows its dead time.
+pub fn drawn(config: &Config, seed: u64) -> Config {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let spread = if config.spread.machine > 1.0 { config.spread.machine } else { 2.0 };
+    let mut factor = |most: f64| random.random_range(-most.ln()..=most.ln()).exp();
+    let mut drawn = config.clone();
+    let saliency = plant_settings(config).saliency;
+    let (m, leakage) = (&mut drawn.motor, factor(spread));
+    m.r_s *= factor(spread);
+    m.r_r *= factor(spread);
+    m.l_m *= factor(spread);
+    m.l_ls *= leakage;
+    m.l_lr *= leakage;
+    let (a_psi, b1) = (factor(spread), factor(spread));
+    if config.model.plant == PlantModel::A {
+        drawn.saliency.a_psi = saliency.a_psi * a_psi;
+        drawn.saliency.b1 = Some(saliency.b1 * b1);
+    }
+    drawn.motor.inertia *= (factor(5.0) * 0.632_456).clamp(0.2, 2.0);
+    drawn.motor.friction = 1e-4;
+    drawn.load.mode = LoadMode::Free;
+    let volts = config.inverter.dc_link_v / 311.0;
+    let mut between = |low: f64, high: f64| random.random_range(low..=high);
+    drawn.inverter.dead_time_s = between(2e-6, 5e-6);
+    drawn.drive.inverter.dead_time_s = drawn.inverter.dead_time_s as f32;
+    drawn.inverter.residual_v = Some(between(0.5, 3.0) * volts);
+    let offset = 0.03 / 4.47 * config.measurement.range_a;
+    let errors = &mut drawn.measurement;
+    (errors.gain_error_a, errors.gain_error_b) = (between(-0.005, 0.005), between(-0.005, 0.005));
+    (errors.offset_a, errors.offset_b) = (between(-offset, offset), between(-offset, offset));
+    drawn
+}
