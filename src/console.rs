@@ -23,6 +23,7 @@ use core::fmt;
 use drive_core::identify::learning::Learned;
 use drive_core::{Command, State};
 
+use crate::commissioning::News;
 use crate::link::trace::Plan;
 use crate::settings::FirmwareSettings;
 use crate::settings::staging::Staging;
@@ -62,6 +63,8 @@ pub struct Console {
     unbelievable: Option<Learned>,
     /// Whether a learning has ended that is not announced yet.
     ended: bool,
+    /// News of the commissioning, and the number of the next line about it.
+    commissioned: Option<(News, usize)>,
     restore: Restore,
     /// The board that the lines that come in belong to, if it is another than this one.
     foreign: Option<&'static str>,
@@ -88,6 +91,7 @@ impl Console {
             armed: false,
             unbelievable: None,
             ended: false,
+            commissioned: None,
             restore: Restore::new(),
             foreign: None,
         }
@@ -110,6 +114,9 @@ impl Console {
             self.unbelievable = Some(*result).filter(|result| !result.verdict.is_accepted());
             self.ended = true;
         });
+        if self.commissioned.is_none() {
+            self.commissioned = drive.commissioned().map(|news| (news, 0));
+        }
         if port.take_damage() {
             self.reader.spoil(LineError::Lost);
         }
@@ -180,6 +187,10 @@ impl Console {
             self.announcer.next(&status, &self.settings.in_force().drive, now_ms)
         {
             self.out.line(format_args!("{news}"));
+        } else if let Some((news, line)) = self.commissioned {
+            let (text, next) = announce::commissioning(&news, line);
+            self.out.line(format_args!("commissioning: {text}"));
+            self.commissioned = next.map(|line| (news, line));
         } else if self.armed && !drive.tracing() {
             self.armed = false;
             self.out.line(format_args!("trace: recorded; `trace` prints it"));

@@ -7,6 +7,7 @@
 
 pub mod board;
 pub mod boards;
+pub mod commissioning;
 pub mod console;
 mod hash;
 pub mod link;

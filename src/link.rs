@@ -3,7 +3,7 @@
 pub mod mailbox;
 pub mod trace;
 
-use drive_core::{Accepted, Hardware, Refused, Sample, State, Telemetry};
+use drive_core::{Accepted, Excited, Hardware, Refused, Sample, State, Telemetry};
 
 /// The drive's answer to a command.
 pub type Answer = Result<Accepted, Refused>;
@@ -30,4 +30,6 @@ pub struct Status {
     pub hardware: Hardware,
     /// While the drive learns: the point that is being measured, from 1 on, and the number of points.
     pub learning: Option<(usize, usize)>,
+    /// For the commissioning.
+    pub excited: Excited,
 }

@@ -14,12 +14,13 @@ use crate::board;
 /// Control periods from one fit of the machine to the next: ten a second.
 const PERIODS_PER_FIT: u32 = board::PWM_HZ / 10;
 
-/// Signals of one control period. The numbers count up while the drive regulates; a missing number is a gap.
+/// Signals of one control period. The numbers count up while the drive regulates or excites the motor; a missing number is a gap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    number: u32,
-    measured: AlphaBeta,
-    realised: AlphaBeta,
+    pub(crate) number: u32,
+    pub(crate) measured: AlphaBeta,
+    pub(crate) realised: AlphaBeta,
+    pub(crate) dc_link: f32,
     reference: Dq,
     rotor_freq: f32,
 }
@@ -27,8 +28,8 @@ pub struct Observation {
 impl Observation {
     /// The signals of control period `number`.
     pub fn new(number: u32, t: &Telemetry) -> Self {
-        let Telemetry { measured, realised, reference, rotor_freq, .. } = *t;
-        Self { number, measured, realised, reference, rotor_freq }
+        let Telemetry { measured, realised, dc_link, reference, rotor_freq, .. } = *t;
+        Self { number, measured, realised, dc_link, reference, rotor_freq }
     }
 }
 

@@ -191,6 +191,8 @@ impl Commissioning {
         self.on |= drive.state != State::Off;
         let result = if !excites {
             Err(Refusal::Drive(drive.state))
+        } else if sums.is_incomplete() {
+            Err(Refusal::SamplesLost)
         } else if sums.samples() < self.until {
             return Next::Wait;
         } else {
@@ -206,11 +208,14 @@ impl Commissioning {
                 Next::Report(report)
             }
             Ok(next) => next,
-            Err(refusal) => {
-                self.progress = Progress::Stop;
-                Next::Report(Report { refusal: Some(refusal), ..Report::new(self.step, []) })
-            }
+            Err(refusal) => Next::Report(self.refuse(refusal)),
         }
+    }
+
+    /// Ends the present step, which is refused, and stops the drive.
+    pub fn refuse(&mut self, refusal: Refusal) -> Report {
+        self.progress = Progress::Stop;
+        Report { refusal: Some(refusal), ..Report::new(self.step, []) }
     }
 
     fn next_step(&mut self) {

@@ -2,9 +2,10 @@
 
 use core::fmt;
 
+use drive_core::commission::Step;
 use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
-use drive_core::{Accepted, Command, Mode, State};
+use drive_core::{Accepted, Command, Mode, Refused, State};
 use thiserror::Error;
 
 use super::grammar::Request;
@@ -23,6 +24,8 @@ pub(super) enum Task {
     Apply,
     /// The same, then start.
     Start(Mode),
+    /// The same, then commission: from this step to that.
+    Commission(Step, Step),
     /// The same, then learn: anew, or again at another rotor position.
     Learn { again: bool },
     /// The same, then save.
@@ -43,6 +46,10 @@ impl Console {
             Request::Status => self.status(drive),
             Request::Start(mode) => self.design_for(Task::Start(mode), drive),
             Request::Learn { again } => self.design_for(Task::Learn { again }, drive),
+            Request::Commission(first, last) => {
+                self.design_for(Task::Commission(first, last), drive);
+            }
+            Request::Accept => self.accept(drive),
             Request::Stop => {
                 self.announcer.stopping();
                 self.give(Command::Stop, "", drive);
@@ -223,7 +230,9 @@ impl Console {
             _ if let Some(other) = self.foreign => {
                 self.error(&WrongBoard(other, in_force.board.name));
             }
-            Task::Start(_) | Task::Learn { .. } if !in_force.board_is_confirmed() => {
+            Task::Start(_) | Task::Learn { .. } | Task::Commission(..)
+                if !in_force.board_is_confirmed() =>
+            {
                 self.error(&NOT_CONFIRMED);
             }
             _ if (anew || self.settings.needs_design()) && drive.status().is_some() => {
@@ -258,6 +267,7 @@ impl Console {
         match task {
             Task::Start(mode) => self.start(mode, drive),
             Task::Learn { again } => self.learn(again, drive),
+            Task::Commission(first, last) => self.commission(first, last, drive),
             _ => self.save(drive),
         }
     }
@@ -303,6 +313,32 @@ impl Console {
                 self.out.line(format_args!("ok: the wiring is checked first"));
             }
             Err(why) => self.error(&why),
+        }
+    }
+
+    /// Lets the drive measure its motor.
+    fn commission(&mut self, first: Step, last: Step, drive: &mut impl DriveHandle) {
+        match drive.status().map(|status| status.state) {
+            None => self.error(&drive.no_control()),
+            Some(State::Fault(fault)) => self.error(&Refused::Fault(fault)),
+            Some(_) => {
+                drive.commission(first, last);
+                self.ok();
+            }
+        }
+    }
+
+    /// Puts in force what the commissioning has found, and saves it.
+    fn accept(&mut self, drive: &mut impl DriveHandle) {
+        if !self.may_stage(drive) {
+            return;
+        }
+        match drive.found(&self.settings.latest().drive) {
+            None => self.error(&"nothing new was found: `commission` first"),
+            Some(found) => {
+                self.settings.stage(found);
+                self.design_for(Task::Save, drive);
+            }
         }
     }
 

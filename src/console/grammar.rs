@@ -6,7 +6,8 @@ mod tests;
 
 use core::str::SplitAsciiWhitespace;
 
-use drive_core::settings::value;
+use drive_core::commission::Step;
+use drive_core::settings::value::{self, Words as _};
 use drive_core::{Fault, Mode};
 use heapless::Vec;
 
@@ -42,6 +43,10 @@ pub enum Request {
         /// On top of it.
         again: bool,
     },
+    /// Put the staged settings in force, then commission: these steps, the first and the last.
+    Commission(Step, Step),
+    /// Put in force what the commissioning has found, and save.
+    Accept,
     /// Torque to zero, then off.
     Stop,
     /// Magnetise again and check that the flux is tracked.
@@ -127,10 +132,39 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 30] = [
-    "help", "status", "start", "learn", "stop", "relock", "torque", "speed", "position", "angle",
-    "get", "describe", "set", "apply", "revert", "save", "defaults", "backup", "learned", "faults",
-    "clear", "trace", "log", "echo", "reboot", "board", "confirm", "version", "h", "?",
+pub const COMMANDS: [&str; 32] = [
+    "help",
+    "status",
+    "start",
+    "commission",
+    "accept",
+    "learn",
+    "stop",
+    "relock",
+    "torque",
+    "speed",
+    "position",
+    "angle",
+    "get",
+    "describe",
+    "set",
+    "apply",
+    "revert",
+    "save",
+    "defaults",
+    "backup",
+    "learned",
+    "faults",
+    "clear",
+    "trace",
+    "log",
+    "echo",
+    "reboot",
+    "board",
+    "confirm",
+    "version",
+    "h",
+    "?",
 ];
 
 /// The words of a line.
@@ -182,6 +216,14 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
                 return Err(ParseError::OneOf { what: "the mode", word, all });
             }
         },
+        "commission" => match words.optional() {
+            None => Request::Commission(Step::Nameplate, Step::LAST),
+            Some(word) => {
+                let first = step(word)?;
+                Request::Commission(first, words.optional().map_or(Ok(first), step)?)
+            }
+        },
+        "accept" => Request::Accept,
         "learn" => match words.optional() {
             None => Request::Learn { again: false },
             Some("again") => Request::Learn { again: true },
@@ -250,6 +292,12 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
         }
     };
     words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))
+}
+
+/// The step of the commissioning with this name.
+fn step(word: &str) -> Result<Step, ParseError<'_>> {
+    let place = Step::WORDS.iter().position(|known| *known == word);
+    place.map(Step::at).ok_or(ParseError::OneOf { what: "the step", word, all: Step::ALL })
 }
 
 /// The setting with this name.

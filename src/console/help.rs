@@ -1,10 +1,12 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 32] = [
+pub const HELP: [&str; 34] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
+    "commission [STEP [STEP]]  measure the motor at rest, from its nameplate: all steps, one, or from one to another",
+    "accept                    put in force what `commission` has found, and save",
     "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",
     "stop                      torque to zero, then off",
     "relock                    no torque, magnetise again, verify the lock, go on",

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use drive_core::Settings;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
@@ -146,6 +147,14 @@ impl Staging {
         // A property of the hardware, not of the settings.
         settings.command.confirmed = self.in_force.command.confirmed;
         *staged = Staged { settings, learned: true };
+        self.drop_if_same();
+    }
+
+    /// Stages settings of the drive that the commissioning has found. They are checked when they are put in force.
+    pub fn stage(&mut self, found: Settings) {
+        let staged = Self::staged(&mut self.staged, &self.in_force);
+        staged.settings.drive = found;
+        staged.settings.command.wiring_checked = true;
         self.drop_if_same();
     }
 

@@ -19,6 +19,7 @@ use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
+use induction_drive::commissioning::Session;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::trace::Trace;
 use induction_drive::link::{Answer, Status};
@@ -109,10 +110,12 @@ pub fn bring_up() -> Result<Board, StartError> {
     let Start { saved, settings, rejected } = start;
     let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
     *tracking = Tracking::new(&settings.drive);
+    let commissioning = singleton!(: Session = Session::new(&settings.drive)).ok_or(TWICE)?;
     let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
-    let supervisor = Supervisor::new(link.ok(), watchdog, chip, tracking, &settings.drive);
+    let supervisor =
+        Supervisor::new(link.ok(), watchdog, chip, tracking, commissioning, &settings.drive);
     Ok(Board { settings, port, supervisor })
 }
 

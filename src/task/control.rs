@@ -49,7 +49,7 @@ pub struct Control {
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
-    /// Periods for the identification of the rotor time constant.
+    /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Producer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
 
@@ -226,7 +226,7 @@ impl Running {
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         let fault = matches!(drive.state(), State::Fault(_));
         trace.step(fault, || drive.telemetry());
-        if drive.tracks_rotor() {
+        if drive.tracks_rotor() || drive.excites() {
             // Without room the period is missing, which the main loop detects by its number.
             let _ = observations.enqueue(Observation::new(self.periods, &drive.telemetry()));
         }
@@ -266,6 +266,7 @@ impl Running {
             report.worst_latency = self.worst_latency;
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
+            report.excited = drive.excited();
         });
         if sent {
             self.unreported = Hardware::empty();

@@ -4,6 +4,7 @@ use core::fmt;
 use core::sync::atomic::Ordering;
 
 use defmt::Display2Format;
+use drive_core::commission::Step;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{Scales, Settings, SettingsError};
@@ -15,6 +16,7 @@ use crate::chip::watchdog::Watchdog;
 use crate::chip::{memory, pwm, stop, time};
 use crate::task::control;
 use induction_drive::board;
+use induction_drive::commissioning::{News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
@@ -43,7 +45,7 @@ pub struct ControlLink {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
-    /// Periods for the identification of the rotor time constant.
+    /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
 
@@ -62,6 +64,8 @@ pub struct Supervisor {
     chip: Chip,
     /// Tracking of the rotor time constant, if the settings enable it. (Large, so not on the stack.)
     tracking: &'static mut Option<Tracking>,
+    /// The commissioning. (Large, too.)
+    commissioning: &'static mut Session,
     /// Scales and pole pairs of the settings in force, for the log.
     scales: (Scales, u8),
 }
@@ -111,6 +115,7 @@ impl Supervisor {
         watchdog: Option<Watchdog>,
         chip: Chip,
         tracking: &'static mut Option<Tracking>,
+        commissioning: &'static mut Session,
         settings: &Settings,
     ) -> Self {
         let clock = Clock { last: time::now(), cycles: 0, ms: 0 };
@@ -123,7 +128,19 @@ impl Supervisor {
         });
         let (status, level, well) = (None, Level::Info, false);
         let scales = (settings.scales, settings.motor.pole_pairs);
-        Self { link, status, level, clock, guard, check, well, chip, tracking, scales }
+        Self {
+            link,
+            status,
+            level,
+            clock,
+            guard,
+            check,
+            well,
+            chip,
+            tracking,
+            commissioning,
+            scales,
+        }
     }
 
     /// Checks a slice of the control's memory. A flipped bit ends the run: start-up copies the code and computes the
@@ -148,6 +165,7 @@ impl Supervisor {
         if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
             self.log(status);
         }
+        self.commission();
         self.clock.ms
     }
 
@@ -174,6 +192,10 @@ impl Supervisor {
     /// Feeds the tracking with the periods received. Terminates: handling one period takes less than one period.
     fn track(&mut self) {
         while let Some(period) = self.link.as_mut().and_then(|link| link.observations.dequeue()) {
+            if self.commissioning.is_running() {
+                self.commissioning.take(&period);
+                continue;
+            }
             let tau_r = self.tracking.as_mut().and_then(|tracking| tracking.take(&period));
             let Some(tau_r) = tau_r else { continue };
             // Refused when the drive has just stopped.
@@ -181,6 +203,15 @@ impl Supervisor {
             if let (Ok(accepted), Some(tracking)) = (answer, self.tracking.as_mut()) {
                 tracking.taken(tau_r, accepted);
             }
+        }
+    }
+
+    /// Goes on with the commissioning.
+    fn commission(&mut self) {
+        let Some(Status { excited, .. }) = self.status else { return };
+        let Some(command) = self.commissioning.poll(&excited) else { return };
+        if let Err(why) = self.command(command) {
+            self.commissioning.refused(why);
         }
     }
 
@@ -265,11 +296,24 @@ impl DriveHandle for Supervisor {
 
     fn configured(&mut self, settings: &FirmwareSettings) {
         *self.tracking = Tracking::new(&settings.drive);
+        self.commissioning.configured(&settings.drive);
         self.scales = (settings.drive.scales, settings.drive.motor.pole_pairs);
     }
 
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
+    }
+
+    fn commission(&mut self, first: Step, last: Step) {
+        self.commissioning.begin(first, last);
+    }
+
+    fn commissioned(&mut self) -> Option<News> {
+        self.commissioning.news()
+    }
+
+    fn found(&self, settings: &Settings) -> Option<Settings> {
+        self.commissioning.found(settings)
     }
 
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {

@@ -70,6 +70,8 @@ pub struct Collector {
     record: Record,
     /// Samples since the record began.
     samples: u32,
+    /// Whether samples are missing in the record.
+    incomplete: bool,
     /// Bin that is filled, and the sample at which it ends.
     bin: usize,
     end: f32,
@@ -87,6 +89,7 @@ impl Default for Collector {
         Self {
             record: Record::Nothing,
             samples: 0,
+            incomplete: false,
             bin: 0,
             end: 0.0,
             length: 0.0,
@@ -103,6 +106,7 @@ impl Collector {
     /// Begins a record.
     pub fn begin(&mut self, record: Record) {
         (self.record, self.samples, self.bin, self.carrier) = (record, 0, 0, 0);
+        self.incomplete = false;
         match record {
             Record::Nothing => {}
             Record::Bins { half, first } => {
@@ -118,6 +122,16 @@ impl Collector {
     /// Samples since the record began.
     pub fn samples(&self) -> u32 {
         self.samples
+    }
+
+    /// Notes that steps of the drive are missing between the last and the next: a record that has begun is incomplete.
+    pub fn gap(&mut self) {
+        self.incomplete |= self.samples > 0 && self.record != Record::Nothing;
+    }
+
+    /// Whether samples are missing in the record.
+    pub fn is_incomplete(&self) -> bool {
+        self.incomplete
     }
 
     /// Takes a step of the drive: `measured`, `realised` and `dc_link` of its [telemetry](crate::Telemetry).

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::drive::State;
+use crate::drive::{Refused, State};
 use crate::fault::Fault;
 use crate::settings::value::{Words as _, words};
 
@@ -32,6 +32,13 @@ words!(Step {
     Self::Leakage => Step::Leakage, "leakage"; Self::Staircase => Step::Staircase, "staircase";
     Self::CurrentLoop => Step::CurrentLoop, "current-loop";
 });
+
+impl Step {
+    /// The last one.
+    pub const LAST: Self = Self::CurrentLoop;
+    /// The words of all, for messages.
+    pub const ALL: &'static str = "nameplate sensors wiring levels leakage staircase current-loop";
+}
 
 /// A value that a step has found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +112,8 @@ pub enum Refusal {
     NoMotor,
     /// A step that must come before is missing.
     Needs(Step),
+    /// The drive has not taken a command.
+    Command(Refused),
     /// Samples were lost on the way to the evaluation.
     SamplesLost,
 }
@@ -261,6 +270,7 @@ impl fmt::Display for Refusal {
             Self::PhaseOpen(n) => write!(f, "phase {} is open", phase(n)),
             Self::SensorOpen(n) => write!(f, "current sensor {} shows no current", phase(n)),
             Self::NoMotor => f.write_str("no motor: no pulse is answered"),
+            Self::Command(why) => write!(f, "{why}"),
             Self::Needs(step) => write!(f, "the step {} comes first", step.word()),
             Self::SamplesLost => f.write_str("samples were lost; repeat it"),
         }

@@ -25,7 +25,7 @@ pub enum Excitation {
 }
 
 /// The quantities of a drive that the commissioning needs beside the samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Excited {
     /// State of the drive.
     pub state: State,

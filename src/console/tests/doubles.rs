@@ -4,11 +4,13 @@ use std::collections::VecDeque;
 use std::fmt::{self, Write};
 
 use drive_core::carrier::asymmetry::Asymmetry;
+use drive_core::commission::Step;
 use drive_core::identify::learning::{Fitted, Learned, Verdict};
 use drive_core::settings::SettingsError;
 use drive_core::settings::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
-use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, State};
+use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, Settings, State};
 use induction_drive::board;
+use induction_drive::commissioning::{News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
 use induction_drive::link::Status;
@@ -41,6 +43,8 @@ pub struct FakeDrive {
     pub found: Option<Learned>,
     /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
+    /// The commissioning.
+    pub session: Session,
 }
 
 impl FakeDrive {
@@ -58,6 +62,7 @@ impl FakeDrive {
             worn_out: false,
             found: None,
             tracking: None,
+            session: Session::new(&Settings::default()),
         }
     }
 }
@@ -84,6 +89,7 @@ impl DriveHandle for FakeDrive {
             worst_latency: u32::MAX,
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
+            excited: self.drive.excited(),
         })
     }
     fn is_off(&self) -> bool {
@@ -94,9 +100,19 @@ impl DriveHandle for FakeDrive {
     }
     fn configured(&mut self, settings: &FirmwareSettings) {
         self.tracking = Tracking::new(&settings.drive);
+        self.session.configured(&settings.drive);
     }
     fn tracking(&self) -> Option<Report> {
         self.tracking.as_ref().map(Tracking::report)
+    }
+    fn commission(&mut self, first: Step, last: Step) {
+        self.session.begin(first, last);
+    }
+    fn commissioned(&mut self) -> Option<News> {
+        self.session.news()
+    }
+    fn found(&self, settings: &Settings) -> Option<Settings> {
+        self.session.found(settings)
     }
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError> {
         if self.worn_out {

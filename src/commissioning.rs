@@ -1,0 +1,113 @@
+//! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
+
+use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
+use drive_core::{Command, Excited, Settings};
+
+use crate::console::handle::CommandError;
+use crate::rotor_tracking::Observation;
+
+/// News of a commissioning.
+// Exists once at a time.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum News {
+    /// A step has ended.
+    Report(Report),
+    /// All steps have ended, or one was refused; the outputs are off.
+    Ended {
+        /// Whether none was refused.
+        sound: bool,
+    },
+}
+
+/// A commissioning, and what it waits for.
+#[derive(Clone, Debug)]
+pub struct Session {
+    commissioning: Commissioning,
+    sums: Collector,
+    /// Number of the next period, if there is no gap.
+    next: u32,
+    /// Until the console has taken it nothing goes on.
+    news: Option<News>,
+    /// Whether no step was refused so far.
+    sound: bool,
+}
+
+impl Session {
+    /// For a drive with these settings; what an earlier one has found is forgotten.
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            commissioning: Commissioning::new(settings),
+            sums: Collector::default(),
+            next: 0,
+            news: None,
+            sound: true,
+        }
+    }
+
+    /// Forgets what was found: the drive has taken these settings.
+    pub fn configured(&mut self, settings: &Settings) {
+        self.commissioning = Commissioning::new(settings);
+    }
+
+    /// Begins the steps from `first` to `last`. The drive must be off.
+    pub fn begin(&mut self, first: Step, last: Step) {
+        (self.news, self.sound) = (None, true);
+        self.commissioning.start(first, last);
+    }
+
+    /// Whether steps are being done.
+    pub fn is_running(&self) -> bool {
+        self.commissioning.is_running()
+    }
+
+    /// Takes the next period.
+    pub fn take(&mut self, seen: &Observation) {
+        if seen.number != self.next {
+            self.sums.gap();
+        }
+        self.next = seen.number.wrapping_add(1);
+        self.sums.push(seen.measured, seen.realised, seen.dc_link);
+    }
+
+    /// Goes on; the command that the drive is to get now. Its answer belongs to [`answered`](Self::answered).
+    pub fn poll(&mut self, drive: &Excited) -> Option<Command> {
+        if !self.is_running() || self.news.is_some() {
+            return None;
+        }
+        match self.commissioning.poll(drive, &mut self.sums) {
+            Next::Wait => {}
+            Next::Excite(excitation) => return Some(Command::Excite(excitation)),
+            Next::Stop => return Some(Command::Stop),
+            Next::Report(report) => self.report(report),
+            Next::Done => self.news = Some(News::Ended { sound: self.sound }),
+        }
+        None
+    }
+
+    /// Notes that the drive has not taken a command.
+    pub fn refused(&mut self, why: CommandError) {
+        let why = match why {
+            CommandError::Refused(refused) => Refusal::Command(refused),
+            CommandError::NoAnswer | CommandError::NotStarted(_) => Refusal::SamplesLost,
+        };
+        let report = self.commissioning.refuse(why);
+        self.report(report);
+    }
+
+    fn report(&mut self, report: Report) {
+        self.sound &= report.refusal.is_none();
+        self.news = Some(News::Report(report));
+    }
+
+    /// The news since the last call.
+    pub fn news(&mut self) -> Option<News> {
+        self.news.take()
+    }
+
+    /// These settings with what has been found; `None` if that changes nothing.
+    pub fn found(&self, settings: &Settings) -> Option<Settings> {
+        let found = self.commissioning.settings(settings);
+        (found != *settings).then_some(found)
+    }
+}
