@@ -42,6 +42,8 @@ mod levels;
 mod plate;
 mod report;
 mod steps;
+#[cfg(test)]
+mod tests;
 
 use crate::drive::{Excitation, Excited, State};
 use crate::settings::Settings;

@@ -46,13 +46,16 @@ const STEADY: usize = BINS - 6;
 const UNCERTAIN: f32 = 0.03;
 /// Largest gain mismatch.
 const MISMATCH: f32 = 0.05;
-/// Largest current across phase a, as a share of that along it.
-const ACROSS: f32 = 0.015;
+/// Largest current across phase a, as a share of that along it, and of the test current.
+const ACROSS: (f32, f32) = (0.015, 0.001);
 /// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
 const MISFIT_PER_NOISE: f32 = 150.0;
 const MISFIT_OF_BUS: f32 = 1e-4;
 /// Largest error of the third level: share of the resistive voltage, and of the dc link.
 const THIRD: (f32, f32) = (0.01, 6.5e-5);
+/// Wait before the third level is measured, and time of its mean, in rotor time constants.
+const WAIT_T: f32 = 3.0;
+const MEAN_T: f32 = 0.5;
 
 /// Bias of the carrier, as shares of the test current; carrier current likewise; largest carrier as a share of the dc link.
 const BIASES: [f32; 2] = [0.5, 0.25];
@@ -241,14 +244,14 @@ impl Commissioning {
                     .of((-MISMATCH, MISMATCH))
                     .check(Meaning::Mismatch, Meaning::Mismatch)?
                     .value;
-                self.check_rest(sums, mismatch, noise)?;
+                self.check_rest(plate, sums, mismatch, noise)?;
                 let report = self.report_levels(plate, &fit, mismatch, noise)?;
                 self.fitted = (fit, mismatch, Some(report));
-                let wait = 3.0 * fit.tau_r;
+                let wait = WAIT_T * fit.tau_r;
                 Ok(self.part(sums, Record::Nothing, periods(wait), third))
             }
             5 => {
-                let mean = 0.5 * self.fitted.0.tau_r;
+                let mean = MEAN_T * self.fitted.0.tau_r;
                 Ok(self.part(sums, record(0, mean.max(QUIET_S)), periods(mean.max(QUIET_S)), third))
             }
             _ => {
@@ -256,7 +259,11 @@ impl Commissioning {
                 let report = report.ok_or(Refusal::SamplesLost)?;
                 let resistive = fit.r_s * seen.current.alpha;
                 let allowed = THIRD.0 * resistive + THIRD.1 * self.setup.dc_link;
-                let error = seen.voltage - fit.e - resistive;
+                // What is left of the transient from the second level.
+                let turned = seen.periods * PERIOD_S / fit.tau_r;
+                let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
+                let rotor = fit.r_r * (LEVELS[2] - LEVELS[1]) * plate.amperes * rest;
+                let error = seen.voltage - fit.e - resistive - rotor;
                 Quantity::new("error of the third level", "V", error)
                     .of((-allowed, allowed))
                     .check(Meaning::Inverter, Meaning::Inverter)?;
@@ -267,12 +274,19 @@ impl Commissioning {
     }
 
     /// No current may flow across phase a, once the gains are corrected.
-    fn check_rest(&self, sums: &Collector, mismatch: f32, noise: f32) -> Result<(), Refusal> {
+    fn check_rest(
+        &self,
+        plate: &Plate,
+        sums: &Collector,
+        mismatch: f32,
+        noise: f32,
+    ) -> Result<(), Refusal> {
         for bin in sums.bins(0).chain(sums.bins(1)) {
             let (a, b) = (bin.current.alpha, on_b(bin.current));
             let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
             let across = (a + 2.0 * b) * (1.0 / SQRT_3);
-            let allowed = ACROSS * a.abs() + 6.0 * noise / libm::sqrtf(bin.periods);
+            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * plate.amperes;
+            let allowed = allowed + 6.0 * noise / libm::sqrtf(bin.periods);
             Quantity::new("current across phase a", "A", across)
                 .of((-allowed, allowed))
                 .check(Meaning::Turning, Meaning::Turning)?;

@@ -1,6 +1,7 @@
 //! The commissioning: one session on the motor of the configuration, or statistics over machines drawn around it.
 
 mod machine;
+pub mod refusals;
 mod session;
 
 use drive_core::commission::{Commissioning, Step};
@@ -78,7 +79,8 @@ impl Study for Commission {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
-        let config = context.config.clone();
+        let mut config = context.config.clone();
+        config.prepare.learn = false;
         let machines = config.extent.runs.map(|runs| runs as usize);
         Ok(Self { config, seed: context.seed, machines })
     }
@@ -93,7 +95,8 @@ impl Study for Commission {
         let unaware = Config { drive: settings, ..config.clone() };
         let rig = Rig::from_config(&unaware, seed)?;
         let steps = (Step::Nameplate, Step::Leakage);
-        let session = Session::run(rig, Commissioning::new(&settings), steps, Abort::default())?;
+        let commissioning = Commissioning::new(&settings);
+        let session = Session::run(rig, commissioning, steps, Abort::default(), |_| {})?;
         let refused = session.refusal().map(|(step, why)| format!("{step:?}: {why}"));
         let m = session.commissioning.settings(&settings).motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
