@@ -39,6 +39,7 @@ mod collector;
 mod found;
 mod leakage;
 mod levels;
+mod loop_check;
 mod plate;
 mod report;
 mod steps;

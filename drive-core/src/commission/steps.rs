@@ -9,7 +9,7 @@ use super::levels::{Fitted, Search};
 use super::plate::Plate;
 use super::report::{Meaning, Quantity, Refusal, Report, Step};
 use super::{Commissioning, Next};
-use crate::drive::{Excitation, Excited};
+use crate::drive::{Excitation, Excited, Regulator};
 use crate::io::{PERIOD_S, periods};
 use crate::math::frames::AlphaBeta;
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
@@ -26,6 +26,8 @@ const BUS: f32 = 0.37;
 /// answer reaches twice of it.
 const ANSWERED: f32 = 0.08;
 const EXPECTED: f32 = 0.125;
+/// Current that a pulse may leave to the next one, likewise: resistances make it.
+const RESIDUAL: f32 = 0.08;
 /// Growth of the pulses.
 const GROWTH: f32 = 1.6;
 /// Pulses of a motor that is not there are answered by less than this share of the test current.
@@ -34,8 +36,10 @@ const SILENT: f32 = 0.02;
 const UNANSWERED: f32 = 0.25;
 /// The inductance by pulses may be that much smaller or larger than the true one.
 const ROUGH: (f32, f32) = (0.5, 1.7);
-/// Share of the rough inductance that the controller is designed for.
+/// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
 const CAUTION: f32 = 0.75;
+const GAIN_RAD_PER_S: f32 = 500.0;
+const ZERO_RAD_PER_S: f32 = 167.0;
 
 /// Current levels, as shares of the test current, and time of the first two, s.
 const LEVELS: [f32; 3] = [0.8, 0.2, 0.45];
@@ -79,12 +83,13 @@ impl Commissioning {
             Step::Wiring => self.wiring(&plate, drive, sums),
             Step::Levels => self.levels(&plate, sums),
             Step::Leakage => self.leakage(&plate, sums),
-            step @ (Step::Staircase | Step::CurrentLoop) => Ok(Next::Report(Report::new(step, []))),
+            Step::Staircase => Ok(Next::Report(Report::new(Step::Staircase, []))),
+            Step::CurrentLoop => self.current_loop(&plate, sums),
         }
     }
 
     /// Begins a part that lasts for so many samples.
-    fn part(
+    pub(super) fn part(
         &mut self,
         sums: &mut Collector,
         record: Record,
@@ -130,6 +135,7 @@ impl Commissioning {
                 .check(Meaning::BusTooLow, Meaning::BusTooLow)?,
         ];
         self.found.noise = Some(noise_a.max(noise_b));
+        self.found.dc_link = Some(quiet.dc_link);
         Ok(Next::Report(Report::new(Step::Sensors, values)))
     }
 
@@ -139,7 +145,7 @@ impl Commissioning {
         WiringSettings {
             sigma_ls: self.pulses.0 / expected_a,
             expected_a,
-            noise_a: self.setup.pulse_noise,
+            noise_a: self.setup.pulse_noise + RESIDUAL * plate.amperes,
             highest_v: self.setup.pulse_v,
         }
     }
@@ -208,8 +214,12 @@ impl Commissioning {
         carrier: AlphaBeta,
     ) -> Result<Excitation, Refusal> {
         let rough = self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?;
-        let (amperes, inductance) = (share * plate.amperes, CAUTION * rough);
-        Ok(Excitation::Current { amperes, inductance, carrier })
+        let regulator = Regulator {
+            k_c: GAIN_RAD_PER_S * CAUTION * rough,
+            z_c: 1.0 - ZERO_RAD_PER_S * PERIOD_S,
+            ..Regulator::default()
+        };
+        Ok(Excitation::Current { amperes: share * plate.amperes, regulator, carrier })
     }
 
     fn levels(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
@@ -267,7 +277,7 @@ impl Commissioning {
                 Quantity::new("error of the third level", "V", error)
                     .of((-allowed, allowed))
                     .check(Meaning::Inverter, Meaning::Inverter)?;
-                self.found.levels = Some(Levels::new(&fit, mismatch, self.setup.dc_link));
+                self.found.levels = Some(Levels::new(&fit, mismatch));
                 Ok(Next::Report(report))
             }
         }
@@ -302,7 +312,7 @@ impl Commissioning {
         noise: f32,
     ) -> Result<Report, Refusal> {
         let rough = self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?;
-        let levels = Levels::new(fit, mismatch, self.setup.dc_link);
+        let levels = Levels::new(fit, mismatch);
         let [d_r_s, d_e, d_r_r] = fit.deviations;
         let limit = MISFIT_OF_BUS * self.setup.dc_link;
         let limit = limit.max(MISFIT_PER_NOISE * CAUTION * rough * noise);
