@@ -39,9 +39,12 @@ mod collector;
 mod found;
 mod leakage;
 mod levels;
+mod loop_check;
 mod plate;
 mod report;
 mod steps;
+#[cfg(test)]
+mod tests;
 
 use crate::drive::{Excitation, Excited, State};
 use crate::settings::Settings;

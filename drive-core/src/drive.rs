@@ -44,7 +44,7 @@ use crate::settings::AngleSource;
 use axes::Axes;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused};
-pub use excitation::{Excitation, Excited};
+pub use excitation::{Excitation, Excited, Regulator};
 use excite::ExcitationState;
 use in_turn::StepResults;
 pub use layout::Layout;

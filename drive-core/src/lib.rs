@@ -60,8 +60,8 @@ pub mod settings;
 pub mod tuning;
 
 pub use drive::{
-    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, State,
-    Telemetry,
+    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
+    State, Telemetry,
 };
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};

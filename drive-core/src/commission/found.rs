@@ -1,13 +1,16 @@
 //! What the steps have found, and the settings that follow from it.
 
 use super::levels::Fitted;
-use crate::settings::{PlantSource, Settings};
+use crate::io::PERIOD_S;
+use crate::settings::{Motor, PlantSource, Settings};
 
 /// What the steps have found; `None` for a step that has not been done or was refused.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Found {
     /// Noise of the current sensors, A rms: the larger of both.
     pub noise: Option<f32>,
+    /// Dc link, V.
+    pub dc_link: Option<f32>,
     /// Transient inductance by the pulses, H: up to 60 % too large.
     pub rough: Option<f32>,
     /// Resistances and rotor.
@@ -27,8 +30,6 @@ pub struct Levels {
     pub tau_r: f32,
     /// Voltage that a phase of the inverter loses, V: dead time and drop.
     pub inverter_v: f32,
-    /// Dc link at which that holds, V.
-    pub dc_link_v: f32,
     /// (gain of sensor a)/(gain of b) - 1.
     pub mismatch: f32,
 }
@@ -48,7 +49,7 @@ impl Levels {
         self.tau_r * self.r_r
     }
 
-    pub(super) fn new(fit: &Fitted, mismatch: f32, dc_link_v: f32) -> Self {
+    pub(super) fn new(fit: &Fitted, mismatch: f32) -> Self {
         // Impedances were divided by the current of sensor a.
         let gain = 1.0 + 0.5 * mismatch;
         Self {
@@ -56,30 +57,41 @@ impl Levels {
             r_r: fit.r_r * gain,
             tau_r: fit.tau_r,
             inverter_v: 0.75 * fit.e,
-            dc_link_v,
             mismatch,
         }
     }
 }
 
 impl Found {
-    /// These settings with what has been found. The inverse-Gamma circuit becomes that of a T with equal leakages.
-    pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
-        let mut new = *settings;
-        let (Some(levels), Some(leakage)) = (self.levels, self.leakage) else { return new };
+    /// The motor, as a T with equal leakages; `None` until both steps have found theirs.
+    pub fn motor(&self, settings: &Motor) -> Option<Motor> {
+        let (levels, leakage) = (self.levels?, self.leakage?);
         let coupled = levels.coupled();
         let k = 1.0 / libm::sqrtf(1.0 + leakage.inductance / coupled);
-        let motor = &mut new.motor;
-        motor.r_s = levels.r_s;
-        motor.r_r = levels.r_r / (k * k);
-        motor.l_m = coupled / k;
-        motor.l_ls = leakage.inductance / (1.0 + k);
-        motor.l_lr = motor.l_ls;
-        motor.pole_pairs = pole_pairs;
+        let l_ls = leakage.inductance / (1.0 + k);
+        Some(Motor {
+            r_s: levels.r_s,
+            r_r: levels.r_r / (k * k),
+            l_m: coupled / k,
+            l_ls,
+            l_lr: l_ls,
+            ..*settings
+        })
+    }
+
+    /// These settings with what has been found.
+    pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
+        let mut new = *settings;
+        let (Some(levels), Some(motor)) = (self.levels, self.motor(&settings.motor)) else {
+            return new;
+        };
+        new.motor = Motor { pole_pairs, ..motor };
         let half = 0.5 * levels.mismatch;
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
         new.current_plant.source = PlantSource::Motor;
+        let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);
+        new.inverter.drop_v = Some(levels.inverter_v - of_dead_time);
         new
     }
 }

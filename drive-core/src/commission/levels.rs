@@ -14,8 +14,10 @@ use core::ops::ControlFlow;
 use super::collector::{Bin, Collector};
 use crate::io::PERIOD_S;
 
-/// Bins that begin earlier in a half are left out, control periods: 12 ms, in which the current still moves fast.
-const FROM: f32 = 72.0;
+/// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
+/// inductance meanwhile: a share of the rotor time constant, from 12 ms to 60 ms.
+const FROM_OF_TAU_R: f32 = 0.08;
+const FROM_S: (f32, f32) = (0.012, 0.060);
 /// Range of the search, s, and its points: first over the range, then around the best of the last.
 const TAU_R: (f32, f32) = (0.01, 4.0);
 const POINTS: u8 = 40;
@@ -62,6 +64,8 @@ struct Candidate {
 pub(super) struct Search {
     round: u8,
     point: u8,
+    /// Bins from here on count, control periods.
+    begins: f32,
     /// Logarithm of the first time constant of this round, and spacing.
     from: f32,
     step: f32,
@@ -78,6 +82,7 @@ impl Search {
         Self {
             round: 0,
             point: 0,
+            begins: FROM_S.0 / PERIOD_S,
             from,
             step: (to - from) / f32::from(POINTS - 1),
             best: None,
@@ -90,7 +95,7 @@ impl Search {
     /// One fit; the result, none where nothing can be fitted, after the last.
     pub fn step(&mut self, sums: &Collector) -> ControlFlow<Option<Fitted>> {
         let x = self.from + self.step * f32::from(self.point);
-        if let Some(candidate) = fit(sums, libm::expf(x)) {
+        if let Some(candidate) = fit(sums, libm::expf(x), self.begins) {
             let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
             if self.after_best && !better {
                 self.neighbours += candidate.left;
@@ -110,6 +115,10 @@ impl Search {
         let Some((x, best)) = self.best else { return ControlFlow::Break(None) };
         if self.round + 1 == ROUNDS {
             return ControlFlow::Break(Some(self.fitted(x, &best)));
+        }
+        if self.round == 0 {
+            let (least, most) = FROM_S;
+            self.begins = (FROM_OF_TAU_R * libm::expf(x)).clamp(least, most) / PERIOD_S;
         }
         // From one spacing below the best to one above.
         self.from = x - self.step;
@@ -138,8 +147,8 @@ impl Search {
     }
 }
 
-/// The linear fit for this time constant, s.
-fn fit(sums: &Collector, tau_r: f32) -> Option<Candidate> {
+/// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level.
+fn fit(sums: &Collector, tau_r: f32, begins: f32) -> Option<Candidate> {
     let (mut xx, mut xy, mut yy) = ([[0.0_f64; N]; N], [0.0_f64; N], 0.0_f64);
     let (mut weight, mut count) = (0.0_f64, 0.0_f64);
     let mut magnetising = 0.0_f32;
@@ -153,10 +162,10 @@ fn fit(sums: &Collector, tau_r: f32) -> Option<Candidate> {
             let decayed = -libm::expm1f(-turned);
             let mean = i + (magnetising - i) * (decayed / turned);
             magnetising += (i - magnetising) * decayed;
-            let begins = start;
+            let counts = start >= begins;
             start += bin.periods;
             if let (Some(before), Some(after)) = (before.replace(bin), bins.peek())
-                && begins >= FROM
+                && counts
             {
                 let apart = bin.periods + 0.5 * (before.periods + after.periods);
                 let slope = (after.current.alpha - before.current.alpha) / (apart * PERIOD_S);

@@ -5,6 +5,7 @@ use core::fmt;
 use crate::drive::{Refused, State};
 use crate::fault::Fault;
 use crate::settings::value::{Words as _, words};
+use crate::tuning::TuningError;
 
 /// A step of the commissioning, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,6 +111,8 @@ pub enum Refusal {
     SensorOpen(u8),
     /// No pulse is answered at all.
     NoMotor,
+    /// The current loop cannot be designed for what was found.
+    Design(TuningError),
     /// A step that must come before is missing.
     Needs(Step),
     /// The drive has not taken a command.
@@ -266,6 +269,7 @@ impl fmt::Display for Refusal {
                 )
             }
             Self::Drive(state) => write!(f, "the drive is {state}"),
+            Self::Design(error) => write!(f, "{error}"),
             Self::Wiring(fault) => write!(f, "{fault}"),
             Self::PhaseOpen(n) => write!(f, "phase {} is open", phase(n)),
             Self::SensorOpen(n) => write!(f, "current sensor {} shows no current", phase(n)),

@@ -9,7 +9,7 @@ use super::levels::{Fitted, Search};
 use super::plate::Plate;
 use super::report::{Meaning, Quantity, Refusal, Report, Step};
 use super::{Commissioning, Next};
-use crate::drive::{Excitation, Excited};
+use crate::drive::{Excitation, Excited, Regulator};
 use crate::io::{PERIOD_S, periods};
 use crate::math::frames::AlphaBeta;
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
@@ -26,6 +26,8 @@ const BUS: f32 = 0.37;
 /// answer reaches twice of it.
 const ANSWERED: f32 = 0.08;
 const EXPECTED: f32 = 0.125;
+/// Current that a pulse may leave to the next one, likewise: resistances make it.
+const RESIDUAL: f32 = 0.08;
 /// Growth of the pulses.
 const GROWTH: f32 = 1.6;
 /// Pulses of a motor that is not there are answered by less than this share of the test current.
@@ -34,8 +36,10 @@ const SILENT: f32 = 0.02;
 const UNANSWERED: f32 = 0.25;
 /// The inductance by pulses may be that much smaller or larger than the true one.
 const ROUGH: (f32, f32) = (0.5, 1.7);
-/// Share of the rough inductance that the controller is designed for.
+/// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
 const CAUTION: f32 = 0.75;
+const GAIN_RAD_PER_S: f32 = 500.0;
+const ZERO_RAD_PER_S: f32 = 167.0;
 
 /// Current levels, as shares of the test current, and time of the first two, s.
 const LEVELS: [f32; 3] = [0.8, 0.2, 0.45];
@@ -46,13 +50,16 @@ const STEADY: usize = BINS - 6;
 const UNCERTAIN: f32 = 0.03;
 /// Largest gain mismatch.
 const MISMATCH: f32 = 0.05;
-/// Largest current across phase a, as a share of that along it.
-const ACROSS: f32 = 0.015;
+/// Largest current across phase a, as a share of that along it, and of the test current.
+const ACROSS: (f32, f32) = (0.015, 0.001);
 /// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
 const MISFIT_PER_NOISE: f32 = 150.0;
 const MISFIT_OF_BUS: f32 = 1e-4;
 /// Largest error of the third level: share of the resistive voltage, and of the dc link.
 const THIRD: (f32, f32) = (0.01, 6.5e-5);
+/// Wait before the third level is measured, and time of its mean, in rotor time constants.
+const WAIT_T: f32 = 3.0;
+const MEAN_T: f32 = 0.5;
 
 /// Bias of the carrier, as shares of the test current; carrier current likewise; largest carrier as a share of the dc link.
 const BIASES: [f32; 2] = [0.5, 0.25];
@@ -76,12 +83,13 @@ impl Commissioning {
             Step::Wiring => self.wiring(&plate, drive, sums),
             Step::Levels => self.levels(&plate, sums),
             Step::Leakage => self.leakage(&plate, sums),
-            step @ (Step::Staircase | Step::CurrentLoop) => Ok(Next::Report(Report::new(step, []))),
+            Step::Staircase => Ok(Next::Report(Report::new(Step::Staircase, []))),
+            Step::CurrentLoop => self.current_loop(&plate, sums),
         }
     }
 
     /// Begins a part that lasts for so many samples.
-    fn part(
+    pub(super) fn part(
         &mut self,
         sums: &mut Collector,
         record: Record,
@@ -127,6 +135,7 @@ impl Commissioning {
                 .check(Meaning::BusTooLow, Meaning::BusTooLow)?,
         ];
         self.found.noise = Some(noise_a.max(noise_b));
+        self.found.dc_link = Some(quiet.dc_link);
         Ok(Next::Report(Report::new(Step::Sensors, values)))
     }
 
@@ -136,7 +145,7 @@ impl Commissioning {
         WiringSettings {
             sigma_ls: self.pulses.0 / expected_a,
             expected_a,
-            noise_a: self.setup.pulse_noise,
+            noise_a: self.setup.pulse_noise + RESIDUAL * plate.amperes,
             highest_v: self.setup.pulse_v,
         }
     }
@@ -205,8 +214,12 @@ impl Commissioning {
         carrier: AlphaBeta,
     ) -> Result<Excitation, Refusal> {
         let rough = self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?;
-        let (amperes, inductance) = (share * plate.amperes, CAUTION * rough);
-        Ok(Excitation::Current { amperes, inductance, carrier })
+        let regulator = Regulator {
+            k_c: GAIN_RAD_PER_S * CAUTION * rough,
+            z_c: 1.0 - ZERO_RAD_PER_S * PERIOD_S,
+            ..Regulator::default()
+        };
+        Ok(Excitation::Current { amperes: share * plate.amperes, regulator, carrier })
     }
 
     fn levels(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
@@ -241,14 +254,14 @@ impl Commissioning {
                     .of((-MISMATCH, MISMATCH))
                     .check(Meaning::Mismatch, Meaning::Mismatch)?
                     .value;
-                self.check_rest(sums, mismatch, noise)?;
+                self.check_rest(plate, sums, mismatch, noise)?;
                 let report = self.report_levels(plate, &fit, mismatch, noise)?;
                 self.fitted = (fit, mismatch, Some(report));
-                let wait = 3.0 * fit.tau_r;
+                let wait = WAIT_T * fit.tau_r;
                 Ok(self.part(sums, Record::Nothing, periods(wait), third))
             }
             5 => {
-                let mean = 0.5 * self.fitted.0.tau_r;
+                let mean = MEAN_T * self.fitted.0.tau_r;
                 Ok(self.part(sums, record(0, mean.max(QUIET_S)), periods(mean.max(QUIET_S)), third))
             }
             _ => {
@@ -256,23 +269,34 @@ impl Commissioning {
                 let report = report.ok_or(Refusal::SamplesLost)?;
                 let resistive = fit.r_s * seen.current.alpha;
                 let allowed = THIRD.0 * resistive + THIRD.1 * self.setup.dc_link;
-                let error = seen.voltage - fit.e - resistive;
+                // What is left of the transient from the second level.
+                let turned = seen.periods * PERIOD_S / fit.tau_r;
+                let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
+                let rotor = fit.r_r * (LEVELS[2] - LEVELS[1]) * plate.amperes * rest;
+                let error = seen.voltage - fit.e - resistive - rotor;
                 Quantity::new("error of the third level", "V", error)
                     .of((-allowed, allowed))
                     .check(Meaning::Inverter, Meaning::Inverter)?;
-                self.found.levels = Some(Levels::new(&fit, mismatch, self.setup.dc_link));
+                self.found.levels = Some(Levels::new(&fit, mismatch));
                 Ok(Next::Report(report))
             }
         }
     }
 
     /// No current may flow across phase a, once the gains are corrected.
-    fn check_rest(&self, sums: &Collector, mismatch: f32, noise: f32) -> Result<(), Refusal> {
+    fn check_rest(
+        &self,
+        plate: &Plate,
+        sums: &Collector,
+        mismatch: f32,
+        noise: f32,
+    ) -> Result<(), Refusal> {
         for bin in sums.bins(0).chain(sums.bins(1)) {
             let (a, b) = (bin.current.alpha, on_b(bin.current));
             let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
             let across = (a + 2.0 * b) * (1.0 / SQRT_3);
-            let allowed = ACROSS * a.abs() + 6.0 * noise / libm::sqrtf(bin.periods);
+            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * plate.amperes;
+            let allowed = allowed + 6.0 * noise / libm::sqrtf(bin.periods);
             Quantity::new("current across phase a", "A", across)
                 .of((-allowed, allowed))
                 .check(Meaning::Turning, Meaning::Turning)?;
@@ -288,7 +312,7 @@ impl Commissioning {
         noise: f32,
     ) -> Result<Report, Refusal> {
         let rough = self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?;
-        let levels = Levels::new(fit, mismatch, self.setup.dc_link);
+        let levels = Levels::new(fit, mismatch);
         let [d_r_s, d_e, d_r_r] = fit.deviations;
         let limit = MISFIT_OF_BUS * self.setup.dc_link;
         let limit = limit.max(MISFIT_PER_NOISE * CAUTION * rough * noise);

@@ -271,7 +271,8 @@ impl Settings {
             } else {
                 DeadTime::NONE
             },
-            inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit),
+            inverter_drop: InverterDrop::new(m, i_d, self.magnetise_s(), current_limit)
+                .known(self.inverter.drop_v),
             thermal: Thermal {
                 motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
                 inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),

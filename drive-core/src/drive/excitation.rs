@@ -16,12 +16,25 @@ pub enum Excitation {
     Current {
         /// Its reference, A.
         amperes: f32,
-        /// Transient inductance that its controller is designed for, H.
-        inductance: f32,
+        /// Its controller.
+        regulator: Regulator,
         /// Amplitude of the carrier along phase a and across it, V peak. Change it from one axis to the other by way of
         /// zero.
         carrier: AlphaBeta,
     },
+}
+
+/// A controller of the current along phase a.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Regulator {
+    /// Gain, V/A.
+    pub k_c: f32,
+    /// Zero, and pole of the reference filter.
+    pub z_c: f32,
+    /// Direct share of the reference beside its filter.
+    pub direct: f32,
+    /// Whether it regulates the current behind the filter of the current loop.
+    pub filtered: bool,
 }
 
 /// The quantities of a drive that the commissioning needs beside the samples.

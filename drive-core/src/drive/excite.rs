@@ -1,26 +1,22 @@
 //! Excitation of a motor at rest for the [commissioning](crate::commission).
 //!
-//! The current along phase a is regulated by one controller without knowledge of the motor but for its transient
-//! inductance, with an optional carrier; the voltage across it is the carrier alone, without control. The dead time is
-//! not compensated: the commissioning measures it.
+//! The current along phase a is regulated by one controller, with an optional carrier; the voltage across it is the
+//! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
 
 use super::Drive;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
 use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
 use crate::current::sensing::Measured;
 use crate::drive::command::{Accepted, Refused};
-use crate::drive::excitation::{Excitation, Excited};
+use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
-use crate::io::{Compare, PERIOD_S};
+use crate::filter::dissertation::LPF;
+use crate::io::Compare;
 use crate::math::frames::{Abc, AlphaBeta, Dq};
 use crate::math::limited;
 use crate::protect::wiring_check::{WiringCheck, WiringCheckState};
 
-/// Gain of the controller per transient inductance, rad/s: the crossover of the loop.
-const GAIN_RAD_PER_S: f32 = 500.0;
-/// Zero of the controller, rad/s.
-const ZERO_RAD_PER_S: f32 = 167.0;
 /// Control periods in which the carrier rises to its amplitude: twenty of its own.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
 
@@ -56,9 +52,9 @@ impl Drive {
 
     /// Takes [`Command::Excite`](super::Command::Excite).
     pub(super) fn take_excitation(&mut self, wanted: Excitation) -> Result<Accepted, Refused> {
-        if let Excitation::Current { amperes, inductance, carrier } = wanted {
+        if let Excitation::Current { amperes, regulator, carrier } = wanted {
             let (max, sum) = (self.c.protection.trip_a, amperes + carrier.alpha + carrier.beta);
-            if !(sum + inductance).is_finite() {
+            if !(sum + regulator.k_c + regulator.z_c + regulator.direct).is_finite() {
                 return Err(Refused::NotFinite);
             }
             if amperes.abs() > max {
@@ -110,12 +106,13 @@ impl Drive {
         let s = &mut self.control.excitation;
         let mut realised = AlphaBeta::ZERO;
         let mut compare = Compare::LOW_SIDES_ON;
-        if let Excitation::Current { amperes, inductance, carrier } = s.wanted {
-            let z_c = 1.0 - ZERO_RAD_PER_S * PERIOD_S;
-            let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct: 0.0 };
+        let filtered = LPF.step(&mut self.control.low_pass, measured.current);
+        if let Excitation::Current { amperes, regulator, carrier } = s.wanted {
+            let Regulator { k_c, z_c, direct, filtered: is_filtered } = regulator;
+            let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
             let reference = filter.step(&mut s.reference, amperes);
-            let regulator = Pi { k_c: GAIN_RAD_PER_S * inductance, z_c };
-            let along = regulator.step(&mut s.regulator, reference - measured.current.alpha);
+            let current = if is_filtered { filtered } else { measured.current };
+            let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - current.alpha);
             let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
             s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
             s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);

@@ -16,6 +16,9 @@ pub struct Inverter {
     pub compensate: bool,
     /// Phase current from which on the compensation is full, A; unset: by rule.
     pub full_compensation_a: Option<f32>,
+    /// Voltage per phase that is lost beyond the dead time, V, as the commissioning found it; unset: measured at every
+    /// start.
+    pub drop_v: Option<f32>,
 }
 
 impl Default for Inverter {
@@ -27,6 +30,7 @@ impl Default for Inverter {
             dead_time_s: 2.2e-6,
             compensate: true,
             full_compensation_a: None,
+            drop_v: None,
         }
     }
 }

@@ -1,14 +1,19 @@
 //! The commissioning: one session on the motor of the configuration, or statistics over machines drawn around it.
 
 mod machine;
+pub mod refusals;
 mod session;
 
+use drive_core::Settings;
 use drive_core::commission::{Commissioning, Step};
+use drive_core::filter::dissertation::LPF;
+use drive_core::io::PERIOD_S;
+use drive_core::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_plant};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::{Study, whole};
-use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::Config;
+use super::{BENCH, Context, DRIVE, Experiment, machines};
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::Rig;
@@ -20,14 +25,19 @@ use session::{Abort, Session, unaware};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "commission",
     stands_for: "beyond the dissertation",
-    about: "From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards.",
-    uses: &[BENCH, DRIVE, &["load.", "spread.machine", "runs"]],
+    about: "From the nameplate to the parameters of the motor, at standstill; `--set runs=N` for random machines and boards; \
+            with `prepare.learn` the drive then learns and is judged at 16 operating points.",
+    uses: &[BENCH, DRIVE, &["load.", "prepare.learn", "spread.machine", "runs", "seconds"]],
     not: &[],
     run: whole::<Commission>,
 };
 
 /// Largest error of an accepted machine that counts as right: linear plant.
 const RIGHT_PCT: f64 = 3.0;
+/// Time of each run afterwards, s, unless `seconds` says otherwise.
+const RUN_S: f64 = 2.0;
+/// Share of the expected saliency from which on a machine counts as one that has enough.
+const ENOUGH: f64 = 0.7;
 /// Machines in the table, the worst first.
 const LISTED: usize = 20;
 
@@ -36,6 +46,8 @@ pub struct Commission {
     config: Config,
     seed: u64,
     machines: Option<usize>,
+    /// Seconds of each run afterwards, if there are any.
+    after: Option<f64>,
 }
 
 /// A session of the statistics.
@@ -52,17 +64,54 @@ pub struct Record {
     /// Largest phase current as a share of the nameplate's peak.
     #[serde(with = "exact")]
     current: f64,
+    /// The loop on the true plant: phase margin, degrees.
+    #[serde(with = "exact")]
+    margin_deg: f64,
+    /// Whether its saliency is at least 0.7 of the expected one.
+    salient: bool,
+    /// Whether all runs afterwards are good, or why there are none.
+    after: Option<Result<bool, String>>,
     /// The session in words, of a single one.
     told: Vec<String>,
 }
 
 impl Record {
+    /// The result in words.
+    fn result(&self) -> String {
+        let accepted = match &self.after {
+            None => "accepted",
+            Some(Ok(true)) => "accepted, good afterwards",
+            Some(Ok(false)) => "accepted, angle error too large afterwards",
+            Some(Err(why)) => why,
+        };
+        self.refused.clone().unwrap_or_else(|| accepted.to_owned())
+    }
+
     fn worst(&self) -> f64 {
         self.errors.iter().fold(0.0, |worst, error| error.abs().max(worst))
     }
 }
 
 impl Commission {
+    /// Whether a commissioned drive, which learns with the shaft locked, is good at all operating points.
+    fn judged(
+        &self,
+        config: &Config,
+        drive: &Settings,
+        seed: u64,
+        seconds: f64,
+    ) -> Result<Result<bool, String>, Error> {
+        let mut config = Config { drive: *drive, ..config.clone() };
+        config.prepare.learn = true;
+        config.drive.injection.synchronous.allow_unlearned = false;
+        match machines::runs(&config, seed, seconds) {
+            Ok(runs) => Ok(Ok(machines::good(&runs))),
+            // A refusal of the drive belongs to the result; other errors do not.
+            Err(Error::Refused(why)) => Ok(Err(why)),
+            Err(other) => Err(other),
+        }
+    }
+
     fn machine(&self, number: usize) -> (Config, u64) {
         let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
         let config = match self.machines {
@@ -78,9 +127,11 @@ impl Study for Commission {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
-        let config = context.config.clone();
+        let mut config = context.config.clone();
+        let after = config.prepare.learn.then(|| context.seconds.unwrap_or(RUN_S));
+        config.prepare.learn = false;
         let machines = config.extent.runs.map(|runs| runs as usize);
-        Ok(Self { config, seed: context.seed, machines })
+        Ok(Self { config, seed: context.seed, machines, after })
     }
 
     fn runs(&self) -> usize {
@@ -92,10 +143,12 @@ impl Study for Commission {
         let settings = unaware(&config);
         let unaware = Config { drive: settings, ..config.clone() };
         let rig = Rig::from_config(&unaware, seed)?;
-        let steps = (Step::Nameplate, Step::Leakage);
-        let session = Session::run(rig, Commissioning::new(&settings), steps, Abort::default())?;
+        let steps = (Step::Nameplate, Step::CurrentLoop);
+        let commissioning = Commissioning::new(&settings);
+        let session = Session::run(rig, commissioning, steps, Abort::default(), |_| {})?;
         let refused = session.refusal().map(|(step, why)| format!("{step:?}: {why}"));
-        let m = session.commissioning.settings(&settings).motor;
+        let commissioned = session.commissioning.settings(&settings);
+        let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
         let truth = Circuit::of_plant(&config);
         let pairs = found.values().into_iter().zip(truth.values());
@@ -105,7 +158,17 @@ impl Study for Commission {
             told.extend(report.values.iter().flatten().map(|value| format!("  {value}")));
             told.push(format!("{at:.2} s  {report}"));
         }
+        let margin_deg = match refused {
+            None => margin(&commissioned, &truth)?,
+            Some(_) => f64::NAN,
+        };
+        let after = self.after.filter(|_| refused.is_none());
+        let after = after.map(|seconds| self.judged(&config, &commissioned, seed, seconds));
+        let expected = f64::from(commissioned.injection.synchronous.flux_saliency);
         Ok(Record {
+            margin_deg,
+            salient: plant_settings(&config).saliency.a_psi.abs() >= ENOUGH * expected.abs(),
+            after: after.transpose()?,
             errors: if refused.is_some() { Vec::new() } else { errors },
             refused,
             seconds: session.seconds,
@@ -136,6 +199,23 @@ impl Study for Commission {
         m.set("shaft_deg_max", records.iter().map(|r| r.shaft_deg).fold(0.0, f64::max));
         m.set("current_max_of_peak", records.iter().map(|r| r.current).fold(0.0, f64::max));
 
+        let margins = sorted(accepted.iter().map(|r| r.margin_deg));
+        m.set("margin_deg_min", margins.first().copied().unwrap_or(f64::NAN));
+        let judged: Vec<_> = accepted.iter().filter(|r| r.after.is_some()).collect();
+        if !judged.is_empty() {
+            let good = |salient: Option<bool>| {
+                let of = |r: &&&&Record| salient.is_none_or(|wanted| r.salient == wanted);
+                let all: Vec<_> = judged.iter().filter(of).collect();
+                let good = all.iter().filter(|r| r.after == Some(Ok(true))).count();
+                good as f64 / all.len() as f64
+            };
+            m.set("good_after", good(None));
+            m.set("good_after_salient", good(Some(true)));
+            m.set("good_after_weak", good(Some(false)));
+            let lost = judged.iter().filter(|r| matches!(r.after, Some(Err(_)))).count();
+            m.set("refused_after", lost as f64);
+        }
+
         let mut heads = vec!["machine"];
         heads.extend(names);
         heads.extend(["seconds", "shaft (°)", "result"]);
@@ -152,13 +232,31 @@ impl Study for Commission {
             let mut row = vec![Cell::from(number.to_string())];
             row.extend(errors);
             row.extend([Cell::fixed(record.seconds, 1), Cell::fixed(record.shaft_deg, 3)]);
-            row.push(Cell::from(record.refused.clone().unwrap_or_else(|| "accepted".into())));
+            row.push(Cell::from(record.result()));
             table.row(row);
         }
         outcome.tables.push(table);
         outcome.remarks.extend(records.iter().flat_map(|r| r.told.clone()));
         Ok(outcome)
     }
+}
+
+/// Phase margin, degrees, of the current loop of these settings on the true plant.
+fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
+    let [design, _] = settings.build().map_err(Error::refused)?.designs;
+    // In this circuit the leakage lies on the stator's side, all of it.
+    let circuit = EquivalentCircuit {
+        r_s: truth.r_s,
+        r_r: truth.r_r,
+        l_ls: truth.leakage,
+        l_m: truth.coupled,
+        l_lr: 1e-9,
+    };
+    let period = f64::from(PERIOD_S);
+    let plant = motor_plant(&circuit, period).map_err(Error::refused)?;
+    let (k_c, z_c) = (design.k_c, design.z_c);
+    let margins = current_loop_margins(k_c, z_c, plant, &LPF.sections, DELAY, period);
+    Ok(margins.map_err(Error::refused)?.phase_margin_deg)
 }
 
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {

@@ -60,8 +60,7 @@ impl Machine {
     }
 
     fn is_good(&self) -> bool {
-        let within = self.rms() <= GOOD_DEG.0 && self.largest() <= GOOD_DEG.1;
-        self.runs.is_ok() && self.lost() == 0 && within
+        self.runs.as_ref().is_ok_and(|runs| good(runs))
     }
 
     /// The outcome in words.
@@ -75,8 +74,16 @@ impl Machine {
     }
 }
 
+/// Whether all runs are good.
+pub(super) fn good(runs: &[SteadyRun]) -> bool {
+    let within = |run: &SteadyRun| {
+        !run.lost && run.error.rms() <= GOOD_DEG.0 && run.error.largest() <= GOOD_DEG.1
+    };
+    runs.iter().all(within)
+}
+
 /// Learns once, then starts anew for each operating point.
-fn runs(config: &Config, seed: u64, seconds: f64) -> Result<Vec<SteadyRun>, Error> {
+pub(super) fn runs(config: &Config, seed: u64, seconds: f64) -> Result<Vec<SteadyRun>, Error> {
     let learned = prepared(&config.drive, config, seed)?;
     let mut runs = Vec::new();
     for speed in SPEEDS_RPM {

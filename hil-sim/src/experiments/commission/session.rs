@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::settings::{Motor, Settings};
-use drive_core::{Command, State};
+use drive_core::{Command, Sample, State};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -41,7 +41,7 @@ pub struct Abort {
 }
 
 impl Session {
-    /// Runs the steps from `first` to `last`. `settings` are those of the drive before.
+    /// Runs the steps from `first` to `last`; `sensors` changes what they say.
     ///
     /// # Errors
     /// When the drive refuses a command, or the session does not end.
@@ -50,6 +50,7 @@ impl Session {
         mut commissioning: Commissioning,
         (first, last): (Step, Step),
         abort: Abort,
+        sensors: fn(&mut Sample),
     ) -> Result<Self, Error> {
         commissioning.start(first, last);
         let mut sums = Collector::default();
@@ -57,7 +58,9 @@ impl Session {
         let (began, mut in_step) = (rig.time(), 0);
         let from = rig.plant.mechanical_angle();
         for period in 0..(LONGEST_S * RATE_HZ) as u32 {
-            rig.step();
+            let mut sample = rig.plant.sample();
+            sensors(&mut sample);
+            rig.step_with(&sample);
             if rig.drive.excites() {
                 let seen = rig.drive.telemetry();
                 sums.push(seen.measured, seen.realised, seen.dc_link);

@@ -1,0 +1,213 @@
+//! Defects of motor, wiring, sensors and board: are they refused, by name?
+
+use drive_core::commission::{Commissioning, Meaning, Refusal, Step};
+use drive_core::{Fault, Sample, State};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use super::super::statistics::{Study, whole};
+use super::super::{BENCH, Context, DRIVE, Experiment};
+use super::machine::drawn;
+use super::session::{Abort, Session, unaware};
+use crate::config::{Config, LoadMode, OpenPhase};
+use crate::error::Error;
+use crate::outcome::{Cell, Outcome, Table};
+use crate::plant::{Channel, CurrentFault};
+use crate::rig::Rig;
+use crate::stats::exact;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "commission-refusals",
+    stands_for: "beyond the dissertation",
+    about: "Defects of motor, wiring, sensors and board, on random machines: does the commissioning refuse them by name? `--set runs=N` of each.",
+    uses: &[BENCH, DRIVE, &["load.", "spread.machine", "runs"]],
+    not: &[],
+    run: whole::<Refusals>,
+};
+
+const RUNS: u32 = 50;
+/// The steps that are done.
+const STEPS: (Step, Step) = (Step::Nameplate, Step::Leakage);
+
+/// A defect.
+struct Defect {
+    name: &'static str,
+    /// Makes it, in the configuration of bench and drive.
+    make: fn(&mut Config),
+    /// Makes it, on the bench.
+    on_bench: fn(&mut Rig),
+    /// Makes it, in what the sensors say.
+    sensors: fn(&mut Sample),
+    /// Whether this refusal names it.
+    named: fn(&Refusal) -> bool,
+    /// Step that is aborted.
+    abort: Option<Step>,
+}
+
+const NONE: Defect = Defect {
+    name: "",
+    make: |_| {},
+    on_bench: |_| {},
+    sensors: |_| {},
+    named: |_| false,
+    abort: None,
+};
+
+/// Codes of the channels without current.
+const ZERO: [u16; 2] = [2022, 2015];
+
+fn meant(refusal: &Refusal, meaning: Meaning) -> bool {
+    matches!(refusal, Refusal::Value { meaning: m, .. } if *m == meaning)
+}
+
+/// A motor whose resistances and inductances are all this multiple.
+fn scaled(config: &mut Config, factor: f64) {
+    let m = &mut config.motor;
+    for value in [&mut m.r_s, &mut m.r_r, &mut m.l_ls, &mut m.l_lr, &mut m.l_m] {
+        *value *= factor;
+    }
+    config.saliency.psi_n = None;
+}
+
+fn stopped(refusal: &Refusal) -> bool {
+    matches!(refusal, Refusal::Drive(State::Off))
+}
+
+#[rustfmt::skip] // a row a defect
+const DEFECTS: &[Defect] = &[
+    Defect { name: "sensors exchanged", sensors: |s| (s.current_a, s.current_b) = (s.current_b, s.current_a), named: |r| matches!(r, Refusal::Wiring(Fault::WiringExchanged)), ..NONE },
+    Defect { name: "sensor a reversed", sensors: |s| s.current_a = 2 * ZERO[0] - s.current_a, named: |r| matches!(r, Refusal::Wiring(Fault::WiringPolarityA)), ..NONE },
+    Defect { name: "sensor b reversed", sensors: |s| s.current_b = 2 * ZERO[1] - s.current_b, named: |r| matches!(r, Refusal::Wiring(Fault::WiringPolarityB)), ..NONE },
+    Defect { name: "sensor b in phase c", sensors: |s| s.current_b = ZERO[0] + ZERO[1] + ZERO[1] - s.current_a - s.current_b, named: |r| matches!(r, Refusal::Wiring(Fault::WiringExchanged)), ..NONE },
+    Defect { name: "phase a open", make: |c| c.inverter.open_phase = OpenPhase::A, named: |r| *r == Refusal::PhaseOpen(0), ..NONE },
+    Defect { name: "phase b open", make: |c| c.inverter.open_phase = OpenPhase::B, named: |r| *r == Refusal::PhaseOpen(1), ..NONE },
+    Defect { name: "phase c open", make: |c| c.inverter.open_phase = OpenPhase::C, named: |r| *r == Refusal::PhaseOpen(2), ..NONE },
+    Defect { name: "sensor a open", on_bench: |r| r.plant.set_current_fault(Channel::A, CurrentFault::Open), named: |r| *r == Refusal::SensorOpen(0), ..NONE },
+    Defect { name: "sensor b open", on_bench: |r| r.plant.set_current_fault(Channel::B, CurrentFault::Open), named: |r| *r == Refusal::SensorOpen(1), ..NONE },
+    Defect { name: "no motor (1000 times the impedance)", make: |c| { scaled(c, 1000.0); c.motor.r_s = c.motor.r_s.min(1000.0); c.motor.r_r = c.motor.r_r.min(1000.0); c.motor.l_m = c.motor.l_m.min(100.0); c.motor.l_ls = c.motor.l_ls.clamp(5.0, 10.0); c.motor.l_lr = c.motor.l_ls; }, named: |r| *r == Refusal::NoMotor, ..NONE },
+    Defect { name: "motor ten times too small", make: |c| scaled(c, 10.0), named: |r| meant(r, Meaning::TooSmall), ..NONE },
+    Defect { name: "motor ten times too large", make: |c| scaled(c, 0.1), named: |r| meant(r, Meaning::TooLarge), ..NONE },
+    Defect { name: "dc link 28 % of the plate's peak", make: |c| { c.inverter.dc_link_v = 150.0; c.drive.inverter.dc_link_v = 150.0; }, named: |r| meant(r, Meaning::BusTooLow), ..NONE },
+    Defect { name: "dc link below its limit", make: |c| { c.inverter.dc_link_v = 100.0; }, named: |r| matches!(r, Refusal::Drive(State::Fault(Fault::DcLinkUnderVoltage))), ..NONE },
+    Defect { name: "noise 50 mA", make: |c| c.measurement.noise_a = Some(0.05), named: |r| meant(r, Meaning::Noise), ..NONE },
+    Defect { name: "offset 0.25 A", make: |c| c.measurement.offset_b = 0.25, named: |r| matches!(r, Refusal::Drive(State::Fault(Fault::OffsetB))), ..NONE },
+    Defect { name: "gain of a 10 % off", make: |c| c.measurement.gain_error_a = 0.1, named: |r| meant(r, Meaning::Mismatch) || meant(r, Meaning::Turning), ..NONE },
+    Defect { name: "shaft at 10 rpm", make: |c| { c.load.mode = LoadMode::Speed; c.load.speed_rpm = 10.0; }, named: |r| meant(r, Meaning::Mismatch) || meant(r, Meaning::Turning), ..NONE },
+    Defect { name: "shaft at -30 rpm", make: |c| { c.load.mode = LoadMode::Speed; c.load.speed_rpm = -30.0; }, named: |r| meant(r, Meaning::Mismatch) || meant(r, Meaning::Turning), ..NONE },
+    Defect { name: "shaft at 1000 rpm", make: |c| { c.load.mode = LoadMode::Speed; c.load.speed_rpm = 1000.0; }, named: |r| meant(r, Meaning::Mismatch) || meant(r, Meaning::Turning), ..NONE },
+    Defect { name: "aborted in sensors", abort: Some(Step::Sensors), named: stopped, ..NONE },
+    Defect { name: "aborted in wiring", abort: Some(Step::Wiring), named: stopped, ..NONE },
+    Defect { name: "aborted in levels", abort: Some(Step::Levels), named: stopped, ..NONE },
+    Defect { name: "aborted in leakage", abort: Some(Step::Leakage), named: stopped, ..NONE },
+];
+
+/// Longest time from the beginning of a step to its abort, control periods.
+fn abort_within(step: Step) -> u32 {
+    match step {
+        Step::Sensors => 1200,
+        Step::Wiring => 800,
+        _ => 6000,
+    }
+}
+
+/// The sessions: `runs` of each defect.
+pub struct Refusals {
+    config: Config,
+    seed: u64,
+    runs: usize,
+}
+
+/// A session with a defect.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Record {
+    /// The answer.
+    answer: String,
+    /// Whether it names the defect; and whether the outputs are off and the settings as they were.
+    named: bool,
+    unchanged: bool,
+    #[serde(with = "exact")]
+    seconds: f64,
+    #[serde(with = "exact")]
+    largest_a: f64,
+}
+
+impl Study for Refusals {
+    type Record = Record;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let mut config = context.config.clone();
+        config.prepare.learn = false;
+        let runs = config.extent.runs.unwrap_or(RUNS) as usize;
+        Ok(Self { config, seed: context.seed, runs })
+    }
+
+    fn runs(&self) -> usize {
+        DEFECTS.len() * self.runs
+    }
+
+    fn run(&self, number: usize) -> Result<Record, Error> {
+        let defect = &DEFECTS[number / self.runs];
+        let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let mut config = drawn(&self.config, seed);
+        (defect.make)(&mut config);
+        config.calibrate();
+        let settings = unaware(&config);
+        let mut rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
+        (defect.on_bench)(&mut rig);
+        let abort = defect.abort.map_or(Abort::default(), |step| {
+            let after = Xoshiro256PlusPlus::seed_from_u64(seed).random_range(1..abort_within(step));
+            Abort { step: Some(step), after }
+        });
+        let commissioning = Commissioning::new(&settings);
+        let session = Session::run(rig, commissioning, STEPS, abort, defect.sensors)?;
+        let refusal = session.refusal().map(|(_, refusal)| refusal);
+        let off = matches!(session.rig.drive.state(), State::Off | State::Fault(_));
+        Ok(Record {
+            answer: refusal.map_or("accepted".into(), |refusal| refusal.to_string()),
+            named: refusal.is_some_and(|refusal| (defect.named)(&refusal)),
+            unchanged: off && session.commissioning.settings(&settings) == settings,
+            seconds: session.seconds,
+            largest_a: session.largest_a,
+        })
+    }
+
+    fn outcome(&self, _: &Context<'_>, records: Vec<Record>) -> Result<Outcome, Error> {
+        let mut outcome = Outcome::default();
+        let heads = [
+            "defect",
+            "machines",
+            "named",
+            "unchanged",
+            "within (s)",
+            "largest (A)",
+            "last other answer, or an answer",
+        ];
+        let mut table = Table::new("Refusals", &heads);
+        let (mut named, mut unchanged) = (0, 0);
+        for (defect, records) in DEFECTS.iter().zip(records.chunks(self.runs)) {
+            let count = |of: fn(&Record) -> bool| records.iter().filter(|&r| of(r)).count();
+            let (by_name, kept) = (count(|r| r.named), count(|r| r.unchanged));
+            named += by_name;
+            unchanged += kept;
+            let most = |of: fn(&Record) -> f64| records.iter().map(of).fold(0.0, f64::max);
+            let other = records.iter().rfind(|r| !r.named).or(records.last());
+            table.row([
+                Cell::from(defect.name),
+                Cell::fixed(records.len() as f64, 0),
+                Cell::fixed(by_name as f64, 0),
+                Cell::fixed(kept as f64, 0),
+                Cell::fixed(most(|r| r.seconds), 1),
+                Cell::fixed(most(|r| r.largest_a), 2),
+                Cell::from(other.map_or(String::new(), |r| r.answer.clone())),
+            ]);
+        }
+        outcome.metrics.set("sessions", records.len() as f64);
+        outcome.metrics.set("named", named as f64);
+        outcome.metrics.set("unchanged", unchanged as f64);
+        outcome.tables.push(table);
+        Ok(outcome)
+    }
+}
