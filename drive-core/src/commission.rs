@@ -36,12 +36,14 @@
 //! two phases that are exchanged between sensors and motor: such a motor turns the other way.
 
 mod collector;
+mod fit;
 mod found;
 mod leakage;
 mod levels;
 mod loop_check;
 mod plate;
 mod report;
+mod staircase;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -50,11 +52,12 @@ use crate::drive::{Excitation, Excited, State};
 use crate::settings::Settings;
 
 pub use collector::{BINS, Bin, Collector, Record};
-pub use found::Found;
+pub use found::{Found, Iron, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
-use levels::{Fitted, Search};
+use fit::{Fitted, Search};
 use plate::Plate;
+use staircase::Staircase;
 
 /// What the commissioning wants next.
 // A report is passed once a step.
@@ -92,6 +95,7 @@ pub struct Commissioning {
     search: Option<Search>,
     /// Fit of the levels, and gain mismatch, until the third level confirms them.
     fitted: (Fitted, f32, Option<Report>),
+    stairs: Staircase,
     /// Inductances along and across at each bias, H.
     inductances: [[f32; 2]; 2],
 }
@@ -139,6 +143,7 @@ impl Commissioning {
             pulses: (0.0, 0),
             search: None,
             fitted: (Fitted::default(), 0.0, None),
+            stairs: Staircase::default(),
             inductances: [[0.0; 2]; 2],
         }
     }
@@ -227,7 +232,10 @@ impl Commissioning {
             Step::Sensors => Step::Wiring,
             Step::Wiring => Step::Levels,
             Step::Levels => Step::Leakage,
-            Step::Leakage => Step::Staircase,
+            Step::Leakage if self.found.levels.is_some_and(|levels| levels.saturates) => {
+                Step::Staircase
+            }
+            Step::Leakage => Step::CurrentLoop,
             Step::Staircase | Step::CurrentLoop => Step::CurrentLoop,
         };
         (self.part, self.until) = (0, 0);
