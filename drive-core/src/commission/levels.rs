@@ -19,15 +19,15 @@ const LEVELS: [f32; 3] = [0.8, 0.2, 0.45];
 const LEVEL_S: f32 = 1.5;
 /// Bins at the end of a level that count as steady.
 const STEADY: usize = BINS - 6;
-/// Largest deviation of the rotor resistance.
-const UNCERTAIN: f32 = 0.03;
+/// Largest deviation of the rotor resistance of a linear motor.
+const LINEAR: f32 = 0.017;
 /// Largest gain mismatch.
 const MISMATCH: f32 = 0.05;
 /// Largest current across phase a, as a share of that along it, and of the test current.
 const ACROSS: (f32, f32) = (0.015, 0.001);
 /// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
-const MISFIT_PER_NOISE: f32 = 150.0;
-const MISFIT_OF_BUS: f32 = 1e-4;
+const MISFIT_PER_NOISE: f32 = 105.0;
+const MISFIT_OF_BUS: f32 = 8e-5;
 /// A misfit up to this multiple of it is that of a main flux that saturates.
 const SATURATED: f32 = 30.0;
 /// Bins at the end of a level that give its resistance then.
@@ -75,8 +75,9 @@ impl Commissioning {
                 let limit = MISFIT_OF_BUS * self.setup.dc_link;
                 let limit = limit.max(MISFIT_PER_NOISE * self.rough()? * noise);
                 let misfit = Quantity::new("misfit", "V", fit.misfit).of((0.0, limit));
-                if fit.misfit > limit {
-                    misfit.of((0.0, SATURATED * limit)).check(Meaning::Misfit, Meaning::Misfit)?;
+                if fit.misfit > limit || fit.deviations[2] > LINEAR * fit.r_r {
+                    let most = misfit.of((0.0, SATURATED * limit));
+                    most.check(Meaning::Misfit, Meaning::Misfit)?;
                     return self.saturated(plate, sums, &fit, mismatch, misfit);
                 }
                 let report = self.report_levels(plate, &fit, mismatch, misfit)?;
@@ -179,9 +180,6 @@ impl Commissioning {
             Quantity::new("gain mismatch", "", mismatch),
             misfit,
         ];
-        Quantity::new("deviation of R_R", "ohm", d_r_r)
-            .of((0.0, UNCERTAIN * levels.r_r))
-            .check(Meaning::Uncertain, Meaning::Uncertain)?;
         Ok(Report::new(Step::Levels, values))
     }
 }
