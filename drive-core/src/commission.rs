@@ -93,8 +93,8 @@ pub struct Commissioning {
     /// Pulses of the present train, and trains before it.
     pulses: (f32, u32),
     search: Option<Search>,
-    /// Fit of the levels, and gain mismatch, until the third level confirms them.
-    fitted: (Fitted, f32, Option<Report>),
+    /// Fit of the levels, gain mismatch, and misfit, until the third level confirms them.
+    fitted: (Fitted, f32, Option<Quantity>),
     stairs: Staircase,
     /// Inductances along and across at each bias, H.
     inductances: [[f32; 2]; 2],
