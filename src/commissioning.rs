@@ -127,3 +127,6 @@ impl Session {
         (found != *settings).then_some(found)
     }
 }
+
+#[cfg(test)]
+mod tests;
