@@ -37,12 +37,14 @@
 //! two phases that are exchanged between sensors and motor: such a motor turns the other way.
 
 mod collector;
+mod fit;
 mod found;
 mod leakage;
 mod levels;
 mod loop_check;
 mod plate;
 mod report;
+mod staircase;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -53,11 +55,12 @@ use crate::settings::{Motor, Settings};
 use crate::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
 
 pub use collector::{BINS, Bin, Collector, Record};
-pub use found::Found;
+pub use found::{Found, Iron, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
-use levels::{Fitted, Search};
+use fit::{Fitted, Search};
 use plate::Plate;
+use staircase::Staircase;
 
 /// What the commissioning wants next.
 // A report is passed once a step.
@@ -99,6 +102,7 @@ pub struct Commissioning {
     fitted: (Fitted, f32, Option<Report>),
     /// The current loop, once it is designed in its step.
     design: Option<Result<CurrentLoopDesign, TuningError>>,
+    stairs: Staircase,
     /// Inductances along and across at each bias, H.
     inductances: [[f32; 2]; 2],
 }
@@ -150,6 +154,7 @@ impl Commissioning {
             search: None,
             fitted: (Fitted::default(), 0.0, None),
             design: None,
+            stairs: Staircase::default(),
             inductances: [[0.0; 2]; 2],
         }
     }
@@ -255,7 +260,10 @@ impl Commissioning {
             Step::Sensors => Step::Wiring,
             Step::Wiring => Step::Levels,
             Step::Levels => Step::Leakage,
-            Step::Leakage => Step::Staircase,
+            Step::Leakage if self.found.levels.is_some_and(|levels| levels.saturates) => {
+                Step::Staircase
+            }
+            Step::Leakage => Step::CurrentLoop,
             Step::Staircase | Step::CurrentLoop => Step::CurrentLoop,
         };
         (self.part, self.until, self.design) = (0, 0, None);

@@ -206,6 +206,11 @@ impl Collector {
         Bin { voltage: sum.voltage * share, current: sum.current * share, ..sum }
     }
 
+    /// Current along phase a at the beginning of the first half, A, where the second has ended.
+    pub(super) fn first_steady(&self) -> f32 {
+        self.mean(1, BINS - 3).current.alpha
+    }
+
     /// The amplitudes at the carrier.
     pub(super) fn phasors(&self) -> Phasors {
         let share = 2.0 / self.samples as f32;

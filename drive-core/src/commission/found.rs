@@ -1,8 +1,8 @@
 //! What the steps have found, and the settings that follow from it.
 
-use super::levels::Fitted;
+use super::fit::Fitted;
 use crate::io::PERIOD_S;
-use crate::settings::{Motor, PlantSource, Settings};
+use crate::settings::{Flux, Motor, PlantSource, Settings};
 
 /// What the steps have found; `None` for a step that has not been done or was refused.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Found {
     pub levels: Option<Levels>,
     /// Transient inductance and saliency.
     pub leakage: Option<Leakage>,
+    /// Magnetising curve.
+    pub iron: Option<Iron>,
 }
 
 /// Result of the current levels: parameters of the inverse-Gamma circuit, inverter, sensors.
@@ -32,6 +34,8 @@ pub struct Levels {
     pub inverter_v: f32,
     /// (gain of sensor a)/(gain of b) - 1.
     pub mismatch: f32,
+    /// Whether the main flux saturates: `r_r` and `tau_r` are then those of no circuit.
+    pub saturates: bool,
 }
 
 /// Result of the carrier.
@@ -41,6 +45,17 @@ pub struct Leakage {
     pub inductance: f32,
     /// Saliency at standstill, (across - along)/(across + along), with half the test current along phase a.
     pub saliency: f32,
+}
+
+/// Result of the staircase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iron {
+    /// The circuit, with the chord of the magnetising curve at the direct current.
+    pub motor: Motor,
+    /// Direct current, A peak.
+    pub i_d: f32,
+    /// Magnetising curve: currents, A peak, and main flux, Wb peak.
+    pub points: [(f32, f32); 7],
 }
 
 impl Levels {
@@ -58,6 +73,7 @@ impl Levels {
             tau_r: fit.tau_r,
             inverter_v: 0.75 * fit.e,
             mismatch,
+            saturates: false,
         }
     }
 }
@@ -66,6 +82,10 @@ impl Found {
     /// The motor, as a T with equal leakages; `None` until both steps have found theirs.
     pub fn motor(&self, settings: &Motor) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
+        if levels.saturates {
+            let Motor { inertia, pole_pairs, .. } = *settings;
+            return self.iron.map(|iron| Motor { inertia, pole_pairs, ..iron.motor });
+        }
         let coupled = levels.coupled();
         let k = 1.0 / libm::sqrtf(1.0 + leakage.inductance / coupled);
         let l_ls = leakage.inductance / (1.0 + k);
@@ -90,6 +110,7 @@ impl Found {
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
         new.current_plant.source = PlantSource::Motor;
+        new.sequence.flux = Flux::High;
         let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);
         new.inverter.drop_v = Some(levels.inverter_v - of_dead_time);
         new

@@ -10,13 +10,29 @@
 
 use core::f32::consts::TAU;
 
-use super::collector::Phasors;
+use super::collector::{Collector, Phasors, Record};
+use super::found::Leakage;
+use super::plate::Plate;
+use super::report::{Meaning, Quantity, Refusal, Report, Step};
+use super::{Commissioning, Next};
 use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::PERIOD_S;
+use crate::io::{PERIOD_S, periods};
 use crate::math::frames::AlphaBeta;
 
 /// Bisections of the inductance.
 const BISECTIONS: u32 = 30;
+
+/// Bias of the carrier, as shares of the test current; carrier current likewise; largest carrier as a share of the dc link.
+const BIASES: [f32; 2] = [0.5, 0.25];
+const CARRIER: f32 = 0.07;
+const CARRIER_OF_BUS: f32 = 0.3;
+/// Control periods of a record, of the rise of the carrier, and of its fall.
+const CARRIER_PERIODS: u32 = 1500;
+const RISE_PERIODS: u32 = 300;
+/// Largest gain mismatch that is left at the carrier.
+const LEFT: f32 = 0.01;
+/// rad/s.
+const CARRIER_RAD_PER_S: f32 = core::f32::consts::TAU * 600.0;
 
 /// An amplitude along an axis, of its cosine and sine parts.
 fn amplitude(parts: [AlphaBeta; 2], along: fn(&AlphaBeta) -> f32) -> f32 {
@@ -25,13 +41,13 @@ fn amplitude(parts: [AlphaBeta; 2], along: fn(&AlphaBeta) -> f32) -> f32 {
 }
 
 /// A/V along phase a, and across it.
-pub(super) fn admittances(seen: &Phasors) -> [f32; 2] {
+fn admittances(seen: &Phasors) -> [f32; 2] {
     let axes: [fn(&AlphaBeta) -> f32; 2] = [|v| v.alpha, |v| v.beta];
     axes.map(|axis| amplitude(seen.current, axis) / amplitude(seen.voltage, axis))
 }
 
 /// Gain mismatch that the carrier along phase a shows: (gain of a)/(gain of b) - 1.
-pub(super) fn mismatch(seen: &Phasors) -> f32 {
+fn mismatch(seen: &Phasors) -> f32 {
     let [re, im] = seen.current;
     let square = re.alpha * re.alpha + im.alpha * im.alpha;
     const SQRT_3: f32 = 1.732_050_8;
@@ -39,7 +55,7 @@ pub(super) fn mismatch(seen: &Phasors) -> f32 {
 }
 
 /// The inductance, H, that gives this admittance, A/V, with the resistance R', ohm, and the analog filter, periods.
-pub(super) fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) -> f32 {
+fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) -> f32 {
     let (sin, cos) = libm::sincosf(TAU / CARRIER_SAMPLES as f32);
     let b = if filter > 0.0 { filter * -libm::expm1f(-1.0 / filter) } else { 0.0 };
     let seen = libm::hypotf((1.0 - b) + b * cos, b * sin);
@@ -55,4 +71,66 @@ pub(super) fn inductance(admittance: f32, resistance: f32, filter: f32, range: (
         }
     }
     libm::expf(0.5 * (low + high))
+}
+
+impl Commissioning {
+    pub(super) fn leakage(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
+        let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
+        let volts = CARRIER * plate.amperes * CARRIER_RAD_PER_S * self.rough()?;
+        let volts = volts.min(CARRIER_OF_BUS * self.setup.dc_link);
+        // Per bias: settle; along: rise, record; fall; across: rise, record; fall.
+        let (bias, part) = (usize::from(self.part / 7), self.part % 7);
+        let Some(&share) = BIASES.get(bias) else { return self.report_leakage(plate) };
+        let none = AlphaBeta::ZERO;
+        let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
+        let (record, samples, carrier) = match part {
+            0 => (Record::Nothing, periods(3.0 * levels.tau_r), none),
+            1 => (Record::Nothing, RISE_PERIODS, along),
+            2 => (Record::Carrier, CARRIER_PERIODS, along),
+            3 | 6 => {
+                let seen = sums.phasors();
+                let axis = usize::from(part == 6);
+                let half = 0.5 * levels.mismatch;
+                let gain = if axis == 0 { 1.0 + half } else { 1.0 - half };
+                let (least, most) = plate.leakage();
+                let henry = inductance(
+                    admittances(&seen)[axis] / gain,
+                    levels.r_s + levels.r_r,
+                    self.setup.filter,
+                    (0.1 * least, 10.0 * most),
+                );
+                self.inductances[bias][axis] = henry;
+                if axis == 0 {
+                    let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
+                    let amperes = volts * admittances(&seen)[0];
+                    let allowed =
+                        6.0 * noise / (amperes * libm::sqrtf(CARRIER_PERIODS as f32 / 2.0));
+                    let allowed = allowed.max(LEFT);
+                    Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
+                        .of((-allowed, allowed))
+                        .check(Meaning::Turning, Meaning::Turning)?;
+                }
+                (Record::Nothing, RISE_PERIODS, none)
+            }
+            4 => (Record::Nothing, RISE_PERIODS, across),
+            _ => (Record::Carrier, CARRIER_PERIODS, across),
+        };
+        let excitation = self.current(plate, share, carrier)?;
+        Ok(self.part(sums, record, samples, excitation))
+    }
+
+    fn report_leakage(&mut self, plate: &Plate) -> Result<Next, Refusal> {
+        let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
+        let [high, low] = self.inductances;
+        let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);
+        let values = [
+            Quantity::new("sigma L_s", "H", inductance)
+                .of(plate.leakage())
+                .check(Meaning::TooLarge, Meaning::TooSmall)?,
+            Quantity::new("saliency at half the current", "", saliency(high)),
+            Quantity::new("saliency at a quarter", "", saliency(low)),
+        ];
+        self.found.leakage = Some(Leakage { inductance, saliency: saliency(high) });
+        Ok(Next::Report(Report::new(Step::Leakage, values)))
+    }
 }

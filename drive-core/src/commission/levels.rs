@@ -1,226 +1,194 @@
-//! Step 4: the fit of a transient between two current levels along phase a, with the shaft at rest.
-//!
-//! Inverse-Gamma circuit, with a voltage `e` of the inverter that is constant as long as all phases carry current:
-//!
-//! ```text
-//! v = r_s i + e + R_R (i - i_m) + L di/dt        d i_m/dt = (i - i_m) / tau_r
-//! ```
-//!
-//! For a given rotor time constant `i_m` follows from the measured current, exactly over bins of constant current, and the
-//! rest is linear in the four unknowns. The time constant with the least misfit is searched for.
+//! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
 
 use core::ops::ControlFlow;
 
-use super::collector::{Bin, Collector};
-use crate::io::PERIOD_S;
+use super::collector::{BINS, Collector, FIRST_BINS, Record};
+use super::fit::{Fitted, Search};
+use super::found::Levels;
+use super::plate::Plate;
+use super::report::{Meaning, Quantity, Refusal, Report, Step};
+use super::{Commissioning, Next};
+use crate::drive::Excitation;
+use crate::io::{PERIOD_S, periods};
+use crate::math::frames::AlphaBeta;
 
-/// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
-/// inductance meanwhile: a share of the rotor time constant, from 12 ms to 60 ms.
-const FROM_OF_TAU_R: f32 = 0.08;
-const FROM_S: (f32, f32) = (0.012, 0.060);
-/// Range of the search, s, and its points: first over the range, then around the best of the last.
-const TAU_R: (f32, f32) = (0.01, 4.0);
-const POINTS: u8 = 40;
-const CLOSER_POINTS: u8 = 9;
-/// Rounds of the search: the spacing shrinks from 15 % to 0.06 %.
-const ROUNDS: u8 = 5;
+/// Pause before the first level, s.
+const QUIET_S: f32 = 0.1;
+/// Current levels, as shares of the test current, and time of the first two, s.
+const LEVELS: [f32; 3] = [0.8, 0.2, 0.45];
+const LEVEL_S: f32 = 1.5;
+/// Bins at the end of a level that count as steady.
+const STEADY: usize = BINS - 6;
+/// Largest deviation of the rotor resistance.
+const UNCERTAIN: f32 = 0.03;
+/// Largest gain mismatch.
+const MISMATCH: f32 = 0.05;
+/// Largest current across phase a, as a share of that along it, and of the test current.
+const ACROSS: (f32, f32) = (0.015, 0.001);
+/// Largest misfit per noise of the current, V/A, per transient inductance, ohm/H; and as a share of the dc link.
+const MISFIT_PER_NOISE: f32 = 150.0;
+const MISFIT_OF_BUS: f32 = 1e-4;
+/// A misfit up to this multiple of it is that of a main flux that saturates.
+const SATURATED: f32 = 30.0;
+/// Bins at the end of a level that give its resistance then.
+const ENDS: usize = BINS - 2;
+/// Largest error of the third level: share of the resistive voltage, and of the dc link.
+const THIRD: (f32, f32) = (0.01, 6.5e-5);
+/// Wait before the third level is measured, and time of its mean, in rotor time constants.
+const WAIT_T: f32 = 3.0;
+const MEAN_T: f32 = 0.5;
 
-/// Unknowns of the linear fit: r_s, e, R_R, L.
-const N: usize = 4;
-
-/// The values of the best fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Fitted {
-    /// ohm.
-    pub r_s: f32,
-    /// Voltage of the inverter along phase a, V.
-    pub e: f32,
-    /// ohm.
-    pub r_r: f32,
-    /// s.
-    pub tau_r: f32,
-    /// Rms of what the fit leaves, V.
-    pub misfit: f32,
-    /// Standard deviations of r_s, e, R_R by what the fit leaves.
-    pub deviations: [f32; 3],
-    /// That of tau_r, s.
-    pub tau_deviation: f32,
-}
-
-/// A fit for one time constant.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    /// Sum of the squares that are left, weighted by the periods, V^2.
-    left: f64,
-    values: [f64; N],
-    variances: [f64; N],
-    /// Periods, and bins.
-    weight: f64,
-    bins: f64,
-}
-
-/// The search for the time constant: one fit a call, so that the main loop goes on meanwhile.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    round: u8,
-    point: u8,
-    /// Bins from here on count, control periods.
-    begins: f32,
-    /// Logarithm of the first time constant of this round, and spacing.
-    from: f32,
-    step: f32,
-    best: Option<(f32, Candidate)>,
-    /// What the neighbours of the best left.
-    last_left: f64,
-    neighbours: f64,
-    after_best: bool,
-}
-
-impl Search {
-    pub fn new() -> Self {
-        let (from, to) = (libm::logf(TAU_R.0), libm::logf(TAU_R.1));
-        Self {
-            round: 0,
-            point: 0,
-            begins: FROM_S.0 / PERIOD_S,
-            from,
-            step: (to - from) / f32::from(POINTS - 1),
-            best: None,
-            last_left: 0.0,
-            neighbours: 0.0,
-            after_best: false,
-        }
-    }
-
-    /// One fit; the result, none where nothing can be fitted, after the last.
-    pub fn step(&mut self, sums: &Collector) -> ControlFlow<Option<Fitted>> {
-        let x = self.from + self.step * f32::from(self.point);
-        if let Some(candidate) = fit(sums, libm::expf(x), self.begins) {
-            let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
-            if self.after_best && !better {
-                self.neighbours += candidate.left;
+impl Commissioning {
+    pub(super) fn levels(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
+        let at = |share| self.current(plate, share, AlphaBeta::ZERO);
+        let [high, low, third] = [at(LEVELS[0])?, at(LEVELS[1])?, at(LEVELS[2])?];
+        let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
+        let record =
+            |half, seconds: f32| Record::Bins { half, first: seconds / PERIOD_S / FIRST_BINS };
+        match self.part {
+            0 => {
+                self.found.levels = None;
+                Ok(self.part(sums, Record::Nothing, periods(QUIET_S), Excitation::Rest))
             }
-            if better {
-                self.best = Some((x, candidate));
-                self.neighbours = self.last_left;
+            1 => Ok(self.part(sums, record(0, LEVEL_S), periods(LEVEL_S), high)),
+            2 => Ok(self.part(sums, record(1, LEVEL_S), periods(LEVEL_S), low)),
+            3 => {
+                sums.begin(Record::Nothing);
+                self.search = Some(Search::new());
+                (self.part, self.until) = (4, 0);
+                Ok(Next::Wait)
             }
-            self.after_best = better;
-            self.last_left = candidate.left;
-        }
-        self.point += 1;
-        let points = if self.round == 0 { POINTS } else { CLOSER_POINTS };
-        if self.point < points {
-            return ControlFlow::Continue(());
-        }
-        let Some((x, best)) = self.best else { return ControlFlow::Break(None) };
-        if self.round + 1 == ROUNDS {
-            return ControlFlow::Break(Some(self.fitted(x, &best)));
-        }
-        if self.round == 0 {
-            let (least, most) = FROM_S;
-            self.begins = (FROM_OF_TAU_R * libm::expf(x)).clamp(least, most) / PERIOD_S;
-        }
-        // From one spacing below the best to one above.
-        self.from = x - self.step;
-        self.step *= 2.0 / f32::from(CLOSER_POINTS - 1);
-        (self.round, self.point, self.best) = (self.round + 1, 0, None);
-        (self.after_best, self.last_left) = (false, 0.0);
-        ControlFlow::Continue(())
-    }
-
-    fn fitted(&self, x: f32, best: &Candidate) -> Fitted {
-        let [r_s, e, r_r, _] = best.values.map(|value| value as f32);
-        let variance = best.left / (best.bins - N as f64);
-        let [d_r_s, d_e, d_r_r, _] = best.variances.map(|v| libm::sqrt(v * variance) as f32);
-        let tau_r = libm::expf(x);
-        let step = f64::from(self.step);
-        let curvature = (self.neighbours - 2.0 * best.left) / (step * step);
-        Fitted {
-            r_s,
-            e,
-            r_r,
-            tau_r,
-            misfit: libm::sqrt(best.left / best.weight) as f32,
-            deviations: [d_r_s, d_e, d_r_r],
-            tau_deviation: tau_r * libm::sqrt(2.0 * variance / curvature.max(1e-12)) as f32,
-        }
-    }
-}
-
-/// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level.
-fn fit(sums: &Collector, tau_r: f32, begins: f32) -> Option<Candidate> {
-    let (mut xx, mut xy, mut yy) = ([[0.0_f64; N]; N], [0.0_f64; N], 0.0_f64);
-    let (mut weight, mut count) = (0.0_f64, 0.0_f64);
-    let mut magnetising = 0.0_f32;
-    for half in 0..2 {
-        let mut bins = sums.bins(half).peekable();
-        let (mut start, mut before) = (0.0_f32, None::<Bin>);
-        while let Some(bin) = bins.next() {
-            let i = bin.current.alpha;
-            // Exact for a constant current: end and mean of i_m over the bin.
-            let turned = bin.periods * PERIOD_S / tau_r;
-            let decayed = -libm::expm1f(-turned);
-            let mean = i + (magnetising - i) * (decayed / turned);
-            magnetising += (i - magnetising) * decayed;
-            let counts = start >= begins;
-            start += bin.periods;
-            if let (Some(before), Some(after)) = (before.replace(bin), bins.peek())
-                && counts
-            {
-                let apart = bin.periods + 0.5 * (before.periods + after.periods);
-                let slope = (after.current.alpha - before.current.alpha) / (apart * PERIOD_S);
-                let x = [i, 1.0, i - mean, slope].map(f64::from);
-                let (y, w) = (f64::from(bin.voltage), f64::from(bin.periods));
-                // The upper half, and few operations: in software they take some 60 cycles each, and the main loop
-                // must be back within 4 ms.
-                for n in 0..N {
-                    let weighted = w * x[n];
-                    for m in n..N {
-                        xx[n][m] += weighted * x[m];
-                    }
-                    xy[n] += weighted * y;
+            4 => {
+                let fit = match self.search.as_mut().map(|search| search.step(sums)) {
+                    Some(ControlFlow::Continue(())) => return Ok(Next::Wait),
+                    Some(ControlFlow::Break(Some(fit))) => fit,
+                    _ => return Err(Refusal::SamplesLost),
+                };
+                self.search = None;
+                let [ends, end] = [0, 1].map(|half| sums.mean(half, STEADY).current);
+                let (da, db) = (ends.alpha - end.alpha, on_b(ends) - on_b(end));
+                let mismatch = Quantity::new("gain mismatch", "", -da / (2.0 * db) - 1.0)
+                    .of((-MISMATCH, MISMATCH))
+                    .check(Meaning::Mismatch, Meaning::Mismatch)?
+                    .value;
+                self.check_rest(plate, sums, mismatch, noise)?;
+                let limit = MISFIT_OF_BUS * self.setup.dc_link;
+                let limit = limit.max(MISFIT_PER_NOISE * self.rough()? * noise);
+                let misfit = Quantity::new("misfit", "V", fit.misfit).of((0.0, limit));
+                if fit.misfit > limit {
+                    misfit.of((0.0, SATURATED * limit)).check(Meaning::Misfit, Meaning::Misfit)?;
+                    return self.saturated(plate, sums, &fit, mismatch, misfit);
                 }
-                yy += w * y * y;
-                weight += w;
-                count += 1.0;
+                let report = self.report_levels(plate, &fit, mismatch, misfit)?;
+                self.fitted = (fit, mismatch, Some(report));
+                let wait = WAIT_T * fit.tau_r;
+                Ok(self.part(sums, Record::Nothing, periods(wait), third))
+            }
+            5 => {
+                let mean = MEAN_T * self.fitted.0.tau_r;
+                Ok(self.part(sums, record(0, mean.max(QUIET_S)), periods(mean.max(QUIET_S)), third))
+            }
+            _ => {
+                let ((fit, mismatch, report), seen) = (self.fitted, sums.mean(0, 0));
+                let report = report.ok_or(Refusal::SamplesLost)?;
+                let resistive = fit.r_s * seen.current.alpha;
+                let allowed = THIRD.0 * resistive + THIRD.1 * self.setup.dc_link;
+                // What is left of the transient from the second level.
+                let turned = seen.periods * PERIOD_S / fit.tau_r;
+                let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
+                let rotor = fit.r_r * (LEVELS[2] - LEVELS[1]) * plate.amperes * rest;
+                let error = seen.voltage - fit.e - resistive - rotor;
+                Quantity::new("error of the third level", "V", error)
+                    .of((-allowed, allowed))
+                    .check(Meaning::Inverter, Meaning::Inverter)?;
+                self.found.levels = Some(Levels::new(&fit, mismatch));
+                Ok(Next::Report(report))
             }
         }
     }
-    if count <= N as f64 {
-        return None;
+
+    /// No current may flow across phase a, once the gains are corrected.
+    fn check_rest(
+        &self,
+        plate: &Plate,
+        sums: &Collector,
+        mismatch: f32,
+        noise: f32,
+    ) -> Result<(), Refusal> {
+        for bin in sums.bins(0).chain(sums.bins(1)) {
+            let (a, b) = (bin.current.alpha, on_b(bin.current));
+            let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
+            let across = (a + 2.0 * b) * (1.0 / SQRT_3);
+            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * plate.amperes;
+            let allowed = allowed + 6.0 * noise / libm::sqrtf(bin.periods);
+            Quantity::new("current across phase a", "A", across)
+                .of((-allowed, allowed))
+                .check(Meaning::Turning, Meaning::Turning)?;
+        }
+        Ok(())
     }
-    let whole = core::array::from_fn(|n| core::array::from_fn(|m| xx[n.min(m)][n.max(m)]));
-    let inverse = inverse(whole)?;
-    let values = inverse.map(|row| row.iter().zip(&xy).map(|(a, b)| a * b).sum::<f64>());
-    let explained: f64 = values.iter().zip(&xy).map(|(a, b)| a * b).sum();
-    let left = (yy - explained).max(0.0);
-    let variances = core::array::from_fn(|n| inverse[n][n]);
-    Some(Candidate { left, values, variances, weight, bins: count })
+
+    /// The main flux saturates: the ends of the levels give the resistance, the staircase is to give the rest.
+    fn saturated(
+        &mut self,
+        plate: &Plate,
+        sums: &Collector,
+        fit: &Fitted,
+        mismatch: f32,
+        misfit: Quantity,
+    ) -> Result<Next, Refusal> {
+        let [high, low] = [0, 1].map(|half| sums.mean(half, ENDS));
+        let r_s = (high.voltage - low.voltage) / (high.current.alpha - low.current.alpha);
+        let ends = Fitted { r_s, e: low.voltage - r_s * low.current.alpha, ..*fit };
+        let levels = Levels { saturates: true, ..Levels::new(&ends, mismatch) };
+        let values = [
+            Quantity::new("r_s", "ohm", levels.r_s)
+                .of(plate.r_s())
+                .check(Meaning::TooLarge, Meaning::TooSmall)?,
+            Quantity::new("inverter voltage", "V", levels.inverter_v),
+            Quantity::new("gain mismatch", "", mismatch),
+            misfit,
+        ];
+        self.found.levels = Some(levels);
+        Ok(Next::Report(Report::new(Step::Levels, values)))
+    }
+
+    fn report_levels(
+        &self,
+        plate: &Plate,
+        fit: &Fitted,
+        mismatch: f32,
+        misfit: Quantity,
+    ) -> Result<Report, Refusal> {
+        let levels = Levels::new(fit, mismatch);
+        let [d_r_s, d_e, d_r_r] = fit.deviations;
+        let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
+        let r_r = Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).of(plate.r_r());
+        let values = [
+            Quantity::new("r_s", "ohm", levels.r_s)
+                .within(d_r_s)
+                .of(plate.r_s())
+                .check(large, small)?,
+            r_r.check(large, small)?,
+            Quantity::new("tau_r", "s", levels.tau_r)
+                .within(fit.tau_deviation)
+                .of(Plate::TAU_R)
+                .check(small, large)?,
+            Quantity::new("L_M", "H", levels.coupled()),
+            Quantity::new("inverter voltage", "V", levels.inverter_v).within(0.75 * d_e),
+            Quantity::new("gain mismatch", "", mismatch),
+            misfit,
+        ];
+        Quantity::new("deviation of R_R", "ohm", d_r_r)
+            .of((0.0, UNCERTAIN * levels.r_r))
+            .check(Meaning::Uncertain, Meaning::Uncertain)?;
+        Ok(Report::new(Step::Levels, values))
+    }
 }
 
-#[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
-/// The inverse of a positive definite matrix, by Gauss and Jordan; none where it is not one.
-fn inverse(mut a: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
-    let mut inverse = [[0.0; N]; N];
-    for n in 0..N {
-        inverse[n][n] = 1.0;
-    }
-    for n in 0..N {
-        let pivot = 1.0 / a[n][n];
-        if !(a[n][n] > 0.0 && pivot.is_finite()) {
-            return None;
-        }
-        let (own, own_inverse) = (a[n].map(|x| x * pivot), inverse[n].map(|x| x * pivot));
-        for row in 0..N {
-            let factor = a[row][n];
-            for column in 0..N {
-                if row != n {
-                    a[row][column] -= factor * own[column];
-                    inverse[row][column] -= factor * own_inverse[column];
-                }
-            }
-        }
-        (a[n], inverse[n]) = (own, own_inverse);
-    }
-    Some(inverse)
+const SQRT_3: f32 = 1.732_050_8;
+
+/// Phase current b of a current vector, A.
+fn on_b(i: AlphaBeta) -> f32 {
+    0.5 * (SQRT_3 * i.beta - i.alpha)
 }

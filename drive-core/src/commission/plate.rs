@@ -28,6 +28,9 @@ pub(super) struct Plate {
     pub pole_pairs: u8,
     /// Peak of the rated voltage between lines, V.
     pub peak_v: f32,
+    /// Rated current, A peak, and rated flux, Wb peak.
+    pub rated: f32,
+    pub flux: f32,
 }
 
 impl Plate {
@@ -59,6 +62,8 @@ impl Plate {
             l_b: z_b / (TAU * plate.frequency_hz),
             pole_pairs: pairs as u8,
             peak_v: SQRT_2 * plate.voltage_v,
+            rated,
+            flux: SQRT_2 / SQRT_3 * plate.voltage_v / (TAU * plate.frequency_hz),
         })
     }
 

@@ -4,7 +4,7 @@
 use core::ops::ControlFlow;
 
 use super::collector::{Collector, FIRST_BINS, Record};
-use super::levels::{Fitted, Search};
+use super::fit::{Fitted, Search};
 use crate::io::PERIOD_S;
 use crate::math::frames::AlphaBeta;
 

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::statistics::{Study, whole};
 use super::{BENCH, Context, DRIVE, Experiment, machines};
-use crate::config::{Config, plant_settings};
+use crate::config::{Config, PlantModel, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::Rig;
@@ -32,8 +32,9 @@ pub const EXPERIMENT: Experiment = Experiment {
     run: whole::<Commission>,
 };
 
-/// Largest error of an accepted machine that counts as right: linear plant.
-const RIGHT_PCT: f64 = 3.0;
+/// Errors, in percent, as [`Circuit::values`], twice of which count as wrong: of a linear machine, and of one of iron.
+const RIGHT_PCT: [f64; 5] = [1.5; 5];
+const RIGHT_IRON_PCT: [f64; 5] = [2.0, 2.0, 6.0, 6.0, 6.0];
 /// Time of each run afterwards, s, unless `seconds` says otherwise.
 const RUN_S: f64 = 2.0;
 /// Share of the expected saliency from which on a machine counts as one that has enough.
@@ -185,7 +186,11 @@ impl Study for Commission {
         m.set("machines", records.len() as f64);
         m.set("accepted", accepted.len() as f64);
         m.set("refused", (records.len() - accepted.len()) as f64);
-        let wrong = accepted.iter().filter(|r| r.worst() > RIGHT_PCT).count();
+        let linear = matches!(self.config.model.plant, PlantModel::A | PlantModel::Linear);
+        let right = if linear { RIGHT_PCT } else { RIGHT_IRON_PCT };
+        let is_wrong =
+            |r: &&&Record| r.errors.iter().zip(right).any(|(e, most)| e.abs() > 2.0 * most);
+        let wrong = accepted.iter().filter(is_wrong).count();
         m.set("wrongly_accepted", wrong as f64);
         let names = Circuit::of_plant(&self.config).values().map(|(name, _)| name);
         for (n, name) in names.into_iter().enumerate() {

@@ -1,0 +1,220 @@
+//! Step 6: the magnetising curve, where the main flux saturates.
+//!
+//! The current along phase a climbs a staircase. In every step the stator flux grows by the area under the voltage that the
+//! end of the step does not explain, and the ends themselves lie on a line:
+//!
+//! ```text
+//! psi_s += sum T (v - v_end - r_s (i - i_end))        v_end = r_s i_end + e        psi_m = psi_s - L_l i
+//! ```
+//!
+//! The first step begins at a current at which the inverter already takes its full voltage; the flux there is on the
+//! straight beginning of the curve. Two levels 20 % around the direct current of the drive then give the circuit of small
+//! changes there, by the fit of step 4; its rotor resistance is the true one, its inductances are the slopes:
+//!
+//! ```text
+//! r_r = R_R'/k'^2        k' = 1/sqrt(1 + L_s'/L_M')        L_l = L_s'/(1 + k')        l_m = psi_m(i_d)/i_d
+//! ```
+
+use core::ops::ControlFlow;
+
+use super::collector::{BINS, Collector, FIRST_BINS, Record};
+use super::fit::{Fitted, Search};
+use super::found::Iron;
+use super::plate::Plate;
+use super::report::{Meaning, Quantity, Refusal, Report, Step};
+use super::{Commissioning, Next};
+use crate::io::{PERIOD_S, periods};
+use crate::math::frames::AlphaBeta;
+use crate::settings::Motor;
+
+/// Levels, as shares of the test current.
+const STAIRS: [f32; STEPS] = [0.06, 0.13, 0.22, 0.33, 0.46, 0.62, 0.8];
+const STEPS: usize = 7;
+/// Time of a level in time constants of step 4, which come out too small, and its limits, s.
+const DWELL_T: f32 = 14.0;
+const DWELL_S: (f32, f32) = (0.6, 3.0);
+/// Bins at the end of a level that count as its end: the last quarter.
+const END: usize = BINS - 3;
+/// The two levels around the direct current.
+const AROUND: [f32; 2] = [1.2, 0.8];
+/// Direct current at most, as a share of the test current.
+const DIRECT: f32 = 0.55;
+/// Largest distance of an end from the line: share of the resistive voltage, and of the dc link.
+const LINE: (f32, f32) = (0.01, 1e-4);
+
+/// A level of the staircase.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stair {
+    /// Current, A, and voltage, V, at the end.
+    end: (f32, f32),
+    /// Sums of what voltage, V s, and current, A s, differ from it.
+    areas: (f32, f32),
+}
+
+/// State of the step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Staircase {
+    stairs: [Stair; STEPS],
+    /// Stator resistance, ohm, and voltage of the inverter, V, by the line; currents, A, and stator flux, Wb, of the levels.
+    r_s: f32,
+    e: f32,
+    flux: [(f32, f32); STEPS],
+    /// Direct current, A.
+    i_d: f32,
+}
+
+impl Stair {
+    fn new(sums: &Collector) -> Self {
+        let end = sums.mean(0, END);
+        let (i, v) = (end.current.alpha, end.voltage);
+        let mut areas = (0.0, 0.0);
+        for bin in sums.bins(0) {
+            let seconds = bin.periods * PERIOD_S;
+            areas.0 += (bin.voltage - v) * seconds;
+            areas.1 += (bin.current.alpha - i) * seconds;
+        }
+        Self { end: (i, v), areas }
+    }
+}
+
+impl Staircase {
+    /// The line through the ends, and the flux of the levels. Currents are those of sensor a over its `gain`.
+    fn evaluate(&mut self, gain: f32, dc_link: f32) -> Result<(), Refusal> {
+        let count = (STEPS - 1) as f32;
+        let ends = || self.stairs.iter().skip(1).map(|stair| stair.end);
+        let (i, v) = ends().fold((0.0, 0.0), |(i, v), end| (i + end.0 / count, v + end.1 / count));
+        let (mut ii, mut iv) = (0.0, 0.0);
+        for end in ends() {
+            ii += (end.0 - i) * (end.0 - i);
+            iv += (end.0 - i) * (end.1 - v);
+        }
+        let r_s = iv / ii;
+        for end in ends() {
+            let allowed = LINE.0 * r_s * end.0 + LINE.1 * dc_link;
+            Quantity::new("distance from the resistive line", "V", end.1 - v - r_s * (end.0 - i))
+                .of((-allowed, allowed))
+                .check(Meaning::Inverter, Meaning::Inverter)?;
+        }
+        let growth = |stair: &Stair| stair.areas.0 - r_s * stair.areas.1;
+        let [first, second, ..] = &self.stairs;
+        let mut flux = growth(second) / (second.end.0 - first.end.0) * first.end.0;
+        self.flux[0] = (first.end.0 / gain, flux);
+        for (place, stair) in self.flux.iter_mut().zip(&self.stairs).skip(1) {
+            flux += growth(stair);
+            *place = (stair.end.0 / gain, flux);
+        }
+        (self.r_s, self.e) = (r_s * gain, v - r_s * i);
+        Ok(())
+    }
+
+    /// Stator flux at a current, Wb, by a parabola through the three nearest levels.
+    fn flux_at(&self, i: f32) -> f32 {
+        let next = self.flux.iter().position(|point| point.0 > i).unwrap_or(STEPS - 1);
+        let from = next.saturating_sub(2).min(STEPS - 3);
+        let mut sum = 0.0;
+        let points = || self.flux.iter().skip(from).take(3);
+        for (n, (i_n, flux)) in points().enumerate() {
+            let others = points().enumerate().filter(|(m, _)| *m != n);
+            sum += others.fold(*flux, |product, (_, (i_m, _))| product * (i - i_m) / (i_n - i_m));
+        }
+        sum
+    }
+}
+
+impl Commissioning {
+    pub(super) fn staircase(
+        &mut self,
+        plate: &Plate,
+        sums: &mut Collector,
+    ) -> Result<Next, Refusal> {
+        let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
+        let leakage = self.found.leakage.ok_or(Refusal::Needs(Step::Leakage))?;
+        let seconds = (DWELL_T * levels.tau_r).clamp(DWELL_S.0, DWELL_S.1);
+        let record = |half| Record::Bins { half, first: seconds / PERIOD_S / FIRST_BINS };
+        let gain = 1.0 + 0.5 * levels.mismatch;
+        let part = usize::from(self.part);
+        if let Some(done) = part.checked_sub(1).and_then(|n| self.stairs.stairs.get_mut(n)) {
+            *done = Stair::new(sums);
+        }
+        if let Some(share) = STAIRS.get(part) {
+            self.found.iron = None;
+            let next = self.current(plate, *share, AlphaBeta::ZERO)?;
+            return Ok(self.part(sums, record(0), periods(seconds), next));
+        }
+        if part == STEPS {
+            self.stairs.evaluate(gain, self.setup.dc_link)?;
+            // The flux of the nameplate, or less where that takes too much current.
+            let main = |(i, flux): &(f32, f32)| flux - leakage.inductance / 1.87 * i < plate.flux;
+            let below =
+                self.stairs.flux.iter().rev().find(|point| main(point)).map_or(0.0, |p| p.0);
+            let [_, _, least, ..] = STAIRS;
+            self.stairs.i_d = below.clamp(least * plate.amperes, DIRECT * plate.rated);
+        }
+        let share = |of: f32| of * self.stairs.i_d / plate.amperes;
+        match part - STEPS {
+            n @ 0..3 => {
+                // Up, settle; down; up.
+                let [high, low] = AROUND;
+                let next =
+                    self.current(plate, share(if n == 1 { low } else { high }), AlphaBeta::ZERO)?;
+                let what = if n == 0 { Record::Nothing } else { record(n - 1) };
+                Ok(self.part(sums, what, periods(seconds), next))
+            }
+            3 => {
+                sums.begin(Record::Nothing);
+                self.search = Some(Search::from_steady(sums.first_steady()));
+                (self.part, self.until) = (self.part + 1, 0);
+                Ok(Next::Wait)
+            }
+            _ => match self.search.as_mut().map(|search| search.step(sums)) {
+                Some(ControlFlow::Continue(())) => Ok(Next::Wait),
+                Some(ControlFlow::Break(Some(fit))) => self.report_staircase(plate, &fit, gain),
+                _ => Err(Refusal::SamplesLost),
+            },
+        }
+    }
+
+    fn report_staircase(
+        &mut self,
+        plate: &Plate,
+        fit: &Fitted,
+        gain: f32,
+    ) -> Result<Next, Refusal> {
+        // Along the axis, and at nearly this current: that of small changes, as the fit's.
+        let [[along, _], _] = self.inductances;
+        let (r_r, i_d) = (fit.r_r * gain, self.stairs.i_d);
+        let k = 1.0 / libm::sqrtf(1.0 + along / (fit.tau_r * r_r));
+        let l = along / (1.0 + k);
+        let points = self.stairs.flux.map(|(i, flux)| (i, flux - l * i));
+        let l_m = self.stairs.flux_at(i_d) / i_d - l;
+        let straight = points[0].1 / points[0].0;
+        let motor = Motor {
+            r_s: self.stairs.r_s,
+            r_r: r_r / (k * k),
+            l_ls: l,
+            l_lr: l,
+            l_m,
+            ..Motor::default()
+        };
+        let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
+        let deviation = fit.deviations[2] / fit.r_r;
+        let values = [
+            Quantity::new("r_s", "ohm", motor.r_s).of(plate.r_s()).check(large, small)?,
+            Quantity::new("r_r", "ohm", motor.r_r).within(deviation * motor.r_r),
+            Quantity::new("direct current", "A", i_d),
+            Quantity::new("main flux there", "Wb", l_m * i_d),
+            Quantity::new("L_m, chord", "H", l_m),
+            Quantity::new("tau_r, chord", "s", motor.tau_r())
+                .of(Plate::TAU_R)
+                .check(small, large)?,
+            Quantity::new("chord of the straight beginning over it", "", straight / l_m)
+                .of((0.95, 5.0))
+                .check(Meaning::Misfit, Meaning::Misfit)?,
+        ];
+        self.found.iron = Some(Iron { motor, i_d, points });
+        if let Some(levels) = &mut self.found.levels {
+            (levels.r_s, levels.inverter_v) = (motor.r_s, 0.75 * self.stairs.e);
+        }
+        Ok(Next::Report(Report::new(Step::Staircase, values)))
+    }
+}
