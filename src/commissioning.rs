@@ -20,6 +20,16 @@ pub enum News {
     },
 }
 
+/// What a commissioning asks for.
+#[allow(clippy::large_enum_variant)] // taken at once
+#[derive(Clone, Copy, Debug)]
+pub enum Action {
+    /// Give the drive this command; [`Session::refused`] if it does not take it.
+    Command(Command),
+    /// Call [`Session::design`].
+    Design,
+}
+
 /// A commissioning, and what it waits for.
 #[derive(Clone, Debug)]
 pub struct Session {
@@ -70,19 +80,25 @@ impl Session {
         self.sums.push(seen.measured, seen.realised, seen.dc_link);
     }
 
-    /// Goes on; the command that the drive is to get now. Its answer belongs to [`answered`](Self::answered).
-    pub fn poll(&mut self, drive: &Excited) -> Option<Command> {
+    /// Goes on; what is to be done now.
+    pub fn poll(&mut self, drive: &Excited) -> Option<Action> {
         if !self.is_running() || self.news.is_some() {
             return None;
         }
         match self.commissioning.poll(drive, &mut self.sums) {
             Next::Wait => {}
-            Next::Excite(excitation) => return Some(Command::Excite(excitation)),
-            Next::Stop => return Some(Command::Stop),
+            Next::Excite(excitation) => return Some(Action::Command(Command::Excite(excitation))),
+            Next::Stop => return Some(Action::Command(Command::Stop)),
+            Next::Design => return Some(Action::Design),
             Next::Report(report) => self.report(report),
             Next::Done => self.news = Some(News::Ended { sound: self.sound }),
         }
         None
+    }
+
+    /// Designs the current loop, which takes long; the outputs are off.
+    pub fn design(&mut self) {
+        self.commissioning.design();
     }
 
     /// Notes that the drive has not taken a command.
@@ -111,3 +127,6 @@ impl Session {
         (found != *settings).then_some(found)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -24,6 +24,7 @@
 //!         Next::Wait => {}
 //!         Next::Excite(excitation) => drop(drive.command(&Command::Excite(excitation))?),
 //!         Next::Stop => drop(drive.command(&Command::Stop)?),
+//!         Next::Design => commissioning.design(), // takes long
 //!         Next::Report(report) => report.values.iter().flatten().for_each(|value| println!("{value}")),
 //!         Next::Done => break,
 //!     }
@@ -49,7 +50,9 @@ mod steps;
 mod tests;
 
 use crate::drive::{Excitation, Excited, State};
-use crate::settings::Settings;
+use crate::io::PERIOD_S;
+use crate::settings::{Motor, Settings};
+use crate::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
 
 pub use collector::{BINS, Bin, Collector, Record};
 pub use found::{Found, Iron, Leakage, Levels};
@@ -70,6 +73,8 @@ pub enum Next {
     Excite(Excitation),
     /// Give the drive [`Command::Stop`](crate::Command::Stop).
     Stop,
+    /// Call [`design`](Commissioning::design). The drive is off.
+    Design,
     /// A step has ended.
     Report(Report),
     /// All steps have ended, or one was refused. The drive is off.
@@ -95,6 +100,8 @@ pub struct Commissioning {
     search: Option<Search>,
     /// Fit of the levels, gain mismatch, and misfit, until the third level confirms them.
     fitted: (Fitted, f32, Option<Quantity>),
+    /// The current loop, once it is designed in its step.
+    design: Option<Result<CurrentLoopDesign, TuningError>>,
     stairs: Staircase,
     /// Inductances along and across at each bias, H.
     inductances: [[f32; 2]; 2],
@@ -116,6 +123,9 @@ struct Setup {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
     Steps,
+    /// Stop the drive, then design the current loop.
+    StopToDesign,
+    StoppingToDesign,
     /// Stop the drive.
     Stop,
     Stopping,
@@ -143,6 +153,7 @@ impl Commissioning {
             pulses: (0.0, 0),
             search: None,
             fitted: (Fitted::default(), 0.0, None),
+            design: None,
             stairs: Staircase::default(),
             inductances: [[0.0; 2]; 2],
         }
@@ -152,7 +163,7 @@ impl Commissioning {
     /// they are repeated.
     pub fn start(&mut self, first: Step, last: Step) {
         (self.step, self.last, self.progress, self.on) = (first, last, Progress::Steps, false);
-        (self.part, self.until) = (0, 0);
+        (self.part, self.until, self.design) = (0, 0, None);
     }
 
     /// Whether steps are being done.
@@ -189,7 +200,13 @@ impl Commissioning {
                 self.progress = Progress::Stopping;
                 return if first { Next::Stop } else { Next::Wait };
             }
-            Progress::Steps => {}
+            Progress::StopToDesign => {
+                self.progress = Progress::StoppingToDesign;
+                return Next::Stop;
+            }
+            Progress::StoppingToDesign if drive.state == State::Off => return Next::Design,
+            Progress::StoppingToDesign if drive.state == State::Exciting => return Next::Wait,
+            Progress::StoppingToDesign | Progress::Steps => {}
         }
         let excites = match drive.state {
             State::Off => !self.on,
@@ -220,6 +237,17 @@ impl Commissioning {
         }
     }
 
+    /// Designs the current loop for the motor that was found. It takes as long as [`Settings::build`]: a second on the target,
+    /// so the drive must be off.
+    pub fn design(&mut self) {
+        self.design = self.found.motor(&Motor::default()).map(|motor| {
+            let period_s = f64::from(PERIOD_S);
+            let plant = motor_plant(&motor.circuit(), period_s)?;
+            design_current_loop(plant, plant, period_s)
+        });
+        (self.progress, self.on) = (Progress::Steps, false);
+    }
+
     /// Ends the present step, which is refused, and stops the drive.
     pub fn refuse(&mut self, refusal: Refusal) -> Report {
         self.progress = Progress::Stop;
@@ -238,6 +266,6 @@ impl Commissioning {
             Step::Leakage => Step::CurrentLoop,
             Step::Staircase | Step::CurrentLoop => Step::CurrentLoop,
         };
-        (self.part, self.until) = (0, 0);
+        (self.part, self.until, self.design) = (0, 0, None);
     }
 }

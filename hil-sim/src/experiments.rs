@@ -6,7 +6,7 @@ mod angle_identification;
 mod anti_windup;
 pub mod battery;
 mod bode;
-mod commission;
+pub mod commission;
 mod current_step;
 mod dead_time;
 mod demodulators;

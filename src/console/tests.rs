@@ -1,4 +1,5 @@
 mod announcements;
+mod commission;
 mod doubles;
 mod learning;
 mod lists;

@@ -16,7 +16,7 @@ use crate::chip::watchdog::Watchdog;
 use crate::chip::{memory, pwm, stop, time};
 use crate::task::control;
 use induction_drive::board;
-use induction_drive::commissioning::{News, Session};
+use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
@@ -209,9 +209,14 @@ impl Supervisor {
     /// Goes on with the commissioning.
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
-        let Some(command) = self.commissioning.poll(&excited) else { return };
-        if let Err(why) = self.command(command) {
-            self.commissioning.refused(why);
+        match self.commissioning.poll(&excited) {
+            None => {}
+            Some(Action::Design) => extended(&mut self.guard, || self.commissioning.design()),
+            Some(Action::Command(command)) => {
+                if let Err(why) = self.command(command) {
+                    self.commissioning.refused(why);
+                }
+            }
         }
     }
 

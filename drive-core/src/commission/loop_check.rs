@@ -4,12 +4,12 @@
 use super::collector::{Collector, FIRST_BINS, Record};
 use super::plate::Plate;
 use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next};
+use super::{Commissioning, Next, Progress};
 use crate::drive::{Excitation, Regulator};
 use crate::io::{PERIOD_S, periods};
 use crate::math::frames::AlphaBeta;
 use crate::settings::Motor;
-use crate::tuning::{DIRECT_SHARE, design_current_loop, motor_plant};
+use crate::tuning::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
 const STEP: [f32; 2] = [0.4, 0.7];
@@ -30,8 +30,10 @@ impl Commissioning {
     ) -> Result<Next, Refusal> {
         let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-        let own = motor_plant(&motor.circuit(), f64::from(PERIOD_S));
-        let design = own.and_then(|plant| design_current_loop(plant, plant, f64::from(PERIOD_S)));
+        let Some(design) = self.design else {
+            self.progress = Progress::StopToDesign;
+            return Ok(Next::Wait);
+        };
         let design = design.map_err(Refusal::Design)?;
         let regulator = Regulator {
             k_c: design.k_c as f32,

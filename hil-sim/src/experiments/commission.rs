@@ -1,6 +1,6 @@
 //! The commissioning: one session on the motor of the configuration, or statistics over machines drawn around it.
 
-mod machine;
+pub mod machine;
 pub mod refusals;
 mod session;
 

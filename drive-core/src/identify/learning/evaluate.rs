@@ -50,7 +50,7 @@ impl Learning {
             Verdict::Sound
         } else if !Verdict::of_slope(slope.at_rest).is_accepted() {
             Verdict::SlopeTooSmall
-        } else if !(ripple <= RIPPLE * slope.at_rest.abs()) {
+        } else if ripple > RIPPLE * slope.at_rest.abs() {
             Verdict::Bent
         } else if limit_a < LEAST_LIMIT as f32 * self.grid.step_a() || slope.table.is_none() {
             Verdict::LimitTooLow

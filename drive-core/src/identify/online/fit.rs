@@ -209,7 +209,7 @@ mod tests {
         let machine = Machine { sigma_l_s: 0.0515, coupled: 0.1532, period: 10.0 / 6000.0 };
         let truth = Unknowns { r_s: 5.4, rate: 1.0 / 0.186, omega_m: 31.4 };
         let settings = crate::settings::Settings::default();
-        let mut rls = crate::identify::online::Online::new(&settings).unwrap().rls().clone();
+        let mut rls = *crate::identify::online::Online::new(&settings).unwrap().rls();
         rls.begin_at(machine.coefficients(&truth));
         for (r_s, at_least, at_most) in [(2.7, 0.29, 0.31), (5.4, 0.0, 0.001)] {
             let fit = machine.step(&rls, &Unknowns { r_s, ..truth }, &truth, false).unwrap();

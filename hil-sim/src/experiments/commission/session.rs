@@ -85,6 +85,7 @@ impl Session {
                 Next::Stop => {
                     rig.command(&Command::Stop)?;
                 }
+                Next::Design => commissioning.design(),
                 Next::Report(report) => reports.push((rig.time() - began, report)),
                 Next::Done => {
                     let seconds = rig.time() - began;

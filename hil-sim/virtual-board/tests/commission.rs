@@ -1,0 +1,130 @@
+//! The image commissions its motor: random machines and boards, at the console.
+
+use anyhow::{Context as _, Result, bail};
+use hil_sim::Config;
+use hil_sim::experiments::commission::machine::{Circuit, drawn};
+use virtual_board::{Board, Image, Options};
+
+/// Machines, unless the environment gives another `MACHINES`.
+const MACHINES: u64 = 6;
+/// Longest that a commissioning takes, control periods: 60 s.
+const LONGEST: u64 = 360_000;
+
+/// A board and what it says.
+struct Console {
+    board: Board,
+    said: String,
+}
+
+impl Console {
+    fn new(config: &Config, seed: u64) -> Result<Self> {
+        let mut options = Options::new(config, seed);
+        options.counting.cycles = false;
+        let mut console =
+            Self { board: Board::new(Image::built()?, options)?, said: String::new() };
+        console.until("last run")?;
+        Ok(console)
+    }
+
+    /// Goes on until a line has come that contains a text; what was said up to its end.
+    fn until(&mut self, text: &str) -> Result<String> {
+        for _ in 0..LONGEST / 100 {
+            self.board.run_periods(100)?;
+            self.said += &self.board.take_console();
+            while self.board.next_period().is_some() {}
+            if let Some(at) = self.said.find(text)
+                && let Some(end) = self.said[at..].find('\n')
+            {
+                let rest = self.said.split_off(at + end + 1);
+                return Ok(core::mem::replace(&mut self.said, rest));
+            }
+        }
+        bail!("{text:?} did not come: {}", self.said)
+    }
+
+    fn say(&mut self, line: &str, until: &str) -> Result<String> {
+        self.board.type_line(line);
+        self.until(until)
+    }
+}
+
+/// The value of a setting.
+fn value(console: &mut Console, key: &str) -> Result<f64> {
+    let answer = console.say(&format!("get {key}"), key)?;
+    let word = answer.split(" = ").nth(1).and_then(|rest| rest.split(' ').next());
+    word.with_context(|| answer.clone())?.parse().with_context(|| answer.clone())
+}
+
+/// The parameters in force, as those of the inverse-Gamma circuit.
+fn in_force(console: &mut Console) -> Result<Circuit> {
+    let mut parameters = [0.0; 5];
+    for (place, key) in parameters.iter_mut().zip(["r_s", "r_r", "l_ls", "l_lr", "l_m"]) {
+        *place = value(console, &format!("motor.{key}"))?;
+    }
+    Ok(Circuit::of(parameters))
+}
+
+/// Largest error in percent, and that of each parameter in words.
+fn commissioned(seed: u64) -> Result<(f64, String)> {
+    let config = drawn(&Config::default(), seed);
+    let mut console = Console::new(&config, seed)?;
+    let told = console.say("commission", "commissioning: ended")?;
+    let sound = told.contains("`accept`");
+    if !sound {
+        bail!("machine {seed}: {told}");
+    }
+    // Saved as well: what is in force after the power was off is what was found.
+    console.say("accept", "\nok")?;
+    console.board.reset(virtual_board::periph::Reset::Power);
+    console.until("last run")?;
+    let (found, truth) = (in_force(&mut console)?, Circuit::of_plant(&config));
+    let pairs = found.values().into_iter().zip(truth.values());
+    let errors = pairs.map(|((name, found), (_, truth))| (name, 100.0 * (found / truth - 1.0)));
+    let errors: Vec<(&str, f64)> = errors.collect();
+    let worst = errors.iter().fold(0.0, |worst: f64, (_, error)| worst.max(error.abs()));
+    Ok((worst, format!("{seed}: {errors:.2?}")))
+}
+
+/// Each parameter times 0.5 to 2, shaft free; the sensors' gains are 0.5 % wrong, which the resistances carry. On the
+/// host 95 % of 500 such machines are within 1 %.
+#[test]
+fn random_machines_are_commissioned_by_the_image() {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+    let machines = std::env::var("MACHINES").map_or(MACHINES, |number| number.parse().unwrap());
+    let share = |n| (1 + n..=machines).step_by(threads as usize).map(commissioned);
+    let results: Vec<_> = std::thread::scope(|scope| {
+        let workers: Vec<_> =
+            (0..threads).map(|n| scope.spawn(move || share(n).collect::<Vec<_>>())).collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
+    });
+    let mut worst = Vec::new();
+    for result in results {
+        let (error, text) = result.unwrap();
+        println!("{text}");
+        worst.push(error);
+    }
+    worst.sort_by(f64::total_cmp);
+    println!("largest errors: {worst:.2?}");
+    // All but one of twenty, and all.
+    let most = worst.len() - 1 - worst.len() / 20;
+    assert!(worst[most] < 1.5 && worst.iter().all(|error| *error < 3.0), "{worst:?}");
+}
+
+#[test]
+fn a_stop_or_a_new_setting_leaves_everything_as_it_was() -> Result<()> {
+    let config = drawn(&Config::default(), 7);
+    let mut console = Console::new(&config, 7)?;
+    let before = in_force(&mut console)?;
+    console.say("commission", "wiring: sound")?;
+    console.board.run_periods(6000)?;
+    let told = console.say("stop", "commissioning: ended")?;
+    assert!(told.contains("levels: refused") && told.contains("as they were"), "{told}");
+    assert!(console.say("accept", "\n")?.contains("commission"), "nothing to accept");
+    assert!(console.say("status", "\n")?.starts_with("off"));
+    let after = in_force(&mut console)?;
+    assert_eq!(before.values().map(|(_, x)| x), after.values().map(|(_, x)| x));
+    // One step alone needs those before it.
+    let told = console.say("commission leakage", "commissioning: ended")?;
+    assert!(told.contains("leakage: refused"), "{told}");
+    Ok(())
+}

@@ -1,0 +1,124 @@
+use drive_core::{Command, Drive, Mode, Refused, State};
+use hil_sim::Config;
+use hil_sim::config::{LoadMode, plant_settings};
+use hil_sim::rig::Rig;
+
+use super::*;
+
+/// Control periods from one pass of the main loop to the next.
+const PASS: u64 = 7;
+/// Longest commissioning, control periods.
+const LONGEST: u64 = 240_000;
+
+/// A bench with a free shaft, whose drive believes in another motor.
+fn bench(seed: u64) -> (Rig, Settings) {
+    let mut config = Config::default();
+    config.load.mode = LoadMode::Free;
+    let mut settings = config.drive;
+    settings.motor.r_s *= 3.0;
+    settings.motor.l_m *= 0.5;
+    (Rig::new(&plant_settings(&config), &settings, seed).unwrap(), settings)
+}
+
+/// Plays the part of the firmware until the session ends; what it told. Of the periods given by `lost` none arrives.
+fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bool) -> Vec<News> {
+    let mut told = Vec::new();
+    for n in 0..LONGEST {
+        rig.step();
+        if rig.drive.excites() && !lost(n, session) {
+            session.take(&Observation::new(n as u32, &rig.drive.telemetry()));
+        }
+        if !n.is_multiple_of(PASS) {
+            continue;
+        }
+        match session.poll(&rig.drive.excited()) {
+            None => {}
+            Some(Action::Design) => {
+                assert_eq!(rig.drive.state(), State::Off, "it takes a second");
+                session.design();
+            }
+            Some(Action::Command(command)) => {
+                if let Err(why) = rig.drive.command(&command) {
+                    session.refused(CommandError::Refused(why));
+                }
+            }
+        }
+        told.extend(session.news());
+        if let Some(News::Ended { .. }) = told.last() {
+            return told;
+        }
+    }
+    panic!("no end: {told:?}");
+}
+
+fn refusal(told: &[News]) -> (Step, Refusal) {
+    let refused = |news: &News| match news {
+        News::Report(report) => report.refusal.map(|why| (report.step, why)),
+        News::Ended { .. } => None,
+    };
+    told.iter().find_map(refused).expect("nothing was refused")
+}
+
+#[test]
+fn the_motor_is_found_from_its_nameplate() {
+    let (mut rig, settings) = bench(3);
+    let mut session = Session::new(&settings);
+    assert_eq!(session.found(&settings), None);
+    session.begin(Step::Nameplate, Step::LAST);
+    let told = play(&mut rig, &mut session, |_, _| false);
+    assert_eq!(told.last(), Some(&News::Ended { sound: true }), "{told:?}");
+    assert_eq!(rig.drive.state(), State::Off);
+    let found = session.found(&settings).unwrap().motor;
+    let truth = Config::default().motor;
+    for (found, truth) in [
+        (found.r_s, truth.r_s),
+        (found.r_r, truth.r_r),
+        (found.l_m, truth.l_m),
+        (found.l_ls, truth.l_ls),
+    ] {
+        assert!((f64::from(found) / truth - 1.0).abs() < 0.015, "{found} {truth}");
+    }
+    // Other settings, another motor perhaps.
+    session.configured(&settings);
+    assert_eq!(session.found(&settings), None);
+}
+
+#[test]
+fn samples_that_are_lost_while_they_count_refuse_the_step() {
+    let (mut rig, settings) = bench(4);
+    let mut session = Session::new(&settings);
+    session.begin(Step::Nameplate, Step::Leakage);
+    // One period, a second into the levels.
+    let told = play(&mut rig, &mut session, |n, _| n == 12_000);
+    assert_eq!(refusal(&told), (Step::Levels, Refusal::SamplesLost));
+    assert_eq!((session.found(&settings), rig.drive.state()), (None, State::Off));
+}
+
+#[test]
+fn a_command_that_is_not_taken_ends_it() {
+    let settings = Config::default().drive;
+    let mut drive = Drive::new(settings.build().unwrap());
+    let mut session = Session::new(&settings);
+    session.begin(Step::Nameplate, Step::LAST);
+    // Somebody starts the drive in between.
+    drive.command(&Command::Start(Mode::Learning)).unwrap();
+    let report = loop {
+        // As far as the session knows, it is still off.
+        let stale = Excited::default();
+        match session.poll(&stale) {
+            Some(Action::Command(command)) => {
+                let why = drive.command(&command).unwrap_err();
+                session.refused(CommandError::Refused(why));
+            }
+            Some(Action::Design) => panic!("too early"),
+            None => {}
+        }
+        match session.news() {
+            Some(News::Report(report)) if report.refusal.is_some() => break report,
+            _ => {}
+        }
+    };
+    assert_eq!(report.step, Step::Sensors);
+    let refused = Refused::State(State::Calibrating);
+    assert_eq!(report.refusal, Some(Refusal::Command(refused)));
+}
