@@ -26,6 +26,8 @@ const BISECTIONS: u32 = 30;
 const BIASES: [f32; 2] = [0.5, 0.25];
 const CARRIER: f32 = 0.07;
 const CARRIER_OF_BUS: f32 = 0.3;
+/// Longest time until the flux of a bias counts as standing, s: it moves the saliency, not the mean inductance.
+const SETTLED_S: f32 = 2.1;
 /// Control periods of a record, of the rise of the carrier, and of its fall.
 const CARRIER_PERIODS: u32 = 1500;
 const RISE_PERIODS: u32 = 300;
@@ -84,7 +86,7 @@ impl Commissioning {
         let none = AlphaBeta::ZERO;
         let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
         let (record, samples, carrier) = match part {
-            0 => (Record::Nothing, periods(3.0 * levels.tau_r), none),
+            0 => (Record::Nothing, periods((3.0 * levels.tau_r).min(SETTLED_S)), none),
             1 => (Record::Nothing, RISE_PERIODS, along),
             2 => (Record::Carrier, CARRIER_PERIODS, along),
             3 | 6 => {

@@ -35,6 +35,7 @@ const DWELL_T: f32 = 14.0;
 const DWELL_S: (f32, f32) = (0.6, 2.9);
 /// Bins at the end of a level that count as its end: the last quarter.
 const END: usize = BINS - 3;
+const END_SHARE: f32 = 0.228;
 /// The two levels around the direct current.
 const AROUND: [f32; 2] = [1.2, 0.8];
 /// Direct current at most, as a share of the test current.
@@ -64,6 +65,11 @@ pub(super) struct Staircase {
     flux: [(f32, f32); STEPS],
     /// Direct current, A.
     i_d: f32,
+}
+
+/// Time of a level, s, for the time constant of step 4.
+fn dwell(tau_r: f32) -> f32 {
+    (DWELL_T * tau_r).clamp(DWELL_S.0, DWELL_S.1)
 }
 
 impl Stair {
@@ -110,6 +116,32 @@ impl Staircase {
         Ok(())
     }
 
+    /// Adds what the levels lack that were left, after `seconds`, before the flux had come to rest: the part e^(-x) of
+    /// the slow flux, x = T/tau, and what is left of the voltage at the end, over the whole time. `r_r` and `leakage` are
+    /// those of the T.
+    fn complete(&mut self, seconds: f32, r_r: f32, leakage: f32) {
+        let ((mut i, mut at_i), mut late) = (self.flux[0], None);
+        for n in 1..STEPS {
+            let (next, after) = self.flux[n];
+            let (step, grown) = (next - i, after - at_i);
+            let (mut whole, mut rest) = (grown / step, 0.0);
+            for _ in 0..4 {
+                let left = |x: f32| libm::expf(-x * seconds * r_r / whole);
+                let ends = (left(1.0 - END_SHARE) - left(1.0)) / END_SHARE;
+                let slow = (whole - leakage) * (whole - leakage) / whole;
+                rest = left(1.0) * slow;
+                // What the level before left comes late; the first was reached from zero.
+                let late = late.unwrap_or(rest * i);
+                whole = (grown - late) / step + rest + ends * slow;
+            }
+            // The first step begins on the straight part of the curve.
+            let from = if n == 1 { whole * i } else { self.flux[n - 1].1 };
+            self.flux[n - 1].1 = from;
+            self.flux[n].1 = from + whole * step;
+            (i, at_i, late) = (next, after, Some(rest * step));
+        }
+    }
+
     /// Stator flux at a current, Wb, by a parabola through the three nearest levels.
     fn flux_at(&self, i: f32) -> f32 {
         let next = self.flux.iter().position(|point| point.0 > i).unwrap_or(STEPS - 1);
@@ -132,7 +164,7 @@ impl Commissioning {
     ) -> Result<Next, Refusal> {
         let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
         let leakage = self.found.leakage.ok_or(Refusal::Needs(Step::Leakage))?;
-        let seconds = (DWELL_T * levels.tau_r).clamp(DWELL_S.0, DWELL_S.1);
+        let seconds = dwell(levels.tau_r);
         let record = |half| Record::Bins { half, first: seconds / PERIOD_S / FIRST_BINS };
         let gain = 1.0 + 0.5 * levels.mismatch;
         let part = usize::from(self.part);
@@ -185,20 +217,16 @@ impl Commissioning {
     ) -> Result<Next, Refusal> {
         // Along the axis, and at nearly this current: that of small changes, as the fit's.
         let [[along, _], _] = self.inductances;
+        let seconds = dwell(self.found.levels.ok_or(Refusal::Needs(Step::Levels))?.tau_r);
         let (r_r, i_d) = (fit.r_r * gain, self.stairs.i_d);
         let k = 1.0 / libm::sqrtf(1.0 + along / (fit.tau_r * r_r));
         let l = along / (1.0 + k);
+        let r_r = r_r / (k * k);
+        self.stairs.complete(seconds, r_r, l);
         let points = self.stairs.flux.map(|(i, flux)| (i, flux - l * i));
         let l_m = self.stairs.flux_at(i_d) / i_d - l;
         let straight = points[0].1 / points[0].0;
-        let motor = Motor {
-            r_s: self.stairs.r_s,
-            r_r: r_r / (k * k),
-            l_ls: l,
-            l_lr: l,
-            l_m,
-            ..Motor::default()
-        };
+        let motor = Motor { r_s: self.stairs.r_s, r_r, l_ls: l, l_lr: l, l_m, ..Motor::default() };
         let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
         let deviation = fit.deviations[2] / fit.r_r;
         Quantity::new("deviation of r_r", "", deviation)

@@ -58,8 +58,13 @@ pub struct Record {
     refused: Option<String>,
     /// Errors in percent, as [`Circuit::values`].
     errors: Vec<f64>,
+    /// Time of the steps up to the leakage, of the staircase, and of the current loop, s.
     #[serde(with = "exact")]
     seconds: f64,
+    #[serde(with = "exact")]
+    staircase_seconds: f64,
+    #[serde(with = "exact")]
+    loop_seconds: f64,
     #[serde(with = "exact")]
     shaft_deg: f64,
     /// Largest phase current as a share of the nameplate's peak.
@@ -196,7 +201,9 @@ impl Study for Commission {
             after: after.transpose()?,
             errors: if refused.is_some() { Vec::new() } else { errors },
             refused,
-            seconds: session.seconds,
+            seconds: session.until(Step::Leakage),
+            staircase_seconds: session.until(Step::Staircase) - session.until(Step::Leakage),
+            loop_seconds: session.seconds - session.until(Step::Staircase),
             shaft_deg: session.shaft_deg,
             current: session.largest_a / f64::from(settings.rated_a()),
             told,
@@ -225,6 +232,9 @@ impl Study for Commission {
         let seconds = sorted(accepted.iter().map(|r| r.seconds));
         m.set("seconds_median", quantile(&seconds, 0.5));
         m.set("seconds_max", quantile(&seconds, 1.0));
+        let longest = |of: fn(&Record) -> f64| accepted.iter().map(|r| of(r)).fold(0.0, f64::max);
+        m.set("staircase_seconds_max", longest(|r| r.staircase_seconds));
+        m.set("loop_seconds_max", longest(|r| r.loop_seconds));
         m.set("shaft_deg_max", records.iter().map(|r| r.shaft_deg).fold(0.0, f64::max));
         m.set("current_max_of_peak", records.iter().map(|r| r.current).fold(0.0, f64::max));
 

@@ -96,6 +96,12 @@ impl Session {
         Err(Error::Refused(format!("the commissioning does not end in {LONGEST_S} s")))
     }
 
+    /// Time until the last report of a step up to this one, s.
+    pub fn until(&self, step: Step) -> f64 {
+        let earlier = self.reports.iter().filter(|(_, report)| report.step <= step);
+        earlier.map(|(at, _)| *at).fold(0.0, f64::max)
+    }
+
     /// Why it was refused.
     pub fn refusal(&self) -> Option<(Step, Refusal)> {
         let refused = |(_, report): &(f64, Report)| Some((report.step, report.refusal?));
