@@ -1,7 +1,7 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{Command, Excited, Settings};
+use drive_core::{Command, Excited, Mode, Settings};
 
 use crate::console::handle::CommandError;
 use crate::rotor_tracking::Observation;
@@ -78,6 +78,7 @@ impl Session {
         }
         self.next = seen.number.wrapping_add(1);
         self.sums.push(seen.measured, seen.realised, seen.dc_link);
+        self.sums.push_motion(seen.reference.q, seen.rotor_freq);
     }
 
     /// Goes on; what is to be done now.
@@ -89,6 +90,8 @@ impl Session {
             Next::Wait => {}
             Next::Excite(excitation) => return Some(Action::Command(Command::Excite(excitation))),
             Next::Stop => return Some(Action::Command(Command::Stop)),
+            Next::Start => return Some(Action::Command(Command::Start(Mode::Torque))),
+            Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
             Next::Design => return Some(Action::Design),
             Next::Report(report) => self.report(report),
             Next::Done => self.news = Some(News::Ended { sound: self.sound }),

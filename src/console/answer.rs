@@ -323,7 +323,13 @@ impl Console {
             Some(State::Fault(fault)) => self.error(&Refused::Fault(fault)),
             Some(_) => {
                 drive.commission(first, last);
-                self.ok();
+                if last < Step::Inertia {
+                    self.ok();
+                } else {
+                    self.out.line(format_args!(
+                        "ok: the shaft is going to turn, at most two turns to and fro"
+                    ));
+                }
             }
         }
     }

@@ -209,6 +209,7 @@ impl Supervisor {
     /// Goes on with the commissioning.
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
+        control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
         match self.commissioning.poll(&excited) {
             None => {}
             Some(Action::Design) => extended(&mut self.guard, || self.commissioning.design()),
