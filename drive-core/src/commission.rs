@@ -104,8 +104,8 @@ pub struct Commissioning {
     /// Pulses of the present train, and trains before it.
     pulses: (f32, u32),
     search: Option<Search>,
-    /// Fit of the levels, and gain mismatch, until the third level confirms them.
-    fitted: (Fitted, f32, Option<Report>),
+    /// Fit of the levels, gain mismatch, and misfit, until the third level confirms them.
+    fitted: (Fitted, f32, Option<Quantity>),
     /// The current loop, once it is designed in its step.
     design: Option<Result<CurrentLoopDesign, TuningError>>,
     stairs: Staircase,

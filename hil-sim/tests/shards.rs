@@ -9,7 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 7] = [
+const SMALL: [(&str, &[&str]); 9] = [
     ("speed-torque-sweep", &["--seconds", "0.2"]),
     (
         "monte-carlo",
@@ -25,6 +25,8 @@ const SMALL: [(&str, &[&str]); 7] = [
         ],
     ),
     ("machines", &["--set", "runs=2", "--set", "spread.machine=1.5", "--seconds", "0.2"]),
+    ("commission", &["--set", "runs=4"]),
+    ("commission-refusals", &["--set", "runs=1"]),
     (
         "battery",
         &["--set", "runs=14", "--set", "disturbed.drawn=0.5", "--set", "after.motor.r_r=1.2"],

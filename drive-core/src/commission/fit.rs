@@ -35,6 +35,8 @@ pub(super) struct Fitted {
     pub r_s: f32,
     /// Voltage of the inverter along phase a, V.
     pub e: f32,
+    /// Voltage times current that e lacks at a small current, V A; see [`levels`](super::levels).
+    pub bend: f32,
     /// ohm.
     pub r_r: f32,
     /// s.
@@ -147,6 +149,7 @@ impl Search {
         Fitted {
             r_s,
             e,
+            bend: 0.0,
             r_r,
             tau_r,
             misfit: libm::sqrt(best.left / best.weight) as f32,

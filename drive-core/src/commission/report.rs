@@ -56,8 +56,8 @@ pub struct Quantity {
     pub value: f32,
     /// Its standard deviation by the noise of the measurement; 0 where there is none to state.
     pub deviation: f32,
-    /// What the nameplate lets expect, from and to; equal where it is one value, infinite where it is none.
-    pub expected: (f32, f32),
+    /// What nameplate and noise allow, from and to; infinite where nothing is expected.
+    pub allowed: (f32, f32),
 }
 
 /// Values of a report at most.
@@ -198,7 +198,7 @@ impl Report {
 impl Quantity {
     /// A value of which the nameplate expects nothing.
     pub(super) const fn new(name: &'static str, unit: &'static str, value: f32) -> Self {
-        Self { name, unit, value, deviation: 0.0, expected: (f32::NEG_INFINITY, f32::INFINITY) }
+        Self { name, unit, value, deviation: 0.0, allowed: (f32::NEG_INFINITY, f32::INFINITY) }
     }
 
     /// With the deviation that noise gives it.
@@ -207,13 +207,13 @@ impl Quantity {
     }
 
     /// With the range that the nameplate lets expect.
-    pub(super) const fn of(self, expected: (f32, f32)) -> Self {
-        Self { expected, ..self }
+    pub(super) const fn of(self, allowed: (f32, f32)) -> Self {
+        Self { allowed, ..self }
     }
 
     /// Refuses a value outside what is expected, or one that is not finite.
     pub(super) fn check(self, below: Meaning, above: Meaning) -> Result<Self, Refusal> {
-        let (min, max) = self.expected;
+        let (min, max) = self.allowed;
         if self.value >= min && self.value <= max {
             return Ok(self);
         }
@@ -240,13 +240,11 @@ impl fmt::Display for Quantity {
         }
         f.write_str(if self.unit.is_empty() { "" } else { " " })?;
         f.write_str(self.unit)?;
-        let (min, max) = self.expected;
-        if min == max {
-            write!(f, " (nameplate: {min:.places$})")
-        } else if min.is_finite() {
-            write!(f, " (nameplate: {min:.places$} to {max:.places$})")
-        } else {
-            Ok(())
+        let (min, max) = self.allowed;
+        match (min.is_finite(), max.is_finite()) {
+            (true, true) => write!(f, " (allowed: {min:.places$} to {max:.places$})"),
+            (true, false) => write!(f, " (allowed: from {min:.places$})"),
+            _ => Ok(()),
         }
     }
 }

@@ -32,7 +32,7 @@ const STAIRS: [f32; STEPS] = [0.06, 0.13, 0.22, 0.33, 0.46, 0.62, 0.8];
 const STEPS: usize = 7;
 /// Time of a level in time constants of step 4, which come out too small, and its limits, s.
 const DWELL_T: f32 = 14.0;
-const DWELL_S: (f32, f32) = (0.6, 3.0);
+const DWELL_S: (f32, f32) = (0.6, 2.9);
 /// Bins at the end of a level that count as its end: the last quarter.
 const END: usize = BINS - 3;
 /// The two levels around the direct current.
@@ -41,6 +41,9 @@ const AROUND: [f32; 2] = [1.2, 0.8];
 const DIRECT: f32 = 0.55;
 /// Largest distance of an end from the line: share of the resistive voltage, and of the dc link.
 const LINE: (f32, f32) = (0.01, 1e-4);
+
+/// Largest relative deviation of the rotor resistance.
+const UNCERTAIN: f32 = 0.05;
 
 /// A level of the staircase.
 #[derive(Clone, Copy, Debug, Default)]
@@ -198,6 +201,9 @@ impl Commissioning {
         };
         let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
         let deviation = fit.deviations[2] / fit.r_r;
+        Quantity::new("deviation of r_r", "", deviation)
+            .of((0.0, UNCERTAIN))
+            .check(Meaning::Uncertain, Meaning::Uncertain)?;
         let values = [
             Quantity::new("r_s", "ohm", motor.r_s).of(plate.r_s()).check(large, small)?,
             Quantity::new("r_r", "ohm", motor.r_r).within(deviation * motor.r_r),

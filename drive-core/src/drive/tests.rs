@@ -1,6 +1,7 @@
 //! The drive on a resistive-inductive load: sequence, protections, commands. How it drives a motor
 //! is tested with the simulator.
 
+mod excitation;
 mod motor;
 mod protections;
 

@@ -32,7 +32,7 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     number!("inverter.dead_time_s", inverter.dead_time_s, "s", "time with both switches of a leg off, at every change").from_to(0.0, 6e-6).changed(Change::FromReset).learned(),
     word!("inverter.compensate", inverter.compensate: bool, "whether the dead time is compensated").learned(),
     auto!("inverter.full_compensation_a", inverter.full_compensation_a, Settings::full_compensation_a, "A", "phase current from which on the compensation is full").from_to(1e-4, 100.0).learned(),
-    auto!("inverter.drop_v", inverter.drop_v, |_| 0.0, "V", "voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start").from_to(-50.0, 50.0).learned(),
+    auto!("inverter.drop_v", inverter.drop_v, |s| s.inverter.drop_v.unwrap_or(0.0), "V", "voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start").from_to(-50.0, 50.0).learned(),
 
     number!("scales.current_a.gain", scales.current_a.gain, "A", "current a per code; negative if a current into the motor lowers the code").beside(|s| gain_range(s.scales.current_a)).learned(),
     number!("scales.current_a.offset", scales.current_a.offset, "A", "current a at code 0").from_to(-1000.0, 1000.0).learned(),

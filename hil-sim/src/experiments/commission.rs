@@ -72,8 +72,10 @@ pub struct Record {
     salient: bool,
     /// Whether all runs afterwards are good, or why there are none.
     after: Option<Result<bool, String>>,
-    /// The session in words, of a single one.
-    told: Vec<String>,
+    /// The parameters found, as [`Circuit::values`].
+    found: Vec<f64>,
+    /// The session in words: time, step and verdict; its values.
+    told: Vec<(String, Vec<String>)>,
 }
 
 impl Record {
@@ -111,6 +113,27 @@ impl Commission {
             Err(Error::Refused(why)) => Ok(Err(why)),
             Err(other) => Err(other),
         }
+    }
+
+    /// What was found beside what is filed.
+    fn found_table(&self, record: &Record) -> Table {
+        let mut table = Table::new("The motor", &["parameter", "found", "filed", "error (%)"]);
+        let filed = Circuit::of_plant(&self.config).values();
+        let units = ["ohm", "H", "ohm", "H", "s"];
+        for (n, ((name, filed), unit)) in filed.into_iter().zip(units).enumerate() {
+            let number = |value: Option<&f64>, places| match value {
+                Some(value) => Cell::fixed(*value, places),
+                None => Cell::from("-"),
+            };
+            let found = record.found.get(n).filter(|_| record.refused.is_none());
+            table.row([
+                Cell::from(format!("{name} ({unit})")),
+                number(found, 5),
+                Cell::fixed(filed, 5),
+                number(record.errors.get(n), 2),
+            ]);
+        }
+        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux.")
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
@@ -156,8 +179,8 @@ impl Study for Commission {
         let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
         let mut told = Vec::new();
         for (at, report) in session.reports.iter().filter(|_| self.machines.is_none()) {
-            told.extend(report.values.iter().flatten().map(|value| format!("  {value}")));
-            told.push(format!("{at:.2} s  {report}"));
+            let values = report.values.iter().flatten().map(ToString::to_string).collect();
+            told.push((format!("{at:.2} s: {report}"), values));
         }
         let margin_deg = match refused {
             None => margin(&commissioned, &truth)?,
@@ -167,6 +190,7 @@ impl Study for Commission {
         let after = after.map(|seconds| self.judged(&config, &commissioned, seed, seconds));
         let expected = f64::from(commissioned.injection.synchronous.flux_saliency);
         Ok(Record {
+            found: found.values().map(|(_, value)| value).into(),
             margin_deg,
             salient: plant_settings(&config).saliency.a_psi.abs() >= ENOUGH * expected.abs(),
             after: after.transpose()?,
@@ -241,9 +265,27 @@ impl Study for Commission {
             table.row(row);
         }
         outcome.tables.push(table);
-        outcome.remarks.extend(records.iter().flat_map(|r| r.told.clone()));
+        if let (None, [record]) = (self.machines, records.as_slice()) {
+            outcome.tables = vec![session_table(record), self.found_table(record)];
+        }
         Ok(outcome)
     }
+}
+
+/// The session: steps with their values and verdicts.
+fn session_table(record: &Record) -> Table {
+    let mut table = Table::new(
+        "The session",
+        &["step and verdict", "found, and what nameplate and noise allow"],
+    );
+    for (step, values) in &record.told {
+        let first = values.first().cloned().unwrap_or_default();
+        table.row([Cell::from(step.clone()), Cell::from(first)]);
+        for value in values.iter().skip(1) {
+            table.row([Cell::from(""), Cell::from(value.clone())]);
+        }
+    }
+    table
 }
 
 /// Phase margin, degrees, of the current loop of these settings on the true plant.
