@@ -1,9 +1,8 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{Command, Excited, Mode, Settings};
+use drive_core::{Command, Excited, Mode, Refused, Settings};
 
-use crate::console::handle::CommandError;
 use crate::rotor_tracking::Observation;
 
 /// News of a commissioning.
@@ -104,13 +103,10 @@ impl Session {
         self.commissioning.design();
     }
 
-    /// Notes that the drive has not taken a command.
-    pub fn refused(&mut self, why: CommandError) {
-        let why = match why {
-            CommandError::Refused(refused) => Refusal::Command(refused),
-            CommandError::NoAnswer | CommandError::NotStarted(_) => Refusal::SamplesLost,
-        };
-        let report = self.commissioning.refuse(why);
+    /// Notes that the drive has not taken a command; `None`: it does not answer.
+    pub fn refused(&mut self, why: Option<Refused>) {
+        let refusal = why.map_or(Refusal::SamplesLost, Refusal::Command);
+        let report = self.commissioning.refuse(refusal);
         self.report(report);
     }
 

@@ -43,6 +43,7 @@ mod inertia;
 mod leakage;
 mod levels;
 mod loop_check;
+mod motion;
 mod plate;
 mod report;
 mod staircase;

@@ -40,7 +40,7 @@ fn play(rig: &mut Rig, session: &mut Session, lost: impl Fn(u64, &Session) -> bo
             }
             Some(Action::Command(command)) => {
                 if let Err(why) = rig.drive.command(&command) {
-                    session.refused(CommandError::Refused(why));
+                    session.refused(Some(why));
                 }
             }
         }
@@ -109,7 +109,7 @@ fn a_command_that_is_not_taken_ends_it() {
         match session.poll(&stale) {
             Some(Action::Command(command)) => {
                 let why = drive.command(&command).unwrap_err();
-                session.refused(CommandError::Refused(why));
+                session.refused(Some(why));
             }
             Some(Action::Design) => panic!("too early"),
             None => {}
