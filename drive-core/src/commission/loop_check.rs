@@ -13,6 +13,9 @@ use crate::tuning::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
 const STEP: [f32; 2] = [0.4, 0.7];
+/// Current before the drive is stopped, likewise, and its time in rotor time constants.
+const LOW: f32 = 0.1;
+const LOW_T: f32 = 2.0;
 /// Time before it, after the flux stands, and of the record, s.
 const BEFORE_S: f32 = 0.2;
 const RECORD_S: f32 = 0.25;
@@ -31,7 +34,13 @@ impl Commissioning {
         let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
         let Some(design) = self.design else {
-            self.progress = Progress::StopToDesign;
+            // Less flux first: while the next start has the low sides on, what is left drives a current against itself, which
+            // turns a light shaft away.
+            if self.part == 0 {
+                let low = self.current(plate, LOW, AlphaBeta::ZERO)?;
+                return Ok(self.part(sums, Record::Nothing, periods(LOW_T * motor.tau_r()), low));
+            }
+            (self.part, self.until, self.progress) = (0, 0, Progress::StopToDesign);
             return Ok(Next::Wait);
         };
         let design = design.map_err(Refusal::Design)?;
