@@ -1,9 +1,8 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{Command, Excited, Settings};
+use drive_core::{Command, Excited, Mode, Refused, Settings};
 
-use crate::console::handle::CommandError;
 use crate::rotor_tracking::Observation;
 
 /// News of a commissioning.
@@ -78,6 +77,7 @@ impl Session {
         }
         self.next = seen.number.wrapping_add(1);
         self.sums.push(seen.measured, seen.realised, seen.dc_link);
+        self.sums.push_motion(seen.reference.q, seen.rotor_freq);
     }
 
     /// Goes on; what is to be done now.
@@ -89,6 +89,8 @@ impl Session {
             Next::Wait => {}
             Next::Excite(excitation) => return Some(Action::Command(Command::Excite(excitation))),
             Next::Stop => return Some(Action::Command(Command::Stop)),
+            Next::Start => return Some(Action::Command(Command::Start(Mode::Torque))),
+            Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
             Next::Design => return Some(Action::Design),
             Next::Report(report) => self.report(report),
             Next::Done => self.news = Some(News::Ended { sound: self.sound }),
@@ -101,13 +103,10 @@ impl Session {
         self.commissioning.design();
     }
 
-    /// Notes that the drive has not taken a command.
-    pub fn refused(&mut self, why: CommandError) {
-        let why = match why {
-            CommandError::Refused(refused) => Refusal::Command(refused),
-            CommandError::NoAnswer | CommandError::NotStarted(_) => Refusal::SamplesLost,
-        };
-        let report = self.commissioning.refuse(why);
+    /// Notes that the drive has not taken a command; `None`: it does not answer.
+    pub fn refused(&mut self, why: Option<Refused>) {
+        let refusal = why.map_or(Refusal::SamplesLost, Refusal::Command);
+        let report = self.commissioning.refuse(refusal);
         self.report(report);
     }
 

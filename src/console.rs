@@ -6,6 +6,7 @@
 
 pub mod announce;
 mod answer;
+mod commissioning;
 pub mod grammar;
 pub mod handle;
 pub mod help;
@@ -188,7 +189,7 @@ impl Console {
         {
             self.out.line(format_args!("{news}"));
         } else if let Some((news, line)) = self.commissioned {
-            let (text, next) = announce::commissioning(&news, line);
+            let (text, next) = commissioning::told(&news, line);
             self.out.line(format_args!("commissioning: {text}"));
             self.commissioned = next.map(|line| (news, line));
         } else if self.armed && !drive.tracing() {

@@ -21,8 +21,8 @@ pub struct Observation {
     pub(crate) measured: AlphaBeta,
     pub(crate) realised: AlphaBeta,
     pub(crate) dc_link: f32,
-    reference: Dq,
-    rotor_freq: f32,
+    pub(crate) reference: Dq,
+    pub(crate) rotor_freq: f32,
 }
 
 impl Observation {

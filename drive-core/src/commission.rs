@@ -39,9 +39,11 @@
 mod collector;
 mod fit;
 mod found;
+mod inertia;
 mod leakage;
 mod levels;
 mod loop_check;
+mod motion;
 mod plate;
 mod report;
 mod staircase;
@@ -59,6 +61,7 @@ pub use found::{Found, Iron, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
+use inertia::Swings;
 use plate::Plate;
 use staircase::Staircase;
 
@@ -73,6 +76,10 @@ pub enum Next {
     Excite(Excitation),
     /// Give the drive [`Command::Stop`](crate::Command::Stop).
     Stop,
+    /// Give the drive [`Command::Start`](crate::Command::Start) in torque mode: the shaft is going to turn.
+    Start,
+    /// Give the drive [`Command::Torque`](crate::Command::Torque), A.
+    Torque(f32),
     /// Call [`design`](Commissioning::design). The drive is off.
     Design,
     /// A step has ended.
@@ -103,6 +110,7 @@ pub struct Commissioning {
     /// The current loop, once it is designed in its step.
     design: Option<Result<CurrentLoopDesign, TuningError>>,
     stairs: Staircase,
+    swings: Swings,
     /// Inductances along and across at each bias, H.
     inductances: [[f32; 2]; 2],
 }
@@ -118,6 +126,12 @@ struct Setup {
     pulse_v: f32,
     /// Nominal dc link, V.
     dc_link: f32,
+    /// Rated current, and limit of the torque current, A peak.
+    rated: f32,
+    i_q_limit: f32,
+    /// Torque per torque current, Nm/A, and pole pairs, in force.
+    torque_per_ampere: f32,
+    pole_pairs: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -142,6 +156,10 @@ impl Commissioning {
                 pulse_noise: settings.share_of_range(0.05),
                 pulse_v: settings.share_of_dc_link(60.0),
                 dc_link: settings.inverter.dc_link_v,
+                rated: settings.rated_a(),
+                i_q_limit: settings.i_q_limit_a(),
+                torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
+                pole_pairs: f32::from(settings.motor.pole_pairs),
             },
             found: Found::default(),
             step: Step::Nameplate,
@@ -155,6 +173,7 @@ impl Commissioning {
             fitted: (Fitted::default(), 0.0, None),
             design: None,
             stairs: Staircase::default(),
+            swings: Swings::default(),
             inductances: [[0.0; 2]; 2],
         }
     }
@@ -210,7 +229,9 @@ impl Commissioning {
         }
         let excites = match drive.state {
             State::Off => !self.on,
-            State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting => true,
+            State::Calibrating | State::Precharge | State::CheckingWiring => true,
+            State::Exciting => self.step != Step::Inertia,
+            State::Magnetising | State::Verifying | State::Torque => self.step == Step::Inertia,
             _ => false,
         };
         self.on |= drive.state != State::Off;
@@ -264,7 +285,8 @@ impl Commissioning {
                 Step::Staircase
             }
             Step::Leakage => Step::CurrentLoop,
-            Step::Staircase | Step::CurrentLoop => Step::CurrentLoop,
+            Step::Staircase => Step::CurrentLoop,
+            Step::CurrentLoop | Step::Inertia => Step::Inertia,
         };
         (self.part, self.until, self.design) = (0, 0, None);
     }

@@ -3,10 +3,8 @@
 use core::fmt;
 
 use drive_core::identify::learning::Learned;
-use drive_core::settings::value::Words as _;
 use drive_core::{Fault, Settings, State};
 
-use crate::commissioning;
 use crate::link::Status;
 
 /// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
@@ -156,28 +154,4 @@ pub fn outcome(result: &Learned) -> impl fmt::Display {
             write!(f, "refused: {result}")
         }
     })
-}
-
-/// Line number `line` of what is told of a commissioning's news, and the number of the next line.
-pub fn commissioning(
-    news: &commissioning::News,
-    line: usize,
-) -> (impl fmt::Display, Option<usize>) {
-    let value = match news {
-        commissioning::News::Report(report) => report.values.get(line).copied().flatten(),
-        commissioning::News::Ended { .. } => None,
-    };
-    let text = fmt::from_fn(move |f| match (news, value) {
-        (commissioning::News::Report(report), Some(value)) => {
-            write!(f, "{}: {value}", report.step.word())
-        }
-        (commissioning::News::Report(report), None) => write!(f, "{report}"),
-        (commissioning::News::Ended { sound: true }, _) => {
-            f.write_str("ended; `accept` puts it in force and saves it")
-        }
-        (commissioning::News::Ended { sound: false }, _) => {
-            f.write_str("ended; the settings are as they were")
-        }
-    });
-    (text, value.map(|_| line + 1))
 }

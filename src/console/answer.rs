@@ -5,7 +5,7 @@ use core::fmt;
 use drive_core::commission::Step;
 use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
-use drive_core::{Accepted, Command, Mode, Refused, State};
+use drive_core::{Accepted, Command, Mode, State};
 use thiserror::Error;
 
 use super::grammar::Request;
@@ -180,7 +180,7 @@ impl Console {
     }
 
     /// Whether settings may be staged now; answers if not.
-    fn may_stage(&mut self, drive: &impl DriveHandle) -> bool {
+    pub(super) fn may_stage(&mut self, drive: &impl DriveHandle) -> bool {
         if drive.status().is_none() {
             self.error(&drive.no_control());
         } else if !drive.is_off() {
@@ -219,7 +219,7 @@ impl Console {
 
     /// Performs a task that needs the staged settings in force. The design of the controllers takes more than a moment:
     /// the console says so first, and does it when that is on its way.
-    fn design_for(&mut self, task: Task, drive: &mut impl DriveHandle) {
+    pub(super) fn design_for(&mut self, task: Task, drive: &mut impl DriveHandle) {
         let in_force = self.settings.in_force();
         let anew = matches!(task, Task::Learn { again: false }) && in_force.learned.is_some();
         match task {
@@ -301,7 +301,7 @@ impl Console {
     }
 
     /// Starts the drive; the first time since the defaults were set with a check of the wiring.
-    fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) {
+    pub(super) fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) {
         if self.settings.in_force().command.wiring_checked {
             return self.give(Command::Start(mode), "", drive);
         }
@@ -312,43 +312,6 @@ impl Console {
                 self.checking = began;
                 self.out.line(format_args!("ok: the wiring is checked first"));
             }
-            Err(why) => self.error(&why),
-        }
-    }
-
-    /// Lets the drive measure its motor.
-    fn commission(&mut self, first: Step, last: Step, drive: &mut impl DriveHandle) {
-        match drive.status().map(|status| status.state) {
-            None => self.error(&drive.no_control()),
-            Some(State::Fault(fault)) => self.error(&Refused::Fault(fault)),
-            Some(_) => {
-                drive.commission(first, last);
-                self.ok();
-            }
-        }
-    }
-
-    /// Puts in force what the commissioning has found, and saves it.
-    fn accept(&mut self, drive: &mut impl DriveHandle) {
-        if !self.may_stage(drive) {
-            return;
-        }
-        match drive.found(&self.settings.latest().drive) {
-            None => self.error(&"nothing new was found: `commission` first"),
-            Some(found) => {
-                self.settings.stage(found);
-                self.design_for(Task::Save, drive);
-            }
-        }
-    }
-
-    /// Lets the drive learn: anew, or again on top of what it has learned.
-    fn learn(&mut self, again: bool, drive: &mut impl DriveHandle) {
-        if again && self.settings.in_force().learned.is_none() {
-            return self.error(&"nothing is learned with these settings: `learn` first");
-        }
-        match self.settings.begin_learning(again, |settings| configure(drive, settings)) {
-            Ok(()) => self.start(Mode::Learning, drive),
             Err(why) => self.error(&why),
         }
     }
@@ -403,7 +366,7 @@ impl Console {
 
 /// Reason why the drive has not taken settings.
 #[derive(Error, Debug)]
-enum NotTaken {
+pub(super) enum NotTaken {
     #[error("{0}; not in force, still staged")]
     Design(SettingsError),
     #[error(transparent)]
@@ -412,7 +375,10 @@ enum NotTaken {
 
 /// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
 #[inline(never)]
-fn configure(drive: &mut impl DriveHandle, settings: &FirmwareSettings) -> Result<(), NotTaken> {
+pub(super) fn configure(
+    drive: &mut impl DriveHandle,
+    settings: &FirmwareSettings,
+) -> Result<(), NotTaken> {
     let taken = match drive.build(settings) {
         Ok(coefficients) => drive.command(Command::Configure(coefficients)),
         Err(why) => return Err(NotTaken::Design(why)),

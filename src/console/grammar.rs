@@ -1,6 +1,7 @@
 //! The grammar: a line in, a [`Request`] or a [`ParseError`] out.
 
 mod error;
+mod recording;
 #[cfg(test)]
 mod tests;
 
@@ -14,7 +15,7 @@ use heapless::Vec;
 use super::suggest::nearest;
 use crate::board;
 use crate::boards::{self, Board};
-use crate::link::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
+use crate::link::trace::Plan;
 use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
 
@@ -266,7 +267,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
         "trace" => match words.optional() {
             None => Request::ShowTrace,
             Some("off") => Request::EndTrace,
-            Some(records) => Request::Trace(plan(records, &mut words)?),
+            Some(records) => Request::Trace(recording::plan(records, &mut words)?),
         },
         "log" => Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?),
         "echo" => {
@@ -355,51 +356,6 @@ fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
     // A number that is not in use any more.
     let all = "the numbers that `docs/faults.md` lists";
     found.copied().ok_or(ParseError::OneOf { what: "the fault", word, all })
-}
-
-/// The trace with this number of records.
-fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, ParseError<'a>> {
-    let records = whole("the number of records", records, 1, LONGEST_TRACE)?;
-    let mut plan =
-        Plan { records, divider: 1, choice: SignalChoice::none(), trigger: Trigger::Now };
-    let mut next = words.optional();
-    if let Some(text) = next
-        && text.starts_with(|c: char| c.is_ascii_digit() || c == '-')
-    {
-        plan.divider = whole("the divider", text, 1, LARGEST_DIVIDER)?;
-        next = words.optional();
-    }
-    while let Some(name) = next {
-        if name == "on" {
-            plan.trigger = trigger(words)?;
-            break;
-        }
-        if !plan.choice.add(signal(name)?) {
-            return Err(ParseError::TooMany { what: "signals", most: trace::MOST });
-        }
-        next = words.optional();
-    }
-    if plan.choice.signals().next().is_none() {
-        plan.choice = SignalChoice::usual();
-    }
-    Ok(plan)
-}
-
-fn signal(word: &str) -> Result<u8, ParseError<'_>> {
-    let near = || nearest(word, SIGNALS.iter().map(|signal| signal.name));
-    trace::find(word).ok_or_else(|| ParseError::Signal { word, near: near() })
-}
-
-fn trigger<'a>(words: &mut Words<'a>) -> Result<Trigger, ParseError<'a>> {
-    match words.next("fault, or a signal")? {
-        "fault" => Ok(Trigger::Fault),
-        name => {
-            let signal = signal(name)?;
-            let sides = [("above", true), ("below", false)];
-            let above = words.one_of("above or below", "above below", &sides)?;
-            Ok(Trigger::Level { signal, level: words.number("the level")?, above })
-        }
-    }
 }
 
 fn whole<'a>(what: &'static str, word: &'a str, min: u16, max: u16) -> Result<u16, ParseError<'a>> {

@@ -57,6 +57,8 @@ pub struct Control {
 pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 /// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
+/// Whether the commissioning is to see what the drive does while it regulates.
+pub static OBSERVED: AtomicBool = AtomicBool::new(false);
 /// Whether a deadline was ever missed.
 pub static MISSED: AtomicBool = AtomicBool::new(false);
 
@@ -226,7 +228,8 @@ impl Running {
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         let fault = matches!(drive.state(), State::Fault(_));
         trace.step(fault, || drive.telemetry());
-        if drive.tracks_rotor() || drive.excites() {
+        let commissioned = OBSERVED.load(Ordering::Relaxed) && drive.state().regulates();
+        if drive.tracks_rotor() || drive.excites() || commissioned {
             // Without room the period is missing, which the main loop detects by its number.
             let _ = observations.enqueue(Observation::new(self.periods, &drive.telemetry()));
         }

@@ -14,6 +14,7 @@ use heapless::spsc::Consumer;
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
 use crate::chip::{memory, pwm, stop, time};
+use crate::task::clock::Clock;
 use crate::task::control;
 use induction_drive::board;
 use induction_drive::commissioning::{Action, News, Session};
@@ -90,24 +91,6 @@ pub struct Chip {
     pub not_started: Option<&'static str>,
 }
 
-/// Milliseconds from the time base, which wraps every 25 s: to be updated more often.
-struct Clock {
-    last: u32,
-    cycles: u32,
-    ms: u32,
-}
-
-impl Clock {
-    fn update(&mut self) {
-        let now = time::now();
-        self.cycles += now.wrapping_sub(self.last);
-        self.last = now;
-        let per_ms = board::CYCLES_PER_US * 1000;
-        self.ms = self.ms.wrapping_add(self.cycles / per_ms);
-        self.cycles %= per_ms;
-    }
-}
-
 impl Supervisor {
     /// A supervisor; without `link`, one whose control does not run.
     pub fn new(
@@ -118,9 +101,9 @@ impl Supervisor {
         commissioning: &'static mut Session,
         settings: &Settings,
     ) -> Self {
-        let clock = Clock { last: time::now(), cycles: 0, ms: 0 };
+        let clock = Clock::new();
         let periods = control::PERIODS.load(Ordering::Relaxed);
-        let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(clock.last, periods)));
+        let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.is_some().then(|| {
             let (code, source) = memory::control_code();
             let (constants, changes) = control::constants();
@@ -166,7 +149,7 @@ impl Supervisor {
             self.log(status);
         }
         self.commission();
-        self.clock.ms
+        self.clock.ms()
     }
 
     /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
@@ -183,7 +166,7 @@ impl Supervisor {
                 stop::keep(Reason::NotFed, [periods, cycles, u32::from(missed), 0]);
             }
         }
-        if self.clock.ms > board::WELL_AFTER_MS && !self.well {
+        if self.clock.ms() > board::WELL_AFTER_MS && !self.well {
             self.well = true;
             stop::forget_resets();
         }
@@ -209,12 +192,16 @@ impl Supervisor {
     /// Goes on with the commissioning.
     fn commission(&mut self) {
         let Some(Status { excited, .. }) = self.status else { return };
+        control::OBSERVED.store(self.commissioning.is_running(), Ordering::Relaxed);
         match self.commissioning.poll(&excited) {
             None => {}
             Some(Action::Design) => extended(&mut self.guard, || self.commissioning.design()),
             Some(Action::Command(command)) => {
                 if let Err(why) = self.command(command) {
-                    self.commissioning.refused(why);
+                    self.commissioning.refused(match why {
+                        CommandError::Refused(refused) => Some(refused),
+                        _ => None,
+                    });
                 }
             }
         }

@@ -3,6 +3,7 @@
 //! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: that of step `k-1` acts
 //! from `k` on, that of `k-2` ended at `k`.
 
+use super::motion::Motion;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::math::frames::AlphaBeta;
 
@@ -30,6 +31,8 @@ pub enum Record {
     Carrier,
     /// Means and squares of the phase currents and of the dc link.
     Noise,
+    /// Torque current and speed, by [`push_motion`](Collector::push_motion).
+    Motion,
 }
 
 /// Means over a bin.
@@ -82,6 +85,7 @@ pub struct Collector {
     sums: [f32; 8],
     first_dc_link: f32,
     carrier: usize,
+    motion: Motion,
 }
 
 impl Default for Collector {
@@ -98,6 +102,7 @@ impl Default for Collector {
             sums: [0.0; 8],
             first_dc_link: 0.0,
             carrier: 0,
+            motion: Motion::default(),
         }
     }
 }
@@ -109,6 +114,7 @@ impl Collector {
         self.incomplete = false;
         match record {
             Record::Nothing => {}
+            Record::Motion => self.motion = Motion::default(),
             Record::Bins { half, first } => {
                 (self.end, self.length) = (first, first);
                 if let Some(bins) = self.bins.get_mut(half) {
@@ -134,12 +140,28 @@ impl Collector {
         self.incomplete
     }
 
-    /// Takes a step of the drive: `measured`, `realised` and `dc_link` of its [telemetry](crate::Telemetry).
+    /// Takes a step of the drive while it regulates torque: reference of the torque current, A, and `rotor_freq` of its
+    /// [telemetry](crate::Telemetry).
+    pub fn push_motion(&mut self, i_q: f32, rotor_freq: f32) {
+        if self.record == Record::Motion {
+            self.motion.push(i_q, rotor_freq);
+            self.samples = self.samples.wrapping_add(1);
+        }
+    }
+
+    pub(super) fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// Takes a step of the drive while it excites: `measured`, `realised` and `dc_link` of its [telemetry](crate::Telemetry).
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta, dc_link: f32) {
+        if self.record == Record::Motion {
+            return;
+        }
         let [last, before] = self.voltages;
         self.voltages = [realised, last];
         match self.record {
-            Record::Nothing => {}
+            Record::Nothing | Record::Motion => {}
             Record::Bins { half, .. } => {
                 // The last bin lasts until the next record.
                 while self.samples as f32 >= self.end && self.bin + 1 < BINS {

@@ -19,6 +19,8 @@ pub struct Found {
     pub leakage: Option<Leakage>,
     /// Magnetising curve.
     pub iron: Option<Iron>,
+    /// Inertia of rotor and load, kg m^2.
+    pub inertia: Option<f32>,
 }
 
 /// Result of the current levels: parameters of the inverse-Gamma circuit, inverter, sensors.
@@ -102,7 +104,10 @@ impl Found {
     /// These settings with what has been found.
     pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
         let mut new = *settings;
-        let (Some(levels), Some(motor)) = (self.levels, self.motor(&settings.motor)) else {
+        if let Some(inertia) = self.inertia {
+            new.motor.inertia = inertia;
+        }
+        let (Some(levels), Some(motor)) = (self.levels, self.motor(&new.motor)) else {
             return new;
         };
         new.motor = Motor { pole_pairs, ..motor };

@@ -25,6 +25,8 @@ pub enum Step {
     Staircase,
     /// The current loop, designed from the values found and checked by a step.
     CurrentLoop,
+    /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
+    Inertia,
 }
 
 words!(Step {
@@ -32,13 +34,15 @@ words!(Step {
     Self::Wiring => Step::Wiring, "wiring"; Self::Levels => Step::Levels, "levels";
     Self::Leakage => Step::Leakage, "leakage"; Self::Staircase => Step::Staircase, "staircase";
     Self::CurrentLoop => Step::CurrentLoop, "current-loop";
+    Self::Inertia => Step::Inertia, "inertia";
 });
 
 impl Step {
-    /// The last one.
+    /// The last one at standstill.
     pub const LAST: Self = Self::CurrentLoop;
     /// The words of all, for messages.
-    pub const ALL: &'static str = "nameplate sensors wiring levels leakage staircase current-loop";
+    pub const ALL: &'static str =
+        "nameplate sensors wiring levels leakage staircase current-loop inertia";
 }
 
 /// A value that a step has found.
@@ -146,6 +150,8 @@ pub enum Meaning {
     Uncertain,
     /// The step response of the current loop.
     Loop,
+    /// The speed does not follow the torque.
+    NotFree,
 }
 
 impl Meaning {
@@ -170,6 +176,9 @@ impl Meaning {
             Self::Turning => "the shaft turns, or the gains of the sensors differ",
             Self::Inverter => "the voltage that the inverter loses still grows with the current",
             Self::Uncertain => "too much noise for this motor",
+            Self::NotFree => {
+                "the shaft must be free to turn; friction, a load or a coupling hides the inertia"
+            }
             Self::Loop => "the motor is not as it was measured",
         }
     }
@@ -244,6 +253,9 @@ impl fmt::Display for Report {
     /// Step and verdict; the values are shown one by one.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.refusal {
+            None if self.step == Step::Inertia => f.write_str(
+                "inertia: sound; it began with positive torque: if the shaft turned the wrong way then, exchange two lines of the motor",
+            ),
             None => write!(f, "{}: sound", self.step.word()),
             Some(refusal) => write!(f, "{}: refused: {refusal}", self.step.word()),
         }

@@ -48,6 +48,7 @@ impl Commissioning {
             Step::Leakage => self.leakage(&plate, sums),
             Step::Staircase => self.staircase(&plate, sums),
             Step::CurrentLoop => self.current_loop(&plate, sums),
+            Step::Inertia => self.inertia(drive, sums),
         }
     }
 

@@ -3,6 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::console::help::HELP;
+use crate::link::trace::{self, SignalChoice, Trigger};
 
 #[test]
 fn every_line_of_the_help_but_the_last_is_a_command_and_every_command_has_one() {

@@ -8,7 +8,6 @@ use hil_sim::rig::Rig;
 
 use super::*;
 use crate::commissioning::{Action, News, Session};
-use crate::console::handle::CommandError;
 use crate::rotor_tracking::Observation;
 
 /// A session on a simulated motor of 6 ohm, which a drive with these settings has found.
@@ -72,7 +71,7 @@ fn every_value_and_verdict_is_told_on_a_line_of_its_own() {
     // A refusal names the step and the reason, and says that nothing has changed.
     let mut talk = Talk::new();
     assert_eq!(talk.ask("commission leakage"), "ok");
-    talk.drive.session.refused(CommandError::NoAnswer);
+    talk.drive.session.refused(None);
     let told = self::told(&mut talk);
     let why = format!("commissioning: leakage: refused: {}", Refusal::SamplesLost);
     assert_eq!(told, [why.as_str(), "commissioning: ended; the settings are as they were"]);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::settings::{Motor, Settings};
-use drive_core::{Command, Sample, State};
+use drive_core::{Command, Mode, Sample, State};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -65,6 +65,10 @@ impl Session {
                 let seen = rig.drive.telemetry();
                 sums.push(seen.measured, seen.realised, seen.dc_link);
             }
+            if rig.drive.state().regulates() {
+                let seen = rig.drive.telemetry();
+                sums.push_motion(seen.reference.q, seen.rotor_freq);
+            }
             let turned = (rig.plant.mechanical_angle() - from) * 360.0 / TAU;
             shaft_deg = shaft_deg.max(turned.abs());
             largest_a = rig.plant.phase_currents().iter().fold(largest_a, |m, i| m.max(i.abs()));
@@ -84,6 +88,12 @@ impl Session {
                 }
                 Next::Stop => {
                     rig.command(&Command::Stop)?;
+                }
+                Next::Start => {
+                    rig.command(&Command::Start(Mode::Torque))?;
+                }
+                Next::Torque(i_q) => {
+                    rig.command(&Command::Torque(i_q))?;
                 }
                 Next::Design => commissioning.design(),
                 Next::Report(report) => reports.push((rig.time() - began, report)),

@@ -1,0 +1,33 @@
+//! The time of the main loop.
+
+use crate::chip::time;
+use induction_drive::board;
+
+/// Milliseconds from the time base, which wraps every 25 s: to be updated more often.
+pub struct Clock {
+    last: u32,
+    cycles: u32,
+    ms: u32,
+}
+
+impl Clock {
+    /// One that begins now.
+    pub fn new() -> Self {
+        Self { last: time::now(), cycles: 0, ms: 0 }
+    }
+
+    /// Milliseconds since it began, as of the last update; wraps.
+    pub fn ms(&self) -> u32 {
+        self.ms
+    }
+
+    /// Reads the time base.
+    pub fn update(&mut self) {
+        let now = time::now();
+        self.cycles += now.wrapping_sub(self.last);
+        self.last = now;
+        let per_ms = board::CYCLES_PER_US * 1000;
+        self.ms = self.ms.wrapping_add(self.cycles / per_ms);
+        self.cycles %= per_ms;
+    }
+}
