@@ -100,8 +100,9 @@ pub struct Commissioning {
     part: u8,
     until: u32,
     progress: Progress,
-    /// Whether the drive has left the state off.
+    /// Whether the drive has left the state off, and its starts before that.
     on: bool,
+    starts: Option<u32>,
     /// Pulses of the present train, and trains before it.
     pulses: (f32, u32),
     search: Option<Search>,
@@ -168,6 +169,7 @@ impl Commissioning {
             until: 0,
             progress: Progress::Ended,
             on: false,
+            starts: None,
             pulses: (0.0, 0),
             search: None,
             fitted: (Fitted::default(), 0.0, None),
@@ -183,6 +185,7 @@ impl Commissioning {
     pub fn start(&mut self, first: Step, last: Step) {
         (self.step, self.last, self.progress, self.on) = (first, last, Progress::Steps, false);
         (self.part, self.until, self.design) = (0, 0, None);
+        self.starts = None;
     }
 
     /// Whether steps are being done.
@@ -227,6 +230,8 @@ impl Commissioning {
             Progress::StoppingToDesign if drive.state == State::Exciting => return Next::Wait,
             Progress::StoppingToDesign | Progress::Steps => {}
         }
+        let before = *self.starts.get_or_insert(drive.starts);
+        self.on |= drive.state != State::Off || drive.starts != before;
         let excites = match drive.state {
             State::Off => !self.on,
             State::Calibrating | State::Precharge | State::CheckingWiring => true,
@@ -234,7 +239,6 @@ impl Commissioning {
             State::Magnetising | State::Verifying | State::Torque => self.step == Step::Inertia,
             _ => false,
         };
-        self.on |= drive.state != State::Off;
         let result = if !excites {
             Err(Refusal::Drive(drive.state))
         } else if sums.is_incomplete() {
@@ -266,7 +270,7 @@ impl Commissioning {
             let plant = motor_plant(&motor.circuit(), period_s)?;
             design_current_loop(plant, plant, period_s)
         });
-        (self.progress, self.on) = (Progress::Steps, false);
+        (self.progress, self.on, self.starts) = (Progress::Steps, false, None);
     }
 
     /// Ends the present step, which is refused, and stops the drive.

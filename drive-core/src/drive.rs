@@ -82,6 +82,8 @@ pub struct Drive {
     /// Whether the next start checks the wiring.
     wiring_unchecked: bool,
     wiring: WiringCheckState,
+    /// Starts so far, wrapping.
+    starts: u32,
     learned: Option<Learned>,
     thermal: ThermalLoads,
 }
@@ -165,6 +167,7 @@ impl Drive {
             control: ControlState::default(),
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
+            starts: 0,
             learned: None,
             thermal: ThermalLoads::default(),
         }

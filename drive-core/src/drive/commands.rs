@@ -146,6 +146,7 @@ impl Drive {
             (state, _) => return Err(Refused::State(state)),
         }
         self.mode = mode;
+        self.starts = self.starts.wrapping_add(1);
         if mode == Mode::Learning {
             self.learned = None;
         }

@@ -42,6 +42,8 @@ pub struct Regulator {
 pub struct Excited {
     /// State of the drive.
     pub state: State,
+    /// Starts so far, wrapping: a drive that is off again has been stopped.
+    pub starts: u32,
     /// Offsets of the current sensors a and b that the start has measured, A.
     pub offsets: [f32; 2],
     /// Pulse trains that have ended since the start.

@@ -44,6 +44,7 @@ impl Drive {
     pub fn excited(&self) -> Excited {
         Excited {
             state: self.state,
+            starts: self.starts,
             offsets: self.c.sensing.offsets(&self.control.sensing),
             trains: self.control.excitation.trains,
             answers: self.wiring.answers(),
