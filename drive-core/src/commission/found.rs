@@ -115,7 +115,8 @@ impl Found {
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
         new.current_plant.source = PlantSource::Motor;
-        new.sequence.flux = Flux::High;
+        // The direct current of the rule for this motor.
+        (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
         let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);
         new.inverter.drop_v = Some(levels.inverter_v - of_dead_time);
         new

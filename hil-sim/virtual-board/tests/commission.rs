@@ -128,3 +128,19 @@ fn a_stop_or_a_new_setting_leaves_everything_as_it_was() -> Result<()> {
     assert!(told.contains("leakage: refused"), "{told}");
     Ok(())
 }
+
+#[test]
+fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
+    let mut config = Config::default();
+    config.load.mode = hil_sim::config::LoadMode::Free;
+    config.motor.inertia = 0.02;
+    let mut console = Console::new(&config, 3)?;
+    let told = console.say("commission inertia", "commissioning: ended")?;
+    assert!(told.contains("the shaft is going to turn") && told.contains("exchange two"), "{told}");
+    console.say("accept", "\nok")?;
+    let inertia = value(&mut console, "motor.inertia")?;
+    assert!((inertia / 0.02 - 1.0).abs() < 0.05, "{inertia}");
+    // Turned by the drive, and at rest again with the outputs off.
+    assert!(console.say("status", "\n")?.starts_with("off"));
+    Ok(())
+}
