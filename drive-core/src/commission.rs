@@ -103,6 +103,8 @@ pub struct Commissioning {
     /// Whether the drive has left the state off, and its starts before that.
     on: bool,
     starts: Option<u32>,
+    /// Whether a step was refused since the last start of steps.
+    refused: bool,
     /// Pulses of the present train, and trains before it.
     pulses: (f32, u32),
     search: Option<Search>,
@@ -170,6 +172,7 @@ impl Commissioning {
             progress: Progress::Ended,
             on: false,
             starts: None,
+            refused: false,
             pulses: (0.0, 0),
             search: None,
             fitted: (Fitted::default(), 0.0, None),
@@ -185,7 +188,7 @@ impl Commissioning {
     pub fn start(&mut self, first: Step, last: Step) {
         (self.step, self.last, self.progress, self.on) = (first, last, Progress::Steps, false);
         (self.part, self.until, self.design) = (0, 0, None);
-        self.starts = None;
+        (self.starts, self.refused) = (None, false);
     }
 
     /// Whether steps are being done.
@@ -203,8 +206,12 @@ impl Commissioning {
         &self.found
     }
 
-    /// The settings with what has been found in them; equal to `settings` where nothing has.
+    /// The settings with what has been found in them; equal to `settings` where nothing has, or where the last steps ended
+    /// with a refusal.
     pub fn settings(&self, settings: &Settings) -> Settings {
+        if self.refused {
+            return *settings;
+        }
         let pole_pairs = self.setup.plate.map(|plate| plate.pole_pairs);
         self.found.settings(settings, pole_pairs.unwrap_or(settings.motor.pole_pairs))
     }
@@ -275,7 +282,7 @@ impl Commissioning {
 
     /// Ends the present step, which is refused, and stops the drive.
     pub fn refuse(&mut self, refusal: Refusal) -> Report {
-        self.progress = Progress::Stop;
+        (self.progress, self.refused) = (Progress::Stop, true);
         Report { refusal: Some(refusal), ..Report::new(self.step, []) }
     }
 

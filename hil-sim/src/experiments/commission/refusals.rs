@@ -10,7 +10,7 @@ use super::super::statistics::{Study, whole};
 use super::super::{BENCH, Context, DRIVE, Experiment};
 use super::machine::drawn;
 use super::session::{Abort, Session, unaware};
-use crate::config::{Config, LoadMode, OpenPhase};
+use crate::config::{Config, FluxLevel, LoadMode, OpenPhase, PlantModel};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::plant::{Channel, CurrentFault};
@@ -29,7 +29,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const RUNS: u32 = 50;
 /// The steps that are done.
-const STEPS: (Step, Step) = (Step::Nameplate, Step::Leakage);
+const STEPS: (Step, Step) = (Step::Nameplate, Step::CurrentLoop);
 
 /// A defect.
 struct Defect {
@@ -71,6 +71,12 @@ fn scaled(config: &mut Config, factor: f64) {
     config.saliency.psi_n = None;
 }
 
+/// Iron whose main flux saturates.
+fn saturating(config: &mut Config) {
+    config.saliency = Config::default().saliency;
+    (config.model.plant, config.model.flux_level) = (PlantModel::M4, FluxLevel::High);
+}
+
 fn stopped(refusal: &Refusal) -> bool {
     matches!(refusal, Refusal::Drive(State::Off))
 }
@@ -101,6 +107,8 @@ const DEFECTS: &[Defect] = &[
     Defect { name: "aborted in wiring", abort: Some(Step::Wiring), named: stopped, ..NONE },
     Defect { name: "aborted in levels", abort: Some(Step::Levels), named: stopped, ..NONE },
     Defect { name: "aborted in leakage", abort: Some(Step::Leakage), named: stopped, ..NONE },
+    Defect { name: "aborted in staircase", make: saturating, abort: Some(Step::Staircase), named: stopped, ..NONE },
+    Defect { name: "aborted in current-loop", abort: Some(Step::CurrentLoop), named: stopped, ..NONE },
 ];
 
 /// Longest time from the beginning of a step to its abort, control periods.
@@ -108,6 +116,7 @@ fn abort_within(step: Step) -> u32 {
     match step {
         Step::Sensors => 1200,
         Step::Wiring => 800,
+        Step::CurrentLoop => 1200,
         _ => 6000,
     }
 }
