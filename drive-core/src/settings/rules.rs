@@ -45,6 +45,9 @@ const DC_LINK_V: f32 = 311.0;
 const RANGE_A: f32 = -Line::CHANNEL_A.offset;
 /// Carrier current per direct current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
+/// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
+/// overshoot.
+const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Frequency of the carrier, Hz.
@@ -168,14 +171,16 @@ impl Settings {
     /// current, 0.26 A of the dissertation's motor at 0.7 A, and at most 0.46 A of it, which the trip leaves room for (family
     /// R at 2 A: 2.9° rms with 0.26 A, 1.7° with 0.46 A). The remainder of the dead time asks for a voltage, 50 V at 311 V. The larger of both is
     /// taken, but not more than the voltage that drives half the direct current: beyond, phases b and c would cross zero
-    /// at a start, where the drop of the inverter is uncertain. The voltage is between 20 and 110 V at 311 V.
+    /// at a start, where the drop of the inverter is uncertain; and not more than the trip leaves room for beside the current
+    /// limit. The voltage is between 20 and 110 V at 311 V.
     pub fn carrier_v(&self) -> f32 {
         let rule = || {
             let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
             let of_i_d = CARRIER_OF_I_D * self.i_d();
             let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
             let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
-            let most = 0.5 * self.i_d() * reactance;
+            let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
+            let most = f32::min(0.5 * self.i_d(), room) * reactance;
             f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
         };
         or_rule(self.injection.amplitude_v, rule)
