@@ -171,7 +171,7 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
         ),
         (
             &["run", "speed-profile", "--resume", "x"],
-            "speed-torque-sweep, monte-carlo, machines, battery",
+            "speed-torque-sweep, monte-carlo, machines, commission, commission-refusals, battery",
         ),
         (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
         (

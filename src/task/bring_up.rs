@@ -87,6 +87,8 @@ pub fn bring_up() -> Result<Board, StartError> {
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc).ok_or(TWICE)?;
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
+    // Before the control runs: it is made with the interrupts masked.
+    let commissioning = singleton!(: Session = Session::new(&start.settings.drive)).ok_or(TWICE)?;
     let link = || -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
         clocked?;
@@ -110,7 +112,7 @@ pub fn bring_up() -> Result<Board, StartError> {
     let Start { saved, settings, rejected } = start;
     let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
     *tracking = Tracking::new(&settings.drive);
-    let commissioning = singleton!(: Session = Session::new(&settings.drive)).ok_or(TWICE)?;
+    commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };

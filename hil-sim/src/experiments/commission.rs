@@ -8,6 +8,7 @@ use drive_core::Settings;
 use drive_core::commission::{Commissioning, Step};
 use drive_core::filter::dissertation::LPF;
 use drive_core::io::PERIOD_S;
+use drive_core::settings::value::Words as _;
 use drive_core::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_plant};
 use serde::{Deserialize, Serialize};
 
@@ -175,7 +176,7 @@ impl Study for Commission {
         let steps = (Step::Nameplate, Step::CurrentLoop);
         let commissioning = Commissioning::new(&settings);
         let session = Session::run(rig, commissioning, steps, Abort::default(), |_| {})?;
-        let refused = session.refusal().map(|(step, why)| format!("{step:?}: {why}"));
+        let refused = session.refusal().map(|(step, why)| format!("{}: {why}", step.word()));
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
