@@ -107,7 +107,7 @@ mod tests {
     fn contents_take_the_memory_that_they_are_loaded_from() {
         let regions = regions(&sources::read("memory.x").unwrap());
         let map = " 80001d8  80001d8     faa0     8 .text
-20006c00  8012edc       48     4 .data
+20007800  8012edc       48     4 .data
 20006c48 20006c48     9364     8 .bss
 10000000  803a000     5100     8 .ccm
 10000000  803a000      3ba     4         a.o:(.text.ADC1_2)
