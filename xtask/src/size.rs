@@ -108,7 +108,7 @@ mod tests {
         let regions = regions(&sources::read("memory.x").unwrap());
         let map = " 80001d8  80001d8     faa0     8 .text
 20007800  8012edc       48     4 .data
-20006c48 20006c48     9364     8 .bss
+20007848 20007848     9364     8 .bss
 10000000  803a000     5100     8 .ccm
 10000000  803a000      3ba     4         a.o:(.text.ADC1_2)
 10000000  803a000       a0     1                 .Lanon.8c1de73ce14781661d140f7ad80739f2.20
