@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! use drive_core::commission::{Collector, Commissioning, Next, Step};
-//! use drive_core::{Command, Drive, Settings};
+//! use drive_core::{Command, Drive, Mode, Settings};
 //!
 //! # fn one_period(drive: &mut Drive) {}
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -24,6 +24,8 @@
 //!         Next::Wait => {}
 //!         Next::Excite(excitation) => drop(drive.command(&Command::Excite(excitation))?),
 //!         Next::Stop => drop(drive.command(&Command::Stop)?),
+//!         Next::Start => drop(drive.command(&Command::Start(Mode::Torque))?),
+//!         Next::Torque(i_q) => drop(drive.command(&Command::Torque(i_q))?),
 //!         Next::Design => commissioning.design(), // takes long
 //!         Next::Report(report) => report.values.iter().flatten().for_each(|value| println!("{value}")),
 //!         Next::Done => break,

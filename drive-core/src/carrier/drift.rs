@@ -21,8 +21,10 @@ use crate::math::limited;
 
 /// Asymmetry per mismatch.
 const GAINS: Asymmetry = Asymmetry::of_gain_mismatch(1.0);
-/// Largest drift that is followed.
+/// Largest drift that is followed, and the same per slope of the saliency, 1/rad: a wrong angle, too, makes |C| swing, and what
+/// is taken for a drift is hidden from the lock monitor, whose unit is the slope.
 const LARGEST: f32 = 0.015;
+const LARGEST_PER_SLOPE: f32 = 0.25;
 /// Least frequency of the flux, electrical turns per period: 0.2 Hz.
 const LEAST_FREQ: f32 = 0.2 * PERIOD_S;
 /// Carrier period, s.
@@ -50,15 +52,20 @@ impl GainDrift {
         learned.plus(&GAINS, self.mismatch)
     }
 
+    /// The largest drift that is followed with this slope without torque current, 1/rad.
+    pub fn largest(slope_at_rest: f32) -> f32 {
+        limited(LARGEST_PER_SLOPE * slope_at_rest.abs(), LARGEST)
+    }
+
     /// Takes the deviation of the ratio from 1 of the latest saliency, which this drift was taken out of. `flux_freq` is the
-    /// frequency of the flux, electrical turns per period.
-    pub fn step(&mut self, deviation: f32, flux_freq: f32) {
+    /// frequency of the flux, electrical turns per period; the drift stays within `largest`.
+    pub fn step(&mut self, deviation: f32, flux_freq: f32, largest: f32) {
         if flux_freq.abs() < LEAST_FREQ {
             return;
         }
         let rest = deviation - self.mean;
         self.mean += MEAN_SHARE * rest;
-        self.mismatch = limited(self.mismatch + STEP * self.h * rest, LARGEST);
+        self.mismatch = limited(self.mismatch + STEP * self.h * rest, largest);
     }
 
     /// The carrier current squared across phase a, where a start measures |C|_ref, relative to that without drift.
@@ -92,7 +99,11 @@ mod tests {
             let square = along(theta).powi(2) / reference + loss;
             let mut seen = Saliency { q: 0.0, carrier_squared: square as f32, i_q: 0.0 };
             drift.on_top_of(&Asymmetry::default(), axis).take_out(&mut seen, axis);
-            drift.step(seen.carrier_squared * drift.at_start() - 1.0, (hz / 6000.0) as f32);
+            drift.step(
+                seen.carrier_squared * drift.at_start() - 1.0,
+                (hz / 6000.0) as f32,
+                LARGEST,
+            );
         }
         drift
     }

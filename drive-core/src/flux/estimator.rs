@@ -77,8 +77,8 @@ pub enum AngleLoop {
         pll: Pll,
         /// Learned asymmetry of sensors and stator.
         asymmetry: Asymmetry,
-        /// Whether it was learned, so that its drift is followed.
-        follows_gains: bool,
+        /// Largest drift of the sensors' gains since it was learned that is followed; 0 where nothing was learned.
+        largest_drift: f32,
     },
 }
 
@@ -175,11 +175,12 @@ impl Estimator {
     pub fn take(&mut self, learned: &Learned) {
         match &mut self.angle_loop {
             AngleLoop::Pii { reference, .. } => *reference = Reference::Learned(learned.reference),
-            AngleLoop::Pll { schedule, asymmetry, follows_gains, .. } => {
+            AngleLoop::Pll { schedule, asymmetry, largest_drift, .. } => {
                 let b = learned.current_saliency;
                 let b = b.accepted.then_some(b.value);
                 *schedule = schedule.with_learned(&learned.reference, learned.slope.as_ref(), b);
-                (*asymmetry, *follows_gains) = (learned.asymmetry, true);
+                *asymmetry = learned.asymmetry;
+                *largest_drift = GainDrift::largest(learned.slope_at_rest);
             }
         }
     }
@@ -209,8 +210,8 @@ impl Estimator {
     /// Takes the deviation of the squared carrier current from that of the tables, relative to it, into the drift of the
     /// gains. `flux_freq` is the frequency of the flux, electrical turns per period.
     pub fn follow_gains(&self, state: &mut EstimatorState, deviation: f32, flux_freq: f32) {
-        if let AngleLoop::Pll { follows_gains: true, .. } = self.angle_loop {
-            state.drift.step(deviation, flux_freq);
+        if let AngleLoop::Pll { largest_drift, .. } = self.angle_loop {
+            state.drift.step(deviation, flux_freq, largest_drift);
         }
     }
 

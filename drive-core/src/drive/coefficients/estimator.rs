@@ -49,7 +49,7 @@ impl Settings {
                 ),
                 pll: Pll::new(t.bandwidth_hz),
                 asymmetry: Asymmetry::default(),
-                follows_gains: false,
+                largest_drift: 0.0,
             },
             _ => AngleLoop::Pii {
                 reference: match p.learned {
