@@ -3,7 +3,7 @@
 
 /// Beginnings of lines that the drive says unasked, those of the firmware's announcements and of its greeting, and of
 /// the one that comes before an answer that takes a while.
-const UNASKED: [&str; 11] = [
+const UNASKED: [&str; 12] = [
     "induction-drive ",
     "fault ",
     "running: ",
@@ -11,6 +11,7 @@ const UNASKED: [&str; 11] = [
     "stopped: ",
     "learning: ",
     "learned: ",
+    "commissioning: ",
     "refused: ",
     "trace: ",
     "applied",
