@@ -102,6 +102,7 @@ impl Drive {
     }
 
     /// A step of the excitation.
+    // Not inlined: it runs while the motor is commissioned alone, and is no part of the path that `cargo xtask cycles` counts.
     #[inline(never)]
     pub(super) fn excite(&mut self, measured: &Measured) -> Result<Compare, Fault> {
         let s = &mut self.control.excitation;
