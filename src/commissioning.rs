@@ -38,8 +38,6 @@ pub struct Session {
     next: u32,
     /// Until the console has taken it nothing goes on.
     news: Option<News>,
-    /// Whether no step was refused so far.
-    sound: bool,
 }
 
 impl Session {
@@ -50,7 +48,6 @@ impl Session {
             sums: Collector::default(),
             next: 0,
             news: None,
-            sound: true,
         }
     }
 
@@ -61,7 +58,7 @@ impl Session {
 
     /// Begins the steps from `first` to `last`. The drive must be off.
     pub fn begin(&mut self, first: Step, last: Step) {
-        (self.news, self.sound) = (None, true);
+        self.news = None;
         self.commissioning.start(first, last);
     }
 
@@ -92,8 +89,8 @@ impl Session {
             Next::Start => return Some(Action::Command(Command::Start(Mode::Torque))),
             Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
             Next::Design => return Some(Action::Design),
-            Next::Report(report) => self.report(report),
-            Next::Done => self.news = Some(News::Ended { sound: self.sound }),
+            Next::Report(report) => self.news = Some(News::Report(report)),
+            Next::Done => self.news = Some(News::Ended { sound: self.commissioning.is_sound() }),
         }
         None
     }
@@ -106,13 +103,7 @@ impl Session {
     /// Notes that the drive has not taken a command; `None`: it does not answer.
     pub fn refused(&mut self, why: Option<Refused>) {
         let refusal = why.map_or(Refusal::SamplesLost, Refusal::Command);
-        let report = self.commissioning.refuse(refusal);
-        self.report(report);
-    }
-
-    fn report(&mut self, report: Report) {
-        self.sound &= report.refusal.is_none();
-        self.news = Some(News::Report(report));
+        self.news = Some(News::Report(self.commissioning.refuse(refusal)));
     }
 
     /// The news since the last call.

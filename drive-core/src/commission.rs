@@ -67,7 +67,7 @@ use inertia::Swings;
 use plate::Plate;
 use staircase::Staircase;
 
-/// What the commissioning wants next.
+/// The next action that the commissioning asks for.
 // A report is passed once a step.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +120,7 @@ pub struct Commissioning {
     inductances: [[f32; 2]; 2],
 }
 
-/// What the settings say.
+/// Values from the settings.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
     plate: Result<Plate, Refusal>,
@@ -157,7 +157,7 @@ impl Commissioning {
         Self {
             setup: Setup {
                 plate: Plate::new(settings),
-                filter: settings.scales.current_delay_s / crate::io::PERIOD_S,
+                filter: settings.scales.current_delay_s / PERIOD_S,
                 pulse_noise: settings.share_of_range(0.05),
                 pulse_v: settings.share_of_dc_link(60.0),
                 dc_link: settings.inverter.dc_link_v,
@@ -198,12 +198,17 @@ impl Commissioning {
         self.progress != Progress::Ended
     }
 
+    /// Whether no step was refused since the last [`start`](Self::start).
+    pub fn is_sound(&self) -> bool {
+        !self.refused
+    }
+
     /// The present step, or the last that was done.
     pub fn step(&self) -> Step {
         self.step
     }
 
-    /// What has been found so far.
+    /// The results so far.
     pub fn found(&self) -> &Found {
         &self.found
     }

@@ -15,6 +15,7 @@
 //! start on).
 
 use crate::carrier::asymmetry::Asymmetry;
+use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::io::PERIOD_S;
 use crate::math::angle::UnitVector;
 use crate::math::limited;
@@ -28,7 +29,7 @@ const LARGEST_PER_SLOPE: f32 = 0.25;
 /// Least frequency of the flux, electrical turns per period: 0.2 Hz.
 const LEAST_FREQ: f32 = 0.2 * PERIOD_S;
 /// Carrier period, s.
-const CARRIER_S: f32 = 10.0 * PERIOD_S;
+const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 /// Share of the newest ratio in its mean: 1 s.
 const MEAN_SHARE: f32 = CARRIER_S;
 /// Step of m per deviation: 2 s, with a mean of h^2 of 2/3.

@@ -14,7 +14,7 @@ const GROWTH: f32 = 1.09;
 /// The ends of all bins, in lengths of the first: (1.09^57 - 1) / 0.09.
 pub(super) const FIRST_BINS: f32 = 1501.0;
 
-/// What is collected.
+/// Kind of record.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Record {
     /// Nothing; what has been collected stays.

@@ -41,7 +41,7 @@ pub(super) struct Fitted {
     pub r_r: f32,
     /// s.
     pub tau_r: f32,
-    /// Rms of what the fit leaves, V.
+    /// Rms of the residual, V.
     pub misfit: f32,
     /// Standard deviations of r_s, e, R_R by what the fit leaves.
     pub deviations: [f32; 3],

@@ -17,7 +17,8 @@ use super::report::{Meaning, Quantity, Refusal, Report, Step};
 use super::{Commissioning, Next};
 use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::io::{PERIOD_S, periods};
-use crate::math::frames::AlphaBeta;
+use crate::math::frames::{AlphaBeta, SQRT_3};
+use crate::settings::rules::CARRIER_HZ;
 
 /// Bisections of the inductance.
 const BISECTIONS: u32 = 30;
@@ -34,7 +35,7 @@ const RISE_PERIODS: u32 = 300;
 /// Largest gain mismatch that is left at the carrier.
 const LEFT: f32 = 0.01;
 /// rad/s.
-const CARRIER_RAD_PER_S: f32 = core::f32::consts::TAU * 600.0;
+const CARRIER_RAD_PER_S: f32 = TAU * CARRIER_HZ;
 
 /// An amplitude along an axis, of its cosine and sine parts.
 fn amplitude(parts: [AlphaBeta; 2], along: fn(&AlphaBeta) -> f32) -> f32 {
@@ -52,7 +53,6 @@ fn admittances(seen: &Phasors) -> [f32; 2] {
 fn mismatch(seen: &Phasors) -> f32 {
     let [re, im] = seen.current;
     let square = re.alpha * re.alpha + im.alpha * im.alpha;
-    const SQRT_3: f32 = 1.732_050_8;
     SQRT_3 * (re.alpha * re.beta + im.alpha * im.beta) / square
 }
 

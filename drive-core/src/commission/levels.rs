@@ -10,7 +10,7 @@ use super::report::{Meaning, Quantity, Refusal, Report, Step};
 use super::{Commissioning, Next};
 use crate::drive::Excitation;
 use crate::io::{PERIOD_S, periods};
-use crate::math::frames::AlphaBeta;
+use crate::math::frames::{AlphaBeta, SQRT_3};
 
 /// Pause before the first level, s.
 const QUIET_S: f32 = 0.1;
@@ -215,8 +215,6 @@ impl Commissioning {
         Ok(Report::new(Step::Levels, values))
     }
 }
-
-const SQRT_3: f32 = 1.732_050_8;
 
 /// Phase current b of a current vector, A.
 fn on_b(i: AlphaBeta) -> f32 {

@@ -3,9 +3,9 @@
 use core::f32::consts::{SQRT_2, TAU};
 
 use super::report::{Quantity, Refusal, Report, Step};
+use crate::math::frames::SQRT_3;
 use crate::settings::Settings;
 
-const SQRT_3: f32 = 1.732_050_8;
 /// Plausible share of the shaft's power in the apparent power: efficiency times power factor.
 const POWER: (f32, f32) = (0.15, 0.95);
 /// Plausible slip at rated speed.

@@ -51,7 +51,7 @@ const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Frequency of the carrier, Hz.
-const CARRIER_HZ: f32 = 600.0;
+pub(crate) const CARRIER_HZ: f32 = 600.0;
 
 /// The value that was set or, if none was, that of the rule, rounded to four digits.
 fn or_rule(set: Option<f32>, rule: impl FnOnce() -> f32) -> f32 {
