@@ -11,7 +11,8 @@
 //! chopper     = clamp((v - on)/(full - on)) clamp(10 (1 - heat))
 //! ```
 //!
-//! Power is torque times speed, so `r` keeps the gain of these loops what it is at `w_power`. Near standstill the
+//! Power is torque times speed, so `r` keeps the gain of these loops what it is at `w_power` (with generating torque, up to
+//! 1.4 times that speed). Near standstill the
 //! copper losses take all that the shaft gives: below `slow` nothing is limited. With a resistor that can still take
 //! energy, generating torque is limited above the chopper's band alone.
 //!
@@ -26,6 +27,13 @@ pub const DIVIDER: u8 = 10;
 /// Seconds per step.
 const STEP_S: f32 = DIVIDER as f32 * PERIOD_S;
 
+/// Band of the voltage in which motoring torque comes, in relation to how far the held voltage gives way: a mains that sags
+/// to `floor + 11 V` carries all torque up to twice `w_power`.
+const RISE: f32 = 1.0 / 9.0;
+/// The same in relation to the band in which the shaft feeds the link. That loop has no mains that damps it.
+const RISE_OF_DEPTH: f32 = 1.0 / 6.0;
+/// Most that the band of generating torque is widened: it stays clear of the nominal voltage.
+const WIDEST: f32 = 1.4;
 /// Share of the slow speed above it within which the limits come on.
 const FADES: f32 = 0.25;
 /// Braking by flux begins where this share of the generating torque is left, and is whole where half of it is.
@@ -207,7 +215,8 @@ pub struct DcLink {
     /// Band of the voltage in which generating torque is limited.
     band: (f32, f32),
     low: f32,
-    floor: f32,
+    /// How far the held voltage gives way at most.
+    room: f32,
     /// Change of the held voltage in a step.
     gives: f32,
     rise: f32,
@@ -230,20 +239,9 @@ pub struct DcLinkState {
     pub heat: f32,
 }
 
-/// `value` within 0 and 1.
-fn share(value: f32) -> f32 {
-    if value < 0.0 {
-        0.0
-    } else if value > 1.0 {
-        1.0
-    } else {
-        value
-    }
-}
-
 /// How far `v` is below the upper end of a band, in relation to its width divided by `gain`.
 fn below((from, high): (f32, f32), v: f32, gain: f32) -> f32 {
-    share(gain * (high - v) / (high - from))
+    (gain * (high - v) / (high - from)).clamp(0.0, 1.0)
 }
 
 impl DcLink {
@@ -263,9 +261,9 @@ impl DcLink {
         Ok(Self {
             band: (s.from_v, s.high_v),
             low: s.low_v,
-            floor: s.floor_v,
+            room: s.low_v - s.floor_v,
             gives: s.yield_v_per_s * STEP_S,
-            rise: (s.low_v - s.floor_v) * (1.0 / 3.0),
+            rise: (s.low_v - s.floor_v) * RISE,
             flux_a: s.flux_a,
             flux_freq: s.flux_rpm * freq_per_rpm,
             slow_freq: s.slow_rpm * freq_per_rpm,
@@ -298,23 +296,29 @@ impl DcLink {
         state.v = Some(v);
         let speed = freq.abs();
         let gain = if speed > self.power_freq { self.power_freq / speed } else { 1.0 };
+        let down = if gain < 1.0 / WIDEST { 1.0 / WIDEST } else { gain };
         // Below `slow` nothing is limited.
-        let weight = share((speed - self.slow_freq) * self.per_slow);
+        let weight = ((speed - self.slow_freq) * self.per_slow).clamp(0.0, 1.0);
 
         let (chopper, cold) = self.brake(state, v);
         let generating = match &self.chopper {
-            None => below(self.band, v, gain),
+            None => below(self.band, v, down),
             Some(c) => {
-                let (alone, with) = (below(self.band, v, gain), below(c.band, v, gain));
+                let (alone, with) = (below(self.band, v, down), below(c.band, v, down));
                 alone + cold * (with - alone)
             }
         };
-        let flux = share(FLUX_GAIN * (FLUX_FROM - generating));
+        let flux = (FLUX_GAIN * (FLUX_FROM - generating)).clamp(0.0, 1.0);
         let flux_a = if speed > self.flux_freq { flux * self.flux_a } else { 0.0 };
 
-        let above = v - (self.low - state.given);
+        // 1 at the upper end of the band of motoring torque.
+        let above = gain * (v - self.low + state.given) / self.rise;
         self.give_way(state, above);
-        let motoring = share(gain * above / self.rise) - share(-0.5 * gain * above / self.rise);
+        let motoring = if above < 0.0 {
+            (RISE_OF_DEPTH * above).clamp(-1.0, 0.0)
+        } else {
+            above.clamp(0.0, 1.0)
+        };
 
         let limit = |share: f32| (1.0 - weight + weight * share) * i_q_limit;
         let (motoring, generating) = (limit(motoring), limit(generating));
@@ -335,20 +339,23 @@ impl DcLink {
     /// Duty of the chopper, and how much of it the heat of the resistor leaves.
     fn brake(&self, state: &mut DcLinkState, v: f32) -> (f32, f32) {
         let Some(c) = &self.chopper else { return (0.0, 0.0) };
-        let cold = share(COOL_GAIN * (1.0 - state.heat));
-        let duty = cold * share((v - c.on) * c.per_band);
+        let cold = (COOL_GAIN * (1.0 - state.heat)).clamp(0.0, 1.0);
+        let duty = cold * ((v - c.on) * c.per_band).clamp(0.0, 1.0);
         state.heat += duty * c.per_square * v * v - c.cooling * state.heat;
         (duty, cold)
     }
 
     /// Lets the held voltage give way while motoring torque is limited, and come back with room to spare; `above` is
-    /// how far the link is above it.
+    /// how far up its band the link is.
     fn give_way(&self, state: &mut DcLinkState, above: f32) {
-        if above < self.rise {
+        if above < 1.0 {
             state.given += self.gives;
-        } else if above > 2.0 * self.rise {
+        } else if above > 2.0 {
             state.given -= self.gives;
         }
-        state.given = (self.low - self.floor) * share(state.given / (self.low - self.floor));
+        state.given = state.given.clamp(0.0, self.room);
     }
 }
+
+#[cfg(test)]
+mod tests;
