@@ -6,15 +6,16 @@
 //!
 //! ```text
 //! generating <= I clamp((high - v)/(r (high - from)))
-//! motoring   <= I clamp((v - held)/(r rise))             held: `low`, which gives way towards `floor` while v < low
+//! motoring   <= I clamp((v - held)/(r rise))             held: `low`, gives way towards `floor` while this limits
 //! motoring   <= -I clamp((held - v)/(r depth))           ride-through: the shaft feeds the link
 //! chopper     = clamp((v - on)/(full - on)) clamp(10 (1 - heat))
 //! ```
 //!
-//! Power is torque times speed, so `r` keeps the gain of these loops what it is at `w_power` (with generating torque, up to
-//! 1.4 times that speed). Near standstill the
-//! copper losses take all that the shaft gives: below `slow` nothing is limited. With a resistor that can still take
-//! energy, generating torque is limited above the chopper's band alone.
+//! Power is torque times speed, so `r` keeps the gain of these loops what it is at `w_power`, 60 Hz electrical (with
+//! generating torque, up to 1.4 times that speed). Near standstill the copper losses take all that the shaft gives: below
+//! 9 Hz nothing is limited. With a resistor that can still take energy, generating torque is limited above the middle of
+//! the chopper's band alone. Above 40 Hz a limited generating torque asks for more flux, whose current burns power; below,
+//! the flux must be back when the carrier comes on.
 //!
 //! A sagging mains and one that is gone look alike at first: motoring torque is taken away. Without load the link of a
 //! sagging mains stays where it is, and `held` gives way below it, so that the torque comes back; in an outage the shaft
@@ -34,67 +35,61 @@ const RISE: f32 = 1.0 / 9.0;
 const RISE_OF_DEPTH: f32 = 1.0 / 6.0;
 /// Most that the band of generating torque is widened: it stays clear of the nominal voltage.
 const WIDEST: f32 = 1.4;
-/// Share of the slow speed above it within which the limits come on.
-const FADES: f32 = 0.25;
+/// Time in which the held voltage gives way to the floor, s.
+const YIELD_S: f32 = 0.45;
+/// Electrical speeds, turns per control period: where the limits begin, over which band they come on, from which on flux
+/// brakes, and from which on gains go down with the speed. 270, 68, 1200 and 1800 rpm of four poles.
+const SLOW: f32 = 9.0 * PERIOD_S;
+const FADES: f32 = 0.25 * SLOW;
+const FLUX: f32 = 40.0 * PERIOD_S;
+const POWER: f32 = 60.0 * PERIOD_S;
 /// Braking by flux begins where this share of the generating torque is left, and is whole where half of it is.
 const FLUX_FROM: f32 = 0.75;
 const FLUX_GAIN: f32 = 4.0;
 /// The duty goes down over the last tenth of what the resistor can take.
 const COOL_GAIN: f32 = 10.0;
 
-/// A brake resistor behind a chopper.
+/// A brake resistor behind a chopper. `under_v` and `over_v` are the voltages at which the drive trips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChopperSettings {
-    /// Voltage at which it begins to conduct, V.
+    /// Voltage at which it begins to conduct, V; half of `full_v` to 0.999 times it.
     pub on_v: f32,
-    /// Voltage from which on it conducts throughout, V.
+    /// Voltage from which on it conducts throughout, V; `from_v` to `over_v`.
     pub full_v: f32,
-    /// Resistance, ohm.
+    /// Resistance, ohm; 0.1 to 1e5.
     pub resistance: f32,
-    /// Energy that it takes from cold, J.
+    /// Energy that it takes from cold, J; 1 to 1e7.
     pub energy_j: f32,
-    /// Power that it takes for ever, W.
+    /// Power that it takes for ever, W; 0.1 to 1e5.
     pub power_w: f32,
 }
 
-/// Settings of the limits. Speeds are mechanical.
+/// Settings of the limits, with their ranges, within which [`DcLink::new`] expects them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DcLinkSettings {
-    /// Voltage from which on generating torque is limited, V.
+    /// Voltage from which on generating torque is limited, V; half of `high_v` to 0.99 times it.
     pub from_v: f32,
-    /// Voltage without generating torque, V.
+    /// Voltage without generating torque, V; `under_v` to `over_v`.
     pub high_v: f32,
-    /// Voltage without motoring torque, V; below, the shaft feeds the link.
+    /// Voltage without motoring torque, V, below which the shaft feeds the link; `under_v` to `from_v`.
     pub low_v: f32,
-    /// Voltage down to which the latter gives way when the link stays low, V.
+    /// Voltage down to which the latter gives way when the link stays low, V; `under_v` to 0.99 of `low_v`.
     pub floor_v: f32,
-    /// How fast, V/s.
-    pub yield_v_per_s: f32,
     /// Direct current that is added while generating torque is limited, A; 0 for none.
     pub flux_a: f32,
-    /// Speed above which it is, rpm: the flux must be back when the carrier comes on.
-    pub flux_rpm: f32,
-    /// Speed below which nothing is limited, rpm.
-    pub slow_rpm: f32,
-    /// Speed above which gains go down with the speed, rpm.
-    pub power_rpm: f32,
     /// The brake resistor, if there is one.
     pub chopper: Option<ChopperSettings>,
 }
 
 impl Default for DcLinkSettings {
-    /// For 311 V and four poles, without resistor.
+    /// For 311 V, without resistor.
     fn default() -> Self {
         Self {
             from_v: 340.0,
             high_v: 390.0,
             low_v: 260.0,
             floor_v: 215.0,
-            yield_v_per_s: 100.0,
             flux_a: 1.0,
-            flux_rpm: 1200.0,
-            slow_rpm: 270.0,
-            power_rpm: 1800.0,
             chopper: None,
         }
     }
@@ -142,60 +137,6 @@ impl DcLinkLimits {
     }
 }
 
-/// A setting of the dc link outside its range.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DcLinkError {
-    /// Name of the setting.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-    /// The value.
-    pub value: f32,
-    /// Smallest allowed.
-    pub min: f32,
-    /// Largest allowed.
-    pub max: f32,
-}
-
-impl core::fmt::Display for DcLinkError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self { name, unit, value, min, max } = self;
-        write!(f, "{name} = {value}: allowed is {min} to {max} {unit}")
-    }
-}
-
-impl core::error::Error for DcLinkError {}
-
-impl DcLinkSettings {
-    /// Checks every value; the link must stay between `under_v` and `over_v`, V, where the drive trips.
-    ///
-    /// # Errors
-    /// The first value outside its range.
-    pub fn check(&self, under_v: f32, over_v: f32) -> Result<(), DcLinkError> {
-        let of = |name, unit, value: f32, min: f32, max: f32| {
-            // A value that is not a number is outside.
-            let inside = (min..=max).contains(&value);
-            if inside { Ok(()) } else { Err(DcLinkError { name, unit, value, min, max }) }
-        };
-        let s = self;
-        of("dc_link.high_v", "V", s.high_v, under_v, over_v)?;
-        of("dc_link.from_v", "V", s.from_v, 0.5 * s.high_v, 0.99 * s.high_v)?;
-        of("dc_link.low_v", "V", s.low_v, under_v, s.from_v)?;
-        of("dc_link.floor_v", "V", s.floor_v, under_v, 0.99 * s.low_v)?;
-        of("dc_link.yield_v_per_s", "V/s", s.yield_v_per_s, 0.0, 1e5)?;
-        of("dc_link.flux_a", "A", s.flux_a, 0.0, 1000.0)?;
-        of("dc_link.slow_rpm", "rpm", s.slow_rpm, 1.0, 20_000.0)?;
-        of("dc_link.flux_rpm", "rpm", s.flux_rpm, s.slow_rpm, 24_000.0)?;
-        of("dc_link.power_rpm", "rpm", s.power_rpm, s.slow_rpm, 24_000.0)?;
-        let Some(chopper) = s.chopper else { return Ok(()) };
-        of("chopper.full_v", "V", chopper.full_v, s.from_v, over_v)?;
-        of("chopper.on_v", "V", chopper.on_v, 0.5 * chopper.full_v, 0.999 * chopper.full_v)?;
-        of("chopper.resistance", "ohm", chopper.resistance, 0.1, 1e5)?;
-        of("chopper.energy_j", "J", chopper.energy_j, 1.0, 1e7)?;
-        of("chopper.power_w", "W", chopper.power_w, 0.1, 1e5)
-    }
-}
-
 /// Coefficients of the chopper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Chopper {
@@ -221,10 +162,6 @@ pub struct DcLink {
     gives: f32,
     rise: f32,
     flux_a: f32,
-    flux_freq: f32,
-    slow_freq: f32,
-    per_slow: f32,
-    power_freq: f32,
     chopper: Option<Chopper>,
 }
 
@@ -239,36 +176,16 @@ pub struct DcLinkState {
     pub heat: f32,
 }
 
-/// How far `v` is below the upper end of a band, in relation to its width divided by `gain`.
-fn below((from, high): (f32, f32), v: f32, gain: f32) -> f32 {
-    (gain * (high - v) / (high - from)).clamp(0.0, 1.0)
-}
-
 impl DcLink {
-    /// Limits with these settings for a drive that trips below `under_v` and above `over_v`, V, and whose speed is
-    /// `freq_per_rpm` electrical turns per control period at 1 rpm.
-    ///
-    /// # Errors
-    /// As [`DcLinkSettings::check`].
-    pub fn new(
-        settings: &DcLinkSettings,
-        under_v: f32,
-        over_v: f32,
-        freq_per_rpm: f32,
-    ) -> Result<Self, DcLinkError> {
-        settings.check(under_v, over_v)?;
-        let s = settings;
-        Ok(Self {
+    /// Limits with these settings, which are within the ranges that [`DcLinkSettings`] states.
+    pub fn new(s: &DcLinkSettings) -> Self {
+        Self {
             band: (s.from_v, s.high_v),
             low: s.low_v,
             room: s.low_v - s.floor_v,
-            gives: s.yield_v_per_s * STEP_S,
+            gives: (s.low_v - s.floor_v) * (STEP_S / YIELD_S),
             rise: (s.low_v - s.floor_v) * RISE,
             flux_a: s.flux_a,
-            flux_freq: s.flux_rpm * freq_per_rpm,
-            slow_freq: s.slow_rpm * freq_per_rpm,
-            per_slow: 1.0 / (FADES * s.slow_rpm * freq_per_rpm),
-            power_freq: s.power_rpm * freq_per_rpm,
             chopper: s.chopper.map(|c| {
                 let half = 0.5 * (c.full_v - c.on_v);
                 Chopper {
@@ -279,7 +196,7 @@ impl DcLink {
                     cooling: STEP_S * c.power_w / c.energy_j,
                 }
             }),
-        })
+        }
     }
 
     /// One step with the measured dc link `dc_link`, V, at the speed `freq` of the rotor, electrical turns per control
@@ -295,38 +212,30 @@ impl DcLink {
         let v = before + 0.5 * (dc_link - before);
         state.v = Some(v);
         let speed = freq.abs();
-        let gain = if speed > self.power_freq { self.power_freq / speed } else { 1.0 };
+        let gain = if speed > POWER { POWER / speed } else { 1.0 };
         let down = if gain < 1.0 / WIDEST { 1.0 / WIDEST } else { gain };
-        // Below `slow` nothing is limited.
-        let weight = ((speed - self.slow_freq) * self.per_slow).clamp(0.0, 1.0);
+        let weight = ((speed - SLOW) * (1.0 / FADES)).clamp(0.0, 1.0);
 
         let (chopper, cold) = self.brake(state, v);
-        let generating = match &self.chopper {
-            None => below(self.band, v, down),
-            Some(c) => {
-                let (alone, with) = (below(self.band, v, down), below(c.band, v, down));
-                alone + cold * (with - alone)
-            }
-        };
+        let with = self.chopper.map_or(self.band, |c| c.band);
+        let (from, high) = (
+            self.band.0 + cold * (with.0 - self.band.0),
+            self.band.1 + cold * (with.1 - self.band.1),
+        );
+        let generating = (down * (high - v) / (high - from)).clamp(0.0, 1.0);
         let flux = (FLUX_GAIN * (FLUX_FROM - generating)).clamp(0.0, 1.0);
-        let flux_a = if speed > self.flux_freq { flux * self.flux_a } else { 0.0 };
+        let flux_a = if speed > FLUX { flux * self.flux_a } else { 0.0 };
 
         // 1 at the upper end of the band of motoring torque.
         let above = gain * (v - self.low + state.given) / self.rise;
         self.give_way(state, above);
-        let motoring = if above < 0.0 {
-            (RISE_OF_DEPTH * above).clamp(-1.0, 0.0)
-        } else {
-            above.clamp(0.0, 1.0)
-        };
+        let slope = if above < 0.0 { RISE_OF_DEPTH } else { 1.0 };
+        let motoring = (slope * above).clamp(-1.0, 1.0);
 
         let limit = |share: f32| (1.0 - weight + weight * share) * i_q_limit;
         let (motoring, generating) = (limit(motoring), limit(generating));
-        let high = if self.chopper.is_some() && cold < 1.0 {
-            Limiting::ResistorHot
-        } else {
-            Limiting::DcLinkHigh
-        };
+        let hot = self.chopper.is_some() && cold < 1.0;
+        let high = if hot { Limiting::ResistorHot } else { Limiting::DcLinkHigh };
         let low = if motoring < 0.0 { Limiting::RideThrough } else { Limiting::DcLinkLow };
         let (i_q, why) = if freq < 0.0 {
             ((-motoring, generating), (low, high))

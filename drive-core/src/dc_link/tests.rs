@@ -2,8 +2,6 @@
 
 use super::*;
 
-const UNDER_V: f32 = 200.0;
-const OVER_V: f32 = 400.0;
 const FREQ_PER_RPM: f32 = 2.0 / 60.0 / 6000.0;
 const I_Q: f32 = 3.0;
 const CAPACITOR: f64 = 470e-6;
@@ -16,10 +14,6 @@ const CHOPPER: ChopperSettings = ChopperSettings {
     energy_j: 2000.0,
     power_w: 50.0,
 };
-
-fn limits(settings: DcLinkSettings) -> DcLink {
-    DcLink::new(&settings, UNDER_V, OVER_V, FREQ_PER_RPM).expect("settings")
-}
 
 /// Motor, shaft and link as energies.
 struct Bench {
@@ -43,7 +37,7 @@ struct Bench {
 impl Bench {
     fn new(settings: DcLinkSettings, rpm: f64) -> Self {
         Self {
-            limits: limits(settings),
+            limits: DcLink::new(&settings),
             state: DcLinkState::default(),
             v: 311.0,
             mains: 311.0,
@@ -234,7 +228,7 @@ fn a_resistor_takes_what_it_may() {
 /// At nominal voltage and near standstill nothing is limited, whatever the direction; a number that is none gives none.
 #[test]
 fn nothing_is_limited_where_nothing_has_to_be() {
-    let limits = limits(DcLinkSettings::default());
+    let limits = DcLink::new(&DcLinkSettings::default());
     let step =
         |v: f32, rpm: f32| limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, I_Q);
     for (v, rpm) in
@@ -256,27 +250,4 @@ fn nothing_is_limited_where_nothing_has_to_be() {
     assert!((half.i_q.0 + 1.5).abs() < 1e-5 && (half.flux_a - 1.0).abs() < 1e-5, "{half:?}");
     assert_eq!(step(365.0, 1100.0).flux_a, 0.0);
     assert!(step(f32::NAN, 1000.0).i_q.0.is_nan());
-}
-
-#[test]
-fn settings_out_of_range_are_named() {
-    let check = |change: fn(&mut DcLinkSettings)| {
-        let mut settings = DcLinkSettings { chopper: Some(CHOPPER), ..DcLinkSettings::default() };
-        change(&mut settings);
-        settings.check(UNDER_V, OVER_V).map_err(|error| error.to_string())
-    };
-    assert_eq!(check(|_| {}), Ok(()));
-    let text = "dc_link.high_v = 410: allowed is 200 to 400 V";
-    assert_eq!(check(|s| s.high_v = 410.0), Err(text.into()));
-    for (name, change) in [
-        ("dc_link.from_v", (|s| s.from_v = 395.0) as fn(&mut DcLinkSettings)),
-        ("dc_link.low_v", |s| s.low_v = f32::NAN),
-        ("dc_link.floor_v", |s| s.floor_v = 150.0),
-        ("dc_link.slow_rpm", |s| s.slow_rpm = 0.0),
-        ("chopper.on_v", |s| s.chopper = Some(ChopperSettings { on_v: 390.0, ..CHOPPER })),
-        ("chopper.energy_j", |s| s.chopper = Some(ChopperSettings { energy_j: 0.0, ..CHOPPER })),
-    ] {
-        let text = check(change).expect_err(name);
-        assert!(text.starts_with(&format!("{name} = ")) && text.contains("allowed is"), "{text}");
-    }
 }
