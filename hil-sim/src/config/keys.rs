@@ -334,6 +334,13 @@ keys! {
         /// Whether the drive learns anew for every twelve runs; otherwise once, unless disturbances are drawn.
         relearn: bool = false, [switch], "";
     }
+    /// The experiment full-range.
+    "full_range." full_range: FullRangeConfig {
+        /// The one kind of runs; unset: all.
+        kind: Option<RangeKind> = None, [RangeKind], "";
+        /// The one run, by its number, with a record of it; unset: all.
+        index: Option<u32> = None, [0 .. 1e9], "";
+    }
     /// Disturbances of the battery: all those of the page Statistics together, in relation to their full sizes.
     "disturbed." disturbed: DisturbedConfig {
         /// Size of each.
