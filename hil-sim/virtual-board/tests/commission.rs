@@ -148,3 +148,24 @@ fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
     assert!(console.say("status", "\n")?.starts_with("off"));
     Ok(())
 }
+
+#[test]
+fn the_image_identifies_the_plants_of_the_current_loop_on_request() -> Result<()> {
+    let mut config = Config::default();
+    config.load.mode = hil_sim::config::LoadMode::Locked;
+    let mut console = Console::new(&config, 4)?;
+    console.say("commission nameplate leakage", "commissioning: ended")?;
+    let told = console.say("commission plant", "commissioning: ended")?;
+    assert!(
+        told.contains("phase margin by rule 3.8 across") && told.contains("plant: sound"),
+        "{told}"
+    );
+    assert!(console.say("get current_plant", "current_plant")?.contains("motor"), "not accepted");
+    console.say("accept", "\nok")?;
+    // (1 - exp(-R T/L))/R with Table 5. On the board the edges of the inverter are real.
+    for key in ["current_plant.d.k", "current_plant.q.k"] {
+        let k = value(&mut console, key)?;
+        assert!((k / 0.0032 - 1.0).abs() < 0.1, "{key}: {k}");
+    }
+    Ok(())
+}
