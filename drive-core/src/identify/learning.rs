@@ -272,17 +272,17 @@ impl Learning {
     /// those in which the flux is ahead, from no current up, and those in which it is behind, down again.
     fn point(&self, number: usize) -> Point {
         let (pair, mirrored) = (number / 2, !number.is_multiple_of(2));
-        let led = self.led();
+        let (led, [step_t, turned_t]) = (self.led(), self.flux_t);
         let (n, lead, flux_t, average_s) = match pair.checked_sub(self.points) {
             None => {
                 let n = if pair < self.first { self.first } else { self.points + self.first };
                 (n - pair, 0, if pair == 0 { FIRST_T } else { 0.0 }, AVERAGE_S)
             }
             Some(0) => (0, 1, SETTLE_T, AVERAGE_S),
-            Some(up) if up <= led => (self.points - 2 * (led - up), 1, self.flux_t[0], SLOPE_S),
+            Some(up) if up <= led => (self.points - 2 * (led - up), 1, step_t, SLOPE_S),
             Some(down) => {
                 let below = down - led - 1;
-                let flux_t = self.flux_t[usize::from(below == 0)];
+                let flux_t = if below == 0 { turned_t } else { step_t };
                 (self.points - 2 * below, 2, flux_t, SLOPE_S)
             }
         };

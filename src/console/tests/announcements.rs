@@ -190,7 +190,7 @@ fn a_learning_tells_its_progress_and_its_end() {
     talk.drive.found = rig.drive.learned().copied();
     let mut told = talk.say("");
     assert!(told[0].starts_with("learned: slope -0.0"), "{told:?}");
-    assert!(told[1].starts_with("learned: trackable from -1."), "{told:?}");
+    assert!(told[1].starts_with("learned: trackable from -0.88 to 0.88 Nm"), "{told:?}");
     while rig.drive.state() != State::Off {
         rig.step();
         talk.drive.drive = rig.drive.clone();

@@ -153,8 +153,8 @@ impl Learning {
         for n in 1..=self.points.min(POINTS - 1) {
             let is_led = (self.points - n).is_multiple_of(2);
             let (below, above) = if is_led { (n, n) } else { (n - 1, n + 1) };
-            let [below, above] = [sides(below), sides(above)];
-            let sides = [0, 1].map(|side| 0.5 * (below[side] + above[side]));
+            let ([ahead, behind], [ahead_too, behind_too]) = (sides(below), sides(above));
+            let sides = [0.5 * (ahead + ahead_too), 0.5 * (behind + behind_too)];
             let enough = |side: f32| {
                 side / at_rest >= LEAST_SLOPE_UNDER_LOAD.0 && side.abs() >= LEAST_SLOPE_UNDER_LOAD.1
             };
