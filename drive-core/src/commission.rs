@@ -131,6 +131,8 @@ struct Setup {
     /// Margin for noise of the pulses, A, and their largest voltage, V.
     pulse_noise: f32,
     pulse_v: f32,
+    /// Dead time as a share of the control period.
+    dead_time: f32,
     /// Nominal dc link, V.
     dc_link: f32,
     /// Rated current, and limit of the torque current, A peak.
@@ -162,6 +164,7 @@ impl Commissioning {
                 filter: settings.scales.current_delay_s / PERIOD_S,
                 pulse_noise: settings.share_of_range(0.05),
                 pulse_v: settings.share_of_dc_link(60.0),
+                dead_time: settings.inverter.dead_time_s / PERIOD_S,
                 dc_link: settings.inverter.dc_link_v,
                 rated: settings.rated_a(),
                 i_q_limit: settings.i_q_limit_a(),

@@ -142,7 +142,7 @@ impl Commission {
                 number(record.errors.get(n), 2),
             ]);
         }
-        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux.")
+        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux; the leakage is that of small changes at the bias.")
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
@@ -183,7 +183,13 @@ impl Study for Commission {
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-        let truth = Circuit::of_plant(&config);
+        let mut truth = Circuit::of_plant(&config);
+        // With iron the leakage that was measured is the incremental one at the bias.
+        let mut found = found;
+        let measured = session.commissioning.found().leakage;
+        if let (Some(incremental), Some(measured)) = (session.leakage, measured) {
+            (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
+        }
         let pairs = found.values().into_iter().zip(truth.values());
         let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
         let mut told = Vec::new();
