@@ -29,8 +29,8 @@ fn with_an_encoder_torque_is_regulated_in_all_regions() {
         let regions: Vec<f64> = regions.map(|(_, rms)| rms).collect();
         assert_eq!(regions.len(), if kind == "sag" { 3 } else { 8 });
         assert!(regions.iter().all(|found| *found < rms && *found > 0.001), "{kind}: {regions:?}");
-        let largest = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_max_deg"));
-        assert!(largest.clone().all(|(_, found)| found < max), "{kind}: {:?}", outcome.metrics);
+        let mut largest = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_max_deg"));
+        assert!(largest.all(|(_, found)| found < max), "{kind}: {:?}", outcome.metrics);
         for none in ["lost_runs", "refused_runs", "silent_runs"] {
             assert_eq!(get(&outcome, none), 0.0, "{kind}: {none}");
         }
@@ -109,8 +109,8 @@ fn one_run_is_repeated_and_recorded() {
     assert_eq!((all.figures.len(), one.figures[0].panels.len()), (0, 6));
 }
 
-/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.03 Nm at 1.4 A and the 3.0 A of the limit, motoring and generating,
-/// with every dc link; at the top the link decides.
+/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 1.93 Nm at 1.4 A and the 3 A of the limit, motoring and generating,
+/// while the dc link allows it; at the top the link decides.
 #[test]
 fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     let outcome = outcome("torque-envelope", &[ENCODER]);
@@ -119,9 +119,10 @@ fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     for word in ["motoring", "generating"] {
         let torque =
             |volts: u32, rpm: u32| get(&outcome, &format!("torque_{word}_{volts}_v_{rpm}_rpm_nm"));
-        for (volts, rpm) in [(311, 300), (311, 1500), (311, 2100), (270, 900)] {
+        for (volts, rpm) in [(311, 300), (311, 1500), (311, 1800), (270, 900)] {
             let share = torque(volts, rpm) / limit;
             assert!((share - 1.0).abs() < 0.02, "{word}, {volts} V, {rpm} rpm: {share}");
         }
+        assert!(torque(230, 3600) < 0.7 * limit && torque(230, 3600) < torque(311, 3600));
     }
 }
