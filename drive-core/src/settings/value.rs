@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use lexical_parse_float::FromLexical as _;
+
 /// A value of a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
@@ -58,7 +60,7 @@ impl fmt::Display for ValueError {
 
 /// The finite number that a text stands for: digits with optional sign, point and power of ten (`-0.5`, `1e-3`).
 pub fn number(text: &str) -> Option<f32> {
-    text.parse().ok().filter(|value: &f32| value.is_finite())
+    f32::from_lexical(text.as_bytes()).ok().filter(|value| value.is_finite())
 }
 
 /// A type whose values are written as words.
