@@ -191,6 +191,7 @@ pub const DRIVE: &[&str] = &[
     "ignore_delays",
     "injection.",
     "limits.",
+    "observer.",
     "sequence.",
     "speed.",
 ];
