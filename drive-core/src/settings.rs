@@ -198,7 +198,7 @@ impl Default for ObserverSettings {
 
 /// What the drive does about the voltage of the dc link; see [`crate::dc_link`]. Unset values follow [`rules`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DcLinkLimitSettings {
+pub struct BrakingSettings {
     /// Voltage without generating torque, V.
     pub high_v: Option<f32>,
     /// Voltage without motoring torque, V, below which the shaft feeds the link.
@@ -206,24 +206,17 @@ pub struct DcLinkLimitSettings {
     /// Direct current that is added while generating torque is limited, A.
     pub flux_a: Option<f32>,
     /// Brake resistor behind the chopper, ohm; 0 for none.
-    pub brake_ohm: f32,
+    pub ohm: f32,
     /// Energy that it takes from cold, J.
-    pub brake_j: f32,
+    pub energy_j: f32,
     /// Power that it takes for ever, W.
-    pub brake_w: f32,
+    pub power_w: f32,
 }
 
-impl Default for DcLinkLimitSettings {
+impl Default for BrakingSettings {
     /// No brake resistor. Where one is fitted, its energy and power stand on it.
     fn default() -> Self {
-        Self {
-            high_v: None,
-            low_v: None,
-            flux_a: None,
-            brake_ohm: 0.0,
-            brake_j: 1000.0,
-            brake_w: 50.0,
-        }
+        Self { high_v: None, low_v: None, flux_a: None, ohm: 0.0, energy_j: 1000.0, power_w: 50.0 }
     }
 }
 
@@ -259,7 +252,7 @@ pub struct Settings {
     /// The speed and the position loop.
     pub speed: SpeedSettings,
     /// The limits by the dc link.
-    pub dc_link: DcLinkLimitSettings,
+    pub braking: BrakingSettings,
 }
 
 /// The reason why settings were refused.

@@ -171,7 +171,10 @@ impl Coefficients {
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
+                if self.injects(s)
+                    && s.hand_over.weight < 1.0
+                    && s.carrier.is_settled()
+                    && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
