@@ -191,7 +191,6 @@ pub const DRIVE: &[&str] = &[
     "ignore_delays",
     "injection.",
     "limits.",
-    "observer.",
     "sequence.",
     "speed.",
     "observer.",

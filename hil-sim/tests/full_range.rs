@@ -62,7 +62,7 @@ fn the_dc_link_stays_between_the_trips() {
         assert_eq!(get(&stop, "lost_runs"), 0.0);
         get(&stop, "braking_0_1800_took_s")
     };
-    let (alone, resistor) = (took(&[]), took(&["dc_link.brake_ohm=100"]));
+    let (alone, resistor) = (took(&[]), took(&["braking.ohm=100"]));
     assert!((15.0..25.0).contains(&alone) && (5.0..7.0).contains(&resistor), "{alone} {resistor}");
     let outage = full_range("outage", &[ENCODER]);
     let lowest = get(&outage, "outage_0_1800_dc_link_min_v");
