@@ -179,6 +179,7 @@ impl Rig {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;
         }
+        self.plant.set_chopper(self.drive.brake_duty().into());
         self.plant.advance(&self.pending, f64::from(PERIOD_S));
         self.pending = compare;
         self.periods += 1;

@@ -9,7 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 9] = [
+const SMALL: [(&str, &[&str]); 10] = [
     ("speed-torque-sweep", &["--seconds", "0.2"]),
     (
         "monte-carlo",

@@ -32,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
             the drive does not notice.",
     uses: &[BENCH, DRIVE, &["full_range.", "runs"]],
-    not: &[&["dc_link."]],
+    not: &[],
     run: whole::<FullRange>,
 };
 
