@@ -47,6 +47,7 @@ mod levels;
 mod loop_check;
 mod motion;
 mod plant;
+mod plant_fit;
 mod plate;
 mod report;
 mod staircase;

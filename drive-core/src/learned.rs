@@ -3,7 +3,6 @@
 use core::fmt;
 
 use crate::carrier::asymmetry::Asymmetry;
-use crate::settings::Settings;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Largest accepted spread of the even part of the reference. Noise gives 0.001.
@@ -199,22 +198,6 @@ impl fmt::Display for Tracked {
 }
 
 impl Learned {
-    /// What a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
-    pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
-        self.slope.filter(|_| self.verdict.is_accepted())?;
-        let (i_d, motor) = (settings.i_d(), &settings.motor);
-        let last = self.reference.grid().current(self.points);
-        let lost = self.limit_a < last;
-        let i_q = self.limit_a.min(settings.i_q_limit_a());
-        Some(Tracked {
-            i_q,
-            torque: i_q * motor.torque_per_ampere(i_d),
-            i_d,
-            flux: i_d * motor.l_m,
-            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
-        })
-    }
-
     /// Least accepted torque limit, A.
     fn least_limit_a(&self) -> f32 {
         self.reference.grid().current(LEAST_LIMIT)

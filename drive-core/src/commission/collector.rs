@@ -4,7 +4,7 @@
 //! from `k` on, that of `k-2` ended at `k`.
 
 use super::motion::Motion;
-use super::plant::PlantFit;
+use super::plant_fit::PlantFit;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::math::frames::AlphaBeta;
 use crate::tuning::FirstOrder;

@@ -180,9 +180,9 @@ fn the_image_goes_from_the_nameplate_to_torque() -> Result<()> {
         ("commission", "commissioning: ended"),
         ("accept", "\nok"),
         ("learn", "off: the learning has ended"),
-        ("save", "\nok"),
+        ("save", "ok"),
         ("start", "running: torque"),
-        ("torque 1", "\nok"),
+        ("torque 1", "ok"),
     ] {
         let began = console.board.time();
         let said = console.say(line, until)?;

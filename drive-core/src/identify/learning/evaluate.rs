@@ -149,8 +149,7 @@ impl Learning {
             }
             _ => [at_rest; 2],
         };
-        // The bound is known, but not to the compiler: without it a panic would be reachable.
-        for n in 1..=self.points.min(POINTS - 1) {
+        for (n, k) in k.iter_mut().enumerate().take(self.points + 1).skip(1) {
             let is_led = (self.points - n).is_multiple_of(2);
             let (below, above) = if is_led { (n, n) } else { (n - 1, n + 1) };
             let ([ahead, behind], [ahead_too, behind_too]) = (sides(below), sides(above));
@@ -161,7 +160,7 @@ impl Learning {
             if !(enough(sides[0]) && enough(sides[1])) {
                 break;
             }
-            k[n] = 0.5 * (sides[0] + sides[1]);
+            *k = 0.5 * (sides[0] + sides[1]);
             last = n;
         }
         let table = SlopeTable::from_points(self.grid, Self::held_beyond(&k, last));
