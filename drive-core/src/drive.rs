@@ -162,6 +162,8 @@ struct ControlState {
     /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
+    /// Whether a learning has measured all that it evaluates.
+    all_measured: bool,
     excitation: ExcitationState,
 }
 
@@ -211,6 +213,8 @@ impl Drive {
         self.elapsed = self.elapsed.wrapping_add(1);
         let result = result.and_then(|compare| self.watch_load().map(|()| compare));
         let compare = result.unwrap_or_else(|off| {
+            let measured = off == State::Off && self.control.all_measured;
+            let off = if measured { self.evaluate_learning() } else { off };
             self.enter(off);
             Compare::OFF
         });

@@ -195,7 +195,7 @@ pub struct ObserverSettings {
 
 impl Default for ObserverSettings {
     fn default() -> Self {
-        Self { enabled: true, leakage_slope: 0.0 }
+        Self { enabled: false, leakage_slope: 0.0 }
     }
 }
 

@@ -19,15 +19,15 @@ use crate::math::frames::Dq;
 
 /// Control periods that are averaged.
 const AVERAGED: u8 = 4;
-/// The lags, averages.
-const LAGS: [usize; 3] = [4, 10, 48];
+/// The lags, averages, each with the least |C| relative to P.
+const SHORT: (usize, f32) = (4, 0.5);
+const MIDDLE: (usize, f32) = (10, 0.85);
+const LONG: (usize, f32) = (48, 0.7);
 /// Averages that are kept: the longest lag three times.
-const KEPT: usize = 3 * LAGS[2] + 1;
+const KEPT: usize = 3 * LONG.0 + 1;
 /// Control periods until the current stands, and until the end: 20 and 250 ms.
 const FROM: u32 = 120;
 const END: u32 = 1500;
-/// Least |C| relative to P of each lag.
-const LEAST: [f32; 3] = [0.5, 0.85, 0.7];
 /// Highest frequency that the short lag tells, and the lowest that counts as turning, electrical turns per period.
 const HIGHEST: f32 = 151.0 * PERIOD_S;
 const LOWEST: f32 = 0.32 * PERIOD_S;
@@ -49,7 +49,7 @@ pub struct CatchState {
     summed: u8,
     kept: [Dq; KEPT],
     count: usize,
-    correlations: [Correlation; LAGS.len()],
+    correlations: [Correlation; 3],
 }
 
 impl Default for CatchState {
@@ -60,7 +60,7 @@ impl Default for CatchState {
             summed: 0,
             kept: [Dq::ZERO; KEPT],
             count: 0,
-            correlations: Default::default(),
+            correlations: [Correlation::default(); 3],
         }
     }
 }
@@ -97,54 +97,60 @@ impl CatchState {
         if let Some(place) = self.kept.get_mut(self.count % KEPT) {
             *place = self.sum;
         }
-        for (lag, sums) in LAGS.into_iter().zip(&mut self.correlations) {
-            if self.count < 3 * lag {
-                continue;
-            }
-            let at = |lags: usize| {
-                let place = self.kept.get((self.count - lags * lag) % KEPT);
-                place.copied().unwrap_or(Dq::ZERO)
-            };
-            let (one, two) = (at(1), at(2));
-            let now = at(0) - one * 2.0 + two;
-            let before = one - two * 2.0 + at(3);
-            sums.re += now.d * before.d + now.q * before.q;
-            sums.im += now.q * before.d - now.d * before.q;
-            sums.power += now.length_squared();
+        let [short, middle, long] = &mut self.correlations;
+        for (sums, (lag, _)) in [(short, SHORT), (middle, MIDDLE), (long, LONG)] {
+            sums.add(lag, &self.kept, self.count);
         }
         self.count += 1;
     }
 
     fn result(&self) -> Caught {
-        let [short, middle, long] = self.correlations;
-        let [w_short, w_middle, w_long] = [(short, 0), (middle, 1), (long, 2)].map(frequency);
-        let [by_short, by_middle, by_long] = [(short, 0), (middle, 1), (long, 2)].map(is_sound);
-        let freq = if by_short && w_short.abs() < HIGHEST {
-            // Turns of the middle lag that the short one sees.
-            let turn = 1.0 / (LAGS[1] * AVERAGED as usize) as f32;
-            let turns = (w_short - w_middle) * (1.0 / turn);
-            w_middle + turn * (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32 as f32
-        } else if by_middle {
-            w_middle
-        } else if by_long {
-            w_long
-        } else {
-            0.0
+        let [short, middle, long] = &self.correlations;
+        let (by_short, by_middle) = (short.frequency(SHORT), middle.frequency(MIDDLE));
+        let freq = match (by_short, by_middle, long.frequency(LONG)) {
+            (Some(near), Some(far), _) if near.abs() < HIGHEST => {
+                // Turns within the middle lag that the short one sees.
+                const TURN: f32 = 1.0 / (MIDDLE.0 * AVERAGED as usize) as f32;
+                let turns = (near - far) * (1.0 / TURN);
+                far + (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32 as f32 * TURN
+            }
+            (_, Some(freq), _) | (_, _, Some(freq)) => freq,
+            _ => 0.0,
         };
         if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq) }
     }
 }
 
-/// Frequency of a lag, electrical turns per period.
-fn frequency((sums, lag): (Correlation, usize)) -> f32 {
-    let largest = if sums.re.abs() > sums.im.abs() { sums.re.abs() } else { sums.im.abs() };
-    // Within the range of whole numbers.
-    let scale = 1e9 / largest;
-    let turn = Angle::from_bits(idsp::atan2((sums.im * scale) as i32, (sums.re * scale) as i32));
-    turn.to_turns() / (LAGS[lag] * usize::from(AVERAGED)) as f32
-}
+impl Correlation {
+    /// Adds the average `count` of those that are kept.
+    #[inline(never)] // small rather than fast
+    fn add(&mut self, lag: usize, kept: &[Dq; KEPT], count: usize) {
+        if count < 3 * lag {
+            return;
+        }
+        let at = |lags: usize| {
+            let place = kept.get((count - lags * lag) % KEPT);
+            place.copied().unwrap_or(Dq::ZERO)
+        };
+        let (one, two) = (at(1), at(2));
+        let now = at(0) - one * 2.0 + two;
+        let before = one - two * 2.0 + at(3);
+        self.re += now.d * before.d + now.q * before.q;
+        self.im += now.q * before.d - now.d * before.q;
+        self.power += now.length_squared();
+    }
 
-fn is_sound((sums, lag): (Correlation, usize)) -> bool {
-    let least = LEAST[lag] * sums.power;
-    sums.re * sums.re + sums.im * sums.im > least * least
+    /// Electrical turns per period, where it is more than noise.
+    #[inline(never)]
+    fn frequency(&self, (lag, least): (usize, f32)) -> Option<f32> {
+        let least = least * self.power;
+        if self.re * self.re + self.im * self.im <= least * least {
+            return None;
+        }
+        let (re, im) = (self.re.abs(), self.im.abs());
+        // Within the range of whole numbers.
+        let scale = 1e9 / if re > im { re } else { im };
+        let turn = idsp::atan2((self.im * scale) as i32, (self.re * scale) as i32);
+        Some(Angle::from_bits(turn).to_turns() / (lag * usize::from(AVERAGED)) as f32)
+    }
 }

@@ -48,8 +48,8 @@ const FROM_INJECTION: f32 = 0.02;
 /// Largest angle error that is taken, rad: 3 degrees. That of a resistance 20 % off is not larger, and an injection that errs
 /// by more at this speed does little.
 const LARGEST_ERROR: f32 = 0.05;
-/// Share of the learned torque limit at which the saliency per ampere is read.
-const JUDGED_AT: f32 = 0.667;
+/// Share of the learned torque limit in the middle of the currents.
+const JUDGED_AT: f32 = 0.5;
 /// Voltages that are kept: the current behind the filter is older than three of them.
 const KEPT: usize = 4;
 
@@ -150,18 +150,17 @@ impl Observer {
     /// Takes an accepted result of a learning.
     ///
     /// The demodulation sees `q = Im s/(1 - Re s)` of the saliency, with `Im s = 2 a e` by a small angle error e and
-    /// `2 b i_d i_q/|i|` by the torque current: both are solved for a and b, the second at two thirds of the limit.
+    /// `2 b i_d i_q/|i|` by the torque current, so that a learned b is too small by `1 - Re s`: some `1 - a + b |i|` in
+    /// the middle of the currents.
     pub fn take(&mut self, learned: &Learned) {
         if let Some(slope) = &learned.slope {
             let k = slope.at_rest();
             self.flux_saliency = k / (2.0 + k);
         }
         if learned.current_saliency.accepted {
-            let (i_d, i_q) = (self.nominal / self.coupled, JUDGED_AT * learned.limit_a);
-            let length = libm::sqrtf(i_d * i_d + i_q * i_q);
-            let q = learned.reference.at(i_q);
-            let along = 2.0 * i_d * i_q + q * (i_d * i_d - i_q * i_q);
-            self.current_saliency = q * (1.0 - self.flux_saliency) * length / along;
+            let b = learned.current_saliency.value;
+            let middle = b * JUDGED_AT * learned.limit_a;
+            self.current_saliency = b * (1.0 - self.flux_saliency + middle);
         }
     }
 
