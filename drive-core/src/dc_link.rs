@@ -282,7 +282,7 @@ impl DcLink {
         } else if above > 2.0 {
             state.given -= self.gives;
         }
-        state.given = state.given.clamp(0.0, self.room);
+        state.given = state.given.max(0.0).min(self.room);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The whole drive: one step per PWM period.
 
 mod axes;
+mod catching;
 mod coefficients;
 mod command;
 mod commands;
@@ -47,6 +48,7 @@ use crate::protect::wiring_check::WiringCheckState;
 use crate::settings::AngleSource;
 
 use axes::Axes;
+use catching::CatchingState;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused};
 pub use excitation::{Excitation, Excited, Regulator};
@@ -156,6 +158,7 @@ struct ControlState {
     lock: LockMonitorState,
     noise: NoiseWatchState,
     inverter_drop: InverterDropState,
+    catching: CatchingState,
     /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
@@ -228,6 +231,8 @@ impl Drive {
         }
         let wanted = self.reference()?;
         let held = self.state == State::Magnetising;
+        let looking = self.state == State::Catching && self.control.catching.is_looking();
+        let alone = self.injection_alone();
         let counts = self.counts();
         let (c, s) = (&self.c, &mut self.control);
         let index = s.carrier.advance();
@@ -313,7 +318,8 @@ impl Drive {
             s.observer.put_out(modulated.realised - carrier);
             // While the flux builds up, its angle is held.
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if !held && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+            if !held && !looking && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err()
+            {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
@@ -338,6 +344,9 @@ impl Drive {
             flux_freq: flux.freq,
             rotor_freq,
             held,
+            looking,
+            building: self.state == State::Catching && !looking,
+            alone,
             learning: self.mode == Mode::Learning,
         };
         c.in_turn(s, index, &results)?;
@@ -351,6 +360,7 @@ impl Drive {
     fn reference(&mut self) -> Result<Dq, State> {
         let r = &mut self.control.references;
         let i_q = match self.state {
+            State::Catching => return Ok(self.catch()),
             State::Magnetising => return Ok(self.magnetise()?),
             State::Verifying => return Ok(self.verify()?),
             State::Learning => self.learn()?,

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::carrier::asymmetry::Asymmetry;
+use crate::settings::Settings;
 use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Largest accepted spread of the even part of the reference. Noise gives 0.001.
@@ -159,7 +160,61 @@ impl fmt::Display for Learned {
     }
 }
 
+/// What a drive can track with a [result](Learned).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracked {
+    /// Largest torque current, A, and torque, Nm; both signs.
+    pub i_q: f32,
+    /// See `i_q`.
+    pub torque: f32,
+    /// Direct current, A, and rotor flux L_m i_d, Wb peak.
+    pub i_d: f32,
+    /// See `i_d`.
+    pub flux: f32,
+    /// What limits it.
+    pub limit: TrackedLimit,
+}
+
+/// What limits the torque current of a drive that tracks the saliency.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackedLimit {
+    /// The slope is lost beyond.
+    Slope,
+    /// The current limit beside the direct current: the slope is there as far as it was learned.
+    Current,
+}
+
+impl fmt::Display for Tracked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { i_q, torque, i_d, flux, limit } = self;
+        let limit = match limit {
+            TrackedLimit::Slope => "the slope, which is lost beyond",
+            TrackedLimit::Current => "the current limit",
+        };
+        write!(
+            f,
+            "trackable from -{torque:.2} to {torque:.2} Nm (-{i_q:.2} to {i_q:.2} A) at {flux:.3} Wb ({i_d:.2} A); the limit is {limit}"
+        )
+    }
+}
+
 impl Learned {
+    /// What a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
+    pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
+        self.slope.filter(|_| self.verdict.is_accepted())?;
+        let (i_d, motor) = (settings.i_d(), &settings.motor);
+        let last = self.reference.grid().current(self.points);
+        let lost = self.limit_a < last;
+        let i_q = self.limit_a.min(settings.i_q_limit_a());
+        Some(Tracked {
+            i_q,
+            torque: i_q * motor.torque_per_ampere(i_d),
+            i_d,
+            flux: i_d * motor.l_m,
+            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
+        })
+    }
+
     /// Least accepted torque limit, A.
     fn least_limit_a(&self) -> f32 {
         self.reference.grid().current(LEAST_LIMIT)

@@ -147,6 +147,8 @@ pub struct Sequence {
     pub i_d: Option<f32>,
     /// Slope of the torque current at a stop, A/s.
     pub stop_a_per_s: Option<f32>,
+    /// Whether a start without an encoder looks for a turning shaft first, for 0.25 s.
+    pub catch: bool,
 }
 
 impl Default for Sequence {
@@ -158,6 +160,7 @@ impl Default for Sequence {
             flux: Flux::Low,
             i_d: None,
             stop_a_per_s: None,
+            catch: true,
         }
     }
 }

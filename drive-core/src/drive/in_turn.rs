@@ -50,6 +50,12 @@ pub(super) struct StepResults<'a> {
     pub rotor_freq: f32,
     /// Whether the flux is held still.
     pub held: bool,
+    /// Whether a turning shaft is looked for: nothing is judged.
+    pub looking: bool,
+    /// Whether the flux of a turning shaft builds up.
+    pub building: bool,
+    /// Whether the observer keeps its hands off the angle.
+    pub alone: bool,
     /// Whether the drive learns: nothing is tracked then, and there is no reference yet.
     pub learning: bool,
 }
@@ -86,13 +92,18 @@ impl Coefficients {
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
-                self.prediction.judge(&mut s.prediction, step.measured.current)
+                self.judge(s, step)
             }
             4 => self.check_lock(s, step),
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
                 if self.observer.is_some() && !step.learning {
                     s.hand_over.update(step.flux_freq);
+                    if step.looking {
+                        s.hand_over.silence();
+                    } else if step.alone {
+                        s.hand_over.weight = 0.0;
+                    }
                 }
                 let silent = s.hand_over.silent;
                 self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis, silent);
@@ -111,7 +122,7 @@ impl Coefficients {
                 if step.rotor_freq.abs() > self.protection.rotor_freq {
                     return Err(Fault::OverSpeed);
                 }
-                self.prediction.judge(&mut s.prediction, step.measured.current)?;
+                self.judge(s, step)?;
                 self.watch_noise(s, 4, step.sample)
             }
             _ => {
@@ -167,19 +178,24 @@ impl Coefficients {
         self.inject && s.hand_over.demodulates()
     }
 
+    /// Judges the current by the voltage.
+    fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
+        let judged = self.prediction.judge(&mut s.prediction, step.measured.current);
+        if step.looking { Ok(()) } else { judged }
+    }
+
     /// Checks that the tracked angle is that of the flux.
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.injects(s)
-                    && s.hand_over.weight < 1.0
-                    && s.carrier.is_settled()
-                    && (step.held || !step.learning) =>
+                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, step.held)? {
+                // What the injection is judged by is measured while it does not lead.
+                let led = step.held || step.building || s.hand_over.weight >= 1.0;
+                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
                 }
                 Ok(())

@@ -100,6 +100,11 @@ impl HandOver {
         self.alone >= QUIET
     }
 
+    /// Turns the carrier off, and leaves the angle to itself.
+    pub fn silence(&mut self) {
+        (self.silent, self.filling, self.weight) = (true, FILLED, 0.0);
+    }
+
     /// Whether the demodulation has the carrier, and what is judged by it may be.
     pub fn demodulates(&self) -> bool {
         self.filling == 0

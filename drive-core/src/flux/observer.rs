@@ -86,6 +86,8 @@ pub struct ObserverState {
     pub flux: f32,
     /// Current in the frame of the flux, A.
     current: Dq,
+    /// Change of the flux in the last period by the voltage, V s.
+    pub change: Dq,
     /// Deviation of the flux from that of the current model in the period, V s.
     deviation: f32,
     /// Angle by which the flux turned in the last period, rad.
@@ -163,9 +165,10 @@ impl Observer {
         }
     }
 
-    /// Resets `state` to no flux.
+    /// Resets `state` to no flux, with the resistance as it was.
     pub fn start(&self, state: &mut ObserverState) {
-        *state = ObserverState { flux: LEAST_FLUX * self.nominal, ..ObserverState::default() };
+        let (flux, resistance) = (LEAST_FLUX * self.nominal, state.resistance);
+        *state = ObserverState { flux, resistance, ..ObserverState::default() };
     }
 
     /// One period, from the `current` of a sample and the voltages that were put out before it. `frame` is the axis of the flux
@@ -201,6 +204,7 @@ impl Observer {
         };
         let r_s = self.r_s * (1.0 + state.resistance);
         let e = voltage * PERIOD_S - mean * r_s - leakage * self.leakage;
+        state.change = e;
         let grown = self.rate * (self.coupled * mean.d - state.flux);
         state.deviation = grown - e.d;
         let flux = state.flux + e.d + slow.gain.d * state.deviation;

@@ -183,8 +183,8 @@ impl LockMonitor {
 
     /// Evaluates one carrier period.
     ///
-    /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held`
-    /// (magnetisation, i_q = 0) the flux lies along it, and the baseline is measured.
+    /// `per_share_squared` is 1 / (share of the carrier amplitude in use)^2. While the axis is `held` by something else than
+    /// the injection (magnetisation, or the observer), the flux lies along it, and the baseline is measured.
     ///
     /// Returns the relative deviation of the squared carrier current from the expected one, where it was judged.
     ///
@@ -204,7 +204,10 @@ impl LockMonitor {
             return Err(Fault::CarrierWeak);
         }
         if held {
-            state.baseline += self.baseline_smoothing * (carrier - state.baseline);
+            let place = self.grid.place(saliency.i_q);
+            let carrier = carrier * between(&self.inverse_square, place);
+            let share = if state.baseline == 0.0 { 1.0 } else { self.baseline_smoothing };
+            state.baseline += share * (carrier - state.baseline);
             *state = LockMonitorState {
                 baseline: state.baseline,
                 weak: state.weak,

@@ -203,6 +203,11 @@ impl PredictionState {
         self.voltages += computed;
     }
 
+    /// Forgets what was unexplained so far: the model was that of another speed.
+    pub fn forget(&mut self) {
+        (self.unexplained, self.mean) = (AlphaBeta::ZERO, Dq::ZERO);
+    }
+
     /// Latches the sum of the voltages; called two samples before [`Prediction::judge`]. The voltage
     /// computed in a sample acts from the next sample to the one after, and so determines the current two
     /// samples later.

@@ -102,6 +102,7 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     word!("sequence.flux", sequence.flux: Flux, "flux that the rule for the direct current aims at: low as in the dissertation, or high").learned(),
     auto!("sequence.i_d", sequence.i_d, Settings::i_d, "A", "direct (magnetising) current, peak").beside(|s| (0.01, s.current_limit_a())).learned(),
     auto!("sequence.stop_a_per_s", sequence.stop_a_per_s, Settings::stop_a_per_s, "A/s", "slope of the torque current at a stop").from_to(0.1, 1e5),
+    word!("sequence.catch", sequence.catch: bool, "whether a start without an encoder looks for a turning shaft first"),
 
     auto!("speed.i_q_limit_a", speed.i_q_limit_a, Settings::i_q_limit_a, "A", "largest torque current of speed and position mode").beside(|s| (0.01, s.current_limit_a())),
     auto!("speed.limit_rpm", speed.limit_rpm, Settings::speed_limit_rpm, "rpm", "largest speed that is asked for").beside(|s| (1.0, s.speed_trip_rpm())),
