@@ -112,11 +112,11 @@ fn values_after_the_learning_do_not_act_while_it_lasts() {
     assert_eq!(error.to_string(), text);
 }
 
-/// A drive that may track up to 100 rpm only stops the runs at more, at a sound angle; one without saliency stops runs whose
-/// angle is wrong.
+/// A drive without observer that may track up to 100 rpm only stops the runs at more, at a sound angle; one without
+/// saliency stops runs whose angle is wrong.
 #[test]
 fn sound_runs_that_are_stopped_are_told_from_others() {
-    let (sound, _) = battery(&["injection.tracked_rpm=100", "runs=12"]);
+    let (sound, _) = battery(&["observer.enabled=no", "injection.tracked_rpm=100", "runs=12"]);
     assert!(get(&sound, "trips") >= 4.0, "{sound:?}");
     assert_eq!(get(&sound, "sound_runs_stopped"), get(&sound, "trips"));
     let (wrong, _) = battery(&["saliency.a_psi=0", "injection.check=no", "runs=12"]);
