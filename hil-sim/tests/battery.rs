@@ -27,10 +27,10 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
         assert!(get(&metrics, "angle_error_max_deg") < 13.0);
         // Torque of sound runs: angle errors of 2° rms cost little at the mean.
         assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
-        // At 0.7 A the slope allows a learned drive 2.5 A to 2.75 A of 3 A.
+        // At 0.7 A the slope allows a learned drive 2.25 A to 2.75 A of 3 A.
         let limited = if learn == "yes" { 48.0 } else { 0.0 };
         assert_eq!(get(&metrics, "limited_runs"), limited);
-        assert!(learn == "no" || get(&metrics, "limit_pct") > 80.0, "{metrics:?}");
+        assert!(learn == "no" || get(&metrics, "limit_pct") > 70.0, "{metrics:?}");
         let none = ["lost_runs", "silent_runs", "stuck_runs", "trips", "refused_starts"];
         for name in none {
             assert_eq!(get(&metrics, name), 0.0, "{name}");

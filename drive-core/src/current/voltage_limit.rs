@@ -53,6 +53,23 @@ pub struct VoltageLimitState {
     pub by_voltage: bool,
 }
 
+/// What the drive does in a carrier period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Operation {
+    /// Reference of the current, A.
+    pub current: Dq,
+    /// Voltage without the carrier, V.
+    pub voltage: Dq,
+    /// Largest voltage vector that the carrier leaves, V.
+    pub largest: f32,
+    /// Frequency of the flux, electrical turns per period.
+    pub flux_freq: f32,
+    /// Whether the flux is kept, as with a carrier: what the injection has learned is that of one direct current.
+    pub kept: bool,
+    /// Direct current on top of the setting, A.
+    pub added: f32,
+}
+
 impl VoltageLimit {
     /// Limit for a motor at the direct current `i_d`, A, with currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
@@ -72,19 +89,9 @@ impl VoltageLimit {
         VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q }, by_voltage: false }
     }
 
-    /// Updates the limits with the `current` reference, A, the `voltage` of the step, V, the `largest` voltage vector that the
-    /// carrier leaves, V, and the frequency of the flux, electrical turns per period. With a carrier the flux is `kept`: what
-    /// the injection has learned is that of one direct current. `added` is direct current on top, A.
-    pub fn step(
-        &self,
-        state: &mut VoltageLimitState,
-        current: Dq,
-        voltage: Dq,
-        largest: f32,
-        flux_freq: f32,
-        kept: bool,
-        added: f32,
-    ) {
+    /// Updates the limits.
+    pub fn step(&self, state: &mut VoltageLimitState, now: &Operation) {
+        let &Operation { current, voltage, largest, flux_freq, kept, added } = now;
         let whole = USED * largest;
         let available = whole * state.trim;
         let w = flux_freq.abs() * (TAU / PERIOD_S) + 1.0;
@@ -105,7 +112,7 @@ impl VoltageLimit {
         let along = libm::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
         // NaN gives the setting; the step finds it.
-        let i_d = if kept || !(i_d < self.i_d) {
+        let i_d = if kept || i_d.is_nan() || i_d >= self.i_d {
             self.i_d
         } else if i_d < LEAST * self.i_d {
             LEAST * self.i_d

@@ -21,6 +21,7 @@
 use super::ControlState;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
+use crate::current::voltage_limit::Operation;
 use crate::dc_link::Limiting;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
@@ -157,10 +158,16 @@ impl Coefficients {
         let carrier = self.inject && !s.hand_over.silent;
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
-        let (reference, limit) = (s.seen.reference, &self.voltage_limit);
-        let freq = step.flux_freq;
-        let (state, added) = (&mut s.voltage_limit, s.limits.flux_a);
-        limit.step(state, reference, step.voltage, largest, freq, carrier, added);
+        let now = Operation {
+            current: s.seen.reference,
+            voltage: step.voltage,
+            largest,
+            flux_freq: step.flux_freq,
+            kept: carrier,
+            added: s.limits.flux_a,
+        };
+        let state = &mut s.voltage_limit;
+        self.voltage_limit.step(state, &now);
         let (most, dc_link) = (state.most.q, step.measured.dc_link);
         s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
         if s.voltage_limit.by_voltage {

@@ -61,6 +61,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
     let (limit, trip, ramp) = (speed(LIMIT_RPM), speed(TRIP_RPM), speed(RAMP_RPM_PER_S));
     let i_d = config.amperes(I_D_A) as f32;
     let drive = &mut config.drive;
+    drive.observer.enabled = true;
     drive.speed.limit_rpm = drive.speed.limit_rpm.or(limit);
     drive.speed.ramp_rpm_per_s = drive.speed.ramp_rpm_per_s.or(ramp);
     drive.limits.speed_rpm = drive.limits.speed_rpm.or(trip);
