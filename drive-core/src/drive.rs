@@ -319,8 +319,11 @@ impl Drive {
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
             let turning = c.observe_fundamental(s, index, held, seen, phi);
-            let carrier = AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
-            s.observer.put_out(modulated.realised - carrier);
+            if c.observer.is_some() {
+                let carrier =
+                    AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
+                s.observer.put_out(modulated.realised - carrier);
+            }
             // While the flux builds up, its angle is held.
             let (estimator, i_q) = (&mut s.estimator, reference.q);
             if !held && !looking && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err()

@@ -37,8 +37,9 @@ pub struct VoltageLimit {
     r_s: f32,
     leakage: f32,
     stator: f32,
-    /// Setting of the direct current, A.
+    /// Setting of the direct current, and the torque current that it leaves, A.
     i_d: f32,
+    i_q: f32,
     /// Square of the largest current, A^2.
     current_squared: f32,
 }
@@ -79,14 +80,14 @@ impl VoltageLimit {
             leakage,
             stator: leakage + motor.coupled_inductance(),
             i_d,
+            i_q: libm::sqrtf(largest_a * largest_a - i_d * i_d),
             current_squared: largest_a * largest_a,
         }
     }
 
     /// State without a limit.
     pub fn start(&self) -> VoltageLimitState {
-        let i_q = libm::sqrtf(self.current_squared - self.i_d * self.i_d);
-        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q }, by_voltage: false }
+        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: self.i_q }, by_voltage: false }
     }
 
     /// Updates the limits.
@@ -95,8 +96,9 @@ impl VoltageLimit {
         let whole = USED * largest;
         let available = whole * state.trim;
         let w = flux_freq.abs() * (TAU / PERIOD_S) + 1.0;
-        let length = libm::sqrtf(voltage.length_squared());
-        let trim = state.trim - TRIM * (length - whole) / whole;
+        // (|u| - U)/U near U, without the root.
+        let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
+        let trim = state.trim - TRIM * excess;
         state.trim = if trim < LEAST_TRIM {
             LEAST_TRIM
         } else if trim < 1.0 {
@@ -120,7 +122,8 @@ impl VoltageLimit {
             i_d
         };
         let all = i_d + added;
-        let rest = libm::sqrtf(self.current_squared - all * all);
+        let rest =
+            if all == self.i_d { self.i_q } else { libm::sqrtf(self.current_squared - all * all) };
         state.by_voltage = by_leakage < rest;
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }

@@ -7,12 +7,12 @@
 //! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | lock monitor | saliency (0) |
+//! | 4 | lock monitor; torque that the dc link bears | saliency (0) |
 //! | 5 | reference current of the saliency; the slowly turning axes | - |
-//! | 6 | carrier current in both channels; voltages for the prediction at 8 | sums (9) |
+//! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
 //! | 7 | rotor voltage for the prediction at 8 | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | averages of the demodulation; the sums begin anew | ten samples mixed |
+//! | 9 | currents that the voltage allows; averages of the demodulation; the sums begin anew | ten samples mixed |
 //!
 //! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
@@ -95,7 +95,10 @@ impl Coefficients {
                 self.check_carrier_headroom(s, step)?;
                 self.judge(s, step)
             }
-            4 => self.check_lock(s, step),
+            4 => {
+                self.limit_torque(s, step);
+                self.check_lock(s, step)
+            }
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
                 if self.observer.is_some() && !step.learning {
@@ -128,7 +131,7 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.limit_currents(s, step);
+                self.limit_voltage(s, step);
                 self.watch_noise(s, 5, step.sample)
             }
         }
@@ -153,8 +156,8 @@ impl Coefficients {
         self.prediction.predict(&mut s.prediction, &flux);
     }
 
-    /// Limits the currents to those that the dc link allows.
-    fn limit_currents(&self, s: &mut ControlState, step: &StepResults) {
+    /// Limits the currents to those that the voltage of the dc link allows.
+    fn limit_voltage(&self, s: &mut ControlState, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.silent;
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
@@ -166,9 +169,12 @@ impl Coefficients {
             kept: carrier,
             added: s.limits.flux_a,
         };
-        let state = &mut s.voltage_limit;
-        self.voltage_limit.step(state, &now);
-        let (most, dc_link) = (state.most.q, step.measured.dc_link);
+        self.voltage_limit.step(&mut s.voltage_limit, &now);
+    }
+
+    /// Limits the torque current to that which the dc link bears.
+    fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
+        let (most, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
         s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
         if s.voltage_limit.by_voltage {
             let why = &mut s.limits.why;
