@@ -283,8 +283,8 @@ impl Commissioning {
         }
     }
 
-    /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes as long as [`Settings::build`]: a second on the target,
-    /// so the drive must be off.
+    /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes
+    /// as long as [`Settings::build`]: a second on the target, so the drive must be off.
     pub fn design(&mut self) {
         self.design = self.found.motor(&Motor::default()).map(|motor| {
             let period_s = f64::from(PERIOD_S);

@@ -151,7 +151,7 @@ struct ControlState {
     motion: MotionState,
     voltage_limit: VoltageLimitState,
     dc_link: DcLinkState,
-    /// What the dc link allows now.
+    /// Present limits by the dc link.
     limits: DcLinkLimits,
     limiting: Limiting,
     carrier_watch: CarrierWatch,
@@ -163,7 +163,7 @@ struct ControlState {
     /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
-    /// Whether a learning has measured all that it evaluates.
+    /// Whether a learning has measured all its points.
     all_measured: bool,
     excitation: ExcitationState,
 }

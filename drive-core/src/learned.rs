@@ -159,7 +159,7 @@ impl fmt::Display for Learned {
     }
 }
 
-/// What a drive can track with a [result](Learned).
+/// Range of torque that a drive tracks with a [result](Learned).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
     /// Largest torque current, A, and torque, Nm; both signs.
@@ -170,11 +170,11 @@ pub struct Tracked {
     pub i_d: f32,
     /// See `i_d`.
     pub flux: f32,
-    /// What limits it.
+    /// The reason of the limit.
     pub limit: TrackedLimit,
 }
 
-/// What limits the torque current of a drive that tracks the saliency.
+/// Reason of the limit of the torque current of a drive that tracks the saliency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackedLimit {
     /// The slope is lost beyond.

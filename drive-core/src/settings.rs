@@ -199,7 +199,7 @@ impl Default for ObserverSettings {
     }
 }
 
-/// What the drive does about the voltage of the dc link; see [`crate::dc_link`]. Unset values follow [`rules`].
+/// Limits of the torque by the voltage of the dc link, and the brake resistor; see [`crate::dc_link`]. Unset values follow [`rules`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingSettings {
     /// Voltage without generating torque, V.

@@ -1,6 +1,7 @@
 //! Currents that the voltage of the dc link allows: field weakening, and the limit of the torque current; once a carrier period.
 //!
-//! With `w = |w_s|` and `U` the voltage that may be used, 0.92 of the largest vector and of what the carrier takes, times a trim,
+//! `w = |w_s|` is the angular frequency of the stator. The usable voltage `U` is 0.92 of the largest vector less the amplitude of
+//! the carrier, times a trim:
 //!
 //! ```text
 //! i_q of the leakage   i_u = 0.7 U/(w sigma L_s)
@@ -54,7 +55,7 @@ pub struct VoltageLimitState {
     pub by_voltage: bool,
 }
 
-/// What the drive does in a carrier period.
+/// Operating point of a carrier period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Operation {
     /// Reference of the current, A.

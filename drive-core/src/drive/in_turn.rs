@@ -206,7 +206,7 @@ impl Coefficients {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                // What the injection is judged by is measured while it does not lead.
+                // The baseline of the monitor is measured while the angle does not come from the injection.
                 let led = step.held || step.building || s.hand_over.weight >= 1.0;
                 if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);

@@ -88,7 +88,7 @@ impl Drive {
 }
 
 impl Learned {
-    /// What a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
+    /// Range of torque that a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
     pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
         self.slope.filter(|_| self.verdict.is_accepted())?;
         let (i_d, motor) = (settings.i_d(), &settings.motor);
