@@ -292,7 +292,12 @@ impl Settings {
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {
                 let allowed_v = self.unexplained_v();
-                Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
+                let mean_v: f32 = if self.uses_observer() {
+                    0.25 * allowed_v
+                } else {
+                    UNEXPLAINED_MEAN * allowed_v
+                };
+                Prediction::new(m, motor_plant, allowed_v, mean_v)
             },
             catching: self.catching(),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),

@@ -147,8 +147,13 @@ impl Coefficients {
 
     /// Computes the rotor voltage that the next judgement of the current reckons with.
     fn predict(&self, s: &mut ControlState, step: &StepResults) {
+        // On iron a weakened flux is larger than the current model says: the observer measures it.
+        let magnetising = match &self.observer {
+            Some(observer) => observer.magnetising(&s.observer),
+            None => s.indirect.magnetising,
+        };
         let flux = RotorFlux {
-            magnetising: s.indirect.magnetising,
+            magnetising,
             rotor_freq: step.rotor_freq,
             axis: step.flux_axis,
             flux_freq: step.flux_freq,
@@ -193,7 +198,12 @@ impl Coefficients {
 
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        let judged = self.prediction.judge(&mut s.prediction, step.measured.current);
+        if step.held {
+            // The flux is still building up, and the drop of the inverter is not known.
+            s.prediction.forget_mean();
+        }
+        let resistance = s.observer.resistance;
+        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
         if step.looking { Ok(()) } else { judged }
     }
 
@@ -206,8 +216,11 @@ impl Coefficients {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                // The baseline of the monitor is measured while the angle does not come from the injection.
-                let led = step.held || step.building || s.hand_over.weight >= 1.0;
+                // The baseline of the monitor is measured while the angle does not come from the injection. Once it is
+                // there, the monitor also watches the observer.
+                let led = step.held
+                    || step.building
+                    || s.hand_over.weight >= 1.0 && !s.lock.is_measured();
                 if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
                 }

@@ -37,9 +37,9 @@ const WITH_SPEED: f32 = 0.4;
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
 const LEAST_FLUX: f32 = 0.01;
-/// Time constants in which the stator resistance is tracked, s: while the motor is magnetised, and at low speed. (The flux also
-/// shows an angle error where it turns: a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
-const RESISTANCE_S: [f32; 2] = [0.15, 5.0];
+/// Time constant in which the stator resistance is tracked at low speed, s. (The flux also shows an angle error where it turns:
+/// a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
+const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -70,8 +70,8 @@ pub struct Observer {
     coupled: f32,
     /// Flux of the nominal direct current, V s.
     nominal: f32,
-    /// Shares of the resistance per V s of `eps` in a period.
-    resistance_gains: [f32; 2],
+    /// Share of the resistance per V s of `eps` in a period.
+    resistance_gain: f32,
     /// Age of the current in samples, without and behind the filter.
     pub ages: [f32; 2],
 }
@@ -142,7 +142,7 @@ impl Observer {
             rate: PERIOD_S / motor.tau_r(),
             coupled,
             nominal: coupled * i_d,
-            resistance_gains: RESISTANCE_S.map(|tau| 1.0 / (tau * motor.r_s * i_d)),
+            resistance_gain: 1.0 / (RESISTANCE_S * motor.r_s * i_d),
             ages,
         }
     }
@@ -233,10 +233,10 @@ impl Observer {
         };
     }
 
-    /// Tracks the stator resistance by the flux, `held` along phase a or at low speed; every period.
-    pub fn track_resistance(&self, state: &mut ObserverState, held: bool) {
-        let [fast, slow] = self.resistance_gains;
-        self.turn_resistance(state, -if held { fast } else { slow } * state.deviation);
+    /// Tracks the stator resistance by the flux at low speed; every period. It starts from the one that the magnetisation
+    /// measured (see [`InverterDrop`](crate::current::inverter_drop::InverterDrop)).
+    pub fn track_resistance(&self, state: &mut ObserverState) {
+        self.turn_resistance(state, -self.resistance_gain * state.deviation);
     }
 
     /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, with the observer's `weight` in the
@@ -263,6 +263,11 @@ impl Observer {
         } else {
             resistance
         };
+    }
+
+    /// Current that makes the flux, A, with the magnetising inductance of the settings.
+    pub fn magnetising(&self, state: &ObserverState) -> f32 {
+        state.flux / self.coupled
     }
 
     /// Voltage that the flux and the leakage induce at these references, V, `flux_freq` in electrical turns per period.
