@@ -42,8 +42,8 @@ const STANDING_HZ: f32 = 1.0;
 pub(super) const THERMAL_EVERY: u32 = 60;
 const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
 /// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
-/// dissertation's motor.
-const UNEXPLAINED_MEAN: f32 = 0.5;
+/// dissertation's motor, and 3 V beside the observer, which tracks the stator resistance.
+const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
 /// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
 /// 18 A/s.
 const MOVED_A: f32 = 0.03;
@@ -292,12 +292,8 @@ impl Settings {
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {
                 let allowed_v = self.unexplained_v();
-                let mean_v: f32 = if self.uses_observer() {
-                    0.25 * allowed_v
-                } else {
-                    UNEXPLAINED_MEAN * allowed_v
-                };
-                Prediction::new(m, motor_plant, allowed_v, mean_v)
+                let share = UNEXPLAINED_MEAN[usize::from(self.uses_observer())];
+                Prediction::new(m, motor_plant, allowed_v, share * allowed_v)
             },
             catching: self.catching(),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
@@ -317,6 +313,7 @@ impl Settings {
                     flux_saliency: 0.5 * self.slope().at_rest(),
                     current_saliency: self.current_saliency(),
                     slope: self.observer.leakage_slope,
+                    at: self.observer.leakage_at_a,
                 };
                 let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
                 Observer::new(m, &leakage, i_d, ages)

@@ -122,7 +122,7 @@ pub struct PredictionState {
     /// Axis of the flux in the middle of the samples, and its back-emf, V.
     flux: (UnitVector, f32),
     /// Mean unexplained voltage in the frame of the flux, V.
-    pub mean: Dq,
+    mean: Dq,
 }
 
 /// Samples between two comparisons: half a carrier period. Over a whole one the carrier would average to
