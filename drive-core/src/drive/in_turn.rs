@@ -28,7 +28,7 @@ use crate::fault::Fault;
 use crate::io::Sample;
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
-use crate::protect::plausibility::RotorFlux;
+use crate::protect::plausibility::{Resistance, RotorFlux};
 use crate::settings::AngleSource;
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
@@ -147,8 +147,8 @@ impl Coefficients {
     fn predict(&self, s: &mut ControlState, step: &StepResults) {
         // On iron a weakened flux is larger than the current model says: the observer measures it.
         let magnetising = match &self.observer {
-            Some(observer) => observer.magnetising(&s.observer),
-            None => s.indirect.magnetising,
+            Some(observer) if !step.learning => observer.magnetising(&s.observer),
+            _ => s.indirect.magnetising,
         };
         let flux = RotorFlux {
             magnetising,
@@ -200,7 +200,8 @@ impl Coefficients {
             // The flux is still building up, and the drop of the inverter is not known.
             s.prediction.forget_mean();
         }
-        let resistance = s.observer.resistance;
+        let tracked = self.observer.is_some() && !step.learning;
+        let resistance = Resistance { deviation: s.observer.resistance, tracked };
         let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
         if step.looking { Ok(()) } else { judged }
     }
