@@ -1,6 +1,6 @@
 //! From reset to a running control interrupt.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicU16, Ordering};
 
 use cortex_m::singleton;
 use drive_core::identify::learning::Learned;
@@ -22,7 +22,7 @@ use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::trace::Trace;
-use induction_drive::link::{Answer, Status};
+use induction_drive::link::{Answer, Status, stream};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Observation, Tracking};
@@ -236,6 +236,10 @@ fn start_control(
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
     let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
     let (send_observations, observations) = observations.ok_or(TWICE)?.split();
+    let samples = singleton!(: Queue<stream::Sample, { board::STREAM_SAMPLES }> = Queue::new())
+        .ok_or(TWICE)?;
+    static STREAM_DIVIDER: AtomicU16 = AtomicU16::new(0);
+    let (send_samples, stream) = stream::split(samples.split(), &STREAM_DIVIDER);
 
     pwm.start()?;
     let drive = Drive::new(coefficients);
@@ -249,11 +253,12 @@ fn start_control(
         answers: send_answers,
         learned: send_learned,
         trace: recorder,
+        stream: send_samples,
         observations: send_observations,
     }
     .run();
     if !comes_at_its_rate() {
         return Err("the control interrupt does not come at its rate");
     }
-    Ok(ControlLink { status, commands, answers, learned, trace, observations })
+    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations })
 }

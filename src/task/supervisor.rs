@@ -21,6 +21,7 @@ use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
+use induction_drive::link::stream::{Sample, Sink};
 use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
@@ -46,6 +47,8 @@ pub struct ControlLink {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
+    /// The stream.
+    pub stream: Sink<'static, { board::STREAM_SAMPLES }>,
     /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
@@ -330,6 +333,16 @@ impl DriveHandle for Supervisor {
 
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)> {
         self.link.as_ref()?.trace.get(i)
+    }
+
+    fn stream(&mut self, divider: u16) {
+        if let Some(link) = &mut self.link {
+            link.stream.ask(divider);
+        }
+    }
+
+    fn sampled(&mut self) -> Option<Sample> {
+        self.link.as_mut()?.stream.next()
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {

@@ -1,10 +1,12 @@
 //! Moves lines between this program and the drive. A thread reads; its lines go to the command that awaits an answer, or
-//! are shown at once.
+//! are shown at once. Frames of a stream between the lines go their own way.
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+use drive_stream::{Frame, Piece, Splitter};
 
 use super::answer::{Awaited, Meaning, is_error};
 use super::trace::{Collector, Trace};
@@ -25,6 +27,9 @@ pub enum LinkError {
     /// The port is gone: unplugged, or the virtual board has ended.
     #[error("the port is closed")]
     Closed,
+    /// A line that could not wait was sent meanwhile; it ends a list.
+    #[error("`{0}`: cut short by another line")]
+    Cut(String),
 }
 
 /// The answer to a command.
@@ -55,6 +60,7 @@ struct Route {
     asked: Option<Sender<String>>,
     /// Or to the person.
     show: Box<dyn FnMut(&str) + Send>,
+    frames: Box<dyn FnMut(Option<Frame>) + Send>,
     traces: Collector,
     closed: bool,
 }
@@ -69,10 +75,43 @@ impl Route {
     }
 }
 
+/// The direction to the drive.
+type Port = Arc<Mutex<Outgoing>>;
+
+struct Outgoing {
+    port: Box<dyn Write + Send>,
+    /// Lines that did not wait for their turn.
+    urgent: u64,
+}
+
+impl Outgoing {
+    fn send(&mut self, line: &str) -> std::io::Result<()> {
+        self.port.write_all(format!("{line}\n").as_bytes())?;
+        self.port.flush()
+    }
+}
+
 /// A connection to a drive.
 pub struct Link {
-    port: Box<dyn Write + Send>,
+    port: Port,
     route: Arc<Mutex<Route>>,
+}
+
+/// Sends lines that cannot wait for an answer that is awaited.
+#[derive(Clone)]
+pub struct Urgent(Port);
+
+impl Urgent {
+    /// Sends a line at once. Its answer is shown, unless a list is being answered: the line cuts that short.
+    ///
+    /// # Errors
+    /// The port is gone.
+    pub fn send(&self, line: &str) -> Result<(), LinkError> {
+        let mut port = locked(&self.0);
+        // An empty line is a sign of life, which cuts nothing short.
+        port.urgent += u64::from(!line.is_empty());
+        port.send(line).map_err(|_| LinkError::Closed)
+    }
 }
 
 impl Link {
@@ -82,18 +121,40 @@ impl Link {
         port: impl Write + Send + 'static,
         show: impl FnMut(&str) + Send + 'static,
     ) -> Self {
-        let traces = Collector::default();
-        let route = Route { asked: None, show: Box::new(show), traces, closed: false };
+        Self::with_frames(reader, port, show, |_| ())
+    }
+
+    /// The same; `frames` gets the frames of a stream, and `None` for bytes that were damaged.
+    pub fn with_frames(
+        reader: impl Read + Send + 'static,
+        port: impl Write + Send + 'static,
+        show: impl FnMut(&str) + Send + 'static,
+        frames: impl FnMut(Option<Frame>) + Send + 'static,
+    ) -> Self {
+        let (show, frames) = (Box::new(show), Box::new(frames));
+        let route =
+            Route { asked: None, show, frames, traces: Collector::default(), closed: false };
         let route = Arc::new(Mutex::new(route));
         let to = route.clone();
         std::thread::spawn(move || read_lines(reader, &to));
-        Self { port: Box::new(port), route }
+        let port = Arc::new(Mutex::new(Outgoing { port: Box::new(port), urgent: 0 }));
+        Self { port, route }
+    }
+
+    /// A way for lines that cannot wait.
+    pub fn urgent(&self) -> Urgent {
+        Urgent(self.port.clone())
+    }
+
+    /// Whether the port is gone.
+    pub fn is_closed(&self) -> bool {
+        locked(&self.route).closed
     }
 
     /// Ends a line that may have begun on the drive's side, and lets the answer go by.
     pub fn begin(&mut self) {
         // The port is found closed with the first command.
-        let _ = self.port.write_all(b"\n").and_then(|()| self.port.flush());
+        let _ = locked(&self.port).send("");
         std::thread::sleep(Duration::from_millis(100));
     }
 
@@ -110,11 +171,18 @@ impl Link {
             }
             route.asked = Some(send);
         }
-        let sent = self.port.write_all(format!("{command}\n").as_bytes());
-        let answer = match sent.and_then(|()| self.port.flush()) {
+        let (sent, before) = {
+            let mut port = locked(&self.port);
+            (port.send(command), port.urgent)
+        };
+        let mut answer = match sent {
             Ok(()) => self.hear(command, &lines, &mut show),
             Err(_) => Err(LinkError::Closed),
         };
+        let cut = locked(&self.port).urgent != before;
+        if cut && answer.as_ref().is_ok_and(|answer| answer.lines.len() > 1) {
+            answer = Err(LinkError::Cut(command.to_owned()));
+        }
         let mut route = locked(&self.route);
         route.asked = None;
         lines.try_iter().for_each(|line| (route.show)(&line));
@@ -158,19 +226,31 @@ impl Link {
 }
 
 /// A thread that panicked while it showed a line leaves the route whole.
-fn locked(route: &Mutex<Route>) -> MutexGuard<'_, Route> {
-    route.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
-    let (mut buffer, mut line) = ([0; 1024], Vec::new());
+    let (mut buffer, mut line, mut splitter) = ([0; 1024], Vec::new(), Splitter::new());
     loop {
         match reader.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => {
                 for byte in &buffer[..read] {
+                    let byte = match splitter.push(*byte) {
+                        Piece::Text(byte) => byte,
+                        Piece::Nothing => continue,
+                        Piece::Frame(frame) => {
+                            (locked(route).frames)(Some(frame));
+                            continue;
+                        }
+                        Piece::Damaged => {
+                            (locked(route).frames)(None);
+                            continue;
+                        }
+                    };
                     if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST {
-                        line.push(*byte);
+                        line.push(byte);
                         continue;
                     }
                     let text = readable(&std::mem::take(&mut line));
