@@ -2,6 +2,7 @@
 //! whether it is there.
 
 use std::collections::VecDeque;
+use std::io::Write as _;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -204,6 +205,8 @@ impl Shared {
     /// Stops the drive at once, for a reason that the page shows.
     pub fn stop(&self, why: &str) {
         self.tell(json!({ "stopped": why }));
+        // Whoever reads it may have gone.
+        let _ = writeln!(std::io::stdout(), "drive stopped: {why}");
         self.send("stop");
     }
 

@@ -1,6 +1,7 @@
 //! A session: the board goes on in small slices of time; between them bytes go to and fro.
 
 use std::f64::consts::TAU;
+use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -192,7 +193,8 @@ impl Session {
         let went = (0..SLICE).try_for_each(|_| self.period());
         self.hear()?;
         if let Some([drive, motor, flux]) = self.flux.take().filter(|_| self.inputs.flux) {
-            println!("flux {drive:.4} {motor:.4} {flux:.3}");
+            // A reader that has gone away is no reason to stop.
+            let _ = writeln!(std::io::stdout(), "flux {drive:.4} {motor:.4} {flux:.3}");
         }
         self.keep_flash()?;
         went.map(|()| None)
