@@ -118,7 +118,9 @@ async function tell(line, to = say) {
 const quiet = () => {};
 
 // --- frames --------------------------------------------------------------------------------------
-const COLOURS = ['#0b57d0', '#c5221f', '#137333', '#b06000', '#8430ce', '#007b83', '#a50e5e', '#5f6368'];
+// Legible on white and on black.
+const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2', '#db2777', '#85888c'];
+const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°' };
 let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, plots = [], shown = 0, phi = null;
 /** Keeps frames of ten little-endian words: period, sequence number, eight values. */
 function takeFrames(view) {
@@ -151,7 +153,7 @@ function draw() {
   const thin = list => { const out = []; for (let i = from; i < list.length; i += step) out.push(list[i]); return out; };
   plots.forEach(({ plot, indices }) => plot.setData([thin(times), ...indices.map(i => thin(columns[i]))]));
 }
-const unit = name => hello?.signals.find(signal => signal.signal === name)?.unit || '';
+const unit = name => (u => SYMBOLS[u] || u || '')(hello?.signals.find(signal => signal.signal === name)?.unit);
 /** One plot a unit; they share the time at the cursor. */
 function buildPlots(into, names, group) {
   into.replaceChildren();
@@ -166,7 +168,7 @@ function buildPlots(into, names, group) {
       scales: { x: { time: false } },
       axes: [{ ...axis, label: 's', labelSize: 16, size: 34 }, { ...axis, label: u, labelSize: 18, size: 60 }],
       series: [{ label: 't', value: (_, v) => v == null ? '–' : `${v.toFixed(4)} s` }, ...indices.map(i => ({
-        label: names[i], stroke: COLOURS[i % 8], width: 1.5, value: (_, v) => v == null ? '–' : v.toPrecision(4) }))],
+        label: names[i], stroke: COLOURS[i % 8], width: 1.5, dash: names[i].includes('_ref') ? [6, 4] : undefined, value: (_, v) => v == null ? '–' : v.toPrecision(4) }))],
     }, [[], ...indices.map(() => [])], into);
     return { plot, indices };
   });
@@ -226,7 +228,7 @@ function drawFlux(angle, motor, psi) {
   pen.beginPath(); pen.moveTo(10, 150); pen.lineTo(290, 150); pen.moveTo(150, 10); pen.lineTo(150, 290); pen.stroke();
   const on = !/^(off|not|in fault)/.test(present);
   if (psi > 0.02) arrow(motor, Math.min(140, 120 * psi / (drawFlux.most = Math.max(drawFlux.most || 0.1, psi))), style.getPropertyValue('--good'), 6);
-  if (on) arrow(angle, 120, style.getPropertyValue('--blue'), 2);
+  if (on) arrow(angle, 138, style.getPropertyValue('--blue'), 2);
   const error = ((angle - motor + 1.5) % 1 - 0.5) * 360;
   $('flux-text').textContent = motor === undefined ? 'rotor flux: the estimate of the drive'
     : `rotor flux: estimate (thin), motor (thick) ${psi.toFixed(2)} Wb${on && psi > 0.02 ? `, apart ${error.toFixed(1)}°` : ''}`;
@@ -254,5 +256,6 @@ addEventListener('keydown', event => {
   if (event.key === 'Escape') { event.preventDefault(); stopDrive(); }
   else if (event.key === 'p' && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) pause();
 }, true);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { if (streamed.length) plots = buildPlots($('curves'), streamed, 'live'); if (traceText) plotTrace(traceText.split('\n').filter(line => line && !line.startsWith('#'))); });
 addEventListener('resize', () => document.querySelectorAll('.curves').forEach(into =>
   [...plots, ...tracePlots].forEach(({ plot }) => into.contains(plot.root) && into.clientWidth && plot.setSize({ width: Math.max(240, into.clientWidth), height: plot.height }))));

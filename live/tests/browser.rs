@@ -134,6 +134,27 @@ fn the_page_shows_and_drives_the_virtual_board() {
     page.value("$('filter').value = ''; showSettings()");
     pictures(&mut page, &folder, "settings");
 
+    // Files: what differs is marked, and a file is loaded line by line.
+    page.value("$('compare').onchange({ target: { files: [new File(['set motor.r_s 5.4'], 'mine.txt')] } })");
+    page.until("compared.size == 1 && compared.get('motor.r_s') === '5.4'", PATIENCE);
+    page.value("$('from-file').onchange({ target: { files: [new File(['# mine\\nset motor.r_s 5.4\\napply\\nset motor.r_s -1'], 'mine.txt')] } })");
+    page.until("/line 3: set motor.r_s -1.*2 lines before it are set/.test($('settings-said').textContent)", PATIENCE);
+    page.until("settings.find(s => s.name == 'motor.r_s').value == 5.4", PATIENCE);
+
+    // The wiring is checked as a guided step.
+    page.value("view('view-setup'); document.querySelector('#steps button').click()");
+    page.until("/done: the wiring/.test(document.querySelector('#steps strong').textContent)", PATIENCE);
+    state(&mut page, "off");
+    pictures(&mut page, &folder, "setup");
+
+    // A recording has its schema, units and image, and every frame.
+    page.value("download = (name, text) => { globalThis.saved = [name, text]; }; $('record').click()");
+    page.until("recorded.rows.length > 50", PATIENCE);
+    page.value("$('record').click()");
+    for part in ["schema 1", "build [0-9a-f]{16}", "# units s,1,", "\\nt_s,sequence,", "phi_deg"] {
+        assert_eq!(page.value(&format!("/{part}/.test(saved[1])")), true, "{part}");
+    }
+
     // Closed while the drive runs: it stops in time.
     page.value("view('view-live'); $('start').click()");
     state(&mut page, "regulating torque");
@@ -150,6 +171,4 @@ fn the_page_shows_and_drives_the_virtual_board() {
     page.value("tell('set limits.dc_over_v 300').then(() => tell('start torque'))");
     page.until("/Fault 4.*dc link/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);
     pictures(&mut page, &folder, "fault");
-    page.value("view('view-setup')");
-    pictures(&mut page, &folder, "setup");
 }
