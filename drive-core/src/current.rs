@@ -6,3 +6,4 @@ pub mod modulation;
 pub mod pi;
 pub mod sensing;
 pub mod shunts;
+pub mod voltage_limit;

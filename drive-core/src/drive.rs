@@ -6,6 +6,7 @@ mod command;
 mod commands;
 mod excitation;
 mod excite;
+mod fundamental;
 mod in_turn;
 mod layout;
 mod learn;
@@ -24,14 +25,18 @@ use crate::carrier::injection::{Carrier, CarrierPeriod};
 use crate::current::inverter_drop::{DropSample, InverterDropState};
 use crate::current::pi::{DqPiState, ReferenceState};
 use crate::current::sensing::SensingState;
+use crate::current::voltage_limit::VoltageLimitState;
 use crate::fault::Fault;
 use crate::filter::dissertation::{LPF, LpfState};
 use crate::flux::estimator::EstimatorState;
+use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
+use crate::flux::observer::ObserverState;
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
+use crate::math::within;
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::noise_watch::NoiseWatchState;
@@ -130,6 +135,10 @@ struct ControlState {
     seen: Observed,
     low_pass: LpfState,
     indirect: IndirectState,
+    observer: ObserverState,
+    hand_over: HandOver,
+    /// Voltage that flux and leakage induce, by the observer's share in the angle, V.
+    induced: Dq,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],
@@ -137,6 +146,9 @@ struct ControlState {
     rotor: RotorCount,
     prediction: PredictionState,
     motion: MotionState,
+    voltage_limit: VoltageLimitState,
+    /// Least and largest torque current that is possible now, A.
+    i_q_range: (f32, f32),
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
@@ -238,16 +250,19 @@ impl Drive {
 
         // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
         // alone it would let the sidebands of a turning carrier through.)
+        let silent = !c.inject || s.hand_over.silent;
         let carrier =
-            if c.inject { s.carrier.at(&c.injection, index) } else { CarrierPeriod::default() };
+            if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
         let carrier_axis = phi.turned_by(axes.carrier);
         let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
+        let seen = if s.hand_over.silent { measured.current } else { filtered };
 
         // Current loop.
         let flux_axis = phi.turned_by(axes.seen);
-        let current = filtered.to_dq(flux_axis);
+        let current = seen.to_dq(flux_axis);
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
+            + s.induced
             + s.references.test_voltage;
         (s.seen.current, s.seen.voltage) = (current, voltage);
 
@@ -291,8 +306,12 @@ impl Drive {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
+            let turning = c.observe_fundamental(s, index, held, seen, phi);
+            let carrier = AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
+            s.observer.put_out(modulated.realised - carrier);
             // While the flux builds up, its angle is held.
-            if !held && c.estimator.track(&mut s.estimator, reference.q, slip_freq).is_err() {
+            let (estimator, i_q) = (&mut s.estimator, reference.q);
+            if !held && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
@@ -339,7 +358,8 @@ impl Drive {
                     _ => Goal::Position(r.turns),
                 };
                 let count = self.control.seen.rotor_count;
-                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count);
+                let range = self.control.i_q_range;
+                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
                 r.current.q
             }
             State::Stopping => {
@@ -355,7 +375,9 @@ impl Drive {
             }
             _ => r.current.q,
         };
-        Ok(Dq { d: self.control.references.current.d, q: i_q })
+        let s = &self.control;
+        let (i_d, most) = (s.references.current.d, s.voltage_limit.most.d);
+        Ok(Dq { d: if i_d < most { i_d } else { most }, q: within(i_q, s.i_q_range) })
     }
 
     /// Whether the flux angle is the counted rotor angle plus the slip: with the encoder, or while the drive

@@ -22,6 +22,7 @@
 //! | [`carrier`] | the injected voltage and the demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`motion`] | speed and position loop |
+//! | [`dc_link`] | limits of the torque current by the dc link, chopper |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`] | what a learning has found |
 //! | [`commission`] | from the nameplate to the parameters of the motor |
@@ -46,6 +47,7 @@
 pub mod carrier;
 pub mod commission;
 pub mod current;
+pub mod dc_link;
 mod drive;
 pub mod fault;
 pub mod filter;

@@ -3,6 +3,17 @@
 pub mod angle;
 pub mod frames;
 
+/// `value` clamped to a range; NaN stays NaN.
+pub(crate) fn within(value: f32, (least, most): (f32, f32)) -> f32 {
+    if value > most {
+        most
+    } else if value < least {
+        least
+    } else {
+        value
+    }
+}
+
 /// `value` clamped to ±`largest`; NaN stays NaN.
 pub(crate) fn limited(value: f32, largest: f32) -> f32 {
     if value > largest {

@@ -26,7 +26,7 @@
 
 use crate::current::pi::{Pi, PiState};
 use crate::math::angle::Angle;
-use crate::math::limited;
+use crate::math::{limited, within};
 use crate::tuning::MotionDesign;
 
 /// Control periods per step of the loops: 100 Hz.
@@ -137,7 +137,9 @@ impl Motion {
     /// period. The current changes every [`DIVIDER`] periods.
     ///
     /// The computation is spread over three periods: speed, speed reference, current.
-    pub fn step(&self, state: &mut MotionState, goal: Goal, count: u32) -> f32 {
+    ///
+    /// `range` is the least and the largest current, A, that is possible now.
+    pub fn step(&self, state: &mut MotionState, goal: Goal, count: u32, range: (f32, f32)) -> f32 {
         match state.phase {
             0 => {
                 let moved = count.wrapping_sub(state.last.unwrap_or(count)) as i32 as f32;
@@ -159,8 +161,12 @@ impl Motion {
 
                 let error = state.reference - state.speed;
                 let wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
-                state.output = limited(wanted, self.i_q_limit);
+                state.output = within(limited(wanted, self.i_q_limit), range);
                 state.pi.back_calculate(state.output - wanted);
+                if state.output != wanted {
+                    // The rotor does not accelerate as wanted.
+                    state.acceleration = 0.0;
+                }
             }
             _ => {}
         }
@@ -206,6 +212,9 @@ impl RotorCount {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// No limit but the own.
+    const ANY: (f32, f32) = (f32::MIN, f32::MAX);
     use crate::tuning::design_motion_loops;
     use core::f64::consts::TAU;
 
@@ -239,7 +248,7 @@ mod tests {
         for k in 0..(seconds / DT) as u32 {
             let t = f64::from(k) * DT;
             let count = 77_u32.wrapping_add((x * f64::from(COUNTS)) as i64 as u32);
-            let i = f64::from(motion.step(&mut state, goal, count));
+            let i = f64::from(motion.step(&mut state, goal, count, ANY));
             let i_load = if t >= load.0 { load.1 } else { 0.0 };
             v += (ACCELERATION * (i - i_load) - 0.08 * v) / heavier * DT;
             x += v * DT;
@@ -286,7 +295,7 @@ mod tests {
         for k in 0..60_000 {
             let t = f64::from(k) / 6000.0;
             let count = (x * f64::from(COUNTS)) as i64 as u32;
-            let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count));
+            let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, ANY));
             assert!(i.abs() <= 3.0);
             let i_load = if (2.0..4.0).contains(&t) { 3.4 } else { 0.0 };
             v += ACCELERATION * (i - i_load) / 6000.0;

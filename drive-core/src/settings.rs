@@ -181,6 +181,21 @@ impl Default for SpeedSettings {
     }
 }
 
+/// The observer that takes the angle over from the injection at speed; see [`crate::flux::observer`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObserverSettings {
+    /// Whether it does. Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
+    pub enabled: bool,
+    /// Relative change of the mean leakage inductance per ampere of stator current, 1/A.
+    pub leakage_slope: f32,
+}
+
+impl Default for ObserverSettings {
+    fn default() -> Self {
+        Self { enabled: true, leakage_slope: 0.0 }
+    }
+}
+
 /// All settings of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
@@ -204,6 +219,8 @@ pub struct Settings {
     pub track_rotor: bool,
     /// The injection.
     pub injection: InjectionSettings,
+    /// The observer.
+    pub observer: ObserverSettings,
     /// Limits and protections.
     pub limits: Limits,
     /// Start and stop.

@@ -11,6 +11,7 @@ mod current_step;
 mod dead_time;
 mod demodulators;
 mod filters;
+mod full_range;
 mod identify_continuous;
 mod identify_discrete;
 mod identify_machine;
@@ -46,6 +47,7 @@ mod steady;
 mod sweep;
 mod torque;
 mod torque_drift;
+mod torque_envelope;
 mod tracking;
 pub mod warming_rotor;
 
@@ -235,6 +237,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     commission::EXPERIMENT,
     commission::refusals::EXPERIMENT,
     battery::EXPERIMENT,
+    full_range::EXPERIMENT,
+    torque_envelope::EXPERIMENT,
     lock_monitor::EXPERIMENT,
     torque_drift::EXPERIMENT,
     record::EXPERIMENT,
@@ -261,6 +265,7 @@ pub const STATISTICAL: &[Statistical] = &[
     Statistical::of::<commission::Commission>(),
     Statistical::of::<commission::refusals::Refusals>(),
     Statistical::of::<battery::Battery>(),
+    Statistical::of::<full_range::FullRange>(),
     Statistical::of::<lock_monitor::LockMonitor>(),
     Statistical::of::<saliency_check::SaliencyCheck>(),
     Statistical::of::<smallest_slope::SmallestSlope>(),

@@ -1,6 +1,6 @@
 //! Which keys an experiment uses, found by changing each of them.
 
-use hil_sim::config::{Allowed, Config, Key, Value};
+use hil_sim::config::{Allowed, Config, Key, RangeKind, Value};
 use hil_sim::experiments::{Context, EXPERIMENTS, Experiment};
 use hil_sim::outcome::Origin;
 use hil_sim::progress::Progress;
@@ -70,7 +70,13 @@ fn others(key: Key, config: &Config) -> Vec<Value> {
 fn short(name: &str) -> Config {
     let mut config = Config::default();
     // The battery needs a run of each of its kinds.
-    config.extent.runs = Some(if name == "battery" { 12 } else { 3 });
+    config.extent.runs = Some(match name {
+        "battery" => 12,
+        "full-range" => 1,
+        _ => 3,
+    });
+    // Free shafts, all regions.
+    config.full_range.kind = Some(RangeKind::LoadSteps);
     (config.record.minutes, config.record.reversal_s) = (0.05, 1.0);
     config.extent.seconds = Some(match name {
         "demodulators" => 1.0,

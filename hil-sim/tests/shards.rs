@@ -31,6 +31,7 @@ const SMALL: [(&str, &[&str]); 9] = [
         "battery",
         &["--set", "runs=14", "--set", "disturbed.drawn=0.5", "--set", "after.motor.r_r=1.2"],
     ),
+    ("full-range", &["--set", "runs=1", "--set", "angle_source=encoder"]),
     ("lock-monitor", &["--set", "runs=1"]),
     ("saliency-check", &["--set", "runs=2"]),
     ("smallest-slope", &["--set", "runs=1"]),

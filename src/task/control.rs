@@ -119,7 +119,7 @@ struct Owned(UnsafeCell<MaybeUninit<Running>>);
 unsafe impl Sync for Owned {}
 
 // SAFETY: a section of memory.x for data without initialisation, which `MaybeUninit` allows for.
-#[unsafe(link_section = ".ccm_data")]
+#[unsafe(link_section = ".control_data")]
 static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 struct Running {

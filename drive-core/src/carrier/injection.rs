@@ -36,7 +36,7 @@ pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
 pub struct Injection {
     periods: [CarrierPeriod; CARRIER_SAMPLES],
     /// Amplitude of the voltage, V peak.
-    amplitude: f32,
+    pub amplitude: f32,
     /// Amplitude of the carrier current along the injection axis at full voltage, A peak.
     pub current_amplitude: f32,
 }

@@ -17,13 +17,15 @@ pub(super) struct Axes {
     pub seen: UnitVector,
     /// The flux when the voltage will act.
     pub applied: UnitVector,
+    /// The flux when the current before the one that is seen flowed.
+    pub before: UnitVector,
 }
 
 impl Default for Axes {
     /// With the flux at rest.
     fn default() -> Self {
         let [along, across] = [(1.0, 0.0), (0.0, 1.0)].map(|(cos, sin)| UnitVector { cos, sin });
-        Self { injection: across, carrier: across, seen: along, applied: along }
+        Self { injection: across, carrier: across, seen: along, applied: along, before: along }
     }
 }
 
@@ -33,14 +35,17 @@ const VOLTAGE_LEAD: f32 = 1.5;
 impl Coefficients {
     /// Turns the axes for a flux of frequency `freq`, turns per period: back by the delays of the measured
     /// currents, ahead to the middle of the period in which the voltage acts.
-    pub(super) fn turn(&self, axes: &mut Axes, freq: f32, injection: UnitVector) {
+    /// `silent` says that the carrier is off: the current is not filtered then.
+    pub(super) fn turn(&self, axes: &mut Axes, freq: f32, injection: UnitVector, silent: bool) {
         let along = UnitVector::default();
-        let lag = self.lag_share * (lpf_lag_samples(freq * TAU) + self.current_lag);
+        let filter = if silent { 0.0 } else { lpf_lag_samples(freq * TAU) };
+        let lag = self.lag_share * (filter + self.current_lag);
         *axes = Axes {
             injection,
             carrier: injection.turned_slightly(-freq * self.estimator.lag),
             seen: along.turned_slightly(-freq * lag),
             applied: along.turned_slightly(freq * VOLTAGE_LEAD),
+            before: along.turned_slightly(-freq * (lag + 1.0)),
         };
     }
 }

@@ -14,8 +14,11 @@ use crate::current::modulation::Modulator;
 use crate::current::pi::{DqPi, Pi, ReferenceFilter};
 use crate::current::sensing::Sensing;
 use crate::current::shunts::Shunts;
+use crate::current::voltage_limit::VoltageLimit;
+use crate::filter::dissertation::lpf_lag_samples;
 use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
+use crate::flux::observer::{Leakage, Observer};
 use crate::identify::learning::Learning;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
@@ -83,11 +86,14 @@ pub struct Coefficients {
     pub(crate) lag_share: f32,
     pub(crate) sequence: SequenceSteps,
     pub(crate) estimator: Estimator,
+    /// The observer, where the angle is not the injection's alone.
+    pub(crate) observer: Option<Observer>,
     /// The watch on the sensors' noise, where the angle is the injection's.
     pub(crate) noise_watch: Option<NoiseWatch>,
     pub(crate) injection: Injection,
     /// The watch on the lock, if it is wanted.
     pub(crate) lock_monitor: Option<LockMonitor>,
+    pub(crate) voltage_limit: VoltageLimit,
     pub(crate) motion: Motion,
     /// Injection axis seen from the flux, as an angle and a unit vector.
     pub(crate) injection_turn: Angle,
@@ -185,7 +191,7 @@ impl Settings {
         let t = &self.injection.synchronous;
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
         let speed_trip = self.speed_trip_rpm();
-        let highest_rpm = if self.tracks_synchronously() {
+        let highest_rpm = if self.tracks_synchronously() && !self.uses_observer() {
             f32::min(self.tracked_rpm(), speed_trip)
         } else {
             speed_trip
@@ -283,6 +289,7 @@ impl Settings {
                 let allowed_v = self.unexplained_v();
                 Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
             },
+            voltage_limit: VoltageLimit::new(m, i_d, current_limit),
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),
             protection: Protection {
@@ -293,6 +300,15 @@ impl Settings {
                 current_squared: current_limit * current_limit,
                 i_q: current_limit,
             },
+            observer: self.uses_observer().then(|| {
+                let leakage = Leakage {
+                    flux_saliency: 0.5 * self.slope().at_rest(),
+                    current_saliency: self.current_saliency(),
+                    slope: self.observer.leakage_slope,
+                };
+                let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
+                Observer::new(m, &leakage, i_d, ages)
+            }),
             sequence: SequenceSteps {
                 precharge: periods(self.sequence.precharge_s),
                 magnetise: periods(self.magnetise_s()),

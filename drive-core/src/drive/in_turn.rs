@@ -90,10 +90,15 @@ impl Coefficients {
             4 => self.check_lock(s, step),
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
-                self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis);
+                if self.observer.is_some() && !step.learning {
+                    s.hand_over.update(step.flux_freq);
+                }
+                let silent = s.hand_over.silent;
+                self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis, silent);
                 Ok(())
             }
             6 => {
+                self.update_observer(s, step);
                 s.prediction.latch_voltage();
                 self.check_both_channels(s, step)
             }
@@ -110,6 +115,7 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
+                self.limit_voltage(s, step);
                 self.watch_noise(s, 5, step.sample)
             }
         }
@@ -118,8 +124,8 @@ impl Coefficients {
     /// Takes one of the six looks at the noise of the current sensors.
     fn watch_noise(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
         match &self.noise_watch {
-            Some(watch) => watch.step(&mut s.noise, look, sample),
-            None => Ok(()),
+            Some(watch) if s.hand_over.is_quiet() => watch.step(&mut s.noise, look, sample),
+            _ => Ok(()),
         }
     }
 
@@ -134,11 +140,28 @@ impl Coefficients {
         self.prediction.predict(&mut s.prediction, &flux);
     }
 
+    /// Limits the currents to those that the dc link allows.
+    fn limit_voltage(&self, s: &mut ControlState, step: &StepResults) {
+        let carrier = self.inject && !s.hand_over.silent;
+        let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
+        let largest = self.modulator.circle(step.measured.dc_link) - taken;
+        let (reference, limit) = (s.seen.reference, &self.voltage_limit);
+        let freq = step.flux_freq;
+        limit.step(&mut s.voltage_limit, reference, step.voltage, largest, freq, carrier);
+        let most = s.voltage_limit.most.q;
+        s.i_q_range = (-most, most);
+    }
+
+    /// Whether the demodulation has a carrier.
+    fn injects(&self, s: &ControlState) -> bool {
+        self.inject && s.hand_over.demodulates()
+    }
+
     /// Checks that the tracked angle is that of the flux.
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.inject && s.carrier.is_settled() && (step.held || !step.learning) =>
+                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
@@ -154,7 +177,7 @@ impl Coefficients {
 
     /// Checks that both current sensors see the carrier.
     fn check_both_channels(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        if !self.inject {
+        if !self.injects(s) {
             return Ok(());
         }
         let amplitude = s.carrier.share * self.injection.current_amplitude;
@@ -168,7 +191,7 @@ impl Coefficients {
         s: &mut ControlState,
         step: &StepResults,
     ) -> Result<(), Fault> {
-        if !self.inject {
+        if !self.inject || s.hand_over.silent {
             return Ok(());
         }
         let largest = self.modulator.circle(step.measured.dc_link);

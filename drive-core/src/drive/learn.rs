@@ -82,6 +82,9 @@ impl Coefficients {
             return;
         }
         self.estimator.take(learned);
+        if let Some(observer) = &mut self.observer {
+            observer.take(learned);
+        }
         if let Some(monitor) = &mut self.lock_monitor {
             monitor.take(learned);
         }

@@ -9,6 +9,7 @@ use crate::carrier::demodulator::{Demodulate, Demodulator};
 use crate::carrier::drift::GainDrift;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
+use crate::flux::hand_over::Turning;
 use crate::flux::indirect::FluxAngle;
 use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
@@ -114,6 +115,8 @@ pub struct EstimatorState {
     pub rotor_freq: f32,
     /// Output of the selected demodulator as a current difference, A; 0 with the synchronous one.
     pub delta_i: f32,
+    /// Angle error by the latest saliency, flux less estimate, rad.
+    pub angle_error: f32,
     /// Correction per period from the latest saliency. It is held for a carrier period, on average 1.1 ms
     /// more than the 3.2 ms delay of the averages: little for a loop of 4 Hz.
     correction: PllCorrection,
@@ -160,6 +163,7 @@ impl Estimator {
             delta_i,
             synchronous,
             correction,
+            angle_error,
             drift,
         } = state;
         // The tracker turns the axis of section 3.4, 90° ahead of the flux.
@@ -168,7 +172,7 @@ impl Estimator {
         demodulator.start(self.demodulator, self.rms_samples);
         (*mean_freq, *rotor_freq, *delta_i) = (0.0, 0.0, 0.0);
         (*synchronous, *correction) = (SynchronousState::default(), PllCorrection::default());
-        *drift = GainDrift::default();
+        (*drift, *angle_error) = (GainDrift::default(), 0.0);
     }
 
     /// Takes an accepted result of a learning.
@@ -220,6 +224,7 @@ impl Estimator {
     pub fn update_correction(&self, state: &mut EstimatorState, acceleration: f32) {
         if let AngleLoop::Pll { schedule, pll, .. } = &self.angle_loop {
             let (error, share) = schedule.angle_error(state.saliency());
+            state.angle_error = error;
             state.correction = pll.correction(error, share, acceleration);
         }
     }
@@ -250,6 +255,7 @@ impl Estimator {
         state: &mut EstimatorState,
         i_q: f32,
         slip_freq: f32,
+        turning: &Turning,
     ) -> Result<(), TrackingLost> {
         match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
@@ -260,7 +266,8 @@ impl Estimator {
                 if held { Ok(()) } else { Err(TrackingLost) }
             }
             AngleLoop::Pll { .. } => {
-                Pll::step(&mut state.tracker, &mut state.rotor_freq, state.correction, slip_freq);
+                let EstimatorState { tracker, rotor_freq, correction, .. } = state;
+                Pll::step(tracker, rotor_freq, *correction, slip_freq, turning);
                 Ok(())
             }
         }
@@ -305,20 +312,20 @@ mod tests {
         estimator.start(&mut state);
         assert_eq!(state.flux(), FluxAngle { phi: Angle::ZERO, freq: 0.0 });
         state.delta_i = 0.015;
-        estimator.track(&mut state, 2.0, 0.0).unwrap();
+        estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         assert!(state.flux().freq < 0.0, "the difference is beyond its reference");
         // At the reference the speed stays.
         state.delta_i = 0.01;
-        estimator.track(&mut state, 2.0, 0.0).unwrap();
+        estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         let freq = state.flux().freq;
         for _ in 0..600 {
-            estimator.track(&mut state, 2.0, 1e-3).unwrap();
+            estimator.track(&mut state, 2.0, 1e-3, &Turning::default()).unwrap();
         }
         assert_eq!(state.flux().freq, freq);
         assert!((state.rotor_freq - (freq - 1e-3)).abs() < 1e-7, "{}", state.rotor_freq);
         // By 5 ms, 30 periods: 63 % of a step.
         for _ in 0..30 {
-            estimator.track(&mut state, 2.0, 0.0).unwrap();
+            estimator.track(&mut state, 2.0, 0.0, &Turning::default()).unwrap();
         }
         let share = (state.rotor_freq - (freq - 1e-3)) / 1e-3;
         assert!((share - 0.638).abs() < 0.005, "{share}");
@@ -330,7 +337,9 @@ mod tests {
         let (estimator, mut state) = (pii(1e-3), EstimatorState::default());
         estimator.start(&mut state);
         state.delta_i = -1.0;
-        assert!((0..1000).any(|_| estimator.track(&mut state, 2.0, 0.0) == Err(TrackingLost)));
+        assert!((0..1000).any(
+            |_| estimator.track(&mut state, 2.0, 0.0, &Turning::default()) == Err(TrackingLost)
+        ));
     }
 
     /// Difference that is seen of a carrier that is larger along dm than along qm, on an axis that turns.

@@ -7,6 +7,7 @@
 
 use core::f32::consts::TAU;
 
+use super::hand_over::Turning;
 use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::limited;
@@ -81,6 +82,7 @@ impl Tracker {
 /// the torque current for fast errors, but not for slow ones.
 ///
 /// ```
+/// use drive_core::flux::hand_over::Turning;
 /// use drive_core::flux::tracker::{Pll, TrackerState};
 ///
 /// let (pll, mut state, mut rotor_freq) = (Pll::new(4.0), TrackerState::default(), 0.0);
@@ -88,7 +90,7 @@ impl Tracker {
 /// for _ in 0..12_000 {
 ///     let error = core::f32::consts::TAU * (axis - state.angle.to_turns());
 ///     let correction = pll.correction(error, 1.0, 0.0);
-///     Pll::step(&mut state, &mut rotor_freq, correction, 0.0);
+///     Pll::step(&mut state, &mut rotor_freq, correction, 0.0, &Turning::default());
 /// }
 /// assert!((state.angle.to_turns() - axis).abs() < 1e-4 && rotor_freq.abs() < 1e-6);
 /// ```
@@ -102,6 +104,10 @@ pub struct Pll {
     jerk: f32,
 }
 
+/// Share of the newest value in the speed that the observer sees: 5 ms.
+const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
+/// Share of the acceleration that is forgotten in a period where the observer has the angle.
+const FORGETTING: f32 = 0.01;
 /// Clamp of the angle error, rad.
 const LARGEST_ERROR: f32 = 0.6;
 
@@ -128,18 +134,28 @@ impl Pll {
         }
     }
 
-    /// Advances by one period with the latest correction and the slip. `rotor_freq` is the speed state;
-    /// frequencies in electrical turns per period. (The drive checks that it is finite and within limits.)
+    /// Advances by one period with the latest correction and the slip, and with the `turning` that the observer sees by its
+    /// weight. `rotor_freq` is the speed state; frequencies in electrical turns per period. (The drive checks that it is
+    /// finite and within limits.)
     pub fn step(
         state: &mut TrackerState,
         rotor_freq: &mut f32,
         correction: PllCorrection,
         slip_freq: f32,
+        turning: &Turning,
     ) {
-        state.acceleration += correction.acceleration;
-        *rotor_freq += correction.speed + state.acceleration;
-        state.freq = *rotor_freq + slip_freq;
-        state.angle += Angle::within_turn(state.freq + correction.angle);
+        let w = turning.weight;
+        let seen_rotor = turning.turned - turning.slip;
+        state.acceleration =
+            (state.acceleration + (1.0 - w) * correction.acceleration) * (1.0 - FORGETTING * w);
+        *rotor_freq += (1.0 - w) * (correction.speed + state.acceleration)
+            + w * ROTOR_SMOOTHING * (seen_rotor - *rotor_freq);
+        let freq = *rotor_freq + slip_freq;
+        let tracked = freq + correction.angle;
+        // The turn is that of an older current: the change of the speed since then is made up for.
+        let seen = turning.turned + turning.age * (freq - state.freq);
+        state.freq = freq;
+        state.angle += Angle::within_turn(tracked + w * (seen - tracked));
     }
 }
 
@@ -192,7 +208,7 @@ mod tests {
         for k in 0..periods {
             error = Angle::from_turns(truth(f64::from(k)) as f32) - state.angle;
             let push = pll.correction(error.to_radians(), share, known);
-            Pll::step(&mut state, &mut rotor_freq, push, 1e-4);
+            Pll::step(&mut state, &mut rotor_freq, push, 1e-4, &Turning::default());
         }
         (error.to_turns().into(), rotor_freq)
     }

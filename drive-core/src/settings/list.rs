@@ -80,6 +80,9 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     auto!("injection.tracked_rpm", injection.synchronous.tracked_rpm, Settings::tracked_rpm, "rpm", "speed that trips without an encoder").from_to(1.0, 20_000.0),
     word!("injection.beside_encoder", injection.beside_encoder: bool, "whether the carrier is injected beside an encoder"),
 
+    word!("observer.enabled", observer.enabled: bool, "whether the voltage of the motor gives the angle at speed, where the injection ends"),
+    number!("observer.leakage_slope", observer.leakage_slope, "1/A", "relative change of the mean leakage inductance per ampere").from_to(-1.0, 1.0),
+
     // A trip level beyond the sensors' range would never be reached.
     auto!("limits.trip_a", limits.trip_a, Settings::trip_a, "A", "phase current that trips").beside(|s| (0.05, s.sensor_range_a())),
     auto!("limits.current_a", limits.current_a, Settings::current_limit_a, "A", "largest current that is regulated, peak").beside(|s| (0.01, s.trip_a())),

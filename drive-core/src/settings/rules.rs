@@ -293,6 +293,11 @@ impl Settings {
             && self.injection.demodulator == crate::carrier::DemodulatorKind::Synchronous
     }
 
+    /// Whether the observer takes the angle over from the injection at speed.
+    pub(crate) fn uses_observer(&self) -> bool {
+        self.tracks_synchronously() && self.observer.enabled
+    }
+
     /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
     fn share_of_poles(&self, on_reference: f32) -> f32 {
         on_reference * POLE_PAIRS / f32::from(self.motor.pole_pairs)

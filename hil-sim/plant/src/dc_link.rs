@@ -21,7 +21,7 @@ pub struct DcLinkSettings {
     pub ripple_hz: f64,
     /// Capacitor behind a rectifier, F; 0 is a stiff link.
     pub capacitor: f64,
-    /// Pulses of the rectifier per mains period: 2 (one phase) or 6 (three phases).
+    /// Pulses of the rectifier per mains period: 2 (one phase), 6 (three phases), or 0 for a supply without ripple.
     pub pulses: u32,
     /// Frequency of the mains, Hz.
     pub mains_hz: f64,
@@ -31,7 +31,17 @@ pub struct DcLinkSettings {
     pub outage_at: f64,
     /// See `outage_at`.
     pub outage: f64,
-    /// Voltage at which the brake chopper goes on, V; 0 is none.
+    /// Start and duration of a sag of the mains, s; none with a duration of 0.
+    pub sag_at: f64,
+    /// See `sag_at`.
+    pub sag: f64,
+    /// Peak of the rectified mains meanwhile, V.
+    pub sag_v: f64,
+    /// Time in which the sag comes, and goes, s; within its duration.
+    pub sag_ramp: f64,
+    /// Power that others take from the link, W.
+    pub load: f64,
+    /// Voltage at which the brake chopper goes on by itself, V; 0 for one that the drive alone commands.
     pub chopper_v: f64,
     /// Its resistor, ohm.
     pub chopper: f64,
@@ -48,6 +58,11 @@ impl Default for DcLinkSettings {
             source: 1.0,
             outage_at: 0.0,
             outage: 0.0,
+            sag_at: 0.0,
+            sag: 0.0,
+            sag_v: 0.0,
+            sag_ramp: 0.01,
+            load: 0.0,
             chopper_v: 0.0,
             chopper: 100.0,
         }
@@ -66,6 +81,8 @@ impl DcLinkSettings {
 pub(crate) struct DcLink {
     settings: DcLinkSettings,
     pub nominal: f64,
+    /// Duty that the drive gives the chopper.
+    pub duty: f64,
     time: f64,
     braking: bool,
 }
@@ -77,16 +94,21 @@ impl DcLink {
         if s.capacitor != 0.0 {
             check("dc_link.capacitor", s.capacitor, 1e-6..=0.1, "F")?;
         }
-        if s.pulses != 2 {
-            check("dc_link.pulses", f64::from(s.pulses), 6.0..=6.0, "(or 2)")?;
+        if s.pulses != 0 && s.pulses != 2 {
+            check("dc_link.pulses", f64::from(s.pulses), 6.0..=6.0, "(or 0, 2)")?;
         }
         check("dc_link.mains_hz", s.mains_hz, 1.0..=1000.0, "Hz")?;
         check("dc_link.source", s.source, 0.01..=1000.0, "ohm")?;
         check("dc_link.outage_at", s.outage_at, 0.0..=1e6, "s")?;
         check("dc_link.outage", s.outage, 0.0..=1e6, "s")?;
+        check("dc_link.sag_at", s.sag_at, 0.0..=1e6, "s")?;
+        check("dc_link.sag", s.sag, 0.0..=1e6, "s")?;
+        check("dc_link.sag_v", s.sag_v, RANGE, "V")?;
+        check("dc_link.sag_ramp", s.sag_ramp, 1e-4..=1e6, "s")?;
+        check("dc_link.load", s.load, 0.0..=1e6, "W")?;
         check("dc_link.chopper_v", s.chopper_v, RANGE, "V")?;
         check("dc_link.chopper", s.chopper, 0.1..=1e6, "ohm")?;
-        Ok(Self { settings: *s, nominal, time: 0.0, braking: false })
+        Ok(Self { settings: *s, nominal, duty: 0.0, time: 0.0, braking: false })
     }
 
     /// Whether the voltage changes at all.
@@ -104,9 +126,11 @@ impl DcLink {
         }
         self.braking =
             s.chopper_v > 0.0 && v > s.chopper_v * if self.braking { CHOPPER_OFF } else { 1.0 };
-        let braked = if self.braking { h * v * v / s.chopper } else { 0.0 };
+        let duty = if self.braking { 1.0 } else { self.duty };
+        // What others take stops with the voltage.
+        let taken = taken + h * (duty * v * v / s.chopper + if v > 0.0 { s.load } else { 0.0 });
         // The energy of the capacitor is balanced, not its charge: exact for a constant power.
-        let alone = (v * v - 2.0 * (taken + braked) / s.capacitor).max(0.0).sqrt();
+        let alone = (v * v - 2.0 * taken / s.capacitor).max(0.0).sqrt();
         let mains = self.mains();
         let weight = h / (s.source * s.capacitor);
         let charged = if mains > alone { (alone + weight * mains) / (1.0 + weight) } else { alone };
@@ -120,9 +144,20 @@ impl DcLink {
         if since >= 0.0 && since < s.outage {
             return 0.0;
         }
+        if s.pulses == 0 {
+            return self.peak();
+        }
         let sector = if s.pulses == 2 { PI } else { FRAC_PI_3 };
         // Time is not negative.
         let pulses = TAU * s.mains_hz * self.time / sector + 0.5;
-        self.nominal * (sector * (pulses.fract() - 0.5)).cos()
+        self.peak() * (sector * (pulses.fract() - 0.5)).cos()
+    }
+
+    /// Its peak, V.
+    fn peak(&self) -> f64 {
+        let s = &self.settings;
+        let since = self.time - s.sag_at;
+        let there = since.min(s.sag - since) / s.sag_ramp;
+        self.nominal + (s.sag_v - self.nominal) * there.clamp(0.0, 1.0)
     }
 }

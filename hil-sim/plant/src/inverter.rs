@@ -14,7 +14,7 @@ use drive_core::Compare;
 use serde::{Deserialize, Serialize};
 
 use crate::averaged::Averaged;
-use crate::complex::clarke;
+use crate::complex::{Complex, clarke, phases, square};
 use crate::error::{PlantError, check};
 
 /// Settings of the inverter.
@@ -139,6 +139,16 @@ impl Inverter {
         check("inverter.dead_time_us", us, 0.0..=10.0, "us")?;
         self.dead_time = (us + self.extra_us) * 1e-6;
         Ok(())
+    }
+
+    /// Power that the switches turn into heat at this current, W: none while the outputs are off, whose diodes are
+    /// ideal. The dead time costs voltage but no energy.
+    pub(crate) fn conduction_loss(&self, i: Complex) -> f64 {
+        if !self.previous.enabled {
+            return 0.0;
+        }
+        let magnitudes: f64 = phases(i).iter().map(|i| i.abs()).sum();
+        self.residual * magnitudes + 1.5 * self.on_resistance * square(i)
     }
 
     /// Fraction of the period for which each leg is commanded high.

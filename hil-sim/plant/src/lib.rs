@@ -152,6 +152,7 @@ impl Plant {
                 sensors: Sensors::new(&settings.measurement)?,
                 substeps: settings.substeps,
                 open: None,
+                taken: 0.0,
             },
             dc_link: DcLink::new(&settings.dc_link, settings.inverter.vdc)?,
             warming: Warming::new(&settings.warming, &settings.machine)?,
@@ -201,7 +202,7 @@ impl Plant {
         let around = &mut self.around;
         if self.dc_link.moves() {
             let i = whichever!(&self.motor, motor => motor.state.electrical.current());
-            let taken = 1.5 * (i.conj() * self.applied).re * period_s;
+            let taken = around.taken + around.inverter.conduction_loss(i) * period_s;
             around.inverter.vdc = self.dc_link.after(around.inverter.vdc, taken, period_s);
         }
         around.sensors.follow_dc_link(around.inverter.vdc, period_s);
@@ -296,6 +297,22 @@ impl Plant {
         self.around.inverter.set_dc_link(vdc)?;
         self.dc_link.nominal = vdc;
         Ok(())
+    }
+
+    /// Changes the peak of the rectified mains alone, V, behind which a capacitor keeps its voltage; without one as
+    /// [`Self::set_dc_link`].
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    pub fn set_mains(&mut self, peak: f64) -> Result<(), PlantError> {
+        let held = self.dc_link();
+        self.set_dc_link(peak)?;
+        if self.dc_link.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
+    }
+
+    /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.
+    pub fn set_chopper(&mut self, duty: f64) {
+        self.dc_link.duty = duty.clamp(0.0, 1.0);
     }
 
     /// Slopes of the phase currents while the terminals are shorted, A/s.

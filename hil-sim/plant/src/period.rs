@@ -23,6 +23,8 @@ pub(crate) struct Around {
     pub substeps: u32,
     /// The interrupted phase, 0 to 2.
     pub open: Option<usize>,
+    /// Energy that inverter and motor have taken from the dc link in the last period, J.
+    pub taken: f64,
 }
 
 impl Around {
@@ -36,6 +38,7 @@ impl Around {
     ) -> Complex {
         motor.begin_period();
         self.sensors.begin_period(period);
+        self.taken = 0.0;
         let volt_seconds = if !compare.enabled {
             self.freewheel(motor, period)
         } else if self.inverter.switched {
@@ -62,7 +65,9 @@ impl Around {
         motor.begin_step();
         let volt_seconds = step(motor, &self.inverter);
         motor.end_step(h);
-        self.sensors.follow(before, motor.state.electrical.current(), h);
+        let after = motor.state.electrical.current();
+        self.sensors.follow(before, after, h);
+        self.taken += 1.5 * (((before + after) * 0.5).conj() * volt_seconds).re;
         volt_seconds
     }
 

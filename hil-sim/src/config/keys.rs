@@ -222,8 +222,8 @@ keys! {
         ripple_hz: f64 = 100.0, [0.1 .. 3000], "Hz";
         /// Capacitor behind a rectifier, with no way back to the mains; 0 for a stiff link.
         capacitor_f: f64 = 0.0, [0 .. 0.1], "F";
-        /// Pulses of the rectifier per mains period: 2 or 6.
-        pulses: u32 = 6, [2 .. 6], "";
+        /// Pulses of the rectifier per mains period: 2 or 6; 0 for a supply without ripple.
+        pulses: u32 = 6, [0 .. 6], "";
         /// Frequency of the mains.
         mains_hz: f64 = 50.0, [1 .. 1000], "Hz";
         /// Resistance of mains and rectifier.
@@ -232,7 +232,17 @@ keys! {
         outage_at_s: f64 = 0.0, [0 .. 1e6], "s";
         /// Duration of the outage; 0 for none.
         outage_s: f64 = 0.0, [0 .. 1e6], "s";
-        /// Voltage at which the brake chopper goes on; unset: no chopper.
+        /// Start of a sag of the mains.
+        sag_at_s: f64 = 0.0, [0 .. 1e6], "s";
+        /// Duration of the sag; 0 for none.
+        sag_s: f64 = 0.0, [0 .. 1e6], "s";
+        /// Peak of the rectified mains meanwhile.
+        sag_v: f64 = 230.0, [0 .. 1000], "V";
+        /// Time in which the sag comes, and goes.
+        sag_ramp_s: f64 = 0.01, [0.0001 .. 1e6], "s";
+        /// Power that others take from the link.
+        load_w: f64 = 0.0, [0 .. 1e6], "W";
+        /// Voltage at which the brake chopper goes on by itself; unset: when the drive says so.
         chopper_v: Option<f64> = None, [10 .. 1000], "V";
         /// Resistor of the chopper.
         chopper: f64 = 100.0, [0.1 .. 1e6], "ohm";
@@ -323,6 +333,13 @@ keys! {
         load_share: f64 = 0.4, [0 .. 2], "";
         /// Whether the drive learns anew for every twelve runs; otherwise once, unless disturbances are drawn.
         relearn: bool = false, [switch], "";
+    }
+    /// The experiment full-range.
+    "full_range." full_range: FullRangeConfig {
+        /// The one kind of runs; unset: all.
+        kind: Option<RangeKind> = None, [RangeKind], "";
+        /// The one run, by its number, with a record of it; unset: all.
+        index: Option<u32> = None, [0 .. 1e9], "";
     }
     /// Disturbances of the battery: all those of the page Statistics together, in relation to their full sizes.
     "disturbed." disturbed: DisturbedConfig {

@@ -155,12 +155,16 @@ macro_rules! words {
         impl $name {
             /// How the variants are written.
             pub const WORDS: &'static [&'static str] = &[$($word,)+];
+
+            /// How it is written.
+            pub const fn word(self) -> &'static str {
+                match self { $(Self::$variant => $word,)+ }
+            }
         }
 
         impl crate::config::value::Field for $name {
             fn to_value(&self) -> crate::config::value::Value {
-                let word = match self { $(Self::$variant => $word,)+ };
-                crate::config::value::Value::Word(word.to_owned())
+                crate::config::value::Value::Word(self.word().to_owned())
             }
             fn from_value(
                 value: &crate::config::value::Value,

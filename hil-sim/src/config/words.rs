@@ -69,6 +69,36 @@ words! {
 }
 
 words! {
+    /// What the drive is asked for in runs over the whole speed range.
+    RangeKind {
+        /// Constant torque at constant speed.
+        Constant = "constant",
+        /// Steps of the torque between its limits at constant speed.
+        Reversals = "reversals",
+        /// Load steps at a regulated speed.
+        LoadSteps = "load-steps",
+        /// Ramps of the speed through zero.
+        Ramps = "ramps",
+        /// The same, and the motor warms up on the way.
+        HotRamps = "hot-ramps",
+        /// Constant torque with a drive that is wrong about its motor.
+        WrongParameters = "wrong-parameters",
+        /// The flux turned at once under constant torque.
+        TurnedFlux = "turned-flux",
+        /// Start on a turning shaft without flux.
+        TurningStart = "turning-start",
+        /// The same soon after a stop, with flux left.
+        ResidualStart = "residual-start",
+        /// Stop of a large inertia on a dc link that takes no energy back.
+        Braking = "braking",
+        /// Mains outage.
+        Outage = "outage",
+        /// Sag of the dc link under torque.
+        Sag = "sag",
+    }
+}
+
+words! {
     /// A phase that is interrupted between inverter and motor.
     OpenPhase {
         /// None.

@@ -15,8 +15,11 @@ mod trial;
 
 use std::sync::OnceLock;
 
+pub(super) use bench::{Bench, Moment};
 pub use drive::{Condition, DriveUnderTest, Purpose};
 pub use kind::{KINDS, Kind, nominal_limit_a, torque_nm};
+pub(super) use kind::{LoadTorque, Part, Shaft};
+pub(super) use run::{LONGEST_START_S, bring_up, follow};
 pub use run::{learned, trial};
 pub use summary::Summary;
 pub use trial::Trial;

@@ -19,7 +19,7 @@ use crate::image::Image;
 use crate::pair::Pair;
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
-const BLOCKS: [(&str, &str); 10] = [
+const BLOCKS: [(&str, &str); 12] = [
     (
         "sensing",
         "drive_core::current::sensing induction_drive::chip::adc \
@@ -31,6 +31,11 @@ const BLOCKS: [(&str, &str); 10] = [
          drive_core::protect::lock_monitor",
     ),
     ("injection", "drive_core::carrier::injection drive_core::protect::saliency_check"),
+    (
+        "observer",
+        "drive_core::drive::fundamental drive_core::flux::observer drive_core::flux::hand_over",
+    ),
+    ("limits", "drive_core::current::voltage_limit"),
     ("tracker", "drive_core::flux::tracker"),
     (
         "estimator",
@@ -42,8 +47,7 @@ const BLOCKS: [(&str, &str); 10] = [
     ("modulation", "drive_core::current::modulation drive_core::current::dead_time"),
     (
         "frames, filters",
-        "drive_core::math::frames drive_core::filter::dissertation drive_core::filter::sos \
-         drive_core::math::angle idsp::",
+        "drive_core::math::frames drive_core::filter::sos drive_core::math::angle idsp::",
     ),
     ("identification", "drive_core::identify::online drive_core::identify::rls"),
     ("sequence", "drive_core::drive drive_core::motion"),

@@ -19,9 +19,13 @@ fn built(source: AngleSource) -> Coefficients {
 #[test]
 fn limits_and_times_are_those_of_the_settings_in_periods() {
     let c = built(AngleSource::Encoder);
-    // Two pole pairs and 6 kHz; without a sensor 700 rpm.
-    near(c.protection.rotor_freq, 2000.0 / 60.0 * 2.0 / 6000.0);
-    near(built(AngleSource::Injection).protection.rotor_freq, 700.0 / 60.0 * 2.0 / 6000.0);
+    // Two pole pairs and 6 kHz; with the injection alone 700 rpm.
+    let (any, tracked) = (2000.0 / 60.0 * 2.0 / 6000.0, 700.0 / 60.0 * 2.0 / 6000.0);
+    near(c.protection.rotor_freq, any);
+    near(built(AngleSource::Injection).protection.rotor_freq, any);
+    let mut alone = Settings::default();
+    alone.observer.enabled = false;
+    near(alone.build().unwrap().protection.rotor_freq, tracked);
     near(c.freq_per_speed, 2.0 / 6000.0);
     near(c.protection.current_squared, 3.5 * 3.5);
     near(c.current_lag, 0.18);
@@ -72,7 +76,7 @@ fn the_axes_lead_and_lag_by_the_delays() {
     let mut axes = Axes::default();
     let step = 50.0 / 6000.0;
     let ahead = UnitVector { cos: 0.0, sin: 1.0 };
-    c.turn(&mut axes, step, ahead);
+    c.turn(&mut axes, step, ahead, false);
     let degrees = |axis: UnitVector| axis.sin.atan2(axis.cos).to_degrees();
     let turned = |samples: f32| samples * step * 360.0;
     assert!((degrees(axes.applied) - turned(1.5)).abs() < 1e-2);

@@ -1,4 +1,5 @@
 //! What the tests of the effects share.
+#![allow(dead_code)] // not every test needs all of it
 
 use drive_core::Compare;
 use motor_plant::{

@@ -12,12 +12,15 @@ use crate::plant::{Load, Plant, PlantSettings};
 use crate::rig::{RATE_HZ, wrapped_degrees};
 use crate::stats::Stats;
 
-/// An error beyond this, degrees, is wrong.
+/// An error beyond this, degrees, is wrong, unless the run says otherwise.
 const WRONG_DEG: f64 = 30.0;
 /// Flux in relation to its nominal value that is off: below the first, above the second.
 const FLUX_OFF: (f64, f64) = (0.5, 2.0);
 /// A state lasts on over interruptions up to this, s: an angle that runs through has a sound one now and then.
 const GAP_S: f64 = 0.1;
+
+/// Periods between two moments of a record: 5 ms.
+const TRACE_EVERY: u64 = 30;
 
 /// How long a state lasts at the longest.
 #[derive(Default)]
@@ -38,6 +41,25 @@ impl Lasting {
     }
 }
 
+/// A moment of a run that is recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Time, s.
+    pub t: f64,
+    /// Angle error while the drive regulates, degrees.
+    pub error_deg: f64,
+    /// Speed of the shaft, rpm.
+    pub rpm: f64,
+    /// Torque of the motor, Nm.
+    pub torque: f64,
+    /// Length of the stator current, A peak.
+    pub current: f64,
+    /// Length of the rotor flux, Wb peak.
+    pub flux: f64,
+    /// The dc link, V.
+    pub dc_link: f64,
+}
+
 /// A drive and a plant, and what is seen of them.
 pub struct Bench<D> {
     /// The plant.
@@ -52,9 +74,21 @@ pub struct Bench<D> {
     pub counted_from: Option<f64>,
     /// Torque of the motor over the same time, Nm.
     pub torque: Stats,
-    error: Stats,
+    /// Angle error over the same time, degrees.
+    pub error: Stats,
+    /// Angle error at the last sample, degrees.
+    pub error_deg: f64,
+    /// Largest error since the start, degrees.
+    pub largest_deg: f64,
+    /// An error beyond this, degrees, is wrong.
+    pub wrong_deg: f64,
+    /// Largest phase current, A.
+    pub peak_a: f64,
+    /// Least and largest voltage of the dc link, V.
+    pub dc_link_v: (f64, f64),
+    /// The record of the run, where one is wanted.
+    pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
-    largest_deg: f64,
     wrong: Lasting,
     flux_off: Lasting,
     /// Whether angle or flux was off at any time since the first reference, and whether one is now.
@@ -89,8 +123,13 @@ impl<D: DriveUnderTest> Bench<D> {
             counted_from: None,
             torque: Stats::default(),
             error: Stats::default(),
-            counts: vec![0; LARGEST_CLASS + 1],
+            error_deg: 0.0,
             largest_deg: 0.0,
+            wrong_deg: WRONG_DEG,
+            peak_a: 0.0,
+            dc_link_v: (settings.inverter.vdc, settings.inverter.vdc),
+            trace: None,
+            counts: vec![0; LARGEST_CLASS + 1],
             wrong: Lasting::default(),
             flux_off: Lasting::default(),
             was_off: false,
@@ -111,9 +150,43 @@ impl<D: DriveUnderTest> Bench<D> {
         if !compare.enabled {
             self.pending = Compare::OFF;
         }
+        self.plant.set_chopper(self.drive.chopper());
         self.plant.advance(&self.pending, 1.0 / RATE_HZ);
+        self.peak_a = self.plant.phase_currents().iter().fold(self.peak_a, |a, i| a.max(i.abs()));
+        let (least, most) = self.dc_link_v;
+        let v = self.plant.dc_link();
+        self.dc_link_v = (least.min(v), most.max(v));
+        if self.periods.is_multiple_of(TRACE_EVERY) {
+            self.record();
+        }
         self.pending = compare;
         self.periods += 1;
+    }
+
+    /// Adds the present moment to the record.
+    fn record(&mut self) {
+        let (t, plant, error_deg) = (self.time(), &self.plant, self.error_deg);
+        let Some(trace) = &mut self.trace else { return };
+        let regulates = self.drive.condition() == Condition::Regulating;
+        trace.push(Moment {
+            t,
+            error_deg: if regulates { error_deg } else { f64::NAN },
+            rpm: plant.mechanical_speed() * 60.0 / TAU,
+            torque: plant.torque(),
+            current: plant.current().norm(),
+            flux: plant.rotor_flux().norm(),
+            dc_link: plant.dc_link(),
+        });
+    }
+
+    /// Longest time for which the angle was wrong, s.
+    pub fn wrong_s(&self) -> f64 {
+        self.wrong.longest
+    }
+
+    /// For some seconds, whatever the drive does.
+    pub fn coast(&mut self, seconds: f64) {
+        (0..(seconds * RATE_HZ).round() as u64).for_each(|_| self.step());
     }
 
     /// Until the drive has left [`Condition::Busy`], or for so many seconds.
@@ -153,8 +226,9 @@ impl<D: DriveUnderTest> Bench<D> {
             }
             let error = wrapped_degrees(flux.arg() - self.drive.flux_turns() * TAU);
             let share = flux.norm() / self.nominal_flux;
+            self.error_deg = error;
             let (wrong, flux_off) =
-                (error.abs() > WRONG_DEG, share < FLUX_OFF.0 || share > FLUX_OFF.1);
+                (error.abs() > self.wrong_deg, share < FLUX_OFF.0 || share > FLUX_OFF.1);
             self.wrong.push(t, wrong);
             self.flux_off.push(t, flux_off);
             self.is_off = wrong || flux_off;

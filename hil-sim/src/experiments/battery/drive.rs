@@ -58,6 +58,12 @@ pub trait DriveUnderTest: Clone + Send + Sync {
     /// # Errors
     /// The reason why it is refused.
     fn speed(&mut self, rpm: f32) -> Result<(), String>;
+    /// Stops; a drive that does not know how goes on.
+    fn stop(&mut self) {}
+    /// Duty that it gives the brake chopper, 0 to 1.
+    fn chopper(&self) -> f64 {
+        0.0
+    }
     /// What it does.
     fn condition(&self) -> Condition;
     /// Its estimate of the angle of the rotor flux at the last sample, electrical turns.
@@ -88,6 +94,11 @@ impl DriveUnderTest for Drive {
 
     fn speed(&mut self, rpm: f32) -> Result<(), String> {
         command(self, &Command::Speed(rpm))
+    }
+
+    fn stop(&mut self) {
+        // Refused by a drive that is not on.
+        let _ = command(self, &Command::Stop);
     }
 
     fn condition(&self) -> Condition {

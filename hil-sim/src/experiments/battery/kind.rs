@@ -138,7 +138,8 @@ pub struct Part {
 }
 
 impl Part {
-    fn constant(reference: f64, seconds: f64) -> Self {
+    /// A constant reference.
+    pub fn constant(reference: f64, seconds: f64) -> Self {
         let reference = (reference, reference);
         Self { reference, load: LoadTorque::Nm(0.0), turn_deg: 0.0, seconds }
     }

@@ -20,7 +20,7 @@ const PACE_S: f64 = 0.01;
 /// How fast the dynamometer gets up to speed, rpm/s.
 const RAMP_RPM_PER_S: f64 = 600.0;
 /// Longest start and longest learning, s.
-const LONGEST_START_S: f64 = 30.0;
+pub const LONGEST_START_S: f64 = 30.0;
 const LONGEST_LEARNING_S: f64 = 1000.0;
 /// Lets a drive learn with the shaft locked; returns it off, or the number of the fault with which it refused.
 ///
@@ -73,6 +73,7 @@ pub fn trial<D: DriveUnderTest>(
     }
     let mut still = bring_up(&mut bench, kind.shaft(), config)?;
     if still {
+        bench.counted_from = Some(bench.time() + SETTLING_S);
         let taken = follow(&mut bench, purpose, config, &parts)?;
         still = taken.is_some();
         let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
@@ -94,7 +95,10 @@ fn limit_share<D: DriveUnderTest>(config: &Config, drive: &D) -> Option<f64> {
 }
 
 /// Brings a held shaft up to speed without torque; says whether the drive regulated to the end.
-fn bring_up<D: DriveUnderTest>(
+///
+/// # Errors
+/// When the plant is refused.
+pub fn bring_up<D: DriveUnderTest>(
     bench: &mut Bench<D>,
     shaft: Shaft,
     config: &Config,
@@ -113,13 +117,15 @@ fn bring_up<D: DriveUnderTest>(
 
 /// Follows the references. Returns the last one as the drive has taken it, A or rpm; none when it did not regulate to the
 /// end.
-fn follow<D: DriveUnderTest>(
+///
+/// # Errors
+/// When the plant is refused, or the drive refuses a reference.
+pub fn follow<D: DriveUnderTest>(
     bench: &mut Bench<D>,
     purpose: Purpose,
     config: &Config,
     parts: &[Part],
 ) -> Result<Option<f64>, Error> {
-    bench.counted_from = Some(bench.time() + SETTLING_S);
     let mut taken = 0.0;
     for part in parts {
         if purpose == Purpose::Speed {

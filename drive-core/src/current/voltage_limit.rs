@@ -1,0 +1,115 @@
+//! Currents that the voltage of the dc link allows: field weakening, and the limit of the torque current; once a carrier period.
+//!
+//! With `w = |w_s|` and `U` the voltage that may be used, 0.92 of the largest vector and of what the carrier takes, times a trim,
+//!
+//! ```text
+//! i_q of the leakage   i_u = 0.7 U/(w sigma L_s)
+//! direct current       i_d <= (sqrt(U^2 - (w sigma L_s min(|i_q|, i_u))^2) - r_s s |i_q|)/(w L_s)     s = sign(i_q w_s)
+//! torque current       |i_q| <= min(sqrt(I^2 - i_d^2), i_u)
+//! trim                 d trim/dt = -5 (|u| - U)/U per second, within 0.6 .. 1
+//! ```
+//!
+//! The direct current stays within 15 % of its setting and the setting, and comes first: a torque current without flux gives
+//! no torque. The feed-forward does the work; the trim takes 0.2 s for what the parameters miss. (A main flux that saturates
+//! needs less direct current for the same flux.)
+
+use core::f32::consts::TAU;
+
+use crate::carrier::injection::CARRIER_SAMPLES;
+use crate::io::PERIOD_S;
+use crate::math::frames::Dq;
+use crate::settings::Motor;
+
+/// Share of the voltage that is used: the rest is for the current controllers.
+const USED: f32 = 0.92;
+/// Share of the voltage that the leakage may take.
+const FOR_LEAKAGE: f32 = 0.7;
+/// Least direct current, as a share of the setting.
+const LEAST: f32 = 0.15;
+/// Change of the trim in a carrier period per relative excess of the voltage.
+const TRIM: f32 = 5.0 * CARRIER_SAMPLES as f32 * PERIOD_S;
+/// Least trim.
+const LEAST_TRIM: f32 = 0.6;
+
+/// Coefficients of the limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoltageLimit {
+    r_s: f32,
+    leakage: f32,
+    stator: f32,
+    /// Setting of the direct current, A.
+    i_d: f32,
+    /// Square of the largest current, A^2.
+    current_squared: f32,
+}
+
+/// State of the limit, with its results.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VoltageLimitState {
+    trim: f32,
+    /// Most direct and torque current, A.
+    pub most: Dq,
+}
+
+impl VoltageLimit {
+    /// Limit for a motor at the direct current `i_d`, A, with currents up to `largest_a`, A peak.
+    pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
+        let leakage = motor.sigma_l_s();
+        Self {
+            r_s: motor.r_s,
+            leakage,
+            stator: leakage + motor.coupled_inductance(),
+            i_d,
+            current_squared: largest_a * largest_a,
+        }
+    }
+
+    /// State without a limit.
+    pub fn start(&self) -> VoltageLimitState {
+        let i_q = libm::sqrtf(self.current_squared - self.i_d * self.i_d);
+        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q } }
+    }
+
+    /// Updates the limits with the `current` reference, A, the `voltage` of the step, V, the `largest` voltage vector that the
+    /// carrier leaves, V, and the frequency of the flux, electrical turns per period. With a carrier the flux is `kept`: what
+    /// the injection has learned is that of one direct current.
+    pub fn step(
+        &self,
+        state: &mut VoltageLimitState,
+        current: Dq,
+        voltage: Dq,
+        largest: f32,
+        flux_freq: f32,
+        kept: bool,
+    ) {
+        let whole = USED * largest;
+        let available = whole * state.trim;
+        let w = flux_freq.abs() * (TAU / PERIOD_S) + 1.0;
+        let length = libm::sqrtf(voltage.length_squared());
+        let trim = state.trim - TRIM * (length - whole) / whole;
+        state.trim = if trim < LEAST_TRIM {
+            LEAST_TRIM
+        } else if trim < 1.0 {
+            trim
+        } else {
+            1.0
+        };
+
+        let by_leakage = FOR_LEAKAGE * available / (w * self.leakage);
+        let i_q = current.q.abs();
+        let drop = self.r_s * if current.q * flux_freq < 0.0 { -i_q } else { i_q };
+        let across = w * self.leakage * if i_q < by_leakage { i_q } else { by_leakage };
+        let along = libm::sqrtf(available * available - across * across) - drop;
+        let i_d = along / (w * self.stator);
+        // NaN gives the setting; the step finds it.
+        let i_d = if kept || !(i_d < self.i_d) {
+            self.i_d
+        } else if i_d < LEAST * self.i_d {
+            LEAST * self.i_d
+        } else {
+            i_d
+        };
+        let rest = libm::sqrtf(self.current_squared - i_d * i_d);
+        state.most = Dq { d: i_d, q: if rest < by_leakage { rest } else { by_leakage } };
+    }
+}

@@ -1,0 +1,56 @@
+//! The observer of the fundamental wave, beside the injection.
+
+use core::f32::consts::TAU;
+
+use super::ControlState;
+use super::in_turn::StepResults;
+use crate::drive::coefficients::Coefficients;
+use crate::flux::hand_over::Turning;
+use crate::math::angle::UnitVector;
+use crate::math::frames::{AlphaBeta, Dq};
+
+/// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
+const COMPARED_FROM: f32 = 0.3;
+/// Frequency of the stator up to which the flux shows the stator resistance, turns per period.
+const RESISTANCE_UP_TO: f32 = 6.0 * crate::io::PERIOD_S;
+
+impl Coefficients {
+    /// One period of the observer; the turn of the flux that it sees. `current` is the one that is regulated, `phi` the
+    /// axis of the flux at the sample.
+    pub(super) fn observe_fundamental(
+        &self,
+        s: &mut ControlState,
+        index: usize,
+        held: bool,
+        current: AlphaBeta,
+        phi: UnitVector,
+    ) -> Turning {
+        let Some(observer) = &self.observer else { return Turning::default() };
+        let filtered = !s.hand_over.silent;
+        let (state, weight) = (&mut s.observer, s.hand_over.weight);
+        observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
+        if weight == 0.0 && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
+            observer.track_resistance(state, held);
+        }
+        const PER_RADIAN: f32 = 1.0 / TAU;
+        let (turned, slip) = (state.turned * PER_RADIAN, state.slip * PER_RADIAN);
+        s.hand_over.turning(index, turned, slip, observer.ages[usize::from(filtered)])
+    }
+
+    /// The slow part of the observer.
+    pub(super) fn update_observer(&self, s: &mut ControlState, step: &StepResults) {
+        let Some(observer) = &self.observer else { return };
+        let weight = s.hand_over.weight;
+        observer.update(&mut s.observer, step.rotor_freq);
+        if weight > COMPARED_FROM && s.hand_over.demodulates() {
+            let error = s.estimator.angle_error;
+            observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
+        }
+        let reference = s.seen.reference;
+        s.induced = if weight > 0.0 {
+            observer.induced(&s.observer, reference, step.flux_freq) * weight
+        } else {
+            Dq::ZERO
+        };
+    }
+}

@@ -1,0 +1,183 @@
+//! The whole range of the speed: torque, load steps, ramps, wrong parameters, turned flux, starts on a turning shaft, and the
+//! dc link, per region of the speed.
+//!
+//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless `sequence.i_d` says otherwise; the
+//! drive learns its tables at that current first.
+
+mod case;
+mod summary;
+mod trial;
+
+use std::sync::OnceLock;
+
+use drive_core::Drive;
+use drive_core::carrier::DemodulatorKind;
+use drive_core::settings::{AngleSource, Flux};
+
+use case::Case;
+use trial::{Run, Trial};
+
+use super::battery::{Moment, learned, seed_of};
+use super::statistics::{Study, whole};
+use super::torque::assumptions;
+use super::{BENCH, Context, DRIVE, Experiment};
+use crate::config::{Config, FluxLevel, PlantModel, RangeKind, check_model, plant_settings};
+use crate::error::Error;
+use crate::outcome::Outcome;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "full-range",
+    stands_for: "beyond the dissertation",
+    about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
+            the drive does not notice.",
+    uses: &[BENCH, DRIVE, &["full_range.", "runs"]],
+    not: &[&["dc_link."]],
+    run: whole::<FullRange>,
+};
+
+/// Runs of a kind in a region, unless `runs` says otherwise.
+const RUNS: u32 = 10;
+/// Direct current of model A, A on the dissertation's motor.
+const I_D_A: f64 = 1.4;
+/// Settings of the drive for the range, where they are not set: largest speed, speed that trips, rpm; ramp, rpm/s; of four
+/// poles.
+const LIMIT_RPM: f64 = 3600.0;
+const TRIP_RPM: f64 = 4500.0;
+const RAMP_RPM_PER_S: f64 = 1000.0;
+/// Errors of what a drive believes that has learned a motor which then changes: leakage, stator resistance, magnetising
+/// inductance; each with both signs.
+const WRONG: (f64, f64, f64) = (0.05, 0.3, 0.1);
+/// The drives: one of the motor's own shaft, and one of a heavy shaft.
+const DRIVES: usize = 2;
+
+/// The configuration with what the whole range needs and does not say.
+///
+/// # Errors
+/// As [`check_model`].
+pub fn for_the_range(config: &Config) -> Result<Config, Error> {
+    let mut config = config.clone();
+    let speed = |rpm: f64| Some(config.rpm(rpm) as f32);
+    let (limit, trip, ramp) = (speed(LIMIT_RPM), speed(TRIP_RPM), speed(RAMP_RPM_PER_S));
+    let i_d = config.amperes(I_D_A) as f32;
+    let drive = &mut config.drive;
+    drive.speed.limit_rpm = drive.speed.limit_rpm.or(limit);
+    drive.speed.ramp_rpm_per_s = drive.speed.ramp_rpm_per_s.or(ramp);
+    drive.limits.speed_rpm = drive.limits.speed_rpm.or(trip);
+    if drive.sequence.i_d.is_none() {
+        match config.model.plant {
+            PlantModel::A => drive.sequence.i_d = Some(i_d),
+            _ => (drive.sequence.flux, config.model.flux_level) = (Flux::High, FluxLevel::High),
+        }
+    }
+    check_model(&config)?;
+    Ok(config)
+}
+
+/// A drive of this configuration, off; it has learned where it can, or refused to with a fault of this number.
+///
+/// # Errors
+/// When the settings are refused.
+pub fn learned_drive(config: &Config, seed: u64) -> Result<Result<Drive, u8>, Error> {
+    let settings = &config.drive;
+    let drive = Drive::new(settings.build().map_err(Error::refused)?);
+    let tracks = settings.angle_source == AngleSource::Injection
+        && settings.injection.demodulator == DemodulatorKind::Synchronous;
+    if tracks { learned(config, &plant_settings(config), drive, seed) } else { Ok(Ok(drive)) }
+}
+
+/// A drive that has learned, or the number of the fault with which it refused to.
+type Learnt = Result<Drive, u8>;
+
+/// The runs: of each case one after the other, so that shards have their part of each.
+pub struct FullRange {
+    config: Config,
+    seed: u64,
+    cases: Vec<Case>,
+    /// The numbers of the runs.
+    numbers: Vec<usize>,
+    drives: [OnceLock<Learnt>; DRIVES],
+}
+
+impl FullRange {
+    fn case(&self, number: usize) -> Case {
+        self.cases[number % self.cases.len()]
+    }
+
+    /// The motor of a run of which the drive is wrong: one of eight choices of the signs.
+    fn changed(&self, number: usize, config: &Config) -> Config {
+        let (mut config, choice) = (config.clone(), number / self.cases.len());
+        let believed =
+            |bit: usize, by: f64| if choice >> bit & 1 == 1 { 1.0 + by } else { 1.0 - by };
+        let motor = &mut config.motor;
+        motor.l_ls /= believed(0, WRONG.0);
+        motor.l_lr /= believed(0, WRONG.0);
+        motor.r_s /= believed(1, WRONG.1);
+        motor.l_m /= believed(2, WRONG.2);
+        config
+    }
+
+    /// The drive of a run, which has learned where it can.
+    fn drive(&self, case: Case, config: &Config) -> Result<&Learnt, Error> {
+        let place = &self.drives[usize::from(case.kind == RangeKind::Braking)];
+        if let Some(drive) = place.get() {
+            return Ok(drive);
+        }
+        let drive = learned_drive(config, self.seed)?;
+        // Two threads that came at once found the same.
+        Ok(place.get_or_init(|| drive))
+    }
+
+    /// Does a run; with `traced` it is recorded.
+    fn done(&self, number: usize, traced: bool) -> Result<(Run, Vec<Moment>), Error> {
+        let (case, seed) = (self.case(number), seed_of(self.seed, number));
+        let mut config = self.config.clone();
+        trial::set_up(case, &mut config);
+        let drive = match self.drive(case, &config)? {
+            Err(fault) => return Ok((Run::unlearned(seed, *fault), Vec::new())),
+            Ok(drive) => drive,
+        };
+        if case.kind == RangeKind::WrongParameters {
+            config = self.changed(number, &config);
+        }
+        Trial::new(case, &config, drive, seed, traced)?.run(seed)
+    }
+}
+
+impl Study for FullRange {
+    type Record = Run;
+    const EXPERIMENT: &'static Experiment = &EXPERIMENT;
+
+    fn new(context: &Context<'_>) -> Result<Self, Error> {
+        let config = for_the_range(context.config)?;
+        let cases = Case::all(config.full_range.kind);
+        let each = config.extent.runs.unwrap_or(RUNS) as usize;
+        let numbers = match config.full_range.index {
+            Some(index) => vec![index as usize],
+            None => (0..each * cases.len()).collect(),
+        };
+        let drives = std::array::from_fn(|_| OnceLock::new());
+        Ok(Self { config, seed: context.seed, cases, numbers, drives })
+    }
+
+    fn runs(&self) -> usize {
+        self.numbers.len()
+    }
+
+    fn run(&self, place: usize) -> Result<Run, Error> {
+        Ok(self.done(self.numbers[place], false)?.0)
+    }
+
+    fn outcome(&self, _: &Context<'_>, runs: Vec<Run>) -> Result<Outcome, Error> {
+        let mut outcome = Outcome::default();
+        let done: Vec<(Case, usize, Run)> =
+            self.numbers.iter().zip(runs).map(|(&n, run)| (self.case(n), n, run)).collect();
+        summary::of(&self.cases, &done, &mut outcome);
+        if let Some(index) = self.config.full_range.index {
+            outcome.figures.push(summary::figure(&self.done(index as usize, true)?.1));
+        }
+        outcome.remarks = assumptions(&self.config);
+        outcome.remarks.push(summary::REMARK.to_owned());
+        Ok(outcome)
+    }
+}

@@ -1,0 +1,379 @@
+//! One run, and what is recorded of it.
+
+use std::f64::consts::TAU;
+
+use drive_core::Drive;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use super::case::{Case, sign};
+use crate::config::{Config, RangeKind, plant_settings};
+use crate::error::Error;
+use crate::experiments::battery::{
+    Bench, Condition, DriveUnderTest as _, LONGEST_START_S, LoadTorque, Moment, Part, Purpose,
+    Shaft, bring_up, follow, nominal_limit_a,
+};
+use crate::experiments::torque::LOST_DEG;
+use crate::plant::Load;
+use crate::stats::Stats;
+
+/// Least and largest constant torque current, in relation to the current limit.
+const TORQUE: (f64, f64) = (1.0 / 7.0, 6.0 / 7.0);
+/// Torque current of the steps and of the time after a start on a turning shaft, A on the dissertation's motor.
+const STEP_A: f64 = 3.0;
+const CAUGHT_A: f64 = 2.0;
+/// Load step, Nm on the dissertation's motor.
+const LOAD_NM: f64 = 0.97;
+/// Turn of the flux, degrees.
+const TURN_DEG: (f64, f64) = (90.0, 180.0);
+/// Rise of the resistances of stator and rotor on a hot ramp, and the time that it takes, s.
+const RISE: (f64, f64) = (0.2, 0.3);
+const WARMING_S: f64 = 3.0;
+/// Error within which a turning shaft is caught, degrees, and the longest time for it, s.
+const CAUGHT_DEG: f64 = 15.0;
+const LONGEST_CATCH_S: f64 = 3.0;
+/// Time without current before a start with flux left, s.
+const OFF_S: (f64, f64) = (0.02, 0.3);
+/// Inertia of the braked shaft in relation to the motor's, its ramp, rpm/s on four poles, and the longest stop, s.
+const HEAVY: f64 = 5.0;
+const HEAVY_RAMP_RPM_PER_S: f64 = 300.0;
+const LONGEST_STOP_S: f64 = 60.0;
+/// Speed at which it has stopped, rpm on four poles.
+const STOPPED_RPM: f64 = 30.0;
+/// The dc link of braking and outage: capacitor, resistance of the mains, other load.
+const CAPACITOR_F: f64 = 470e-6;
+const SOURCE_OHM: f64 = 2.0;
+const OTHERS_W: f64 = 5.0;
+const OUTAGE_S: f64 = 1.0;
+/// The sag: share of the dc link that is left, how long it takes to come and to go, how long it lasts.
+const SAG: f64 = 230.0 / 311.0;
+const SAG_RAMP_S: f64 = 0.01;
+const SAG_S: f64 = 1.0;
+
+/// What is recorded of a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Run {
+    /// Seed.
+    pub seed: u64,
+    /// Speed, rpm on four poles, and torque current, A, that were drawn.
+    pub rpm: f64,
+    /// See `rpm`.
+    pub i_q: f64,
+    /// Angle error, true minus estimated, degrees.
+    pub error: Stats,
+    /// Largest error while the drive regulated, until the flux is turned.
+    pub largest_deg: f64,
+    /// Longest time beyond 45° while it regulated, s.
+    pub silent_s: f64,
+    /// Largest phase current, A; from the start on the turning shaft on, where there is one.
+    pub peak_a: f64,
+    /// Least and largest dc link, V.
+    pub dc_link_v: (f64, f64),
+    /// Number of the fault that stopped the drive.
+    pub trip: Option<u8>,
+    /// Why the drive did not start.
+    pub refused: Option<String>,
+    /// Time until a turning shaft was caught, or a stop had ended, s.
+    pub took_s: Option<f64>,
+}
+
+impl Run {
+    /// That of a drive that refused to learn.
+    pub fn unlearned(seed: u64, fault: u8) -> Self {
+        Self {
+            seed,
+            rpm: 0.0,
+            i_q: 0.0,
+            error: Stats::default(),
+            largest_deg: 0.0,
+            silent_s: 0.0,
+            peak_a: 0.0,
+            dc_link_v: (0.0, 0.0),
+            trip: None,
+            refused: Some(format!("fault {fault} while it learned")),
+            took_s: None,
+        }
+    }
+
+    /// Lost: stopped by a fault, or beyond 45°; after a turn of the flux neither counts.
+    pub fn is_lost(&self, kind: RangeKind) -> bool {
+        let stopped = self.trip.is_some() && kind != RangeKind::TurnedFlux;
+        stopped || self.largest_deg > LOST_DEG
+    }
+}
+
+/// Gives a configuration what the shaft and the dc link of a case need.
+pub fn set_up(case: Case, config: &mut Config) {
+    if case.kind == RangeKind::Braking {
+        config.motor.inertia *= HEAVY;
+        config.drive.motor.inertia *= HEAVY as f32;
+        config.drive.speed.ramp_rpm_per_s = Some(config.rpm(HEAVY_RAMP_RPM_PER_S) as f32);
+    }
+    if matches!(case.kind, RangeKind::Braking | RangeKind::Outage) {
+        let link = &mut config.dc_link;
+        (link.capacitor_f, link.source, link.load_w) = (CAPACITOR_F, SOURCE_OHM, OTHERS_W);
+        link.pulses = 0;
+    }
+}
+
+/// A run: the bench, and what was drawn for it.
+pub struct Trial<'a> {
+    case: Case,
+    config: &'a Config,
+    machine: (f64, f64),
+    rpm: f64,
+    i_q: f64,
+    sign: f64,
+    turn_deg: f64,
+    off_s: f64,
+    bench: Bench<Drive>,
+    took_s: Option<f64>,
+}
+
+/// Why a run has ended before its time.
+enum End {
+    /// The drive does not start.
+    Refused(String),
+    /// It no longer regulates.
+    Stopped,
+    Failed(Error),
+}
+
+impl From<Error> for End {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Goes on while the drive regulates.
+fn still(regulates: bool) -> Result<(), End> {
+    if regulates { Ok(()) } else { Err(End::Stopped) }
+}
+
+impl<'a> Trial<'a> {
+    /// With a copy of a drive that is off; the configuration is one of [`set_up`].
+    ///
+    /// # Errors
+    /// When the plant is refused.
+    pub fn new(
+        case: Case,
+        config: &'a Config,
+        drive: &Drive,
+        seed: u64,
+        traced: bool,
+    ) -> Result<Self, Error> {
+        let plant = plant_settings(config);
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let rpm = case.speed(&mut random);
+        let per_a = config.amperes(1.0);
+        let most = nominal_limit_a(config) / per_a;
+        let limit = f64::from(config.drive.current_limit_a()) / per_a;
+        let share = random.random_range(TORQUE.0..=TORQUE.1);
+        let i_q = sign(&mut random) * most.min(share * limit);
+        let sign = sign(&mut random);
+        let turn_deg = sign * random.random_range(TURN_DEG.0..=TURN_DEG.1);
+        let off_s = random.random_range(OFF_S.0..=OFF_S.1);
+        let held = case.shaft(rpm) != Shaft::Free;
+        let load = if held { Load::Speed { speed: 0.0 } } else { Load::Free { torque: 0.0 } };
+        let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+        bench.wrong_deg = LOST_DEG;
+        bench.trace = traced.then(Vec::new);
+        let machine = (plant.machine.rs, plant.machine.rr);
+        Ok(Self { case, config, machine, rpm, i_q, sign, turn_deg, off_s, bench, took_s: None })
+    }
+
+    /// Does the run; returns its record too, where there is one.
+    ///
+    /// # Errors
+    /// When the plant is refused, or the drive refuses a reference.
+    pub fn run(mut self, seed: u64) -> Result<(Run, Vec<Moment>), Error> {
+        let refused = match self.course() {
+            Ok(()) | Err(End::Stopped) => None,
+            Err(End::Refused(why)) => Some(why),
+            Err(End::Failed(error)) => return Err(error),
+        };
+        let bench = self.bench;
+        let trip = match bench.drive.condition() {
+            Condition::Fault(code) if refused.is_none() => Some(code),
+            _ => None,
+        };
+        let run = Run {
+            seed,
+            rpm: self.rpm,
+            i_q: self.i_q,
+            error: bench.error,
+            largest_deg: bench.largest_deg,
+            silent_s: bench.wrong_s(),
+            peak_a: bench.peak_a,
+            dc_link_v: bench.dc_link_v,
+            trip,
+            refused,
+            took_s: self.took_s,
+        };
+        Ok((run, bench.trace.unwrap_or_default()))
+    }
+
+    fn course(&mut self) -> Result<(), End> {
+        let (rpm, i_q, sign) = (self.rpm, self.i_q, self.sign);
+        let step = sign * STEP_A.min(nominal_limit_a(self.config) / self.config.amperes(1.0));
+        let loaded = |nm: f64| Part { load: LoadTorque::Nm(nm), ..Part::constant(rpm, 1.0) };
+        match self.case.kind {
+            RangeKind::Constant | RangeKind::WrongParameters => {
+                self.up_to_speed()?;
+                self.counted(0.5, &[Part::constant(i_q, 3.5)])
+            }
+            RangeKind::Reversals => {
+                self.up_to_speed()?;
+                let steps = [step, -step, step, 0.0, -step].map(|a| Part::constant(a, 0.6));
+                self.counted(0.5, &steps)
+            }
+            RangeKind::LoadSteps => {
+                self.up_to_speed()?;
+                let nm = sign * LOAD_NM;
+                self.counted(0.0, &[nm, 0.0, -nm, 0.0].map(loaded))
+            }
+            RangeKind::Ramps | RangeKind::HotRamps => self.ramps(),
+            RangeKind::TurnedFlux => {
+                self.up_to_speed()?;
+                let turned = Part { turn_deg: self.turn_deg, ..Part::constant(i_q, 3.0) };
+                self.counted(0.5, &[Part::constant(i_q, 1.0), turned])
+            }
+            RangeKind::TurningStart => self.turning_start(),
+            RangeKind::ResidualStart => {
+                self.up_to_speed()?;
+                self.bench.drive.stop();
+                self.bench.wait(LONGEST_START_S);
+                self.bench.coast(self.off_s);
+                self.turning_start()
+            }
+            RangeKind::Braking => self.braking(),
+            RangeKind::Outage => {
+                self.up_to_speed()?;
+                let nominal = self.config.inverter.dc_link_v;
+                self.bench.counted_from = Some(self.bench.time());
+                for (mains, seconds) in [(0.0, OUTAGE_S), (nominal, 2.0)] {
+                    self.bench.plant.set_mains(mains).map_err(Error::refused)?;
+                    self.follow(&[Part::constant(rpm, seconds)])?;
+                }
+                Ok(())
+            }
+            RangeKind::Sag => self.sag(),
+        }
+    }
+
+    fn purpose(&self) -> Purpose {
+        if self.case.shaft(self.rpm) == Shaft::Free { Purpose::Speed } else { Purpose::Torque }
+    }
+
+    /// Starts, and waits until the drive regulates.
+    fn start(&mut self) -> Result<(), End> {
+        let purpose = self.purpose();
+        self.bench.drive.start(purpose).map_err(End::Refused)?;
+        match self.bench.wait(LONGEST_START_S) {
+            Condition::Regulating => Ok(()),
+            Condition::Fault(code) => Err(End::Refused(format!("fault {code}"))),
+            other => Err(End::Refused(format!("the drive is {other}"))),
+        }
+    }
+
+    /// Starts at rest and brings the shaft up to speed, without torque or by the drive.
+    fn up_to_speed(&mut self) -> Result<(), End> {
+        self.start()?;
+        let shaft = self.case.shaft(self.rpm);
+        still(bring_up(&mut self.bench, shaft, self.config)?)?;
+        if shaft != Shaft::Free {
+            return Ok(());
+        }
+        let ramp = f64::from(self.config.drive.ramp_rpm_per_s());
+        let seconds = self.config.rpm(self.rpm.abs()) / ramp + 1.5;
+        self.follow(&[Part::constant(self.rpm, seconds)])
+    }
+
+    fn follow(&mut self, parts: &[Part]) -> Result<(), End> {
+        let purpose = self.purpose();
+        still(follow(&mut self.bench, purpose, self.config, parts)?.is_some())
+    }
+
+    /// Follows, and counts the error after so many seconds.
+    fn counted(&mut self, after: f64, parts: &[Part]) -> Result<(), End> {
+        self.bench.counted_from = Some(self.bench.time() + after);
+        self.follow(parts)
+    }
+
+    /// Through zero and back; on the way the motor warms up, or not.
+    fn ramps(&mut self) -> Result<(), End> {
+        self.start()?;
+        let rate = f64::from(self.config.drive.ramp_rpm_per_s());
+        let once = self.config.rpm(self.rpm.abs()) / rate;
+        let rpm = self.rpm;
+        self.counted(0.0, &[Part::constant(rpm, once + 0.7)])?;
+        if self.case.kind == RangeKind::HotRamps {
+            let (rs, rr) = self.machine;
+            let steps = 100;
+            for n in 1..=steps {
+                let share = f64::from(n) / f64::from(steps);
+                let (rs, rr) = (rs * (1.0 + RISE.0 * share), rr * (1.0 + RISE.1 * share));
+                self.bench.plant.set_resistances(rs, rr).map_err(Error::refused)?;
+                still(self.bench.watch(WARMING_S / f64::from(steps)))?;
+            }
+        }
+        self.follow(&[Part::constant(-rpm, 2.0 * once + 0.7), Part::constant(0.0, once + 1.0)])
+    }
+
+    /// A start while a dynamometer turns the shaft, then torque.
+    fn turning_start(&mut self) -> Result<(), End> {
+        let speed = self.config.rpm(self.rpm) * TAU / 60.0;
+        self.bench.set_load(Load::Speed { speed })?;
+        let (from, i_q) = (self.bench.time(), self.sign * CAUGHT_A);
+        self.bench.peak_a = 0.0;
+        self.start()?;
+        // The error of the first samples belongs to the catching.
+        let before = self.bench.largest_deg;
+        loop {
+            still(self.bench.watch(1.0 / 600.0))?;
+            if self.bench.error_deg.abs() < CAUGHT_DEG {
+                break;
+            }
+            if self.bench.time() - from > LONGEST_CATCH_S {
+                return Ok(());
+            }
+        }
+        self.bench.largest_deg = before;
+        self.took_s = Some(self.bench.time() - from);
+        self.counted(0.1, &[Part::constant(i_q, 0.7)])
+    }
+
+    /// From full speed to standstill.
+    fn braking(&mut self) -> Result<(), End> {
+        self.up_to_speed()?;
+        let from = self.bench.time();
+        self.bench.counted_from = Some(from);
+        let stopped = self.config.rpm(STOPPED_RPM) * TAU / 60.0;
+        while self.bench.plant.mechanical_speed().abs() > stopped {
+            self.follow(&[Part::constant(0.0, 0.02)])?;
+            if self.bench.time() - from > LONGEST_STOP_S {
+                return Ok(());
+            }
+        }
+        self.took_s = Some(self.bench.time() - from);
+        Ok(())
+    }
+
+    /// A stiff dc link goes down and comes back under torque.
+    fn sag(&mut self) -> Result<(), End> {
+        self.up_to_speed()?;
+        self.counted(0.5, &[Part::constant(self.i_q, 1.0)])?;
+        let nominal = self.config.inverter.dc_link_v;
+        for (from, to) in [(1.0, SAG), (SAG, 1.0)] {
+            let steps = 60;
+            for n in 1..=steps {
+                let share = from + (to - from) * f64::from(n) / f64::from(steps);
+                self.bench.plant.set_dc_link(nominal * share).map_err(Error::refused)?;
+                still(self.bench.watch(SAG_RAMP_S / f64::from(steps)))?;
+            }
+            still(self.bench.watch(SAG_S))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! The largest torque over speed and dc link, motoring and generating, as the drive gives it.
+
+use super::battery::{
+    Bench, Condition, DriveUnderTest as _, LONGEST_START_S, Purpose, Shaft, bring_up,
+    nominal_limit_a, torque_nm,
+};
+use super::full_range::{for_the_range, learned_drive};
+use super::torque::assumptions;
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
+use crate::config::{Config, plant_settings};
+use crate::error::Error;
+use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::plant::Load;
+
+/// Not in the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "torque-envelope",
+    stands_for: "beyond the dissertation",
+    about: "Largest torque over speed at three voltages of the dc link, motoring and generating, measured on the motor.",
+    uses: &[BENCH, DRIVE],
+    not: &[FREE_SHAFT, &["dc_link."]],
+    run,
+};
+
+/// Speeds, rpm on four poles.
+const STEP_RPM: f64 = 300.0;
+const STEPS: u32 = 12;
+/// Voltages of the dc link in relation to the nominal one: 230, 270 and 311 V.
+const LINKS: [f64; 3] = [230.0 / 311.0, 270.0 / 311.0, 1.0];
+/// Time under torque before it is measured, s: field weakening and its trim have settled; and the time of the mean.
+const SETTLING_S: f64 = 2.0;
+const MEAN_S: f64 = 0.5;
+
+/// A point of the curve.
+#[derive(Clone, Copy)]
+struct Point {
+    rpm: f64,
+    link: f64,
+    /// 1 for motoring, -1 for generating.
+    sign: f64,
+}
+
+/// What was measured there; none where the drive did not regulate to the end.
+type Measured = Option<(f64, f64)>;
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let config = for_the_range(context.config)?;
+    let drive = match learned_drive(&config, context.seed)? {
+        Ok(drive) => drive,
+        Err(fault) => {
+            return Err(Error::Refused(format!("the drive does not learn: fault {fault}")));
+        }
+    };
+    let mut points = Vec::new();
+    for sign in [1.0, -1.0] {
+        for link in LINKS {
+            let at = |n: u32| Point { rpm: f64::from(n) * STEP_RPM, link, sign };
+            points.extend((0..=STEPS).map(at));
+        }
+    }
+    let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
+        measure(&config, &drive, point, context.seed.wrapping_add(number))
+    })?;
+    Ok(outcome(&config, &points, &measured))
+}
+
+/// Mean torque, Nm, in the direction asked for, and largest phase current, A.
+fn measure(
+    config: &Config,
+    drive: &drive_core::Drive,
+    point: Point,
+    seed: u64,
+) -> Result<Measured, Error> {
+    let (load, plant) = (Load::Speed { speed: 0.0 }, plant_settings(config));
+    let mut bench = Bench::new(config, &plant, drive, load, seed)?;
+    bench.drive.start(Purpose::Torque).map_err(Error::Refused)?;
+    if bench.wait(LONGEST_START_S) != Condition::Regulating
+        || !bring_up(&mut bench, Shaft::Held(point.rpm), config)?
+    {
+        return Ok(None);
+    }
+    let volts = config.inverter.dc_link_v * point.link;
+    bench.plant.set_dc_link(volts).map_err(Error::refused)?;
+    let most = point.sign * nominal_limit_a(config);
+    bench.drive.torque(most as f32).map_err(Error::Refused)?;
+    bench.counted_from = Some(bench.time() + SETTLING_S);
+    let still = bench.watch(SETTLING_S + MEAN_S);
+    Ok(still.then(|| (point.sign * bench.torque.mean(), bench.peak_a)))
+}
+
+fn outcome(config: &Config, points: &[Point], measured: &[Measured]) -> Outcome {
+    let mut outcome = Outcome::default();
+    let mut table = Table::new("Largest torque", &[]);
+    let mut figure = Figure::new("envelope", "Largest torque over the speed", "");
+    let volts = |link: f64| format!("{:.0} V", link * config.inverter.dc_link_v);
+    let at = |sign: f64, link: f64| {
+        points.iter().zip(measured).filter(move |(p, _)| p.sign == sign && p.link == link)
+    };
+    let of_currents = torque_nm(config, nominal_limit_a(config));
+    for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
+        let mut panel = Panel::new("speed (rpm)", format!("torque, {word} (Nm)"));
+        for link in LINKS {
+            let curve = at(sign, link).filter_map(|(p, m)| Some((config.rpm(p.rpm), (*m)?.0)));
+            panel = panel.with(Series::line(volts(link), curve.collect()));
+        }
+        let ends = [0.0, config.rpm(STEP_RPM * f64::from(STEPS))];
+        let limit = ends.map(|rpm| (rpm, of_currents)).to_vec();
+        figure = figure.panel(panel.with(Series::limit("current limit at full flux", limit)));
+    }
+    for n in 0..=STEPS {
+        let rpm = f64::from(n) * STEP_RPM;
+        let mut row = vec![("speed (rpm)".to_owned(), Cell::fixed(config.rpm(rpm), 0))];
+        for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
+            for link in LINKS {
+                let found = at(sign, link).find(|(p, _)| p.rpm == rpm).and_then(|(_, m)| *m);
+                let cell = found.map_or(Cell::from("-"), |(nm, _)| Cell::fixed(nm, 2));
+                row.push((format!("{word}, {} (Nm)", volts(link)), cell));
+            }
+        }
+        table.record(row);
+    }
+    let m = &mut outcome.metrics;
+    m.set("torque_limit_nm", of_currents);
+    for (point, nm) in points.iter().zip(measured).filter_map(|(p, m)| Some((p, (*m)?.0))) {
+        let word = if point.sign > 0.0 { "motoring" } else { "generating" };
+        let link = (point.link * config.inverter.dc_link_v).round();
+        m.set(format!("torque_{word}_{link}_v_{}_rpm_nm", point.rpm), nm);
+    }
+    m.set("points_lost", measured.iter().filter(|m| m.is_none()).count() as f64);
+    let peak = measured.iter().flatten().map(|(_, peak)| *peak).fold(0.0, f64::max);
+    m.set("current_peak_a", peak);
+    outcome.tables.push(table.note("-: the drive did not start, or did not regulate to the end."));
+    outcome.figures.push(figure);
+    outcome.remarks = assumptions(config);
+    outcome
+}

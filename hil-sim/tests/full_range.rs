@@ -1,0 +1,127 @@
+//! The runs over the whole speed range, with the encoder, whose angle and torque follow from equations; and without one, in
+//! the range of the injection.
+
+use hil_sim::outcome::Outcome;
+use hil_sim::{Config, experiments};
+
+const ENCODER: &str = "angle_source=encoder";
+
+fn outcome(name: &str, set: &[&str]) -> Outcome {
+    let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
+    let config = Config::load(None, None, &set).expect("allowed settings");
+    experiments::run(name, &config, 1).expect("an outcome")
+}
+
+fn full_range(kind: &str, set: &[&str]) -> Outcome {
+    outcome("full-range", &[&[&format!("full_range.kind={kind}"), "runs=2"], set].concat())
+}
+
+fn get(outcome: &Outcome, name: &str) -> f64 {
+    outcome.metrics.get(name).unwrap_or_else(|| panic!("{name}: {:?}", outcome.metrics))
+}
+
+/// With an encoder and exact parameters nothing is left but sampling and noise: 0.15° rms, in every region.
+#[test]
+fn with_an_encoder_torque_is_regulated_in_all_regions() {
+    for (kind, rms, max) in [("constant", 0.06, 0.2), ("reversals", 0.25, 1.2), ("sag", 0.2, 0.6)] {
+        let outcome = full_range(kind, &[ENCODER]);
+        let regions = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_rms_deg"));
+        let regions: Vec<f64> = regions.map(|(_, rms)| rms).collect();
+        assert_eq!(regions.len(), if kind == "sag" { 3 } else { 8 });
+        assert!(regions.iter().all(|found| *found < rms && *found > 0.001), "{kind}: {regions:?}");
+        let largest = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_max_deg"));
+        assert!(largest.clone().all(|(_, found)| found < max), "{kind}: {:?}", outcome.metrics);
+        for none in ["lost_runs", "refused_runs", "silent_runs"] {
+            assert_eq!(get(&outcome, none), 0.0, "{kind}: {none}");
+        }
+    }
+}
+
+/// A rotor that is 30 % warmer than the drive believes: with an encoder the angle is wrong by `atan(x) - atan(x/1.3)`,
+/// `x = i_q/i_d`, 7.5° at the most, a little more while the flux follows. A cold one shows none of it.
+#[test]
+fn a_hot_rotor_turns_the_angle_of_an_encoder() {
+    let cold = full_range("ramps", &[ENCODER]);
+    let hot = full_range("hot-ramps", &[ENCODER]);
+    assert!(get(&cold, "ramps_0_1800_angle_error_max_deg") < 0.6);
+    let largest = get(&hot, "hot_ramps_0_1800_angle_error_max_deg");
+    assert!((6.5..11.0).contains(&largest), "{largest}");
+    assert_eq!(get(&hot, "lost_runs"), 0.0);
+}
+
+/// The link of the stop and of the outage is one that takes no energy back: a stop charges it beyond the mains, an outage
+/// empties it, and it stays between the voltages at which the drive trips, give or take what a period brings.
+#[test]
+fn the_dc_link_charges_and_empties() {
+    let stop = full_range("braking", &[ENCODER]);
+    let highest = get(&stop, "braking_0_1800_dc_link_max_v");
+    assert!((340.0..402.0).contains(&highest), "{highest}");
+    let outage = full_range("outage", &[ENCODER]);
+    let lowest = get(&outage, "outage_0_1800_dc_link_min_v");
+    assert!((198.0..265.0).contains(&lowest), "{lowest}");
+}
+
+/// A flux that is turned under an encoder is seen: the drive stops, or turns it back within half a second, and the run
+/// counts neither as lost nor with its error.
+#[test]
+fn a_turned_flux_is_no_loss() {
+    let outcome = full_range("turned-flux", &[ENCODER]);
+    assert_eq!((get(&outcome, "lost_runs"), get(&outcome, "silent_runs")), (0.0, 0.0));
+    assert!(get(&outcome, "turned_flux_1200_1800_stopped_runs") > 0.0);
+    assert!(get(&outcome, "turned_flux_1200_1800_angle_error_max_deg") < 1.0);
+}
+
+/// A dynamometer turns the shaft before the start: with an encoder the drive starts as ever, in 1.04 s.
+#[test]
+fn a_turning_shaft_is_there_before_the_start() {
+    let outcome = full_range("turning-start", &[ENCODER]);
+    let took = get(&outcome, "turning_start_550_750_took_s");
+    assert!((0.5..1.5).contains(&took), "{took}");
+    // The direct current, the torque current beside it, and what the speed adds.
+    let peak = get(&outcome, "turning_start_550_750_current_peak_a");
+    assert!((2.0..3.5).contains(&peak), "{peak}");
+}
+
+/// Without an encoder the injection holds up to its range, and a motor without saliency is refused while the drive learns.
+#[test]
+fn without_an_encoder_the_low_regions_are_those_of_the_injection() {
+    let outcome = full_range("constant", &[]);
+    for region in ["0_150", "150_350", "350_550"] {
+        let rms = get(&outcome, &format!("constant_{region}_angle_error_rms_deg"));
+        assert!((0.5..2.0).contains(&rms), "{region}: {rms}");
+        assert_eq!(get(&outcome, &format!("constant_{region}_lost_runs")), 0.0);
+    }
+    let refused = full_range("constant", &["saliency.a_psi=0"]);
+    assert_eq!(get(&refused, "refused_runs"), 16.0);
+    assert!(refused.faults.iter().all(|fault| fault.contains("while it learned")));
+}
+
+/// One run by its number is the same as among all, with a record of it.
+#[test]
+fn one_run_is_repeated_and_recorded() {
+    let name = "reversals_750_1200_angle_error_rms_deg";
+    let all = outcome("full-range", &[ENCODER, "full_range.kind=reversals", "runs=1"]);
+    let index = &["full_range.index=4"];
+    let one =
+        outcome("full-range", &[&[ENCODER, "full_range.kind=reversals"], &index[..]].concat());
+    assert_eq!(get(&all, name), get(&one, name));
+    assert_eq!((get(&all, "runs"), get(&one, "runs")), (8.0, 1.0));
+    assert_eq!((all.figures.len(), one.figures[0].panels.len()), (0, 6));
+}
+
+/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.03 Nm at 1.4 A and the 3.0 A of the limit, motoring and generating,
+/// with every dc link; at the top the link decides.
+#[test]
+fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
+    let outcome = outcome("torque-envelope", &[ENCODER]);
+    let limit = 1.5 * 2.0 * 0.1771 * 0.1771 / 0.2047 * 1.4 * 3.0;
+    assert!((get(&outcome, "torque_limit_nm") / limit - 1.0).abs() < 0.01);
+    for word in ["motoring", "generating"] {
+        let torque =
+            |volts: u32, rpm: u32| get(&outcome, &format!("torque_{word}_{volts}_v_{rpm}_rpm_nm"));
+        for (volts, rpm) in [(311, 300), (311, 1500), (311, 2100), (270, 900)] {
+            let share = torque(volts, rpm) / limit;
+            assert!((share - 1.0).abs() < 0.02, "{word}, {volts} V, {rpm} rpm: {share}");
+        }
+    }
+}
