@@ -143,12 +143,17 @@ fn the_page_shows_and_drives_the_virtual_board() {
 
     // The wiring is checked as a guided step.
     page.value("view('view-setup'); document.querySelector('#steps button').click()");
-    page.until("/done: the wiring/.test(document.querySelector('#steps strong').textContent)", PATIENCE);
+    page.until(
+        "/done: the wiring/.test(document.querySelector('#steps strong').textContent)",
+        PATIENCE,
+    );
     state(&mut page, "off");
     pictures(&mut page, &folder, "setup");
 
     // A recording has its schema, units and image, and every frame.
-    page.value("download = (name, text) => { globalThis.saved = [name, text]; }; $('record').click()");
+    page.value(
+        "download = (name, text) => { globalThis.saved = [name, text]; }; $('record').click()",
+    );
     page.until("recorded.rows.length > 50", PATIENCE);
     page.value("$('record').click()");
     for part in ["schema 1", "build [0-9a-f]{16}", "# units s,1,", "\\nt_s,sequence,", "phi_deg"] {

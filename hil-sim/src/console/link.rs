@@ -63,32 +63,44 @@ struct Route {
     frames: Box<dyn FnMut(Option<Frame>) + Send>,
     traces: Collector,
     closed: bool,
+    /// Answers to urgent lines that come before that to the command, and behind it.
+    owed: u32,
+    owed_behind: u32,
 }
 
 impl Route {
     fn line(&mut self, line: String) {
         self.traces.push(&line);
         match &self.asked {
-            Some(asked) => drop(asked.send(line)),
-            None => (self.show)(&line),
+            Some(asked) if self.owed == 0 || !ends_answer(&line) => drop(asked.send(line)),
+            _ => self.unasked(&line),
         }
+    }
+
+    /// Shows a line that answers no command.
+    fn unasked(&mut self, line: &str) {
+        if ends_answer(line) {
+            self.owed = self.owed.saturating_sub(1);
+        }
+        (self.show)(line);
     }
 }
 
 /// The direction to the drive.
 type Port = Arc<Mutex<Outgoing>>;
 
-struct Outgoing {
-    port: Box<dyn Write + Send>,
-    /// Lines that did not wait for their turn.
-    urgent: u64,
-}
+struct Outgoing(Box<dyn Write + Send>);
 
 impl Outgoing {
     fn send(&mut self, line: &str) -> std::io::Result<()> {
-        self.port.write_all(format!("{line}\n").as_bytes())?;
-        self.port.flush()
+        self.0.write_all(format!("{line}\n").as_bytes())?;
+        self.0.flush()
     }
+}
+
+/// Whether a line ends an answer, whatever the command was.
+fn ends_answer(line: &str) -> bool {
+    line == "ok" || line.starts_with("ok:") || is_error(line)
 }
 
 /// A connection to a drive.
@@ -99,7 +111,7 @@ pub struct Link {
 
 /// Sends lines that cannot wait for an answer that is awaited.
 #[derive(Clone)]
-pub struct Urgent(Port);
+pub struct Urgent(Port, Arc<Mutex<Route>>);
 
 impl Urgent {
     /// Sends a line at once. Its answer is shown, unless a list is being answered: the line cuts that short.
@@ -107,9 +119,16 @@ impl Urgent {
     /// # Errors
     /// The port is gone.
     pub fn send(&self, line: &str) -> Result<(), LinkError> {
+        // Locked while it is noted as well: the answers come in the order of the lines.
         let mut port = locked(&self.0);
-        // An empty line is a sign of life, which cuts nothing short.
-        port.urgent += u64::from(!line.is_empty());
+        // An empty line is a sign of life, which has no answer and cuts nothing short.
+        if !line.is_empty() {
+            let mut route = locked(&self.1);
+            match route.asked {
+                Some(_) => route.owed_behind += 1,
+                None => route.owed += 1,
+            }
+        }
         port.send(line).map_err(|_| LinkError::Closed)
     }
 }
@@ -132,18 +151,25 @@ impl Link {
         frames: impl FnMut(Option<Frame>) + Send + 'static,
     ) -> Self {
         let (show, frames) = (Box::new(show), Box::new(frames));
-        let route =
-            Route { asked: None, show, frames, traces: Collector::default(), closed: false };
+        let route = Route {
+            asked: None,
+            show,
+            frames,
+            traces: Collector::default(),
+            closed: false,
+            owed: 0,
+            owed_behind: 0,
+        };
         let route = Arc::new(Mutex::new(route));
         let to = route.clone();
         std::thread::spawn(move || read_lines(reader, &to));
-        let port = Arc::new(Mutex::new(Outgoing { port: Box::new(port), urgent: 0 }));
+        let port = Arc::new(Mutex::new(Outgoing(Box::new(port))));
         Self { port, route }
     }
 
     /// A way for lines that cannot wait.
     pub fn urgent(&self) -> Urgent {
-        Urgent(self.port.clone())
+        Urgent(self.port.clone(), self.route.clone())
     }
 
     /// Whether the port is gone.
@@ -164,28 +190,34 @@ impl Link {
     /// There is no whole answer.
     pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
         let (send, lines) = channel();
-        {
+        let sent = {
+            let mut port = locked(&self.port);
             let mut route = locked(&self.route);
             if route.closed {
                 return Err(LinkError::Closed);
             }
             route.asked = Some(send);
-        }
-        let (sent, before) = {
-            let mut port = locked(&self.port);
-            (port.send(command), port.urgent)
+            drop(route);
+            port.send(command)
         };
         let mut answer = match sent {
             Ok(()) => self.hear(command, &lines, &mut show),
             Err(_) => Err(LinkError::Closed),
         };
-        let cut = locked(&self.port).urgent != before;
-        if cut && answer.as_ref().is_ok_and(|answer| answer.lines.len() > 1) {
-            answer = Err(LinkError::Cut(command.to_owned()));
-        }
+        let _port = locked(&self.port);
         let mut route = locked(&self.route);
         route.asked = None;
-        lines.try_iter().for_each(|line| (route.show)(&line));
+        // The answer to an urgent line has ended a list.
+        let many = answer.as_ref().is_ok_and(|answer| answer.lines.len() > 1);
+        if route.owed_behind > 0 && many {
+            route.owed_behind -= 1;
+            answer = Err(LinkError::Cut(command.to_owned()));
+        }
+        route.owed += std::mem::take(&mut route.owed_behind);
+        if matches!(answer, Err(LinkError::Silence(..))) {
+            route.owed = 0;
+        }
+        lines.try_iter().for_each(|line| route.unasked(&line));
         answer
     }
 
@@ -289,6 +321,63 @@ fn readable(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A drive that answers each line with the next of these texts; what was shown unasked.
+    #[cfg(unix)]
+    fn talk(answers: &'static [&str], with: impl FnOnce(&mut Link, &Urgent)) -> Vec<String> {
+        use std::io::{BufRead as _, BufReader};
+        use std::os::unix::net::UnixStream;
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let (shown, unasked) = channel();
+        let show = move |line: &str| drop(shown.send(line.to_owned()));
+        let mut link = Link::new(ours.try_clone().unwrap(), ours, show);
+        let mut out = theirs.try_clone().unwrap();
+        let drive = std::thread::spawn(move || {
+            let lines = BufReader::new(theirs).lines().map_while(Result::ok);
+            for (_, answer) in lines.filter(|line| !line.is_empty()).zip(answers) {
+                std::thread::sleep(Duration::from_millis(30));
+                out.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        let urgent = link.urgent();
+        with(&mut link, &urgent);
+        drive.join().unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        unasked.try_iter().collect()
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_answer_to_an_urgent_line_is_no_answer_to_the_next_command() {
+        let shown = talk(&["ok\r\n", "off; dc link 311 V\r\n"], |link, urgent| {
+            urgent.send("stop").unwrap();
+            urgent.send("").unwrap();
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; dc link 311 V"]);
+        });
+        assert_eq!(shown, ["ok"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_urgent_line_cuts_a_list_short_and_nothing_else() {
+        let answers = &["a  b\r\nc  d\r\n", "ok\r\n", "off; x\r\n", "ok\r\n", "off; y\r\n"];
+        talk(answers, |link, urgent| {
+            let later = |urgent: Urgent| {
+                std::thread::spawn(move || {
+                    std::thread::sleep(Duration::from_millis(10));
+                    urgent.send("stop").unwrap();
+                })
+            };
+            let sent = later(urgent.clone());
+            let cut = link.ask("help", |_| ());
+            assert!(matches!(cut, Err(LinkError::Cut(_))), "{cut:?}");
+            sent.join().unwrap();
+            let sent = later(urgent.clone());
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; x"]);
+            sent.join().unwrap();
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; y"]);
+        });
+    }
 
     #[test]
     fn sequences_of_a_terminal_are_no_text() {

@@ -163,3 +163,35 @@ fn a_stream_that_the_line_cannot_carry_is_refused() -> Result<()> {
     );
     Ok(())
 }
+
+/// The longest control interrupt of a run with commands and a trace, and the latest start that the firmware reports, us.
+fn longest(stream: bool) -> Result<(u32, f64)> {
+    let (mut pair, mut ear) = streaming(4)?;
+    if !stream {
+        ear.ask(&mut pair, "stream off")?;
+    }
+    pair.board.longest = Default::default();
+    for line in ["torque 1.5", "torque -1", "torque 1"] {
+        ear.ask(&mut pair, line)?;
+        pair.board.type_line("trace 500 2");
+        pair.run(SECOND, |_, _| {})?;
+        ear.hear(&mut pair);
+        ear.text.clear();
+    }
+    pair.board.send(b"\n");
+    let (status, _) = ear.ask(&mut pair, "status")?;
+    let latest = status.split("latest start ").nth(1).and_then(|text| text.split(' ').next());
+    let latest = latest.and_then(|text| text.parse().ok()).with_context(|| status.clone())?;
+    Ok((pair.board.longest.cycles, latest))
+}
+
+/// 100 cycles are 0.4 % of a period. A sample waits for a period without a report, which is longer than one with a sample.
+#[test]
+fn a_stream_makes_the_longest_control_interrupt_no_longer() -> Result<()> {
+    let (without, _) = longest(false)?;
+    let (with, latest_us) = longest(true)?;
+    println!("{without} cycles without a stream, {with} with one; latest start {latest_us} us");
+    ensure!(with <= without + 100, "{without} cycles without a stream, {with} with one");
+    ensure!(latest_us < 1.0, "started {latest_us} us late");
+    Ok(())
+}
