@@ -262,9 +262,8 @@ const _: () = {
 pub const SERIAL_FALL_BACK_MS: u32 = 1000;
 /// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
 pub const STREAM_SHARE: u32 = 80;
-/// Size of the queue of samples for the stream, which holds one less: 7.5 ms at 2000 a second, longer than the watchdog
-/// allows the main loop to be late.
-pub const STREAM_SAMPLES: usize = 16;
+/// Samples for the stream that can wait: 7.5 ms at 2000 a second, longer than the watchdog allows the main loop to be late.
+pub const STREAM_SAMPLES: usize = 15;
 /// Size of the receive queue, which holds one byte less: 22 ms at full rate; the main loop reads a thousand times
 /// as often.
 pub const SERIAL_RECEIVE: usize = 256;

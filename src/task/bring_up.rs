@@ -1,6 +1,6 @@
 //! From reset to a running control interrupt.
 
-use core::sync::atomic::{AtomicU16, Ordering};
+use core::sync::atomic::Ordering;
 
 use cortex_m::singleton;
 use drive_core::identify::learning::Learned;
@@ -236,10 +236,9 @@ fn start_control(
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
     let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
     let (send_observations, observations) = observations.ok_or(TWICE)?.split();
-    let samples = singleton!(: Queue<stream::Sample, { board::STREAM_SAMPLES }> = Queue::new())
-        .ok_or(TWICE)?;
-    static STREAM_DIVIDER: AtomicU16 = AtomicU16::new(0);
-    let (send_samples, stream) = stream::split(samples.split(), &STREAM_DIVIDER);
+    type Samples = stream::Queue<{ board::STREAM_SAMPLES }>;
+    let samples = singleton!(: Samples = Samples::new(stream::Sample::default())).ok_or(TWICE)?;
+    let (send_samples, stream) = samples.split();
 
     pwm.start()?;
     let drive = Drive::new(coefficients);

@@ -234,13 +234,15 @@ impl Running {
         }
 
         // Between two steps: a command acts from the next step on.
-        if let Some(answer) = commands.take_with(|command| drive.command(command)) {
+        let answer = commands.take_with(|command| drive.command(command));
+        let commanded = answer.is_some();
+        if let Some(answer) = answer {
             // There is room: the main loop takes the last answer before it sends a command.
             answers.send(answer);
         }
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         let fault = matches!(drive.state(), State::Fault(_));
-        trace.step(fault, || drive.telemetry());
+        let traced = trace.step(fault, || drive.telemetry());
         let commissioned = OBSERVED.load(Ordering::Relaxed) && drive.state().regulates();
         if drive.tracks_rotor() || drive.excites() || commissioned {
             // Without room the period is missing, which the main loop detects by its number.
@@ -252,7 +254,8 @@ impl Running {
         // A new state is reported immediately.
         let reports = self.reported != Some(drive.state())
             || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
-        stream.step(self.periods, reports, || drive.telemetry());
+        let busy = reports || traced || commanded;
+        stream.step(self.periods, busy, || drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         if cycles > self.worst_cycles {

@@ -342,7 +342,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn sampled(&mut self) -> Option<Sample> {
-        self.link.as_mut()?.stream.next()
+        self.link.as_mut()?.stream.fetch()
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {
