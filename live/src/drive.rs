@@ -95,13 +95,14 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
         match asks.recv_timeout(STATUS.saturating_sub(asked.elapsed())) {
             Ok(Ask::Hello) => hello(shared, link),
             Ok(Ask::Line(id, line)) => {
-                if line.starts_with("stream ") {
-                    shared.new_stream();
-                }
                 let answer = match link.ask(&line, |_| ()) {
                     Ok(answer) => json!({ "id": id, "lines": answer.lines }),
                     Err(why) => json!({ "id": id, "error": why.to_string() }),
                 };
+                // Its frames come behind the answer.
+                if line.starts_with("stream ") {
+                    shared.new_stream();
+                }
                 shared.tell(answer);
             }
             Err(RecvTimeoutError::Timeout) => {}

@@ -157,9 +157,10 @@ async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
                     break;
                 }
                 let (texts, frames) = shared.take();
+                // Texts first: the answer to a new stream tells what its frames are.
                 let messages = [
-                    (!frames.is_empty()).then(|| Message::binary(frames)),
                     Some(Message::text(json!(texts).to_string())),
+                    (!frames.is_empty()).then(|| Message::binary(frames)),
                 ];
                 let mut sent = true;
                 for message in messages.into_iter().flatten() {

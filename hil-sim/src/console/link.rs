@@ -334,7 +334,8 @@ mod tests {
         let mut out = theirs.try_clone().unwrap();
         let drive = std::thread::spawn(move || {
             let lines = BufReader::new(theirs).lines().map_while(Result::ok);
-            for (_, answer) in lines.filter(|line| !line.is_empty()).zip(answers) {
+            // In this order: it does not wait for a line behind the last answer.
+            for (answer, _) in answers.iter().zip(lines.filter(|line| !line.is_empty())) {
                 std::thread::sleep(Duration::from_millis(30));
                 out.write_all(answer.as_bytes()).unwrap();
             }
