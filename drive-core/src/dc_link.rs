@@ -101,6 +101,8 @@ pub enum Limiting {
     /// It is not.
     #[default]
     No,
+    /// The dc link has no more voltage at this speed; see [`voltage_limit`](crate::current::voltage_limit).
+    Voltage,
     /// Generating torque: the link is high.
     DcLinkHigh,
     /// Generating torque: the link is high, and the brake resistor has taken all that it can.
@@ -112,7 +114,7 @@ pub enum Limiting {
 }
 
 /// Result of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DcLinkLimits {
     /// Least and largest torque current, A. Both have one sign while the shaft feeds the link.
     pub i_q: (f32, f32),
@@ -234,15 +236,33 @@ impl DcLink {
 
         let limit = |share: f32| (1.0 - weight + weight * share) * i_q_limit;
         let (motoring, generating) = (limit(motoring), limit(generating));
-        let hot = self.chopper.is_some() && cold < 1.0;
-        let high = if hot { Limiting::ResistorHot } else { Limiting::DcLinkHigh };
-        let low = if motoring < 0.0 { Limiting::RideThrough } else { Limiting::DcLinkLow };
+        let high = if generating >= i_q_limit {
+            Limiting::No
+        } else if self.chopper.is_some() && cold < 1.0 {
+            Limiting::ResistorHot
+        } else {
+            Limiting::DcLinkHigh
+        };
+        let low = if motoring >= i_q_limit {
+            Limiting::No
+        } else if motoring < 0.0 {
+            Limiting::RideThrough
+        } else {
+            Limiting::DcLinkLow
+        };
         let (i_q, why) = if freq < 0.0 {
             ((-motoring, generating), (low, high))
         } else {
             ((-generating, motoring), (high, low))
         };
         DcLinkLimits { i_q, why, flux_a, chopper }
+    }
+
+    /// Cools the resistor for so many control periods without torque.
+    pub fn rest(&self, state: &mut DcLinkState, periods: u32) {
+        if let Some(c) = &self.chopper {
+            state.heat -= c.cooling * (periods as f32 / f32::from(DIVIDER)) * state.heat;
+        }
     }
 
     /// Duty of the chopper, and how much of it the heat of the resistor leaves.

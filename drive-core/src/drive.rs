@@ -26,6 +26,7 @@ use crate::current::inverter_drop::{DropSample, InverterDropState};
 use crate::current::pi::{DqPiState, ReferenceState};
 use crate::current::sensing::SensingState;
 use crate::current::voltage_limit::VoltageLimitState;
+use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::fault::Fault;
 use crate::filter::dissertation::{LPF, LpfState};
 use crate::flux::estimator::EstimatorState;
@@ -36,7 +37,6 @@ use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
-use crate::math::within;
 use crate::motion::{Goal, MotionState, RotorCount};
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::noise_watch::NoiseWatchState;
@@ -147,8 +147,10 @@ struct ControlState {
     prediction: PredictionState,
     motion: MotionState,
     voltage_limit: VoltageLimitState,
-    /// Least and largest torque current that is possible now, A.
-    i_q_range: (f32, f32),
+    dc_link: DcLinkState,
+    /// What the dc link allows now.
+    limits: DcLinkLimits,
+    limiting: Limiting,
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
@@ -358,7 +360,7 @@ impl Drive {
                     _ => Goal::Position(r.turns),
                 };
                 let count = self.control.seen.rotor_count;
-                let range = self.control.i_q_range;
+                let range = self.control.limits.i_q;
                 r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
                 r.current.q
             }
@@ -375,9 +377,21 @@ impl Drive {
             }
             _ => r.current.q,
         };
-        let s = &self.control;
+        let s = &mut self.control;
         let (i_d, most) = (s.references.current.d, s.voltage_limit.most.d);
-        Ok(Dq { d: if i_d < most { i_d } else { most }, q: within(i_q, s.i_q_range) })
+        let (i_q, why) = s.limits.hold(i_q);
+        s.limiting = why;
+        Ok(Dq { d: if i_d < most { i_d } else { most } + s.limits.flux_a, q: i_q })
+    }
+
+    /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
+    pub fn brake_duty(&self) -> f32 {
+        if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
+    }
+
+    /// Why the torque is smaller than asked for.
+    pub fn limiting(&self) -> Limiting {
+        if self.state.regulates() { self.control.limiting } else { Limiting::No }
     }
 
     /// Whether the flux angle is the counted rotor angle plus the slip: with the encoder, or while the drive

@@ -196,6 +196,30 @@ impl Default for ObserverSettings {
     }
 }
 
+/// What the drive does about the voltage of the dc link; see [`crate::dc_link`]. Unset values follow [`rules`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BrakingSettings {
+    /// Voltage without generating torque, V.
+    pub high_v: Option<f32>,
+    /// Voltage without motoring torque, V, below which the shaft feeds the link.
+    pub low_v: Option<f32>,
+    /// Direct current that is added while generating torque is limited, A.
+    pub flux_a: Option<f32>,
+    /// Brake resistor behind the chopper, ohm; 0 for none.
+    pub ohm: f32,
+    /// Energy that it takes from cold, J.
+    pub energy_j: f32,
+    /// Power that it takes for ever, W.
+    pub power_w: f32,
+}
+
+impl Default for BrakingSettings {
+    /// No brake resistor. Where one is fitted, its energy and power stand on it.
+    fn default() -> Self {
+        Self { high_v: None, low_v: None, flux_a: None, ohm: 0.0, energy_j: 1000.0, power_w: 50.0 }
+    }
+}
+
 /// All settings of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
@@ -227,6 +251,8 @@ pub struct Settings {
     pub sequence: Sequence,
     /// The speed and the position loop.
     pub speed: SpeedSettings,
+    /// The limits by the dc link.
+    pub braking: BrakingSettings,
 }
 
 /// The reason why settings were refused.

@@ -193,6 +193,8 @@ pub const DRIVE: &[&str] = &[
     "limits.",
     "sequence.",
     "speed.",
+    "observer.",
+    "braking.",
 ];
 /// Keys of the speed loop, which a drive that regulates torque does not use.
 pub const SPEED_LOOP: &[&str] =

@@ -49,6 +49,8 @@ pub struct VoltageLimitState {
     trim: f32,
     /// Most direct and torque current, A.
     pub most: Dq,
+    /// Whether the latter is that of the voltage.
+    pub by_voltage: bool,
 }
 
 impl VoltageLimit {
@@ -67,12 +69,12 @@ impl VoltageLimit {
     /// State without a limit.
     pub fn start(&self) -> VoltageLimitState {
         let i_q = libm::sqrtf(self.current_squared - self.i_d * self.i_d);
-        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q } }
+        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q }, by_voltage: false }
     }
 
     /// Updates the limits with the `current` reference, A, the `voltage` of the step, V, the `largest` voltage vector that the
     /// carrier leaves, V, and the frequency of the flux, electrical turns per period. With a carrier the flux is `kept`: what
-    /// the injection has learned is that of one direct current.
+    /// the injection has learned is that of one direct current. `added` is direct current on top, A.
     pub fn step(
         &self,
         state: &mut VoltageLimitState,
@@ -81,6 +83,7 @@ impl VoltageLimit {
         largest: f32,
         flux_freq: f32,
         kept: bool,
+        added: f32,
     ) {
         let whole = USED * largest;
         let available = whole * state.trim;
@@ -109,7 +112,9 @@ impl VoltageLimit {
         } else {
             i_d
         };
-        let rest = libm::sqrtf(self.current_squared - i_d * i_d);
-        state.most = Dq { d: i_d, q: if rest < by_leakage { rest } else { by_leakage } };
+        let all = i_d + added;
+        let rest = libm::sqrtf(self.current_squared - all * all);
+        state.by_voltage = by_leakage < rest;
+        state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }
 }

@@ -15,6 +15,7 @@ use crate::current::pi::{DqPi, Pi, ReferenceFilter};
 use crate::current::sensing::Sensing;
 use crate::current::shunts::Shunts;
 use crate::current::voltage_limit::VoltageLimit;
+use crate::dc_link::DcLink;
 use crate::filter::dissertation::lpf_lag_samples;
 use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
@@ -94,6 +95,7 @@ pub struct Coefficients {
     /// The watch on the lock, if it is wanted.
     pub(crate) lock_monitor: Option<LockMonitor>,
     pub(crate) voltage_limit: VoltageLimit,
+    pub(crate) dc_link: DcLink,
     pub(crate) motion: Motion,
     /// Injection axis seen from the flux, as an angle and a unit vector.
     pub(crate) injection_turn: Angle,
@@ -290,6 +292,7 @@ impl Settings {
                 Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
             },
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
+            dc_link: DcLink::new(&self.dc_link_limits()),
             motion: self.motion(&motion_design),
             freq_per_speed: self.freq_of_rpm(60.0),
             protection: Protection {

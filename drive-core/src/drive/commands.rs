@@ -150,14 +150,15 @@ impl Drive {
         if mode == Mode::Learning {
             self.learned = None;
         }
-        self.control = ControlState::default();
+        // The brake resistor stays hot.
+        self.control = ControlState { dc_link: self.control.dc_link, ..ControlState::default() };
         self.control.references = self.no_torque(self.c.sequence.i_d);
         self.c.turn(&mut self.control.axes, 0.0, self.c.injection_axis, false);
         self.c.sensing.start(&mut self.control.sensing);
         self.c.estimator.start(&mut self.control.estimator);
         self.control.voltage_limit = self.c.voltage_limit.start();
         let most = self.control.voltage_limit.most.q;
-        self.control.i_q_range = (-most, most);
+        self.control.limits.i_q = (-most, most);
         if let Some(observer) = &self.c.observer {
             observer.start(&mut self.control.observer);
         }

@@ -21,6 +21,7 @@
 use super::ControlState;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
+use crate::dc_link::Limiting;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::Sample;
@@ -115,7 +116,7 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.limit_voltage(s, step);
+                self.limit_currents(s, step);
                 self.watch_noise(s, 5, step.sample)
             }
         }
@@ -141,15 +142,24 @@ impl Coefficients {
     }
 
     /// Limits the currents to those that the dc link allows.
-    fn limit_voltage(&self, s: &mut ControlState, step: &StepResults) {
+    fn limit_currents(&self, s: &mut ControlState, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.silent;
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
         let (reference, limit) = (s.seen.reference, &self.voltage_limit);
         let freq = step.flux_freq;
-        limit.step(&mut s.voltage_limit, reference, step.voltage, largest, freq, carrier);
-        let most = s.voltage_limit.most.q;
-        s.i_q_range = (-most, most);
+        let (state, added) = (&mut s.voltage_limit, s.limits.flux_a);
+        limit.step(state, reference, step.voltage, largest, freq, carrier, added);
+        let (most, dc_link) = (state.most.q, step.measured.dc_link);
+        s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
+        if s.voltage_limit.by_voltage {
+            let why = &mut s.limits.why;
+            for why in [&mut why.0, &mut why.1] {
+                if *why == Limiting::No {
+                    *why = Limiting::Voltage;
+                }
+            }
+        }
     }
 
     /// Whether the demodulation has a carrier.
@@ -161,7 +171,10 @@ impl Coefficients {
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
+                if self.injects(s)
+                    && s.hand_over.weight < 1.0
+                    && s.carrier.is_settled()
+                    && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.

@@ -49,7 +49,12 @@ impl Drive {
         let square = if on { self.control.seen.current.length_squared() } else { 0.0 };
         let borne = self.c.thermal.step(&mut self.thermal, square);
         // Off it cools, and is not judged.
-        if on { Ok(borne?) } else { Ok(()) }
+        if on {
+            Ok(borne?)
+        } else {
+            self.c.dc_link.rest(&mut self.control.dc_link, THERMAL_EVERY);
+            Ok(())
+        }
     }
 
     /// The fault when a result is not finite: settings, references or state, whichever is not.

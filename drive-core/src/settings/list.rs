@@ -108,6 +108,13 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     auto!("speed.ramp_rpm_per_s", speed.ramp_rpm_per_s, Settings::ramp_rpm_per_s, "rpm/s", "largest acceleration that is asked for").from_to(1.0, 1e5),
     // Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
     number!("speed.phase_margin_deg", speed.phase_margin_deg, "deg", "phase margin of the speed loop: more is calmer and slower").from_to(45.0, 70.0),
+
+    auto!("braking.high_v", braking.high_v, Settings::dc_high_v, "V", "dc link without generating torque").beside(|s| (1.05 * s.inverter.dc_link_v, s.dc_over_v())),
+    auto!("braking.low_v", braking.low_v, Settings::dc_low_v, "V", "dc link without motoring torque, below which the shaft feeds it").beside(|s| (1.05 * s.dc_under_v(), 0.95 * s.inverter.dc_link_v)),
+    auto!("braking.flux_a", braking.flux_a, Settings::braking_flux_a, "A", "direct current that is added while generating torque is limited; 0 for none").beside(|s| (0.0, s.current_limit_a())),
+    number!("braking.ohm", braking.ohm, "ohm", "brake resistor behind the chopper; 0 for none").from_to(0.0, 1e5),
+    number!("braking.energy_j", braking.energy_j, "J", "energy that the brake resistor takes from cold").from_to(1.0, 1e7),
+    number!("braking.power_w", braking.power_w, "W", "power that it takes for ever").from_to(0.1, 1e5),
 ];
 
 /// The setting with this name.

@@ -101,6 +101,10 @@ impl DriveUnderTest for Drive {
         let _ = command(self, &Command::Stop);
     }
 
+    fn chopper(&self) -> f64 {
+        self.brake_duty().into()
+    }
+
     fn condition(&self) -> Condition {
         match self.state() {
             State::Off => Condition::Off,
