@@ -282,7 +282,8 @@ impl DcLink {
         } else if above > 2.0 {
             state.given -= self.gives;
         }
-        state.given = state.given.clamp(0.0, self.room);
+        // Not `clamp`, which checks its bounds and could panic.
+        state.given = state.given.max(0.0).min(self.room);
     }
 }
 
