@@ -126,11 +126,7 @@ impl Console {
             Request::StreamState => self.stream_state(),
             Request::EndStream => self.end_stream(drive),
             Request::Signals => self.begin(ListKind::Signals),
-            Request::Baud(baud) => {
-                self.stop_stream(drive);
-                self.wire.want(baud);
-                self.ok();
-            }
+            Request::Baud(baud) => self.baud(baud, drive),
             Request::Log(level) => {
                 drive.set_log_level(level);
                 self.ok();

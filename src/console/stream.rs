@@ -63,12 +63,8 @@ impl Wire {
 
 /// Reason why a stream is refused.
 #[derive(Debug, Error)]
-#[error(
-    "{signals} signals {rate} times a second are {wanted} bytes/s; {baud} baud has room for {room}: `baud`, or fewer"
-)]
+#[error("the stream needs {wanted} bytes/s; {baud} baud has room for {room}: `baud`, or fewer")]
 struct TooMuch {
-    signals: usize,
-    rate: u32,
     wanted: u32,
     baud: u32,
     room: u32,
@@ -83,7 +79,7 @@ impl Console {
         // Ten bits a byte.
         let room = baud / 10 * board::STREAM_SHARE / 100;
         if wanted > room {
-            return self.error(&TooMuch { signals, rate, wanted, baud, room });
+            return self.error(&TooMuch { wanted, baud, room });
         }
         drive.stream(0);
         drive.stream(stream.divider);
@@ -97,6 +93,13 @@ impl Console {
         let Wire { sent, dropped, .. } = self.wire;
         let on = if self.wire.stream.is_some() { "on" } else { "off" };
         self.out.line(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
+    }
+
+    /// Asks for a rate; a stream ends.
+    pub(super) fn baud(&mut self, baud: u32, drive: &mut impl DriveHandle) {
+        self.stop_stream(drive);
+        self.wire.want(baud);
+        self.ok();
     }
 
     /// Ends the stream and tells its state.

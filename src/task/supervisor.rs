@@ -336,9 +336,7 @@ impl DriveHandle for Supervisor {
     }
 
     fn stream(&mut self, divider: u16) {
-        if let Some(link) = &mut self.link {
-            link.stream.ask(divider);
-        }
+        self.link.iter_mut().for_each(|link| link.stream.ask(divider));
     }
 
     fn sampled(&mut self) -> Option<Sample> {

@@ -52,10 +52,7 @@ fn a_stream_is_refused_whole() {
     let mut talk = Talk::new();
     for (line, why) in [
         ("stream i_q_a 9999", "the frames a second = 9999: not a whole number from 1 to 6000"),
-        (
-            "stream i_q_a 2000",
-            "1 signals 2000 times a second are 30000 bytes/s; 115200 baud has room for 9216",
-        ),
+        ("stream i_q_a 2000", "the stream needs 30000 bytes/s; 115200 baud has room for 9216"),
         ("stream 100", "a signal is missing"),
         ("stream i_q", "ok"),
         ("stream iq_a", "no such signal: iq_a; did you mean"),
