@@ -16,6 +16,8 @@ pub enum News {
     Ended {
         /// Whether none was refused.
         sound: bool,
+        /// The last step that was done.
+        step: Step,
     },
 }
 
@@ -90,7 +92,10 @@ impl Session {
             Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
             Next::Design => return Some(Action::Design),
             Next::Report(report) => self.news = Some(News::Report(report)),
-            Next::Done => self.news = Some(News::Ended { sound: self.commissioning.is_sound() }),
+            Next::Done => {
+                let (sound, step) = (self.commissioning.is_sound(), self.commissioning.step());
+                self.news = Some(News::Ended { sound, step });
+            }
         }
         None
     }

@@ -189,6 +189,9 @@ impl Console {
             let learned = self.settings.in_force().learned.as_ref();
             if let Some(result) = self.unbelievable.as_ref().or(learned) {
                 self.out.line(format_args!("{}", announce::outcome(result)));
+                if let Some(tracked) = result.tracked(&self.settings.in_force().drive) {
+                    self.out.line(format_args!("learned: {tracked}"));
+                }
             }
         } else if let Some(news) =
             self.announcer.next(&status, &self.settings.in_force().drive, now_ms)

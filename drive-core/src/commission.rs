@@ -46,6 +46,8 @@ mod leakage;
 mod levels;
 mod loop_check;
 mod motion;
+mod plant;
+mod plant_fit;
 mod plate;
 mod report;
 mod staircase;
@@ -56,7 +58,7 @@ mod tests;
 use crate::drive::{Excitation, Excited, State};
 use crate::io::PERIOD_S;
 use crate::settings::{Motor, Settings};
-use crate::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
+use crate::tuning::{CurrentLoopDesign, FirstOrder, TuningError, design_current_loop, motor_plant};
 
 pub use collector::{BINS, Bin, Collector, Record};
 pub use found::{Found, Iron, Leakage, Levels};
@@ -112,8 +114,9 @@ pub struct Commissioning {
     search: Option<Search>,
     /// Fit of the levels, gain mismatch, and misfit, until the third level confirms them.
     fitted: (Fitted, f32, Option<Quantity>),
-    /// The current loop, once it is designed in its step.
-    design: Option<Result<CurrentLoopDesign, TuningError>>,
+    /// The current loop along and across, once it is designed in its step, and the plants it is to be designed for.
+    design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
+    plants: [FirstOrder; 2],
     stairs: Staircase,
     swings: Swings,
     /// Inductances along and across at each bias, H.
@@ -129,6 +132,8 @@ struct Setup {
     /// Margin for noise of the pulses, A, and their largest voltage, V.
     pulse_noise: f32,
     pulse_v: f32,
+    /// Dead time as a share of the control period.
+    dead_time: f32,
     /// Nominal dc link, V.
     dc_link: f32,
     /// Rated current, and limit of the torque current, A peak.
@@ -160,6 +165,7 @@ impl Commissioning {
                 filter: settings.scales.current_delay_s / PERIOD_S,
                 pulse_noise: settings.share_of_range(0.05),
                 pulse_v: settings.share_of_dc_link(60.0),
+                dead_time: settings.inverter.dead_time_s / PERIOD_S,
                 dc_link: settings.inverter.dc_link_v,
                 rated: settings.rated_a(),
                 i_q_limit: settings.i_q_limit_a(),
@@ -179,6 +185,7 @@ impl Commissioning {
             search: None,
             fitted: (Fitted::default(), 0.0, None),
             design: None,
+            plants: [FirstOrder { k: 0.0, p: 0.0 }; 2],
             stairs: Staircase::default(),
             swings: Swings::default(),
             inductances: [[0.0; 2]; 2],
@@ -276,13 +283,18 @@ impl Commissioning {
         }
     }
 
-    /// Designs the current loop for the motor that was found. It takes as long as [`Settings::build`]: a second on the target,
-    /// so the drive must be off.
+    /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes
+    /// as long as [`Settings::build`]: a second on the target, so the drive must be off.
     pub fn design(&mut self) {
         self.design = self.found.motor(&Motor::default()).map(|motor| {
             let period_s = f64::from(PERIOD_S);
             let plant = motor_plant(&motor.circuit(), period_s)?;
-            design_current_loop(plant, plant, period_s)
+            let designed = |identified| design_current_loop(identified, plant, period_s);
+            if self.step == Step::Plant {
+                let [d, q] = self.plants;
+                return Ok([designed(d)?, designed(q)?]);
+            }
+            designed(plant).map(|design| [design; 2])
         });
         (self.progress, self.on, self.starts) = (Progress::Steps, false, None);
     }
@@ -304,7 +316,8 @@ impl Commissioning {
             }
             Step::Leakage => Step::CurrentLoop,
             Step::Staircase => Step::CurrentLoop,
-            Step::CurrentLoop | Step::Inertia => Step::Inertia,
+            Step::CurrentLoop if self.last == Step::Plant => Step::Plant,
+            Step::CurrentLoop | Step::Plant | Step::Inertia => Step::Inertia,
         };
         (self.part, self.until, self.design) = (0, 0, None);
     }

@@ -46,7 +46,7 @@ const POWER: f32 = 60.0 * PERIOD_S;
 /// Braking by flux begins where this share of the generating torque is left, and is whole where half of it is.
 const FLUX_FROM: f32 = 0.75;
 const FLUX_GAIN: f32 = 4.0;
-/// The duty goes down over the last tenth of what the resistor can take.
+/// The duty goes down over the last tenth of the energy that the resistor takes.
 const COOL_GAIN: f32 = 10.0;
 
 /// A brake resistor behind a chopper. `under_v` and `over_v` are the voltages at which the drive trips.
@@ -282,7 +282,6 @@ impl DcLink {
         } else if above > 2.0 {
             state.given -= self.gives;
         }
-        // Not `clamp`, which checks its bounds and could panic.
         state.given = state.given.max(0.0).min(self.room);
     }
 }

@@ -1,6 +1,7 @@
 //! The whole drive: one step per PWM period.
 
 mod axes;
+mod catching;
 mod coefficients;
 mod command;
 mod commands;
@@ -12,6 +13,7 @@ mod layout;
 mod learn;
 mod observed;
 mod protect;
+mod reference;
 mod starting;
 mod state;
 #[cfg(test)]
@@ -37,7 +39,7 @@ use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
-use crate::motion::{Goal, MotionState, RotorCount};
+use crate::motion::{MotionState, RotorCount};
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::noise_watch::NoiseWatchState;
 use crate::protect::plausibility::{CarrierWatch, PredictionState};
@@ -47,6 +49,7 @@ use crate::protect::wiring_check::WiringCheckState;
 use crate::settings::AngleSource;
 
 use axes::Axes;
+use catching::CatchingState;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused};
 pub use excitation::{Excitation, Excited, Regulator};
@@ -148,7 +151,7 @@ struct ControlState {
     motion: MotionState,
     voltage_limit: VoltageLimitState,
     dc_link: DcLinkState,
-    /// What the dc link allows now.
+    /// Present limits by the dc link.
     limits: DcLinkLimits,
     limiting: Limiting,
     carrier_watch: CarrierWatch,
@@ -156,9 +159,12 @@ struct ControlState {
     lock: LockMonitorState,
     noise: NoiseWatchState,
     inverter_drop: InverterDropState,
+    catching: CatchingState,
     /// Large: it holds the state of the alternative demodulations.
     estimator: EstimatorState,
     learning: LearningState,
+    /// Whether a learning has measured all its points.
+    all_measured: bool,
     excitation: ExcitationState,
 }
 
@@ -208,6 +214,8 @@ impl Drive {
         self.elapsed = self.elapsed.wrapping_add(1);
         let result = result.and_then(|compare| self.watch_load().map(|()| compare));
         let compare = result.unwrap_or_else(|off| {
+            let measured = off == State::Off && self.control.all_measured;
+            let off = if measured { self.evaluate_learning() } else { off };
             self.enter(off);
             Compare::OFF
         });
@@ -228,6 +236,8 @@ impl Drive {
         }
         let wanted = self.reference()?;
         let held = self.state == State::Magnetising;
+        let looking = self.state == State::Catching && self.control.catching.is_looking();
+        let alone = self.injection_alone();
         let counts = self.counts();
         let (c, s) = (&self.c, &mut self.control);
         let index = s.carrier.advance();
@@ -291,7 +301,9 @@ impl Drive {
                 signs: signs.to_abc().to_alpha_beta().to_dq(applied),
                 dc_link: measured.dc_link,
             };
-            c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample);
+            if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample) {
+                s.observer.resistance = ratio - 1.0;
+            }
         }
 
         // Angles for the next sample.
@@ -309,11 +321,15 @@ impl Drive {
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
             let turning = c.observe_fundamental(s, index, held, seen, phi);
-            let carrier = AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
-            s.observer.put_out(modulated.realised - carrier);
+            if c.observer.is_some() {
+                let carrier =
+                    AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
+                s.observer.put_out(modulated.realised - carrier);
+            }
             // While the flux builds up, its angle is held.
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if !held && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+            if !held && !looking && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err()
+            {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
@@ -338,60 +354,13 @@ impl Drive {
             flux_freq: flux.freq,
             rotor_freq,
             held,
+            looking,
+            building: self.state == State::Catching && !looking,
+            alone,
             learning: self.mode == Mode::Learning,
         };
         c.in_turn(s, index, &results)?;
         Ok(Compare::on(modulated.compare))
-    }
-
-    /// The current to regulate in this state, A; moves on to the next state where it is time.
-    ///
-    /// # Errors
-    /// The state to go to with the outputs off: a fault, or off where it has stopped.
-    fn reference(&mut self) -> Result<Dq, State> {
-        let r = &mut self.control.references;
-        let i_q = match self.state {
-            State::Magnetising => return Ok(self.magnetise()?),
-            State::Verifying => return Ok(self.verify()?),
-            State::Learning => self.learn()?,
-            State::Speed | State::Position => {
-                let goal = match self.mode {
-                    Mode::Speed => Goal::Speed(r.speed),
-                    _ => Goal::Position(r.turns),
-                };
-                let count = self.control.seen.rotor_count;
-                let range = self.control.limits.i_q;
-                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
-                r.current.q
-            }
-            State::Stopping => {
-                let ramp = self.c.sequence.stop_ramp;
-                r.current.q = if r.current.q > ramp {
-                    r.current.q - ramp
-                } else if r.current.q < -ramp {
-                    r.current.q + ramp
-                } else {
-                    return Err(State::Off);
-                };
-                r.current.q
-            }
-            _ => r.current.q,
-        };
-        let s = &mut self.control;
-        let (i_d, most) = (s.references.current.d, s.voltage_limit.most.d);
-        let (i_q, why) = s.limits.hold(i_q);
-        s.limiting = why;
-        Ok(Dq { d: if i_d < most { i_d } else { most } + s.limits.flux_a, q: i_q })
-    }
-
-    /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
-    pub fn brake_duty(&self) -> f32 {
-        if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
-    }
-
-    /// Why the torque is smaller than asked for.
-    pub fn limiting(&self) -> Limiting {
-        if self.state.regulates() { self.control.limiting } else { Limiting::No }
     }
 
     /// Whether the flux angle is the counted rotor angle plus the slip: with the encoder, or while the drive

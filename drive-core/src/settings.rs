@@ -147,6 +147,8 @@ pub struct Sequence {
     pub i_d: Option<f32>,
     /// Slope of the torque current at a stop, A/s.
     pub stop_a_per_s: Option<f32>,
+    /// Whether a start without an encoder looks for a turning shaft first, for 0.25 s.
+    pub catch: bool,
 }
 
 impl Default for Sequence {
@@ -158,6 +160,7 @@ impl Default for Sequence {
             flux: Flux::Low,
             i_d: None,
             stop_a_per_s: None,
+            catch: true,
         }
     }
 }
@@ -192,11 +195,11 @@ pub struct ObserverSettings {
 
 impl Default for ObserverSettings {
     fn default() -> Self {
-        Self { enabled: true, leakage_slope: 0.0 }
+        Self { enabled: false, leakage_slope: 0.0 }
     }
 }
 
-/// What the drive does about the voltage of the dc link; see [`crate::dc_link`]. Unset values follow [`rules`].
+/// Limits of the torque by the voltage of the dc link, and the brake resistor; see [`crate::dc_link`]. Unset values follow [`rules`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakingSettings {
     /// Voltage without generating torque, V.

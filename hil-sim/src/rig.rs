@@ -12,7 +12,7 @@ use crate::config::{self, Config, plant_settings};
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
 
-/// Longest learning, s: 30 points of 31 s at most, and the start.
+/// Longest learning, s.
 const LONGEST_LEARNING_S: u32 = 1000;
 /// Time at rest after a learning, in rotor time constants.
 const REST_T: f64 = 8.0;
@@ -30,6 +30,8 @@ pub struct Rig {
     /// Compare values on their way: computed in the last period, in force in this one.
     pending: Compare,
     periods: u64,
+    /// Time of the last learning, s, to a second.
+    pub learning_s: f64,
 }
 
 /// True state of the plant and estimates of the drive at one sample.
@@ -90,6 +92,7 @@ impl Rig {
             drive: Drive::new(drive.build().map_err(Error::refused)?),
             pending: Compare::OFF,
             periods: 0,
+            learning_s: 0.0,
         })
     }
 
@@ -121,11 +124,15 @@ impl Rig {
     /// # Errors
     /// [`Error::Refused`] when the drive refuses the command, stops with a fault or does not finish.
     pub fn learn(&mut self) -> Result<Learned, Error> {
+        let began = self.time();
         self.command(&Command::Start(Mode::Learning))?;
         for _ in 0..LONGEST_LEARNING_S {
             self.run(1.0, |_| {});
             match (self.drive.state(), self.drive.learned()) {
-                (State::Off, Some(learned)) => return Ok(*learned),
+                (State::Off, Some(learned)) => {
+                    self.learning_s = self.time() - began;
+                    return Ok(*learned);
+                }
                 (State::Fault(fault), learned) => {
                     let found = learned.map_or(String::new(), |learned| format!(": {learned}"));
                     return Err(Error::Refused(format!(
@@ -172,6 +179,7 @@ impl Rig {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;
         }
+        self.plant.set_chopper(self.drive.brake_duty().into());
         self.plant.advance(&self.pending, f64::from(PERIOD_S));
         self.pending = compare;
         self.periods += 1;

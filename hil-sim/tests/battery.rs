@@ -27,10 +27,10 @@ fn the_drive_passes_on_the_motor_that_it_is_made_for() {
         assert!(get(&metrics, "angle_error_max_deg") < 13.0);
         // Torque of sound runs: angle errors of 2° rms cost little at the mean.
         assert!(get(&metrics, "torque_error_max_pct").abs() < 5.0, "{metrics:?}");
-        // At 0.7 A the slope allows a learned drive 2.5 A to 2.75 A of 3 A.
+        // At 0.7 A the slope allows a learned drive 2.25 A to 2.75 A of 3 A.
         let limited = if learn == "yes" { 48.0 } else { 0.0 };
         assert_eq!(get(&metrics, "limited_runs"), limited);
-        assert!(learn == "no" || get(&metrics, "limit_pct") > 80.0, "{metrics:?}");
+        assert!(learn == "no" || get(&metrics, "limit_pct") > 70.0, "{metrics:?}");
         let none = ["lost_runs", "silent_runs", "stuck_runs", "trips", "refused_starts"];
         for name in none {
             assert_eq!(get(&metrics, name), 0.0, "{name}");
@@ -112,11 +112,11 @@ fn values_after_the_learning_do_not_act_while_it_lasts() {
     assert_eq!(error.to_string(), text);
 }
 
-/// A drive that may track up to 100 rpm only stops the runs at more, at a sound angle; one without saliency stops runs whose
-/// angle is wrong.
+/// A drive without observer that may track up to 100 rpm only stops the runs at more, at a sound angle; one without
+/// saliency stops runs whose angle is wrong.
 #[test]
 fn sound_runs_that_are_stopped_are_told_from_others() {
-    let (sound, _) = battery(&["injection.tracked_rpm=100", "runs=12"]);
+    let (sound, _) = battery(&["observer.enabled=no", "injection.tracked_rpm=100", "runs=12"]);
     assert!(get(&sound, "trips") >= 4.0, "{sound:?}");
     assert_eq!(get(&sound, "sound_runs_stopped"), get(&sound, "trips"));
     let (wrong, _) = battery(&["saliency.a_psi=0", "injection.check=no", "runs=12"]);

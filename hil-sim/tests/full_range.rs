@@ -20,17 +20,18 @@ fn get(outcome: &Outcome, name: &str) -> f64 {
     outcome.metrics.get(name).unwrap_or_else(|| panic!("{name}: {:?}", outcome.metrics))
 }
 
-/// With an encoder and exact parameters nothing is left but sampling and noise: 0.15° rms, in every region.
+/// With an encoder and exact parameters nothing is left but sampling and noise, in every region; where the field is weakened a reversal
+/// changes the flux, of which the slip knows nothing.
 #[test]
 fn with_an_encoder_torque_is_regulated_in_all_regions() {
-    for (kind, rms, max) in [("constant", 0.06, 0.2), ("reversals", 0.25, 1.2), ("sag", 0.2, 0.6)] {
+    for (kind, rms, max) in [("constant", 0.06, 0.2), ("reversals", 0.25, 2.5), ("sag", 0.2, 0.6)] {
         let outcome = full_range(kind, &[ENCODER]);
         let regions = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_rms_deg"));
         let regions: Vec<f64> = regions.map(|(_, rms)| rms).collect();
         assert_eq!(regions.len(), if kind == "sag" { 3 } else { 8 });
         assert!(regions.iter().all(|found| *found < rms && *found > 0.001), "{kind}: {regions:?}");
-        let largest = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_max_deg"));
-        assert!(largest.clone().all(|(_, found)| found < max), "{kind}: {:?}", outcome.metrics);
+        let mut largest = outcome.metrics.iter().filter(|(name, _)| name.ends_with("_max_deg"));
+        assert!(largest.all(|(_, found)| found < max), "{kind}: {:?}", outcome.metrics);
         for none in ["lost_runs", "refused_runs", "silent_runs"] {
             assert_eq!(get(&outcome, none), 0.0, "{kind}: {none}");
         }
@@ -49,16 +50,24 @@ fn a_hot_rotor_turns_the_angle_of_an_encoder() {
     assert_eq!(get(&hot, "lost_runs"), 0.0);
 }
 
-/// The link of the stop and of the outage is one that takes no energy back: a stop charges it beyond the mains, an outage
-/// empties it, and it stays between the voltages at which the drive trips, give or take what a period brings.
+/// The link of the stop and of the outage is one that takes no energy back: a stop charges it, and the drive brakes no more
+/// than it bears; an outage empties it, and the shaft holds it. Five times the inertia,
+/// braked by the losses alone, takes 18 s; with a resistor of 100 ohm it follows its ramp, 6 s.
 #[test]
-fn the_dc_link_charges_and_empties() {
-    let stop = full_range("braking", &[ENCODER]);
-    let highest = get(&stop, "braking_0_1800_dc_link_max_v");
-    assert!((340.0..402.0).contains(&highest), "{highest}");
+fn the_dc_link_stays_between_the_trips() {
+    let took = |more: &[&str]| {
+        let stop = full_range("braking", &[&[ENCODER], more].concat());
+        let highest = get(&stop, "braking_0_1800_dc_link_max_v");
+        assert!((360.0..395.0).contains(&highest), "{highest}");
+        assert_eq!(get(&stop, "lost_runs"), 0.0);
+        get(&stop, "braking_0_1800_took_s")
+    };
+    let (alone, resistor) = (took(&[]), took(&["braking.ohm=100"]));
+    assert!((15.0..25.0).contains(&alone) && (5.0..7.0).contains(&resistor), "{alone} {resistor}");
     let outage = full_range("outage", &[ENCODER]);
     let lowest = get(&outage, "outage_0_1800_dc_link_min_v");
-    assert!((198.0..265.0).contains(&lowest), "{lowest}");
+    assert!((205.0..265.0).contains(&lowest), "{lowest}");
+    assert_eq!(get(&outage, "lost_runs"), 0.0);
 }
 
 /// A flux that is turned under an encoder is seen: the drive stops, or turns it back within half a second, and the run
@@ -109,8 +118,8 @@ fn one_run_is_repeated_and_recorded() {
     assert_eq!((all.figures.len(), one.figures[0].panels.len()), (0, 6));
 }
 
-/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.03 Nm at 1.4 A and the 3.0 A of the limit, motoring and generating,
-/// with every dc link; at the top the link decides.
+/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 1.93 Nm at 1.4 A and the 3 A of the limit, motoring and generating,
+/// while the dc link allows it; at the top the link decides.
 #[test]
 fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     let outcome = outcome("torque-envelope", &[ENCODER]);
@@ -119,9 +128,10 @@ fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     for word in ["motoring", "generating"] {
         let torque =
             |volts: u32, rpm: u32| get(&outcome, &format!("torque_{word}_{volts}_v_{rpm}_rpm_nm"));
-        for (volts, rpm) in [(311, 300), (311, 1500), (311, 2100), (270, 900)] {
+        for (volts, rpm) in [(311, 300), (311, 1500), (311, 1800), (270, 900)] {
             let share = torque(volts, rpm) / limit;
             assert!((share - 1.0).abs() < 0.02, "{word}, {volts} V, {rpm} rpm: {share}");
         }
+        assert!(torque(230, 3600) < 0.7 * limit && torque(230, 3600) < torque(311, 3600));
     }
 }

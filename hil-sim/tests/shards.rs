@@ -9,7 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 9] = [
+const SMALL: [(&str, &[&str]); 10] = [
     ("speed-torque-sweep", &["--seconds", "0.2"]),
     (
         "monte-carlo",
@@ -31,7 +31,10 @@ const SMALL: [(&str, &[&str]); 9] = [
         "battery",
         &["--set", "runs=14", "--set", "disturbed.drawn=0.5", "--set", "after.motor.r_r=1.2"],
     ),
-    ("full-range", &["--set", "runs=1", "--set", "angle_source=encoder"]),
+    (
+        "full-range",
+        &["--set", "runs=1", "--set", "full_range.kind=constant", "--set", "angle_source=encoder"],
+    ),
     ("lock-monitor", &["--set", "runs=1"]),
     ("saliency-check", &["--set", "runs=2"]),
     ("smallest-slope", &["--set", "runs=1"]),

@@ -1,6 +1,8 @@
+use drive_core::settings::PlantSource;
 use drive_core::{Command, Drive, Mode, Refused, State};
 use hil_sim::Config;
 use hil_sim::config::{LoadMode, plant_settings};
+use hil_sim::experiments::commission::machine::Circuit;
 use hil_sim::rig::Rig;
 
 use super::*;
@@ -67,7 +69,7 @@ fn the_motor_is_found_from_its_nameplate() {
     assert_eq!(session.found(&settings), None);
     session.begin(Step::Nameplate, Step::LAST);
     let told = play(&mut rig, &mut session, |_, _| false);
-    assert_eq!(told.last(), Some(&News::Ended { sound: true }), "{told:?}");
+    assert_eq!(told.last(), Some(&News::Ended { sound: true, step: Step::LAST }), "{told:?}");
     assert_eq!(rig.drive.state(), State::Off);
     let found = session.found(&settings).unwrap().motor;
     let truth = Config::default().motor;
@@ -140,7 +142,11 @@ fn the_inertia_is_found_with_a_free_shaft() {
         session.begin(Step::Inertia, Step::Inertia);
         let from = rig.plant.mechanical_angle();
         let told = play(&mut rig, &mut session, |_, _| false);
-        assert_eq!(told.last(), Some(&News::Ended { sound: true }), "{inertia}: {told:?}");
+        assert_eq!(
+            told.last(),
+            Some(&News::Ended { sound: true, step: Step::Inertia }),
+            "{inertia}: {told:?}"
+        );
         let turned = (rig.plant.mechanical_angle() - from) / std::f64::consts::TAU;
         let found = session.found(&settings).unwrap();
         let error = f64::from(found.motor.inertia) / inertia - 1.0;
@@ -162,4 +168,40 @@ fn the_inertia_is_found_with_a_free_shaft() {
     let (step, why) = refusal(&told);
     assert!(step == Step::Inertia && why.to_string().contains("free to turn"), "{why}");
     assert_eq!(rig.drive.state(), State::Off);
+}
+
+/// The plants from the pseudo-random voltage are those of the motor, and come into the settings with the rest.
+#[test]
+fn the_plants_of_the_current_loop_are_identified_on_request() {
+    for (seed, scale) in [(1, 1.0), (2, 0.6), (3, 1.7)] {
+        let mut config = Config::default();
+        config.load.mode = LoadMode::Locked;
+        config.motor.l_ls *= scale;
+        config.motor.l_lr *= scale;
+        let settings = config.drive;
+        let mut rig = Rig::new(&plant_settings(&config), &settings, seed).unwrap();
+        let mut session = Session::new(&settings);
+        session.begin(Step::Nameplate, Step::LAST);
+        play(&mut rig, &mut session, |_, _| false);
+        let parameters = session.found(&settings).unwrap();
+        assert_eq!(parameters.current_plant.source, PlantSource::Motor);
+        rig.run(1.0, |_| {});
+        session.begin(Step::Plant, Step::Plant);
+        let told = play(&mut rig, &mut session, |_, _| false);
+        assert_eq!(told.last(), Some(&News::Ended { sound: true, step: Step::Plant }), "{told:?}");
+        let found = session.found(&settings).unwrap();
+        assert_eq!(found.current_plant.source, PlantSource::Identified);
+        assert_eq!(found.motor, parameters.motor);
+        // The motor's own plant. The saliencies of the flux and of the current hardly show at half the test current.
+        let truth = Circuit::of_plant(&config);
+        let pole = (-(truth.r_s + truth.r_r) / (6000.0 * truth.leakage)).exp();
+        let gain = (1.0 - pole) / (truth.r_s + truth.r_r);
+        for plant in [found.current_plant.d, found.current_plant.q] {
+            let (k, p) = (f64::from(plant.k.unwrap()), f64::from(plant.p.unwrap()));
+            let (k, lag) = (k / gain, (1.0 - p) / (1.0 - pole));
+            println!("leakage x{scale}: k {k:.4} and 1 - p {lag:.3} of the motor's");
+            assert!((k - 1.0).abs() < 0.03 && (lag - 1.0).abs() < 0.15, "{plant:?}");
+        }
+        found.build().unwrap();
+    }
 }

@@ -93,7 +93,7 @@ impl Announcer {
                     (State::Fault(_), _) => None,
                     // The commissioning says so itself.
                     (State::Exciting | State::CheckingWiring, State::Exciting) => None,
-                    (State::Stopping, State::Learning) if !asked => {
+                    (State::Learning | State::Stopping, State::Learning) if !asked => {
                         Some(News::Off("the learning has ended"))
                     }
                     (State::Stopping, _) => Some(News::Off("stopped")),

@@ -67,10 +67,17 @@ pub(super) fn told(news: &News, line: usize) -> (impl fmt::Display, Option<usize
             write!(f, "{}: {value}", report.step.word())
         }
         (News::Report(report), None) => write!(f, "{report}"),
-        (News::Ended { sound: true }, _) => {
-            f.write_str("ended; `accept` puts it in force and saves it")
+        (News::Ended { sound: true, step }, _) => {
+            f.write_str("ended; `accept` puts it in force and saves it")?;
+            // Another motor has to be learned.
+            f.write_str(match step {
+                Step::Inertia => "",
+                _ => "; then lock the shaft and `learn`",
+            })
         }
-        (News::Ended { sound: false }, _) => f.write_str("ended; the settings are as they were"),
+        (News::Ended { sound: false, .. }, _) => {
+            f.write_str("ended; the settings are as they were")
+        }
     });
     (text, value.map(|_| line + 1))
 }

@@ -4,8 +4,10 @@
 //! from `k` on, that of `k-2` ended at `k`.
 
 use super::motion::Motion;
+use super::plant_fit::PlantFit;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::math::frames::AlphaBeta;
+use crate::tuning::FirstOrder;
 
 /// Bins of a record.
 pub const BINS: usize = 57;
@@ -31,6 +33,13 @@ pub enum Record {
     Carrier,
     /// Means and squares of the phase currents and of the dc link.
     Noise,
+    /// Fit of the plant of the current loop.
+    Plant {
+        /// Whether across phase a, or along it.
+        across: bool,
+        /// Amplitude of the voltage, V, and of the current that a sample of it makes, A: the bases of the fit.
+        bases: (f32, f32),
+    },
     /// Torque current and speed, by [`push_motion`](Collector::push_motion).
     Motion,
 }
@@ -86,6 +95,7 @@ pub struct Collector {
     first_dc_link: f32,
     carrier: usize,
     motion: Motion,
+    plant: PlantFit,
 }
 
 impl Default for Collector {
@@ -103,6 +113,7 @@ impl Default for Collector {
             first_dc_link: 0.0,
             carrier: 0,
             motion: Motion::default(),
+            plant: PlantFit::default(),
         }
     }
 }
@@ -115,6 +126,7 @@ impl Collector {
         match record {
             Record::Nothing => {}
             Record::Motion => self.motion = Motion::default(),
+            Record::Plant { .. } => self.plant = PlantFit::default(),
             Record::Bins { half, first } => {
                 (self.end, self.length) = (first, first);
                 if let Some(bins) = self.bins.get_mut(half) {
@@ -149,6 +161,11 @@ impl Collector {
         }
     }
 
+    /// The plant that was fitted, in the bases of its record; `None` without one.
+    pub(super) fn plant(&self) -> Option<FirstOrder> {
+        self.plant.found()
+    }
+
     pub(super) fn motion(&self) -> &Motion {
         &self.motion
     }
@@ -175,6 +192,10 @@ impl Collector {
                     bin.voltage += voltage;
                     bin.current += measured;
                 }
+            }
+            Record::Plant { across, bases } => {
+                let axis = |x: AlphaBeta| if across { x.beta } else { x.alpha };
+                self.plant.push(axis(realised) / bases.0, axis(measured) / bases.1);
             }
             Record::Carrier => {
                 let table = (CARRIER_COS.get(self.carrier), CARRIER_SIN.get(self.carrier));

@@ -2,7 +2,8 @@
 
 use super::fit::Fitted;
 use crate::io::PERIOD_S;
-use crate::settings::{Flux, Motor, PlantSource, Settings};
+use crate::settings::{CurrentPlant, Flux, IdentifiedPlant, Motor, PlantSource, Settings};
+use crate::tuning::FirstOrder;
 
 /// What the steps have found; `None` for a step that has not been done or was refused.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,6 +20,8 @@ pub struct Found {
     pub leakage: Option<Leakage>,
     /// Magnetising curve.
     pub iron: Option<Iron>,
+    /// Plants of the current loop along the direct and the quadrature axis, A/V, from the pseudo-random voltage.
+    pub plants: Option<[FirstOrder; 2]>,
     /// Inertia of rotor and load, kg m^2.
     pub inertia: Option<f32>,
 }
@@ -114,7 +117,17 @@ impl Found {
         let half = 0.5 * levels.mismatch;
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
-        new.current_plant.source = PlantSource::Motor;
+        let set = |plant: FirstOrder| IdentifiedPlant {
+            k: Some(plant.k as f32),
+            p: Some(plant.p as f32),
+        };
+        match self.plants {
+            Some([d, q]) => {
+                new.current_plant =
+                    CurrentPlant { source: PlantSource::Identified, d: set(d), q: set(q) };
+            }
+            None => new.current_plant.source = PlantSource::Motor,
+        }
         // The direct current of the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
         let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);

@@ -37,6 +37,9 @@ const ENDS: usize = BINS - 2;
 const THIRD: (f32, f32) = (0.01, 6.5e-5);
 /// Share of it from which on the inverter's voltage is taken to depend on the current.
 const BENT: f32 = 0.3;
+/// Least voltage of the inverter, as a share of that of the dead time: with less, nodes of much capacitance make it grow with the
+/// current up to the test current, like a resistance. (Transistors may turn off later than they turn on.)
+const DEAD_TIME: f32 = 0.7;
 /// Wait before the third level is measured, and time of its mean, in rotor time constants.
 const WAIT_T: f32 = 3.0;
 const MEAN_T: f32 = 0.5;
@@ -178,12 +181,18 @@ impl Commissioning {
             Quantity::new("r_s", "ohm", levels.r_s)
                 .of(plate.r_s())
                 .check(Meaning::TooLarge, Meaning::TooSmall)?,
-            Quantity::new("inverter voltage", "V", levels.inverter_v),
+            self.inverter_voltage(&levels).check(Meaning::Inverter, Meaning::Inverter)?,
             Quantity::new("gain mismatch", "", mismatch),
             misfit,
         ];
         self.found.levels = Some(levels);
         Ok(Next::Report(Report::new(Step::Levels, values)))
+    }
+
+    fn inverter_voltage(&self, levels: &Levels) -> Quantity {
+        let of_dead_time = self.setup.dead_time * self.found.dc_link.unwrap_or(0.0);
+        Quantity::new("inverter voltage", "V", levels.inverter_v)
+            .of((DEAD_TIME * of_dead_time, f32::INFINITY))
     }
 
     fn report_levels(
@@ -208,7 +217,9 @@ impl Commissioning {
                 .of(Plate::TAU_R)
                 .check(small, large)?,
             Quantity::new("L_M", "H", levels.coupled()),
-            Quantity::new("inverter voltage", "V", levels.inverter_v).within(0.75 * d_e),
+            self.inverter_voltage(&levels)
+                .within(0.75 * d_e)
+                .check(Meaning::Inverter, Meaning::Inverter)?,
             Quantity::new("gain mismatch", "", mismatch),
             misfit,
         ];

@@ -37,13 +37,14 @@ impl Commissioning {
             // Less flux first: while the next start has the low sides on, what is left drives a current against itself, which
             // turns a light shaft away.
             if self.part == 0 {
+                self.found.plants = None;
                 let low = self.current(plate, LOW, AlphaBeta::ZERO)?;
                 return Ok(self.part(sums, Record::Nothing, periods(LOW_T * motor.tau_r()), low));
             }
             (self.part, self.until, self.progress) = (0, 0, Progress::StopToDesign);
             return Ok(Next::Wait);
         };
-        let design = design.map_err(Refusal::Design)?;
+        let [design, _] = design.map_err(Refusal::Design)?;
         let regulator = Regulator {
             k_c: design.k_c as f32,
             z_c: design.z_c as f32,
@@ -54,6 +55,7 @@ impl Commissioning {
             amperes: share * plate.amperes,
             regulator,
             carrier: AlphaBeta::ZERO,
+            binary: false,
         };
         let record = Record::Bins { half: 0, first: RECORD_S / PERIOD_S / FIRST_BINS };
         match self.part {

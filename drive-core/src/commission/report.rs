@@ -25,6 +25,8 @@ pub enum Step {
     Staircase,
     /// The current loop, designed from the values found and checked by a step.
     CurrentLoop,
+    /// The plants of the current loop from a pseudo-random voltage, as in section 3.7, shaft locked.
+    Plant,
     /// The inertia, with a free shaft and a drive that has learned: the shaft turns to and fro.
     Inertia,
 }
@@ -33,7 +35,7 @@ words!(Step {
     Self::Nameplate => Step::Nameplate, "nameplate"; Self::Sensors => Step::Sensors, "sensors";
     Self::Wiring => Step::Wiring, "wiring"; Self::Levels => Step::Levels, "levels";
     Self::Leakage => Step::Leakage, "leakage"; Self::Staircase => Step::Staircase, "staircase";
-    Self::CurrentLoop => Step::CurrentLoop, "current-loop";
+    Self::CurrentLoop => Step::CurrentLoop, "current-loop"; Self::Plant => Step::Plant, "plant";
     Self::Inertia => Step::Inertia, "inertia";
 });
 
@@ -42,7 +44,7 @@ impl Step {
     pub const LAST: Self = Self::CurrentLoop;
     /// The words of all, for messages.
     pub const ALL: &'static str =
-        "nameplate sensors wiring levels leakage staircase current-loop inertia";
+        "nameplate sensors wiring levels leakage staircase current-loop plant inertia";
 }
 
 /// A value that a step has found.
@@ -61,7 +63,7 @@ pub struct Quantity {
 }
 
 /// Values of a report at most.
-pub const VALUES: usize = 7;
+pub const VALUES: usize = 8;
 
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -48,6 +48,7 @@ impl Commissioning {
             Step::Leakage => self.leakage(&plate, sums),
             Step::Staircase => self.staircase(&plate, sums),
             Step::CurrentLoop => self.current_loop(&plate, sums),
+            Step::Plant => self.plant(&plate, sums),
             Step::Inertia => self.inertia(drive, sums),
         }
     }
@@ -187,6 +188,11 @@ impl Commissioning {
             z_c: 1.0 - ZERO_RAD_PER_S * PERIOD_S,
             ..Regulator::default()
         };
-        Ok(Excitation::Current { amperes: share * plate.amperes, regulator, carrier })
+        Ok(Excitation::Current {
+            amperes: share * plate.amperes,
+            regulator,
+            carrier,
+            binary: false,
+        })
     }
 }

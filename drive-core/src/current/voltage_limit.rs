@@ -1,6 +1,7 @@
 //! Currents that the voltage of the dc link allows: field weakening, and the limit of the torque current; once a carrier period.
 //!
-//! With `w = |w_s|` and `U` the voltage that may be used, 0.92 of the largest vector and of what the carrier takes, times a trim,
+//! `w = |w_s|` is the angular frequency of the stator. The usable voltage `U` is 0.92 of the largest vector less the amplitude of
+//! the carrier, times a trim:
 //!
 //! ```text
 //! i_q of the leakage   i_u = 0.7 U/(w sigma L_s)
@@ -37,8 +38,9 @@ pub struct VoltageLimit {
     r_s: f32,
     leakage: f32,
     stator: f32,
-    /// Setting of the direct current, A.
+    /// Setting of the direct current, and the torque current that it leaves, A.
     i_d: f32,
+    i_q: f32,
     /// Square of the largest current, A^2.
     current_squared: f32,
 }
@@ -53,6 +55,23 @@ pub struct VoltageLimitState {
     pub by_voltage: bool,
 }
 
+/// Operating point of a carrier period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Operation {
+    /// Reference of the current, A.
+    pub current: Dq,
+    /// Voltage without the carrier, V.
+    pub voltage: Dq,
+    /// Largest voltage vector that the carrier leaves, V.
+    pub largest: f32,
+    /// Frequency of the flux, electrical turns per period.
+    pub flux_freq: f32,
+    /// Whether the flux is kept, as with a carrier: what the injection has learned is that of one direct current.
+    pub kept: bool,
+    /// Direct current on top of the setting, A.
+    pub added: f32,
+}
+
 impl VoltageLimit {
     /// Limit for a motor at the direct current `i_d`, A, with currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
@@ -62,34 +81,25 @@ impl VoltageLimit {
             leakage,
             stator: leakage + motor.coupled_inductance(),
             i_d,
+            i_q: libm::sqrtf(largest_a * largest_a - i_d * i_d),
             current_squared: largest_a * largest_a,
         }
     }
 
     /// State without a limit.
     pub fn start(&self) -> VoltageLimitState {
-        let i_q = libm::sqrtf(self.current_squared - self.i_d * self.i_d);
-        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: i_q }, by_voltage: false }
+        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: self.i_q }, by_voltage: false }
     }
 
-    /// Updates the limits with the `current` reference, A, the `voltage` of the step, V, the `largest` voltage vector that the
-    /// carrier leaves, V, and the frequency of the flux, electrical turns per period. With a carrier the flux is `kept`: what
-    /// the injection has learned is that of one direct current. `added` is direct current on top, A.
-    pub fn step(
-        &self,
-        state: &mut VoltageLimitState,
-        current: Dq,
-        voltage: Dq,
-        largest: f32,
-        flux_freq: f32,
-        kept: bool,
-        added: f32,
-    ) {
+    /// Updates the limits.
+    pub fn step(&self, state: &mut VoltageLimitState, now: &Operation) {
+        let &Operation { current, voltage, largest, flux_freq, kept, added } = now;
         let whole = USED * largest;
         let available = whole * state.trim;
         let w = flux_freq.abs() * (TAU / PERIOD_S) + 1.0;
-        let length = libm::sqrtf(voltage.length_squared());
-        let trim = state.trim - TRIM * (length - whole) / whole;
+        // (|u| - U)/U near U, without the root.
+        let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
+        let trim = state.trim - TRIM * excess;
         state.trim = if trim < LEAST_TRIM {
             LEAST_TRIM
         } else if trim < 1.0 {
@@ -105,7 +115,7 @@ impl VoltageLimit {
         let along = libm::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
         // NaN gives the setting; the step finds it.
-        let i_d = if kept || !(i_d < self.i_d) {
+        let i_d = if kept || i_d.is_nan() || i_d >= self.i_d {
             self.i_d
         } else if i_d < LEAST * self.i_d {
             LEAST * self.i_d
@@ -113,7 +123,8 @@ impl VoltageLimit {
             i_d
         };
         let all = i_d + added;
-        let rest = libm::sqrtf(self.current_squared - all * all);
+        let rest =
+            if all == self.i_d { self.i_q } else { libm::sqrtf(self.current_squared - all * all) };
         state.by_voltage = by_leakage < rest;
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }

@@ -16,6 +16,7 @@ use crate::current::sensing::Sensing;
 use crate::current::shunts::Shunts;
 use crate::current::voltage_limit::VoltageLimit;
 use crate::dc_link::DcLink;
+use crate::drive::catching::Catching;
 use crate::filter::dissertation::lpf_lag_samples;
 use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
@@ -94,6 +95,8 @@ pub struct Coefficients {
     pub(crate) injection: Injection,
     /// The watch on the lock, if it is wanted.
     pub(crate) lock_monitor: Option<LockMonitor>,
+    /// The start on a turning shaft, if it is wanted.
+    pub(crate) catching: Option<Catching>,
     pub(crate) voltage_limit: VoltageLimit,
     pub(crate) dc_link: DcLink,
     pub(crate) motion: Motion,
@@ -289,8 +292,14 @@ impl Settings {
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {
                 let allowed_v = self.unexplained_v();
-                Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
+                let mean_v: f32 = if self.uses_observer() {
+                    0.25 * allowed_v
+                } else {
+                    UNEXPLAINED_MEAN * allowed_v
+                };
+                Prediction::new(m, motor_plant, allowed_v, mean_v)
             },
+            catching: self.catching(),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
             dc_link: DcLink::new(&self.dc_link_limits()),
             motion: self.motion(&motion_design),

@@ -150,8 +150,15 @@ impl Drive {
         if mode == Mode::Learning {
             self.learned = None;
         }
-        // The brake resistor stays hot.
-        self.control = ControlState { dc_link: self.control.dc_link, ..ControlState::default() };
+        // The brake resistor stays hot; a start on a turning shaft measures neither drop nor carrier.
+        let ControlState { dc_link, inverter_drop, observer, lock, .. } = self.control;
+        self.control = ControlState { dc_link, ..ControlState::default() };
+        self.control.inverter_drop.volts = inverter_drop.volts;
+        self.control.observer.resistance = observer.resistance;
+        self.control.lock.baseline = lock.baseline;
+        let gone = self.c.catching.map_or(0, |c| c.flux_gone);
+        self.control.catching.flux_left =
+            self.starts > 1 && self.elapsed < gone && self.can_catch();
         self.control.references = self.no_torque(self.c.sequence.i_d);
         self.c.turn(&mut self.control.axes, 0.0, self.c.injection_axis, false);
         self.c.sensing.start(&mut self.control.sensing);

@@ -21,6 +21,8 @@ pub enum Excitation {
         /// Amplitude of the carrier along phase a and across it, V peak. Change it from one axis to the other by way of
         /// zero.
         carrier: AlphaBeta,
+        /// Whether a pseudo-random binary sequence takes the place of the carrier's cosine: 255 samples of plus or minus one.
+        binary: bool,
     },
 }
 

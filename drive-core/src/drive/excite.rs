@@ -30,8 +30,17 @@ pub(super) struct ExcitationState {
     carrier: AlphaBeta,
     /// Sample within the period of the carrier.
     index: usize,
+    /// Register of the binary sequence; zero before its first sample.
+    register: u8,
     /// Pulse trains that have ended.
     trains: u32,
+}
+
+/// The next sample, plus or minus one, of the sequence of largest length by x^8 + x^6 + x^5 + x^4 + 1.
+fn next_bit(register: &mut u8) -> f32 {
+    let r = if *register == 0 { 1 } else { *register };
+    *register = (r << 1) | ((r >> 7 ^ r >> 5 ^ r >> 4 ^ r >> 3) & 1);
+    if r & 1 == 1 { 1.0 } else { -1.0 }
 }
 
 impl Drive {
@@ -53,7 +62,7 @@ impl Drive {
 
     /// Takes [`Command::Excite`](super::Command::Excite).
     pub(super) fn take_excitation(&mut self, wanted: Excitation) -> Result<Accepted, Refused> {
-        if let Excitation::Current { amperes, regulator, carrier } = wanted {
+        if let Excitation::Current { amperes, regulator, carrier, .. } = wanted {
             let (max, sum) = (self.c.protection.trip_a, amperes + carrier.alpha + carrier.beta);
             if !(sum + regulator.k_c + regulator.z_c + regulator.direct).is_finite() {
                 return Err(Refused::NotFinite);
@@ -109,7 +118,7 @@ impl Drive {
         let mut realised = AlphaBeta::ZERO;
         let mut compare = Compare::LOW_SIDES_ON;
         let filtered = LPF.step(&mut self.control.low_pass, measured.current);
-        if let Excitation::Current { amperes, regulator, carrier } = s.wanted {
+        if let Excitation::Current { amperes, regulator, carrier, binary } = s.wanted {
             let Regulator { k_c, z_c, direct, filtered: is_filtered } = regulator;
             let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
             let reference = filter.step(&mut s.reference, amperes);
@@ -120,7 +129,8 @@ impl Drive {
             s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);
             let cos = CARRIER_COS.get(s.index).copied().unwrap_or(0.0);
             s.index = if s.index + 1 < CARRIER_SAMPLES { s.index + 1 } else { 0 };
-            let wanted = AlphaBeta::new(along, 0.0) + s.carrier * cos;
+            let factor = if binary { next_bit(&mut s.register) } else { cos };
+            let wanted = AlphaBeta::new(along, 0.0) + s.carrier * factor;
             if !(wanted.alpha + wanted.beta).is_finite() {
                 return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
             }

@@ -7,12 +7,12 @@
 //! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | lock monitor | saliency (0) |
+//! | 4 | lock monitor; torque that the dc link bears | saliency (0) |
 //! | 5 | reference current of the saliency; the slowly turning axes | - |
-//! | 6 | carrier current in both channels; voltages for the prediction at 8 | sums (9) |
+//! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
 //! | 7 | rotor voltage for the prediction at 8 | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
-//! | 9 | averages of the demodulation; the sums begin anew | ten samples mixed |
+//! | 9 | currents that the voltage allows; averages of the demodulation; the sums begin anew | ten samples mixed |
 //!
 //! The noise watch takes its six looks in samples 0 to 2 (channel a) and 7 to 9 (channel b): three samples
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
@@ -21,6 +21,7 @@
 use super::ControlState;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
+use crate::current::voltage_limit::Operation;
 use crate::dc_link::Limiting;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
@@ -50,6 +51,12 @@ pub(super) struct StepResults<'a> {
     pub rotor_freq: f32,
     /// Whether the flux is held still.
     pub held: bool,
+    /// Whether a turning shaft is looked for: nothing is judged.
+    pub looking: bool,
+    /// Whether the flux of a turning shaft builds up.
+    pub building: bool,
+    /// Whether the observer keeps its hands off the angle.
+    pub alone: bool,
     /// Whether the drive learns: nothing is tracked then, and there is no reference yet.
     pub learning: bool,
 }
@@ -86,13 +93,21 @@ impl Coefficients {
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
-                self.prediction.judge(&mut s.prediction, step.measured.current)
+                self.judge(s, step)
             }
-            4 => self.check_lock(s, step),
+            4 => {
+                self.limit_torque(s, step);
+                self.check_lock(s, step)
+            }
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
                 if self.observer.is_some() && !step.learning {
                     s.hand_over.update(step.flux_freq);
+                    if step.looking {
+                        s.hand_over.silence();
+                    } else if step.alone {
+                        s.hand_over.weight = 0.0;
+                    }
                 }
                 let silent = s.hand_over.silent;
                 self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis, silent);
@@ -111,12 +126,12 @@ impl Coefficients {
                 if step.rotor_freq.abs() > self.protection.rotor_freq {
                     return Err(Fault::OverSpeed);
                 }
-                self.prediction.judge(&mut s.prediction, step.measured.current)?;
+                self.judge(s, step)?;
                 self.watch_noise(s, 4, step.sample)
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.limit_currents(s, step);
+                self.limit_voltage(s, step);
                 self.watch_noise(s, 5, step.sample)
             }
         }
@@ -132,8 +147,13 @@ impl Coefficients {
 
     /// Computes the rotor voltage that the next judgement of the current reckons with.
     fn predict(&self, s: &mut ControlState, step: &StepResults) {
+        // On iron a weakened flux is larger than the current model says: the observer measures it.
+        let magnetising = match &self.observer {
+            Some(observer) => observer.magnetising(&s.observer),
+            None => s.indirect.magnetising,
+        };
         let flux = RotorFlux {
-            magnetising: s.indirect.magnetising,
+            magnetising,
             rotor_freq: step.rotor_freq,
             axis: step.flux_axis,
             flux_freq: step.flux_freq,
@@ -141,16 +161,25 @@ impl Coefficients {
         self.prediction.predict(&mut s.prediction, &flux);
     }
 
-    /// Limits the currents to those that the dc link allows.
-    fn limit_currents(&self, s: &mut ControlState, step: &StepResults) {
+    /// Limits the currents to those that the voltage of the dc link allows.
+    fn limit_voltage(&self, s: &mut ControlState, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.silent;
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
-        let (reference, limit) = (s.seen.reference, &self.voltage_limit);
-        let freq = step.flux_freq;
-        let (state, added) = (&mut s.voltage_limit, s.limits.flux_a);
-        limit.step(state, reference, step.voltage, largest, freq, carrier, added);
-        let (most, dc_link) = (state.most.q, step.measured.dc_link);
+        let now = Operation {
+            current: s.seen.reference,
+            voltage: step.voltage,
+            largest,
+            flux_freq: step.flux_freq,
+            kept: carrier,
+            added: s.limits.flux_a,
+        };
+        self.voltage_limit.step(&mut s.voltage_limit, &now);
+    }
+
+    /// Limits the torque current to that which the dc link bears.
+    fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
+        let (most, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
         s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
         if s.voltage_limit.by_voltage {
             let why = &mut s.limits.why;
@@ -167,19 +196,32 @@ impl Coefficients {
         self.inject && s.hand_over.demodulates()
     }
 
+    /// Judges the current by the voltage.
+    fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
+        if step.held {
+            // The flux is still building up, and the drop of the inverter is not known.
+            s.prediction.forget_mean();
+        }
+        let resistance = s.observer.resistance;
+        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
+        if step.looking { Ok(()) } else { judged }
+    }
+
     /// Checks that the tracked angle is that of the flux.
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.injects(s)
-                    && s.hand_over.weight < 1.0
-                    && s.carrier.is_settled()
-                    && (step.held || !step.learning) =>
+                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, step.held)? {
+                // The baseline of the monitor is measured while the angle does not come from the injection. Once it is
+                // there, the monitor also watches the observer.
+                let led = step.held
+                    || step.building
+                    || s.hand_over.weight >= 1.0 && !s.lock.is_measured();
+                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
                 }
                 Ok(())

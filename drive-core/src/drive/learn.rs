@@ -6,9 +6,10 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
+use crate::learned::{Tracked, TrackedLimit};
 use crate::math::angle::Angle;
 use crate::math::limited;
-use crate::settings::AngleSource;
+use crate::settings::{AngleSource, Settings};
 
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.
@@ -29,7 +30,7 @@ impl Drive {
 
     /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
     /// result replaces the settings, and the drive stops.
-    pub(super) fn learn(&mut self) -> Result<f32, Fault> {
+    pub(super) fn learn(&mut self) -> Result<f32, State> {
         let (c, s) = (&self.c, &mut self.control);
         let t = s.seen;
         let saliency = *s.estimator.saliency();
@@ -49,29 +50,58 @@ impl Drive {
                     (r.lead, r.lead_axis) = (lead, lead.unit_vector());
                 }
             }
-            LearningAction::Moved | LearningAction::Stuck => return Err(Fault::ShaftNotLocked),
+            LearningAction::Moved | LearningAction::Stuck => {
+                return Err(Fault::ShaftNotLocked.into());
+            }
             LearningAction::Done => {
-                let check = c.saliency_check;
-                let start = Start {
-                    looked: check.map(|check| check.mean(&s.saliency_check)),
-                    per_looked: check.map_or(0.0, |check| check.per_mean()),
-                    baseline: s.lock.baseline,
-                };
-                let learned = c.learning.result(&s.learning, &start);
-                self.learned = Some(learned);
-                match learned.verdict {
-                    verdict if verdict.is_accepted() => {}
-                    Verdict::SlopeTooSmall | Verdict::LimitTooLow => {
-                        return Err(Fault::SlopeTooSmall);
-                    }
-                    _ => return Err(Fault::NothingLearned),
-                }
-                self.c.take(&learned);
-                self.changes = self.changes.wrapping_add(1);
-                self.enter(State::Stopping);
+                self.control.all_measured = true;
+                return Err(State::Off);
             }
         }
         Ok(self.control.references.current.q)
+    }
+
+    /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the
+    /// flash. Returns the state to be in.
+    #[inline(never)] // it has a place of its own in the memory
+    pub(super) fn evaluate_learning(&mut self) -> State {
+        let (c, s) = (&self.c, &mut self.control);
+        s.all_measured = false;
+        let check = c.saliency_check;
+        let start = Start {
+            looked: check.map(|check| check.mean(&s.saliency_check)),
+            per_looked: check.map_or(0.0, |check| check.per_mean()),
+            baseline: s.lock.baseline,
+        };
+        let learned = c.learning.result(&s.learning, &start);
+        self.learned = Some(learned);
+        match learned.verdict {
+            verdict if verdict.is_accepted() => {
+                self.c.take(&learned);
+                self.changes = self.changes.wrapping_add(1);
+                State::Off
+            }
+            Verdict::SlopeTooSmall | Verdict::LimitTooLow => Fault::SlopeTooSmall.into(),
+            _ => Fault::NothingLearned.into(),
+        }
+    }
+}
+
+impl Learned {
+    /// Range of torque that a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
+    pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
+        self.slope.filter(|_| self.verdict.is_accepted())?;
+        let (i_d, motor) = (settings.i_d(), &settings.motor);
+        let last = self.reference.grid().current(self.points);
+        let lost = self.limit_a < last;
+        let i_q = self.limit_a.min(settings.i_q_limit_a());
+        Some(Tracked {
+            i_q,
+            torque: i_q * motor.torque_per_ampere(i_d),
+            i_d,
+            flux: i_d * motor.l_m,
+            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
+        })
     }
 }
 

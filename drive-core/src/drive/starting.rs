@@ -1,11 +1,13 @@
 //! From off to regulating: offsets, bootstraps, wiring, flux, saliency, lock.
 
 use super::Drive;
+use crate::current::inverter_drop::InverterDropState;
 use crate::current::sensing::Measured;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
 use crate::io::{Compare, Sample};
 use crate::math::frames::Dq;
+use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
 use crate::protect::wiring_check::{WiringAction, WiringCheckState};
 use crate::settings::AngleSource;
@@ -31,7 +33,12 @@ impl Drive {
 
     fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
         if self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
-            self.enter(State::Precharge);
+            // Flux from a run before would meet a short circuit.
+            if self.control.catching.flux_left {
+                self.catch_from_here();
+            } else {
+                self.enter(State::Precharge);
+            }
         }
         Ok(Compare::OFF)
     }
@@ -48,7 +55,7 @@ impl Drive {
                 self.wiring = WiringCheckState::default();
                 self.enter(State::CheckingWiring);
             } else {
-                self.magnetising_from_here(sample);
+                self.current_from_here(sample.encoder);
             }
         }
         Ok(Compare::LOW_SIDES_ON)
@@ -71,16 +78,31 @@ impl Drive {
             WiringAction::Ended => {
                 pulses.judge(&self.wiring.answers())?;
                 self.wiring_unchecked = false;
-                self.magnetising_from_here(sample);
+                self.current_from_here(sample.encoder);
                 Compare::LOW_SIDES_ON
             }
         })
     }
 
-    fn magnetising_from_here(&mut self, sample: &Sample) {
+    /// The first current: to find a turning shaft where there is no encoder, or to magnetise.
+    fn current_from_here(&mut self, encoder: u32) {
+        if self.can_catch() {
+            self.catch_from_here();
+        } else {
+            self.magnetising_from_here(encoder);
+        }
+    }
+
+    /// Whether this start looks for a turning shaft. A drive that learns has a locked one.
+    pub(super) fn can_catch(&self) -> bool {
+        self.c.catching.is_some() && State::of_mode(self.mode).regulates()
+    }
+
+    pub(super) fn magnetising_from_here(&mut self, encoder: u32) {
         let s = &mut self.control;
+        (s.lock, s.inverter_drop) = (LockMonitorState::default(), InverterDropState::default());
         s.seen.rotor_count = match self.c.source {
-            AngleSource::Encoder => sample.encoder,
+            AngleSource::Encoder => encoder,
             AngleSource::Injection => s.count_by_flux(),
         };
         self.c.motion.start(&mut s.motion, s.seen.rotor_count);

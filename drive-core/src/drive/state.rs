@@ -34,6 +34,8 @@ pub enum State {
     CheckingWiring,
     /// Exciting the motor at rest, for the [commissioning](crate::commission).
     Exciting,
+    /// Current along phase a, to find the speed of a turning shaft; then its flux builds up.
+    Catching,
     /// Current on the direct axis only, until the flux stands.
     Magnetising,
     /// Flux built up, tracking without torque: is it the flux that is tracked?
@@ -68,7 +70,8 @@ impl State {
     pub(crate) const fn has_current(self) -> bool {
         matches!(
             self,
-            Self::Magnetising
+            Self::Catching
+                | Self::Magnetising
                 | Self::Verifying
                 | Self::Torque
                 | Self::Speed
@@ -98,6 +101,7 @@ impl fmt::Display for State {
             Self::Precharge => "precharging",
             Self::CheckingWiring => "checking the wiring",
             Self::Exciting => "exciting the motor at rest",
+            Self::Catching => "looking for a turning shaft",
             Self::Magnetising => "magnetising",
             Self::Verifying => "verifying the lock",
             Self::Torque => "regulating torque",

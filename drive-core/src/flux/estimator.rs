@@ -140,6 +140,11 @@ impl EstimatorState {
         FluxAngle { phi: self.tracker.angle - Angle::QUARTER, freq: self.tracker.freq }
     }
 
+    /// Lets the axis turn on with a rotor of this speed, electrical turns per period.
+    pub fn turn_with(&mut self, rotor_freq: f32) {
+        (self.rotor_freq, self.tracker.freq) = (rotor_freq, rotor_freq);
+    }
+
     /// Whether all state variables of the loop are finite.
     pub fn is_finite(&self) -> bool {
         (self.tracker.freq + self.mean_freq + self.rotor_freq + self.delta_i).is_finite()

@@ -24,12 +24,12 @@ const CARRIER_ON: f32 = 24.0 * PERIOD_S;
 /// Carrier periods until the demodulation is filled.
 const FILLED: u8 = 8;
 /// Carrier periods with the injection alone until the noise is judged.
-const QUIET: u16 = 120;
+const QUIET: u8 = 120;
 /// Mean age of a turn that is averaged over a carrier period, samples.
 const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
 
 /// State of the hand-over.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct HandOver {
     /// Share of the observer in the angle, 0 to 1.
     pub weight: f32,
@@ -37,27 +37,12 @@ pub struct HandOver {
     pub silent: bool,
     /// Carrier periods until the demodulation is filled.
     filling: u8,
-    /// Carrier periods for which the injection has had the angle alone.
-    alone: u16,
+    /// Carrier periods until the noise of the sensors is judged.
+    unquiet: u8,
     /// Turns of the last ten periods, their sum, and the sum of the present carrier period.
     turns: [f32; CARRIER_SAMPLES],
     sum: f32,
     fresh: f32,
-}
-
-impl Default for HandOver {
-    /// With the injection alone.
-    fn default() -> Self {
-        Self {
-            weight: 0.0,
-            silent: false,
-            filling: 0,
-            alone: QUIET,
-            turns: [0.0; CARRIER_SAMPLES],
-            sum: 0.0,
-            fresh: 0.0,
-        }
-    }
 }
 
 /// Turn of the flux as the observer sees it, for the tracking loop.
@@ -92,12 +77,17 @@ impl HandOver {
         } else {
             0.0
         };
-        self.alone = if self.weight > 0.0 { 0 } else { self.alone.saturating_add(1) };
+        self.unquiet = if self.weight > 0.0 { QUIET } else { self.unquiet.saturating_sub(1) };
     }
 
     /// Whether the noise of the sensors may be judged: some 0.2 s after the injection has the angle alone.
     pub fn is_quiet(&self) -> bool {
-        self.alone >= QUIET
+        self.unquiet == 0
+    }
+
+    /// Turns the carrier off, and leaves the angle to itself.
+    pub fn silence(&mut self) {
+        (self.silent, self.filling, self.weight) = (true, FILLED, 0.0);
     }
 
     /// Whether the demodulation has the carrier, and what is judged by it may be.

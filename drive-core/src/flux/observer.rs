@@ -37,9 +37,9 @@ const WITH_SPEED: f32 = 0.4;
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
 const LEAST_FLUX: f32 = 0.01;
-/// Time constants in which the stator resistance is tracked, s: while the motor is magnetised, and at low speed. (The flux also
-/// shows an angle error where it turns: a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
-const RESISTANCE_S: [f32; 2] = [0.15, 5.0];
+/// Time constant in which the stator resistance is tracked at low speed, s. (The flux also shows an angle error where it turns:
+/// a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
+const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -48,8 +48,8 @@ const FROM_INJECTION: f32 = 0.02;
 /// Largest angle error that is taken, rad: 3 degrees. That of a resistance 20 % off is not larger, and an injection that errs
 /// by more at this speed does little.
 const LARGEST_ERROR: f32 = 0.05;
-/// Share of the learned torque limit at which the saliency per ampere is read.
-const JUDGED_AT: f32 = 0.667;
+/// Share of the learned torque limit in the middle of the currents.
+const JUDGED_AT: f32 = 0.5;
 /// Voltages that are kept: the current behind the filter is older than three of them.
 const KEPT: usize = 4;
 
@@ -70,8 +70,8 @@ pub struct Observer {
     coupled: f32,
     /// Flux of the nominal direct current, V s.
     nominal: f32,
-    /// Shares of the resistance per V s of `eps` in a period.
-    resistance_gains: [f32; 2],
+    /// Share of the resistance per V s of `eps` in a period.
+    resistance_gain: f32,
     /// Age of the current in samples, without and behind the filter.
     pub ages: [f32; 2],
 }
@@ -86,6 +86,8 @@ pub struct ObserverState {
     pub flux: f32,
     /// Current in the frame of the flux, A.
     current: Dq,
+    /// Change of the flux in the last period by the voltage, V s.
+    pub change: Dq,
     /// Deviation of the flux from that of the current model in the period, V s.
     deviation: f32,
     /// Angle by which the flux turned in the last period, rad.
@@ -140,7 +142,7 @@ impl Observer {
             rate: PERIOD_S / motor.tau_r(),
             coupled,
             nominal: coupled * i_d,
-            resistance_gains: RESISTANCE_S.map(|tau| 1.0 / (tau * motor.r_s * i_d)),
+            resistance_gain: 1.0 / (RESISTANCE_S * motor.r_s * i_d),
             ages,
         }
     }
@@ -148,24 +150,24 @@ impl Observer {
     /// Takes an accepted result of a learning.
     ///
     /// The demodulation sees `q = Im s/(1 - Re s)` of the saliency, with `Im s = 2 a e` by a small angle error e and
-    /// `2 b i_d i_q/|i|` by the torque current: both are solved for a and b, the second at two thirds of the limit.
+    /// `2 b i_d i_q/|i|` by the torque current, so that a learned b is too small by `1 - Re s`: some `1 - a + b |i|` in
+    /// the middle of the currents.
     pub fn take(&mut self, learned: &Learned) {
         if let Some(slope) = &learned.slope {
             let k = slope.at_rest();
             self.flux_saliency = k / (2.0 + k);
         }
         if learned.current_saliency.accepted {
-            let (i_d, i_q) = (self.nominal / self.coupled, JUDGED_AT * learned.limit_a);
-            let length = libm::sqrtf(i_d * i_d + i_q * i_q);
-            let q = learned.reference.at(i_q);
-            let along = 2.0 * i_d * i_q + q * (i_d * i_d - i_q * i_q);
-            self.current_saliency = q * (1.0 - self.flux_saliency) * length / along;
+            let b = learned.current_saliency.value;
+            let middle = b * JUDGED_AT * learned.limit_a;
+            self.current_saliency = b * (1.0 - self.flux_saliency + middle);
         }
     }
 
-    /// Resets `state` to no flux.
+    /// Resets `state` to no flux, with the resistance as it was.
     pub fn start(&self, state: &mut ObserverState) {
-        *state = ObserverState { flux: LEAST_FLUX * self.nominal, ..ObserverState::default() };
+        let (flux, resistance) = (LEAST_FLUX * self.nominal, state.resistance);
+        *state = ObserverState { flux, resistance, ..ObserverState::default() };
     }
 
     /// One period, from the `current` of a sample and the voltages that were put out before it. `frame` is the axis of the flux
@@ -201,6 +203,7 @@ impl Observer {
         };
         let r_s = self.r_s * (1.0 + state.resistance);
         let e = voltage * PERIOD_S - mean * r_s - leakage * self.leakage;
+        state.change = e;
         let grown = self.rate * (self.coupled * mean.d - state.flux);
         state.deviation = grown - e.d;
         let flux = state.flux + e.d + slow.gain.d * state.deviation;
@@ -230,10 +233,10 @@ impl Observer {
         };
     }
 
-    /// Tracks the stator resistance by the flux, `held` along phase a or at low speed; every period.
-    pub fn track_resistance(&self, state: &mut ObserverState, held: bool) {
-        let [fast, slow] = self.resistance_gains;
-        self.turn_resistance(state, -if held { fast } else { slow } * state.deviation);
+    /// Tracks the stator resistance by the flux at low speed; every period. It starts from the one that the magnetisation
+    /// measured (see [`InverterDrop`](crate::current::inverter_drop::InverterDrop)).
+    pub fn track_resistance(&self, state: &mut ObserverState) {
+        self.turn_resistance(state, -self.resistance_gain * state.deviation);
     }
 
     /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, with the observer's `weight` in the
@@ -260,6 +263,11 @@ impl Observer {
         } else {
             resistance
         };
+    }
+
+    /// Current that makes the flux, A, with the magnetising inductance of the settings.
+    pub fn magnetising(&self, state: &ObserverState) -> f32 {
+        state.flux / self.coupled
     }
 
     /// Voltage that the flux and the leakage induce at these references, V, `flux_freq` in electrical turns per period.

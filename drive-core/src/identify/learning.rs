@@ -3,7 +3,7 @@
 //!
 //! With the shaft locked the flux rotates at slip frequency, and its angle is known from the currents
 //! without a position sensor. At each point a torque current is regulated in a frame that lies behind the flux by the lead
-//! e of the flux, and the demodulated signal q is averaged over whole half turns of the flux:
+//! e of the flux, and the demodulated signal q is averaged:
 //!
 //! ```text
 //! reference(i_q) = q(i_q, 0)        slope k(i_q) = dq/de = (q(i_q, x) - q(i_q, -x)) / 2x
@@ -12,9 +12,16 @@
 //!
 //! The flux sees i_d' and i_q', which give its magnetising current and its slip. It does not slip where tan x = i_q/i_d, so
 //! tan x is an odd multiple of half a step of the table over i_d: 8.5° to 15°. Each point has a mirrored one, (-i_q, -e);
-//! q is odd. Components that repeat with every half turn average out; they are the
-//! [asymmetry](crate::carrier::asymmetry) of sensors and stator, with the part of q that is even. A part that repeats four times
-//! in a turn comes from a current sensor that is not linear, and cannot be taken out: where it is large, learning refuses.
+//! q is odd. In the mirrored one the flux turns back over the angles of the first: what depends on the angle alone drops out.
+//!
+//! From the current on at which the flux makes a half turn in about the averaging time, points last for whole half turns. The
+//! three smallest of these currents come first. (At larger ones a gain mismatch also makes a real current that turns the
+//! other way.) Components that repeat there with every half turn are the [asymmetry](crate::carrier::asymmetry) of sensors and stator, with the part of q that is
+//! even; they are taken out of the samples of all other points, which need no whole turn. A part that repeats four times in a turn
+//! comes from a current sensor that is not linear, and cannot be taken out: where it is large, learning refuses.
+//!
+//! The reference is learned at every current of the table, the slope at every other one: between them it is interpolated.
+//! A pair has the magnetising current i_d' of its neighbour to a few percent, or exactly, so the flux hardly has to settle.
 //!
 //! Two checks detect a shaft that is not locked. A shaft turned from outside induces a quadrature voltage
 //! that is equal at both points of a pair, while all other components change sign. A
@@ -23,26 +30,26 @@
 //! inverter drop.)
 
 mod evaluate;
+mod points;
 #[cfg(test)]
 mod tests;
 
 use core::f32::consts::{PI, TAU};
 
+use crate::carrier::asymmetry::Asymmetry;
 use crate::io::{PERIOD_S, periods};
-use crate::math::angle::{Angle, UnitVector};
+use crate::math::angle::Angle;
 use crate::math::frames::Dq;
 use crate::settings::Motor;
 use crate::settings::table::{Grid, POINTS};
 
 pub use crate::learned::{Fitted, LEAST_SLOPE, Learned, Verdict};
 pub use evaluate::Start;
+use points::{AVERAGE_S, LEFT, Point, SETTLE_T};
 
-/// Settling time of flux and averages at a point, in rotor time constants.
-const SETTLE_T: f32 = 2.0;
-/// Minimum averaging time at a point, s. One second reduces sensor noise of 5 mA to 0.2°.
-const AVERAGE_S: f32 = 1.0;
-/// Maximum averaging time, s; longer where three half turns of the flux at the smallest torque current take longer.
-const LONGEST_S: f32 = 30.0;
+/// Pairs that the asymmetry is taken from, and the most half turns that a point may last beyond the averaging time.
+const TURNING: usize = 3;
+const MOST_HALVES: f32 = 3.0;
 /// Lag of the synchronous demodulation, samples: 19 of the averages, and 4.5 on average because they are
 /// evaluated once in ten samples.
 const LAG: f32 = 23.5;
@@ -61,10 +68,10 @@ const LONE_TAN_LEAD: f32 = 0.2;
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
-    /// Settling time of a point, control periods.
-    settle: u32,
-    /// Minimum and maximum averaging time, control periods.
-    average: (u32, u32),
+    /// Longest point, control periods.
+    longest: u32,
+    /// Table point of the first pair.
+    first: usize,
     /// Torque currents of the table.
     grid: Grid,
     /// Number of table points to learn, without zero.
@@ -73,6 +80,9 @@ pub struct Learning {
     pub(crate) normalised: bool,
     /// Lead x of the flux, rad.
     lead: f32,
+    /// Settling times of the flux, in rotor time constants: from one current with a lead to the next, and where the lead
+    /// changes its sign at the largest current.
+    flux_t: [f32; 2],
     /// Direct current, A.
     i_d: f32,
     /// Rotor time constant, s.
@@ -113,8 +123,7 @@ struct Sums {
     /// Squares of the carrier current, A^2.
     carrier: f32,
     /// Parts in phase with the sine and the cosine of twice the angle of the injection axis.
-    sin: f32,
-    cos: f32,
+    once: [f32; 2],
     /// The same of four times that angle.
     twice: [f32; 2],
     voltage: Dq,
@@ -132,10 +141,9 @@ pub struct LearningState {
     odd: [[f32; POINTS]; LEADS.len()],
     /// Even part of the signal over all pairs: sum, least, largest.
     even: (f32, f32, f32),
-    /// Sums over all points of the parts in phase with the sine and the cosine.
-    sin: f32,
-    cos: f32,
-    /// Largest square of the part that repeats four times in a turn, of all points.
+    /// Means over the first pairs of the parts in phase with the sine and the cosine.
+    turning: Asymmetry,
+    /// Largest square of the part that repeats four times in a turn, of the points of whole half turns.
     ripple: f32,
     /// Mean squared carrier current over both signs of every current without lead, A^2.
     carrier: [f32; POINTS],
@@ -146,17 +154,6 @@ pub struct LearningState {
 
 /// Leads of the flux at the pairs of a torque current, in units of x.
 const LEADS: [f32; 3] = [0.0, 1.0, -1.0];
-
-/// A point of the learning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Point {
-    /// Index of its current in the table.
-    n: usize,
-    /// Index of its lead in [`LEADS`].
-    lead: usize,
-    /// Whether it is the second of its pair, with torque current and lead of the opposite sign.
-    mirrored: bool,
-}
 
 /// Operating point that the drive is to regulate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -188,64 +185,34 @@ impl Learning {
         let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
         let half_step = 0.5 * grid.step_a() / i_d;
-        // The flux makes a half turn in pi tau_r i_d / i_q.
-        let least_slip = if half_step > MOST_TAN_LEAD { LONE_TAN_LEAD } else { half_step };
-        let half_turn_s = PI * motor.tau_r() / least_slip;
         let tan_lead = if half_step > MOST_TAN_LEAD {
             LONE_TAN_LEAD
         } else {
             let odd = 2.0 * libm::ceilf(0.5 * (LEAST_TAN_LEAD / half_step - 1.0)) + 1.0;
             half_step * if odd > 1.0 { odd } else { 1.0 }
         };
+        let points = (most as usize).min(POINTS - 1);
+        let lead = libm::atanf(tan_lead);
+        // The flux makes a half turn in pi tau_r i_d / i_q.
+        let half_turn_s = PI * motor.tau_r() * i_d / grid.step_a();
+        let first = (libm::ceilf(half_turn_s / AVERAGE_S) as usize + TURNING - 1).min(points);
+        let slowest = first.saturating_sub(TURNING - 1).max(1) as f32;
         Self {
-            settle: periods(SETTLE_T * motor.tau_r()),
-            average: (periods(AVERAGE_S), periods(LONGEST_S).max(periods(3.0 * half_turn_s))),
+            longest: periods(AVERAGE_S + MOST_HALVES * half_turn_s / slowest),
+            first,
             grid,
-            points: (most as usize).min(POINTS - 1),
+            points,
             normalised,
-            lead: libm::atanf(tan_lead),
+            lead,
+            flux_t: [2.0, 2.0 * points as f32].map(|steps| {
+                let change = steps * grid.step_a() * libm::sinf(lead) / i_d;
+                libm::logf(change / LEFT).max(SETTLE_T)
+            }),
             i_d,
             tau_r: motor.tau_r(),
             leakage: motor.l_ls + motor.l_m - coupled,
             coupled,
             rad_per_s: TAU / PERIOD_S,
-        }
-    }
-
-    /// Number of points of a learning: two for every current and lead of the flux, and two leads without current.
-    pub fn points(&self) -> usize {
-        if self.normalised { 6 * self.points + 2 } else { 2 * self.points }
-    }
-
-    /// The point that is being measured, from 1 on, and the number of points.
-    pub fn progress(&self, state: &LearningState) -> (usize, usize) {
-        (self.points().min(state.point + 1), self.points())
-    }
-
-    /// Expected time, s, from the beginning of a point, from 1 on, to the end of the learning. The flux rotates at slip
-    /// frequency, and a point ends at a completed half turn: points of small torque current take seconds.
-    pub fn seconds_left(&self, point: usize) -> f32 {
-        let least_s = self.average.0 as f32 * PERIOD_S;
-        let settle_s = self.settle as f32 * PERIOD_S;
-        let seconds = |number| {
-            let Point { n, lead, .. } = self.point(number);
-            let lead = LEADS.get(lead).map_or(0.0, |lead| lead * self.lead);
-            let UnitVector { cos, sin } = Angle::from_radians(lead).unit_vector();
-            let i_q = self.grid.current(n);
-            let (d, q) = (self.i_d * cos + i_q * sin, i_q * cos - self.i_d * sin);
-            let half_turn_s = PI * self.tau_r * (d / q).abs();
-            settle_s + half_turn_s * libm::ceilf(least_s / half_turn_s)
-        };
-        (point.max(1) - 1..self.points()).map(seconds).sum()
-    }
-
-    /// The point with this number. Pairs without lead come first, in the order of the currents.
-    fn point(&self, number: usize) -> Point {
-        let (pair, mirrored) = (number / 2, !number.is_multiple_of(2));
-        match pair.checked_sub(self.points) {
-            None => Point { n: pair + 1, lead: 0, mirrored },
-            Some(0) => Point { n: 0, lead: 1, mirrored },
-            Some(led) => Point { n: led.div_ceil(2), lead: 2 - led % 2, mirrored },
         }
     }
 
@@ -263,31 +230,38 @@ impl Learning {
         if state.point >= self.points() {
             return LearningAction::Done;
         }
+        let point = self.point(state.point);
         let s = &mut state.sums;
         s.elapsed = s.elapsed.saturating_add(1);
-        if s.elapsed <= self.settle {
-            return self.operate(self.point(state.point));
+        if s.elapsed <= periods(point.settle_s) {
+            return self.operate(point);
         }
         let seen = sample.theta - Angle::within_turn(sample.flux_freq * LAG);
         let twice = (seen + seen).unit_vector();
-        let UnitVector { cos, sin } = twice;
-        let four = twice.turned_by(twice);
         s.count += 1;
         s.turned += sample.flux_freq;
-        s.signal += sample.signal;
-        s.carrier += sample.carrier_squared;
-        s.sin += sample.signal * sin;
-        s.cos += sample.signal * cos;
-        s.twice[0] += sample.signal * four.sin;
-        s.twice[1] += sample.signal * four.cos;
         s.voltage += sample.voltage;
-        if s.count > self.average.1 {
+        if point.turns {
+            let four = twice.turned_by(twice);
+            s.signal += sample.signal;
+            s.carrier += sample.carrier_squared;
+            s.once[0] += sample.signal * twice.sin;
+            s.once[1] += sample.signal * twice.cos;
+            s.twice[0] += sample.signal * four.sin;
+            s.twice[1] += sample.signal * four.cos;
+        } else {
+            let known = &state.turning;
+            s.signal += sample.signal - known.sin * twice.sin - known.cos * twice.cos;
+            let along = if self.normalised { known.along(twice) } else { 0.0 };
+            s.carrier += sample.carrier_squared * (1.0 - 2.0 * along);
+        }
+        if s.count > self.longest {
             return LearningAction::Stuck;
         }
-        // A point ends at a completed half turn.
         let half_turned = 2.0 * s.turned.abs() >= (s.halves + 1) as f32;
         s.halves += u32::from(half_turned);
-        if half_turned && s.count >= self.average.0 && !self.finish(state) {
+        let ends = s.count >= periods(point.average_s) && (half_turned || !point.turns);
+        if ends && !self.finish(state, point) {
             return LearningAction::Moved;
         }
         if state.point >= self.points() {
@@ -298,18 +272,23 @@ impl Learning {
     }
 
     /// Evaluates the sums of a completed point. False when the shaft moved.
-    fn finish(&self, state: &mut LearningState) -> bool {
-        let (s, point) = (state.sums, self.point(state.point));
+    fn finish(&self, state: &mut LearningState, point: Point) -> bool {
+        let s = state.sums;
         state.sums = Sums::default();
         state.point += 1;
         let mean = 1.0 / s.count as f32;
         let (signal, voltage) = (s.signal * mean, s.voltage * mean);
-        state.sin += 2.0 * s.sin * mean;
-        state.cos += 2.0 * s.cos * mean;
-        let [sin, cos] = s.twice.map(|sum| 2.0 * sum * mean);
-        let ripple = sin * sin + cos * cos;
-        if ripple > state.ripple {
-            state.ripple = ripple;
+        if point.turns {
+            if state.point <= 2 * TURNING {
+                let share = mean / self.points.clamp(1, TURNING) as f32;
+                state.turning.sin += share * s.once[0];
+                state.turning.cos += share * s.once[1];
+            }
+            let [sin, cos] = s.twice.map(|sum| 2.0 * sum * mean);
+            let ripple = sin * sin + cos * cos;
+            if ripple > state.ripple {
+                state.ripple = ripple;
+            }
         }
         if let (0, Some(carrier)) = (point.lead, state.carrier.get_mut(point.n)) {
             *carrier += 0.5 * s.carrier * mean;
@@ -342,7 +321,7 @@ impl Learning {
         let direct = voltage + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
         let free_shaft_v = self.coupled * (x - first_x);
-        let judged = free_shaft_v > JUDGED_RAD_PER_S * self.coupled * self.i_d;
-        judged && direct - first_v < -0.5 * free_shaft_v
+        let judged = free_shaft_v.abs() > JUDGED_RAD_PER_S * self.coupled * self.i_d;
+        judged && (first_v - direct) * free_shaft_v > 0.5 * free_shaft_v * free_shaft_v
     }
 }

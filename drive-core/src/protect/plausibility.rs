@@ -75,6 +75,8 @@ impl CarrierWatch {
 /// Coefficients of the comparison between measured and predicted current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
+    /// Stator resistance of the settings, ohm.
+    r_s: f32,
     /// 1/k of the current response, V/A.
     per_ampere: f32,
     /// Pole of the current response.
@@ -120,7 +122,7 @@ pub struct PredictionState {
     /// Axis of the flux in the middle of the samples, and its back-emf, V.
     flux: (UnitVector, f32),
     /// Mean unexplained voltage in the frame of the flux, V.
-    mean: Dq,
+    pub mean: Dq,
 }
 
 /// Samples between two comparisons: half a carrier period. Over a whole one the carrier would average to
@@ -143,6 +145,7 @@ impl Prediction {
     pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32, allowed_mean_v: f32) -> Self {
         let coupled = motor.coupled_inductance();
         Self {
+            r_s: motor.r_s,
             per_ampere: (1.0 / plant.k) as f32,
             pole: plant.p as f32,
             decay: coupled / motor.tau_r(),
@@ -167,16 +170,23 @@ impl Prediction {
     }
 
     /// Compares the `current`, A, after it was [collected](PredictionState::collect); called in every fifth
-    /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five.
+    /// sample. The model of one period, `i[k] - p i[k-1] = k_g v[k-2]`, is averaged over the five. `resistance` is the
+    /// deviation of the stator resistance from the settings, relative.
     ///
     /// # Errors
     /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit, [`Fault::FluxNotAsPredicted`]
     /// when its mean in the frame of the flux does: the flux is not where, or not as large as, it is believed to be. At rest
     /// and without slip no voltage shows that.
-    pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
+    pub fn judge(
+        &self,
+        state: &mut PredictionState,
+        current: AlphaBeta,
+        resistance: f32,
+    ) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
-        let unexplained = (changed * self.per_ampere - state.taken) * MEAN - state.rotor;
+        let explained = changed * self.per_ampere + state.currents * (self.r_s * resistance);
+        let unexplained = (explained - state.taken) * MEAN - state.rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         (state.last, state.currents) = (current, AlphaBeta::ZERO);
         // The two uncertainties are independent: their squares add.
@@ -201,6 +211,17 @@ impl PredictionState {
     pub fn collect(&mut self, current: AlphaBeta, computed: AlphaBeta) {
         self.currents += current;
         self.voltages += computed;
+    }
+
+    /// Forgets what was unexplained so far: the model was that of another speed.
+    pub fn forget(&mut self) {
+        self.unexplained = AlphaBeta::ZERO;
+        self.forget_mean();
+    }
+
+    /// Forgets the mean in the frame of the flux: the flux was not there.
+    pub fn forget_mean(&mut self) {
+        self.mean = Dq::ZERO;
     }
 
     /// Latches the sum of the voltages; called two samples before [`Prediction::judge`]. The voltage
@@ -313,7 +334,7 @@ mod tests {
                     },
                 ),
                 3 | 8 => {
-                    if let Err(fault) = prediction.judge(&mut state, current) {
+                    if let Err(fault) = prediction.judge(&mut state, current, 0.0) {
                         return (state.unexplained, Some((n, fault)));
                     }
                 }

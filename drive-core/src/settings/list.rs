@@ -102,6 +102,7 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     word!("sequence.flux", sequence.flux: Flux, "flux that the rule for the direct current aims at: low as in the dissertation, or high").learned(),
     auto!("sequence.i_d", sequence.i_d, Settings::i_d, "A", "direct (magnetising) current, peak").beside(|s| (0.01, s.current_limit_a())).learned(),
     auto!("sequence.stop_a_per_s", sequence.stop_a_per_s, Settings::stop_a_per_s, "A/s", "slope of the torque current at a stop").from_to(0.1, 1e5),
+    word!("sequence.catch", sequence.catch: bool, "whether a start with the observer looks for a turning shaft first"),
 
     auto!("speed.i_q_limit_a", speed.i_q_limit_a, Settings::i_q_limit_a, "A", "largest torque current of speed and position mode").beside(|s| (0.01, s.current_limit_a())),
     auto!("speed.limit_rpm", speed.limit_rpm, Settings::speed_limit_rpm, "rpm", "largest speed that is asked for").beside(|s| (1.0, s.speed_trip_rpm())),
@@ -109,8 +110,8 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     // Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
     number!("speed.phase_margin_deg", speed.phase_margin_deg, "deg", "phase margin of the speed loop: more is calmer and slower").from_to(45.0, 70.0),
 
-    auto!("braking.high_v", braking.high_v, Settings::dc_high_v, "V", "dc link without generating torque").beside(|s| (1.05 * s.inverter.dc_link_v, s.dc_over_v())),
-    auto!("braking.low_v", braking.low_v, Settings::dc_low_v, "V", "dc link without motoring torque, below which the shaft feeds it").beside(|s| (1.05 * s.dc_under_v(), 0.95 * s.inverter.dc_link_v)),
+    auto!("braking.high_v", braking.high_v, Settings::dc_high_v, "V", "dc link without generating torque").beside(|s| (s.inverter.dc_link_v + 0.05 * s.inverter.dc_link_v, s.dc_over_v())),
+    auto!("braking.low_v", braking.low_v, Settings::dc_low_v, "V", "dc link without motoring torque, below which the shaft feeds it").beside(|s| (s.dc_under_v() + 0.05 * s.dc_under_v(), s.inverter.dc_link_v - 0.05 * s.inverter.dc_link_v)),
     auto!("braking.flux_a", braking.flux_a, Settings::braking_flux_a, "A", "direct current that is added while generating torque is limited; 0 for none").beside(|s| (0.0, s.current_limit_a())),
     number!("braking.ohm", braking.ohm, "ohm", "brake resistor behind the chopper; 0 for none").from_to(0.0, 1e5),
     number!("braking.energy_j", braking.energy_j, "J", "energy that the brake resistor takes from cold").from_to(1.0, 1e7),

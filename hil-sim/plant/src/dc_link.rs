@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_3, PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use crate::Plant;
 use crate::error::{PlantError, check};
 
 /// The chopper goes off at this fraction of the voltage at which it goes on.
@@ -159,5 +160,23 @@ impl DcLink {
         let since = self.time - s.sag_at;
         let there = since.min(s.sag - since) / s.sag_ramp;
         self.nominal + (s.sag_v - self.nominal) * there.clamp(0.0, 1.0)
+    }
+}
+
+impl Plant {
+    /// Changes the peak of the rectified mains alone, V, behind which a capacitor keeps its voltage; without one as
+    /// [`Self::set_dc_link`].
+    ///
+    /// # Errors
+    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
+    pub fn set_mains(&mut self, peak: f64) -> Result<(), PlantError> {
+        let held = self.dc_link();
+        self.set_dc_link(peak)?;
+        if self.dc_link.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
+    }
+
+    /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.
+    pub fn set_chopper(&mut self, duty: f64) {
+        self.dc_link.duty = duty.clamp(0.0, 1.0);
     }
 }

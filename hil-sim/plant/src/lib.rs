@@ -299,22 +299,6 @@ impl Plant {
         Ok(())
     }
 
-    /// Changes the peak of the rectified mains alone, V, behind which a capacitor keeps its voltage; without one as
-    /// [`Self::set_dc_link`].
-    ///
-    /// # Errors
-    /// [`PlantError::OutOfRange`] outside 0 to 1000 V.
-    pub fn set_mains(&mut self, peak: f64) -> Result<(), PlantError> {
-        let held = self.dc_link();
-        self.set_dc_link(peak)?;
-        if self.dc_link.moves() { self.around.inverter.set_dc_link(held) } else { Ok(()) }
-    }
-
-    /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.
-    pub fn set_chopper(&mut self, duty: f64) {
-        self.dc_link.duty = duty.clamp(0.0, 1.0);
-    }
-
     /// Slopes of the phase currents while the terminals are shorted, A/s.
     pub fn shorted_slopes(&self) -> [f64; 3] {
         phases(whichever!(&self.motor, motor => {

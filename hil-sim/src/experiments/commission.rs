@@ -13,7 +13,7 @@ use drive_core::tuning::{DELAY, EquivalentCircuit, current_loop_margins, motor_p
 use serde::{Deserialize, Serialize};
 
 use super::statistics::{Study, whole};
-use super::{BENCH, Context, DRIVE, Experiment, machines};
+use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
 use crate::config::{Config, PlantModel, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
@@ -76,8 +76,8 @@ pub struct Record {
     margin_deg: f64,
     /// Whether its saliency is at least 0.7 of the expected one.
     salient: bool,
-    /// Whether all runs afterwards are good, or why there are none.
-    after: Option<Result<bool, String>>,
+    /// Whether all runs afterwards are good, and the time of the learning, s, or why there are none.
+    after: Option<Result<(bool, f64), String>>,
     /// The parameters found, as [`Circuit::values`].
     found: Vec<f64>,
     /// The session in words: time, step and verdict; its values.
@@ -89,8 +89,8 @@ impl Record {
     fn result(&self) -> String {
         let accepted = match &self.after {
             None => "accepted",
-            Some(Ok(true)) => "accepted, good afterwards",
-            Some(Ok(false)) => "accepted, angle error too large afterwards",
+            Some(Ok((true, _))) => "accepted, good afterwards",
+            Some(Ok((false, _))) => "accepted, angle error too large afterwards",
             Some(Err(why)) => why,
         };
         self.refused.clone().unwrap_or_else(|| accepted.to_owned())
@@ -109,12 +109,15 @@ impl Commission {
         drive: &Settings,
         seed: u64,
         seconds: f64,
-    ) -> Result<Result<bool, String>, Error> {
+    ) -> Result<Result<(bool, f64), String>, Error> {
         let mut config = Config { drive: *drive, ..config.clone() };
         config.prepare.learn = true;
         config.drive.injection.synchronous.allow_unlearned = false;
-        match machines::runs(&config, seed, seconds) {
-            Ok(runs) => Ok(Ok(machines::good(&runs))),
+        match steady::prepared(drive, &config, seed) {
+            Ok(learned) => {
+                let runs = machines::runs(&learned, &config, seed, seconds)?;
+                Ok(Ok((machines::good(&runs), learned.learning_s)))
+            }
             // A refusal of the drive belongs to the result; other errors do not.
             Err(Error::Refused(why)) => Ok(Err(why)),
             Err(other) => Err(other),
@@ -139,7 +142,7 @@ impl Commission {
                 number(record.errors.get(n), 2),
             ]);
         }
-        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux.")
+        table.note("Inverse-Gamma circuit; that of iron at the direct current found, and filed at its nominal flux; the leakage is that of small changes at the bias.")
     }
 
     fn machine(&self, number: usize) -> (Config, u64) {
@@ -180,7 +183,13 @@ impl Study for Commission {
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;
         let found = Circuit::of([m.r_s, m.r_r, m.l_ls, m.l_lr, m.l_m].map(f64::from));
-        let truth = Circuit::of_plant(&config);
+        let mut truth = Circuit::of_plant(&config);
+        // With iron the leakage that was measured is the incremental one at the bias.
+        let mut found = found;
+        let measured = session.commissioning.found().leakage;
+        if let (Some(incremental), Some(measured)) = (session.leakage, measured) {
+            (truth.leakage, found.leakage) = (incremental, f64::from(measured.inductance));
+        }
         let pairs = found.values().into_iter().zip(truth.values());
         let errors = pairs.map(|((_, found), (_, truth))| 100.0 * (found / truth - 1.0)).collect();
         let mut told = Vec::new();
@@ -246,7 +255,7 @@ impl Study for Commission {
             let good = |salient: Option<bool>| {
                 let of = |r: &&&&Record| salient.is_none_or(|wanted| r.salient == wanted);
                 let all: Vec<_> = judged.iter().filter(of).collect();
-                let good = all.iter().filter(|r| r.after == Some(Ok(true))).count();
+                let good = all.iter().filter(|r| matches!(r.after, Some(Ok((true, _))))).count();
                 good as f64 / all.len() as f64
             };
             m.set("good_after", good(None));
@@ -254,6 +263,20 @@ impl Study for Commission {
             m.set("good_after_weak", good(Some(false)));
             let lost = judged.iter().filter(|r| matches!(r.after, Some(Err(_)))).count();
             m.set("refused_after", lost as f64);
+            let learned = |r: &&Record| match r.after {
+                Some(Ok((_, seconds))) => {
+                    let steps = r.seconds + r.staircase_seconds + r.loop_seconds;
+                    Some((seconds, steps + seconds))
+                }
+                _ => None,
+            };
+            let learned: Vec<(f64, f64)> = accepted.iter().filter_map(learned).collect();
+            let learning = sorted(learned.iter().map(|(learning, _)| *learning));
+            let all = sorted(learned.iter().map(|(_, all)| *all));
+            for (name, seconds) in [("learning_seconds", learning), ("all_seconds", all)] {
+                m.set(format!("{name}_median"), quantile(&seconds, 0.5));
+                m.set(format!("{name}_max"), quantile(&seconds, 1.0));
+            }
         }
 
         let mut heads = vec!["machine"];

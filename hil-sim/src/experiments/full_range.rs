@@ -32,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
             the drive does not notice.",
     uses: &[BENCH, DRIVE, &["full_range.", "runs"]],
-    not: &[&["dc_link."]],
+    not: &[],
     run: whole::<FullRange>,
 };
 
@@ -61,6 +61,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
     let (limit, trip, ramp) = (speed(LIMIT_RPM), speed(TRIP_RPM), speed(RAMP_RPM_PER_S));
     let i_d = config.amperes(I_D_A) as f32;
     let drive = &mut config.drive;
+    drive.observer.enabled = true;
     drive.speed.limit_rpm = drive.speed.limit_rpm.or(limit);
     drive.speed.ramp_rpm_per_s = drive.speed.ramp_rpm_per_s.or(ramp);
     drive.limits.speed_rpm = drive.limits.speed_rpm.or(trip);

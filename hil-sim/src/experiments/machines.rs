@@ -11,6 +11,7 @@ use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::{Config, PlantModel, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::rig::Rig;
 
 /// Not a figure of the source: whether the drive suits other motors.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -82,9 +83,13 @@ pub(super) fn good(runs: &[SteadyRun]) -> bool {
     runs.iter().all(within)
 }
 
-/// Learns once, then starts anew for each operating point.
-pub(super) fn runs(config: &Config, seed: u64, seconds: f64) -> Result<Vec<SteadyRun>, Error> {
-    let learned = prepared(&config.drive, config, seed)?;
+/// Starts a drive that has learned anew for each operating point.
+pub(super) fn runs(
+    learned: &Rig,
+    config: &Config,
+    seed: u64,
+    seconds: f64,
+) -> Result<Vec<SteadyRun>, Error> {
     let mut runs = Vec::new();
     for speed in SPEEDS_RPM {
         for iq in IQ_A {
@@ -157,7 +162,8 @@ impl Study for Machines {
 
     fn run(&self, number: usize) -> Result<Self::Record, Error> {
         let (config, seed) = self.drawn(number);
-        match runs(&config, seed, self.seconds) {
+        let learned = prepared(&config.drive, &config, seed);
+        match learned.and_then(|rig| runs(&rig, &config, seed, self.seconds)) {
             Ok(runs) => Ok(Ok(runs)),
             // A refusal of the drive belongs to the result; other errors do not.
             Err(Error::Refused(why)) => Ok(Err(why)),

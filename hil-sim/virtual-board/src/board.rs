@@ -89,8 +89,8 @@ impl Board {
             Cpu::new(Chip::default(), options.counting).map_err(|e| anyhow!("emulator: {e:?}"))?;
         for segment in image.segments() {
             let end = segment.address + segment.bytes.len() as u32;
-            let in_bank_1 = segment.address >= memory::FLASH && end <= memory::BANK_2;
-            ensure!(in_bank_1, "a segment at {:#x} is not in bank 1", segment.address);
+            let inside = segment.address >= memory::FLASH && end <= memory::STORED;
+            ensure!(inside, "a segment at {:#x} is not in the flash of the code", segment.address);
             cpu.write(segment.address, &segment.bytes);
         }
         let addresses = Addresses::find(&image)?;

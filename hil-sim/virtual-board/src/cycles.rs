@@ -33,7 +33,7 @@ const BLOCKS: [(&str, &str); 12] = [
     ("injection", "drive_core::carrier::injection drive_core::protect::saliency_check"),
     (
         "observer",
-        "drive_core::drive::fundamental drive_core::flux::observer drive_core::flux::hand_over",
+        "Coefficients>::observe_fundamental drive_core::flux::observer drive_core::flux::hand_over",
     ),
     ("limits", "drive_core::current::voltage_limit"),
     ("tracker", "drive_core::flux::tracker"),

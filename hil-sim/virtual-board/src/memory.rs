@@ -31,9 +31,11 @@ pub enum Backing {
 pub const FLASH: u32 = 0x0800_0000;
 /// Flash in both banks, bytes.
 pub const FLASH_SIZE: u32 = 512 * 1024;
-/// The second bank. It goes through the model of the flash, so that half-written words can be told
-/// from data. No code lies in it.
+/// The second bank. It begins with the control code's copy.
 pub const BANK_2: u32 = FLASH + FLASH_SIZE / 2;
+/// The second half of it, which the firmware writes. It goes through the model of the flash, so that half-written words
+/// can be told from data. No code lies in it.
+pub const STORED: u32 = BANK_2 + FLASH_SIZE / 4;
 /// First address of SRAM1 and SRAM2.
 pub const RAM: u32 = 0x2000_0000;
 /// SRAM1 and SRAM2, bytes.
@@ -53,8 +55,8 @@ pub const PERIPHERALS: u32 = 0x4000_0000;
 
 /// All regions but the alias of CCM: first address, bytes, kind.
 pub const MAP: [(u32, u32, Backing); 9] = [
-    (FLASH, FLASH_SIZE / 2, Backing::Flash),
-    (BANK_2, FLASH_SIZE / 2, Backing::Registers),
+    (FLASH, STORED - FLASH, Backing::Flash),
+    (STORED, FLASH + FLASH_SIZE - STORED, Backing::Registers),
     (RAM, RAM_SIZE, Backing::Ram),
     (CCM, CCM_SIZE, Backing::Ram),
     (PERIPHERALS, 0x3_0000, Backing::Registers),

@@ -7,8 +7,8 @@ use virtual_board::{Board, Image, Options};
 
 /// Machines, unless the environment gives another `MACHINES`.
 const MACHINES: u64 = 6;
-/// Longest that a commissioning takes, control periods: 60 s.
-const LONGEST: u64 = 360_000;
+/// Longest that a commissioning or a learning takes, control periods: 100 s.
+const LONGEST: u64 = 600_000;
 
 /// A board and what it says.
 struct Console {
@@ -146,5 +146,56 @@ fn the_image_finds_the_inertia_with_a_free_shaft() -> Result<()> {
     assert!((inertia / 0.02 - 1.0).abs() < 0.05, "{inertia}");
     // Turned by the drive, and at rest again with the outputs off.
     assert!(console.say("status", "\n")?.starts_with("off"));
+    Ok(())
+}
+
+#[test]
+fn the_image_identifies_the_plants_of_the_current_loop_on_request() -> Result<()> {
+    let mut config = Config::default();
+    config.load.mode = hil_sim::config::LoadMode::Locked;
+    let mut console = Console::new(&config, 4)?;
+    console.say("commission nameplate leakage", "commissioning: ended")?;
+    let told = console.say("commission plant", "commissioning: ended")?;
+    assert!(
+        told.contains("phase margin by rule 3.8 across") && told.contains("plant: sound"),
+        "{told}"
+    );
+    assert!(console.say("get current_plant", "current_plant")?.contains("motor"), "not accepted");
+    console.say("accept", "\nok")?;
+    // (1 - exp(-R T/L))/R with Table 5. On the board the edges of the inverter are real.
+    for key in ["current_plant.d.k", "current_plant.q.k"] {
+        let k = value(&mut console, key)?;
+        assert!((k / 0.0032 - 1.0).abs() < 0.1, "{key}: {k}");
+    }
+    Ok(())
+}
+
+/// The session of the manual, from the nameplate to torque; with `--nocapture` it prints what the console says.
+#[test]
+fn the_image_goes_from_the_nameplate_to_torque() -> Result<()> {
+    let mut config = Config::default();
+    config.load.mode = hil_sim::config::LoadMode::Locked;
+    let mut console = Console::new(&config, 1)?;
+    for (line, until) in [
+        ("commission", "commissioning: ended"),
+        ("accept", "\nok"),
+        ("learn", "off: the learning has ended"),
+        ("save", "ok"),
+        ("start", "running: torque"),
+        ("torque 1", "ok"),
+    ] {
+        let began = console.board.time();
+        let said = console.say(line, until)?;
+        let seconds = console.board.time() - began;
+        println!("{line}\n{said}({seconds:.0} s)");
+        if line == "commission" {
+            assert!(said.contains("then lock the shaft and `learn`"), "{said}");
+        }
+        if line == "learn" {
+            // 3/2 P L_M i_d = 0.92 Nm/A with 2 A; 11 steps of 0.25 A leave the current limit.
+            assert!(said.contains("learned: trackable from -2.5"), "{said}");
+            assert!(seconds < 65.0, "{seconds} s");
+        }
+    }
     Ok(())
 }

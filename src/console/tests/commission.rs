@@ -29,7 +29,7 @@ fn found_on_a_motor(settings: &Settings) -> Session {
         }
         match session.news() {
             Some(News::Report(report)) => assert_eq!(report.refusal, None, "{report}"),
-            Some(News::Ended { sound }) => assert!(sound),
+            Some(News::Ended { sound, .. }) => assert!(sound),
             None => {}
         }
         if !session.is_running() {

@@ -7,7 +7,7 @@ use crate::protect::wiring_check::WiringSettings;
 fn current(amperes: f32, carrier: AlphaBeta) -> Command {
     let regulator =
         Regulator { k_c: 25.0, z_c: 1.0 - 167.0 / 6000.0, direct: 0.0, filtered: false };
-    Command::Excite(Excitation::Current { amperes, regulator, carrier })
+    Command::Excite(Excitation::Current { amperes, regulator, carrier, binary: false })
 }
 
 /// A drive that excites, and its load.

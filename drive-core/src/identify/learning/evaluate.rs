@@ -95,7 +95,7 @@ impl Learning {
         let constant = 2.0 * per_point * sum;
         let (above, below) = (largest - constant, constant - least);
         let spread = if above > below { above } else { below };
-        let found = Asymmetry { constant, sin: per_point * state.sin, cos: per_point * state.cos };
+        let found = Asymmetry { constant, ..state.turning };
         let value = found.gain_mismatch();
         let rest = found.plus(&Asymmetry::of_gain_mismatch(value), -1.0);
         let misfit = rest.size();
@@ -142,16 +142,25 @@ impl Learning {
         let at_rest = ahead[0] * per_lead;
         let mut k = [at_rest; POINTS];
         let mut last = 0;
-        // The bound is known, but not to the compiler: without it a panic would be reachable.
-        for n in 1..=self.points.min(POINTS - 1) {
-            let sides = [ahead[n] - without[n], without[n] - behind[n]].map(|q| q * per_lead);
+        // The slopes on both sides at a current with leads.
+        let sides = |n: usize| match (ahead.get(n), without.get(n), behind.get(n)) {
+            (Some(ahead), Some(without), Some(behind)) if n > 0 => {
+                [ahead - without, without - behind].map(|q| q * per_lead)
+            }
+            _ => [at_rest; 2],
+        };
+        for (n, k) in k.iter_mut().enumerate().take(self.points + 1).skip(1) {
+            let is_led = (self.points - n).is_multiple_of(2);
+            let (below, above) = if is_led { (n, n) } else { (n - 1, n + 1) };
+            let ([ahead, behind], [ahead_too, behind_too]) = (sides(below), sides(above));
+            let sides = [0.5 * (ahead + ahead_too), 0.5 * (behind + behind_too)];
             let enough = |side: f32| {
                 side / at_rest >= LEAST_SLOPE_UNDER_LOAD.0 && side.abs() >= LEAST_SLOPE_UNDER_LOAD.1
             };
             if !(enough(sides[0]) && enough(sides[1])) {
                 break;
             }
-            k[n] = 0.5 * (sides[0] + sides[1]);
+            *k = 0.5 * (sides[0] + sides[1]);
             last = n;
         }
         let table = SlopeTable::from_points(self.grid, Self::held_beyond(&k, last));

@@ -150,11 +150,12 @@ fn the_slope_decides_what_is_accepted_and_how_far() {
     let found = learned(&lost(1.6));
     assert_eq!((found.verdict, found.limit_a), (Verdict::Sound, 1.5));
     let k = *found.slope.unwrap().points();
-    assert!(k[6..].iter().all(|k| (k + 0.05).abs() < 1e-3), "held beyond the limit: {k:?}");
-    let found = learned(&lost(0.9));
-    assert_eq!((found.verdict, found.limit_a), (Verdict::LimitTooLow, 0.75));
+    // Interpolated: half of one side is lost between 1.25 and 1.75 A.
+    assert!(k[6..].iter().all(|k| (k + 0.0375).abs() < 1e-3), "held beyond the limit: {k:?}");
+    let found = learned(&lost(0.6));
+    assert_eq!((found.verdict, found.limit_a), (Verdict::LimitTooLow, 0.5));
     let text = found.to_string();
-    assert!(text.contains("lost above 0.75 A") && text.contains("-0.05"), "{text}");
+    assert!(text.contains("lost above 0.50 A") && text.contains("-0.05"), "{text}");
 }
 
 #[test]
@@ -194,7 +195,7 @@ fn the_flux_turns_at_every_point() {
         let learning = Learning::new(&Motor::default(), i_d, largest, true);
         let degrees = learning.lead.to_degrees();
         assert!((8.5..16.0).contains(&degrees), "{i_d}: {degrees}");
-        let mut seen = [0; 2];
+        let (mut seen, mut magnetising, mut previous) = ([[0; POINTS]; 3], i_d, None);
         for number in 0..learning.points() {
             let point = learning.point(number);
             let LearningAction::Operate(Operate { i_q, lead }) = learning.operate(point) else {
@@ -203,9 +204,23 @@ fn the_flux_turns_at_every_point() {
             let slipping = i_q * lead.cos() - i_d * lead.sin();
             let least = f32::min(0.48 * learning.grid.step_a(), 0.19 * i_d);
             assert!(slipping.abs() > least, "{i_d}: {point:?}");
-            seen[usize::from(point.mirrored)] += 1;
+            seen[point.lead][point.n] += 1;
+            if let (true, Some(first)) = (point.mirrored, previous) {
+                assert_eq!((i_q, lead), first, "{point:?}");
+            }
+            previous = Some((-i_q, -lead));
+            // What is left of the change of the flux after the settling.
+            let now = i_d * lead.cos() + i_q * lead.sin();
+            let left = (now - magnetising) * (-point.settle_s / learning.tau_r).exp();
+            assert!(left.abs() < 0.021 * i_d, "{point:?}: {left}");
+            magnetising = now;
         }
-        assert_eq!(seen, [3 * learning.points + 1; 2]);
+        let without: Vec<usize> = (1..=learning.points).collect();
+        let of = |lead: usize| (0..POINTS).filter(move |&n| seen[lead][n] == 2);
+        assert!(of(0).eq(without), "every current: {seen:?}");
+        let led: Vec<usize> = (1..=learning.points).rev().step_by(2).collect();
+        assert!(of(2).eq(led.iter().rev().copied()), "every other: {seen:?}");
+        assert!(of(1).eq([0].into_iter().chain(led.into_iter().rev())), "{seen:?}");
     }
     // A current difference has no slope.
     assert_eq!(Learning::new(&Motor::default(), 0.7, 3.5, false).points(), 26);

@@ -25,10 +25,10 @@ impl Circuit {
         Self { r_s, leakage: l_ls + k * l_lr, r_r: k * k * r_r, coupled: k * l_m }
     }
 
-    /// That of the simulated motor; with iron, at its nominal flux.
+    /// That of the simulated motor, with the switch that a phase current flows through; with iron, at its nominal flux.
     pub fn of_plant(config: &Config) -> Self {
         let m = plant_settings(config).machine;
-        Self::of([m.rs, m.rr, m.lls, m.llr, m.lm])
+        Self::of([m.rs + config.inverter.on_resistance, m.rr, m.lls, m.llr, m.lm])
     }
 
     /// Rotor time constant, s.

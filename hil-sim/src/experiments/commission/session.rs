@@ -4,11 +4,13 @@ use std::f64::consts::TAU;
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::settings::{Motor, Settings};
-use drive_core::{Command, Mode, Sample, State};
+use drive_core::{AlphaBeta, Command, Excitation, Mode, Sample, State};
 
 use crate::config::Config;
 use crate::error::Error;
+use crate::plant::{Complex, ElectricalRate as _, MachineModel as _};
 use crate::rig::{RATE_HZ, Rig};
+use crate::stats::Stats;
 
 /// Control periods from one poll of the main loop to the next.
 const POLL: u32 = 6;
@@ -29,6 +31,21 @@ pub struct Session {
     pub shaft_deg: f64,
     /// Largest phase current, A.
     pub largest_a: f64,
+    /// Transient inductance of a motor of iron at the operating points of the carrier, mean along and across it, H.
+    pub leakage: Option<f64>,
+}
+
+/// The transient inductance of a motor of iron at its present currents, along and across phase a, H.
+fn transient(rig: &Rig) -> Option<[f64; 2]> {
+    let motor = rig.plant.energy_model()?;
+    let rate = |volts| {
+        let speed = motor.machine.pole_pairs() * motor.state.speed;
+        motor.machine.derivative(&motor.state.electrical, volts, speed).current_rate()
+    };
+    let rest = rate(Complex::ZERO);
+    let along = rate(Complex::new(1.0, 0.0)) - rest;
+    let across = rate(Complex::new(0.0, 1.0)) - rest;
+    Some([1.0 / along.re, 1.0 / across.im])
 }
 
 /// Where a session is stopped from outside.
@@ -57,6 +74,8 @@ impl Session {
         let (mut reports, mut shaft_deg, mut largest_a) = (Vec::new(), 0.0_f64, 0.0_f64);
         let (began, mut in_step) = (rig.time(), 0);
         let from = rig.plant.mechanical_angle();
+        let mut carrier_on = AlphaBeta::ZERO;
+        let mut leakage = [Stats::default(); 2];
         for period in 0..(LONGEST_S * RATE_HZ) as u32 {
             let mut sample = rig.plant.sample();
             sensors(&mut sample);
@@ -78,12 +97,21 @@ impl Session {
                     rig.command(&Command::Stop)?;
                 }
             }
+            if commissioning.step() == Step::Leakage && carrier_on != AlphaBeta::ZERO {
+                let axis = usize::from(carrier_on.beta != 0.0);
+                if let Some(inductances) = transient(&rig) {
+                    leakage[axis].push(inductances[axis]);
+                }
+            }
             if !period.is_multiple_of(POLL) {
                 continue;
             }
             match commissioning.poll(&rig.drive.excited(), &mut sums) {
                 Next::Wait => {}
                 Next::Excite(excitation) => {
+                    if let Excitation::Current { carrier, .. } = excitation {
+                        carrier_on = carrier;
+                    }
                     rig.command(&Command::Excite(excitation))?;
                 }
                 Next::Stop => {
@@ -99,7 +127,17 @@ impl Session {
                 Next::Report(report) => reports.push((rig.time() - began, report)),
                 Next::Done => {
                     let seconds = rig.time() - began;
-                    return Ok(Self { rig, commissioning, reports, seconds, shaft_deg, largest_a });
+                    let [along, across] = leakage.map(|axis| axis.mean());
+                    let iron = rig.plant.energy_model().is_some();
+                    return Ok(Self {
+                        rig,
+                        commissioning,
+                        reports,
+                        seconds,
+                        shaft_deg,
+                        largest_a,
+                        leakage: iron.then_some(0.5 * (along + across)),
+                    });
                 }
             }
         }

@@ -7,7 +7,7 @@ use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec;
 
 use super::Options;
-use crate::memory::BANK_2;
+use crate::memory::STORED;
 use crate::periph::flash::Flash;
 
 /// The settings of a board, confirmed.
@@ -31,7 +31,7 @@ pub fn save(options: &Options, flash: &mut Flash) -> Result<()> {
     let (contents, torn) = flash.contents();
     let (mut contents, torn) = (contents.to_vec(), torn.to_vec());
     for (word, value) in record.iter().take(codec::length(&record)).enumerate() {
-        let at = (settings_address(0, word) - BANK_2) as usize;
+        let at = (settings_address(0, word) - STORED) as usize;
         contents[at..at + 8].copy_from_slice(&value.to_le_bytes());
     }
     flash.replace_contents(&contents, &torn);

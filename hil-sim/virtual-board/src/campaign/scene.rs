@@ -12,7 +12,7 @@ use crate::board::snapshot::Snapshot;
 use crate::board::{Board, Options};
 use crate::chip::Chip;
 use crate::image::Image;
-use crate::memory::{BANK_2, Region};
+use crate::memory::{Region, STORED};
 use crate::pair::Pair;
 use crate::power_stage::PowerStage;
 
@@ -182,7 +182,7 @@ fn started(pair: &mut Pair, torque: &str) -> Result<Snapshot> {
     pair.board.keep()
 }
 
-/// The second bank, as the firmware reads it.
+/// The stored part of the flash, as the firmware reads it.
 #[derive(Debug)]
 struct Bank<'a>(&'a mut Chip);
 
@@ -209,8 +209,8 @@ impl Flash for Bank<'_> {
 /// The flash holds none.
 pub fn saved_settings(board: &mut Board) -> Result<FirmwareSettings> {
     ensure!(
-        induction_drive::board::settings_address(0, 0) >= BANK_2,
-        "settings outside the second bank"
+        induction_drive::board::settings_address(0, 0) >= STORED,
+        "settings outside the part that can be written"
     );
     let mut chip = board.chip().clone();
     let defaults = FirmwareSettings::of(chip.gates.stage().board());

@@ -125,7 +125,7 @@ impl Chip {
                 _ => self.scs.read(address, now),
             };
         }
-        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
+        if (memory::STORED..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let (value, torn) = self.flash.load(address);
             if torn {
                 if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
@@ -181,7 +181,7 @@ impl Chip {
             };
             return self.follow(effect);
         }
-        if (memory::BANK_2..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
+        if (memory::STORED..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
             let effect = self.flash.store(address, value, now)?;
             return self.follow(effect);
         }

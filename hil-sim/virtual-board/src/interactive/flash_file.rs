@@ -1,4 +1,4 @@
-//! The second bank of the flash, where the firmware keeps its settings, in a file: a mark, the contents, and a bit for
+//! The part of the flash in which the firmware keeps its settings, in a file: a mark, the contents, and a bit for
 //! every double word that cannot be read because the power went while it was being written.
 
 use std::fs;
@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use hil_sim::Error;
 
-use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
+use crate::memory::{FLASH, FLASH_SIZE, STORED};
 use crate::periph::flash::Flash;
 
 /// First bytes of the file, with its version.
-const MARK: &[u8; 16] = b"virtual flash 1\n";
-/// Contents of the bank, bytes.
-const BANK: usize = (FLASH + FLASH_SIZE - BANK_2) as usize;
+const MARK: &[u8; 16] = b"virtual flash 2\n";
+/// Contents, bytes.
+const BANK: usize = (FLASH + FLASH_SIZE - STORED) as usize;
 /// Bytes with a bit for every double word.
 const TORN: usize = BANK / 64;
 
@@ -120,7 +120,7 @@ mod tests {
         let mut later = Flash::default();
         FlashFile::open(&path, &mut later).unwrap();
         assert_eq!(later.contents(), (&contents[..], &torn[..]));
-        assert_eq!(later.load(BANK_2 + 72), (u32::MAX, true));
+        assert_eq!(later.load(STORED + 72), (u32::MAX, true));
         fs::remove_file(path).unwrap();
     }
 
@@ -128,7 +128,7 @@ mod tests {
     fn other_files_are_refused_and_left_alone() {
         let path = path("other");
         for (bytes, said) in [
-            (vec![1, 2, 3], "3 bytes; the flash of this board takes 266256"),
+            (vec![1, 2, 3], "3 bytes; the flash of this board takes 133136"),
             (vec![0; MARK.len() + BANK + TORN], "not a file that --flash has written"),
         ] {
             fs::write(&path, &bytes).unwrap();

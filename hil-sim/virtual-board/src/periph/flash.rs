@@ -1,13 +1,13 @@
 //! The flash (RM0440, section 3): two banks, programmed by double words, erased by pages of 2 KiB.
 //!
-//! Only the second bank can be written: code lies in the first. A double word that was being written
+//! Only the part behind the code ([`STORED`]) can be written. A double word that was being written
 //! when the power went has a wrong check code: reading it raises the NMI. A page whose erasure was cut
 //! short holds such words too.
 
 use std::ops::Range;
 
 use super::{Effect, Store, registers};
-use crate::memory::{BANK_2, FLASH, FLASH_SIZE};
+use crate::memory::{BANK_2, FLASH, FLASH_SIZE, STORED};
 use crate::rules::{Rule, Rules};
 
 registers! {
@@ -78,7 +78,7 @@ pub struct Flash {
 /// Erased.
 impl Default for Flash {
     fn default() -> Self {
-        let size = (FLASH + FLASH_SIZE - BANK_2) as usize;
+        let size = (FLASH + FLASH_SIZE - STORED) as usize;
         Self {
             store: Store::new(KNOWN),
             options: OPTIONS,
@@ -119,14 +119,14 @@ impl Flash {
         BROWN_OUT[(self.options >> 8 & 7) as usize]
     }
 
-    /// Gives a double word of the second bank a wrong check code.
+    /// Gives a double word of the stored part a wrong check code.
     pub fn tear(&mut self, address: u32) {
-        if let Some(torn) = self.torn.get_mut(((address - BANK_2) / 8) as usize) {
+        if let Some(torn) = self.torn.get_mut(((address - STORED) / 8) as usize) {
             *torn = true;
         }
     }
 
-    /// Contents of the second bank, and its double words whose check code is wrong.
+    /// Contents of the stored part, and its double words whose check code is wrong.
     pub fn contents(&self) -> (&[u8], &[bool]) {
         (&self.bytes, &self.torn)
     }
@@ -149,14 +149,14 @@ impl Flash {
         }
     }
 
-    /// A word of the second bank, and whether its check code is wrong.
+    /// A word of the stored part, and whether its check code is wrong.
     pub fn load(&mut self, address: u32) -> (u32, bool) {
-        let at = (address - BANK_2) as usize & !3;
+        let at = (address - STORED) as usize & !3;
         let word =
             self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let torn = self.torn.get(at / 8) == Some(&true);
         if torn {
-            self.eccr = ECCD | 1 << 21 | (at as u32 / 8) & 0x7_ffff;
+            self.eccr = ECCD | 1 << 21 | (address - BANK_2) / 8 & 0x7_ffff;
         }
         (word, torn)
     }
@@ -189,7 +189,7 @@ impl Flash {
     }
 
     fn program(&mut self, address: u32, low: u32, high: u32, now: u64) {
-        let at = (address - BANK_2) as usize;
+        let at = (address - STORED) as usize;
         let new = u64::from(low) | u64::from(high) << 32;
         let Some(place) = self.bytes.get_mut(at..at + 8) else { return };
         let old = u64::from_le_bytes([
@@ -213,15 +213,16 @@ impl Flash {
     fn erase(&mut self, cr: u32, now: u64) {
         self.busy_until = now + ERASE;
         let number = (cr >> 3 & 0x7f) as usize;
-        let (start, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
-            (true, true) => (number * PAGE, PAGE),
-            // One bank: pages twice as long, counted from the beginning of the flash.
-            (false, _) if number >= 64 => ((number - 64) * 2 * PAGE, 2 * PAGE),
-            _ => {
-                // The pages of the code.
-                self.status |= PROGERR;
-                return;
-            }
+        // Counted from the beginning of a bank; one bank has pages twice as long.
+        let (address, size) = match (self.options & DBANK != 0, cr & BKER != 0) {
+            (true, true) => (BANK_2 as usize + number * PAGE, PAGE),
+            (true, false) => (FLASH as usize + number * PAGE, PAGE),
+            (false, _) => (FLASH as usize + number * 2 * PAGE, 2 * PAGE),
+        };
+        let Some(start) = address.checked_sub(STORED as usize) else {
+            // A page of the code.
+            self.status |= PROGERR;
+            return;
         };
         let lost = self.power_goes();
         let range = start..start + size;

@@ -1,0 +1,117 @@
+//! Start on a turning shaft.
+
+use super::Drive;
+use crate::drive::state::State;
+use crate::flux::catch::{CatchState, Caught};
+use crate::flux::hand_over::HandOver;
+use crate::flux::indirect::IndirectState;
+use crate::io::periods;
+use crate::math::frames::Dq;
+use crate::settings::Settings;
+
+/// Current that the rotor is looked for with, as a share of the current limit.
+const SHARE: f32 = 0.714;
+/// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
+const BUILT_S: f32 = 0.35;
+const ALONE_S: f32 = 0.2;
+/// Rotor time constants after which no flux is left in a motor that was switched off.
+const FLUX_GONE_T: f32 = 4.0;
+
+/// Coefficients of a start on a turning shaft, control periods and A.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Catching {
+    pub current: f32,
+    /// Time with that current until the flux of the setting has built up.
+    pub forced: u32,
+    pub alone: u32,
+    pub built: u32,
+    pub flux_gone: u32,
+}
+
+impl Settings {
+    /// The start on a turning shaft, where the observer can follow it.
+    pub(crate) fn catching(&self) -> Option<Catching> {
+        let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
+        let current = f32::max(SHARE * self.current_limit_a(), i_d);
+        let ratio = current / i_d;
+        let forced_s =
+            if ratio > 1.05 { tau_r * libm::logf(ratio / (ratio - 1.0)) } else { BUILT_S };
+        (self.uses_observer() && self.sequence.catch).then(|| Catching {
+            current,
+            forced: periods(forced_s),
+            alone: periods(ALONE_S),
+            built: periods(BUILT_S),
+            flux_gone: periods(FLUX_GONE_T * tau_r),
+        })
+    }
+}
+
+/// State of such a start.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CatchingState {
+    search: CatchState,
+    /// Period in which the speed was found.
+    found: Option<u32>,
+    /// Whether there may be flux from a run before.
+    pub flux_left: bool,
+}
+
+impl CatchingState {
+    /// Whether the speed is still looked for: the frame stands, and nothing is judged.
+    pub fn is_looking(&self) -> bool {
+        self.found.is_none()
+    }
+}
+
+impl Drive {
+    pub(super) fn catch_from_here(&mut self) {
+        self.control.hand_over.silence();
+        self.enter(State::Catching);
+    }
+
+    /// The current while a turning shaft is looked for and magnetised, A.
+    pub(super) fn catch(&mut self) -> Dq {
+        let Some(c) = self.c.catching else {
+            self.magnetising_from_here(0);
+            return Dq::ZERO;
+        };
+        let (s, elapsed) = (&mut self.control, self.elapsed);
+        let Some(found) = s.catching.found else {
+            // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
+            let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
+                return Dq::ZERO;
+            };
+            match s.catching.search.step(n, s.observer.change) {
+                Caught::Searching => {}
+                Caught::Standing => {
+                    s.hand_over = HandOver::default();
+                    self.magnetising_from_here(0);
+                }
+                Caught::Turning(freq) => {
+                    s.catching.found = Some(elapsed);
+                    s.estimator.turn_with(freq);
+                    s.indirect = IndirectState::default();
+                    if let Some(observer) = &self.c.observer {
+                        observer.start(&mut s.observer);
+                    }
+                }
+            }
+            // Nothing was judged.
+            self.control.prediction.forget();
+            return Dq { d: c.current, q: 0.0 };
+        };
+        let since = elapsed.wrapping_sub(found);
+        if since >= c.built {
+            self.c.motion.start(&mut s.motion, s.seen.rotor_count);
+            self.enter(State::of_mode(self.mode));
+        }
+        Dq { d: if since < c.forced { c.current } else { self.c.sequence.i_d }, q: 0.0 }
+    }
+
+    /// Whether the observer is still to keep its hands off the angle.
+    pub(super) fn injection_alone(&self) -> bool {
+        let since = |found| self.elapsed.wrapping_sub(found);
+        let alone = |c: Catching| self.control.catching.found.is_some_and(|f| since(f) < c.alone);
+        self.state == State::Catching && self.c.catching.is_some_and(alone)
+    }
+}

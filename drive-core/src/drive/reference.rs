@@ -1,0 +1,60 @@
+//! The current that is regulated, by state, within what the dc link allows.
+
+use super::Drive;
+use crate::dc_link::Limiting;
+use crate::drive::state::{Mode, State};
+use crate::math::frames::Dq;
+use crate::motion::Goal;
+
+impl Drive {
+    /// The current to regulate in this state, A; moves on to the next state where it is time.
+    ///
+    /// # Errors
+    /// The state to go to with the outputs off: a fault, or off where it has stopped.
+    pub(super) fn reference(&mut self) -> Result<Dq, State> {
+        let r = &mut self.control.references;
+        let i_q = match self.state {
+            State::Catching => return Ok(self.catch()),
+            State::Magnetising => return Ok(self.magnetise()?),
+            State::Verifying => return Ok(self.verify()?),
+            State::Learning => self.learn()?,
+            State::Speed | State::Position => {
+                let goal = match self.mode {
+                    Mode::Speed => Goal::Speed(r.speed),
+                    _ => Goal::Position(r.turns),
+                };
+                let count = self.control.seen.rotor_count;
+                let range = self.control.limits.i_q;
+                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
+                r.current.q
+            }
+            State::Stopping => {
+                let ramp = self.c.sequence.stop_ramp;
+                r.current.q = if r.current.q > ramp {
+                    r.current.q - ramp
+                } else if r.current.q < -ramp {
+                    r.current.q + ramp
+                } else {
+                    return Err(State::Off);
+                };
+                r.current.q
+            }
+            _ => r.current.q,
+        };
+        let s = &mut self.control;
+        let (i_d, most) = (s.references.current.d, s.voltage_limit.most.d);
+        let (i_q, why) = s.limits.hold(i_q);
+        s.limiting = why;
+        Ok(Dq { d: if i_d < most { i_d } else { most } + s.limits.flux_a, q: i_q })
+    }
+
+    /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
+    pub fn brake_duty(&self) -> f32 {
+        if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
+    }
+
+    /// Why the torque is smaller than asked for.
+    pub fn limiting(&self) -> Limiting {
+        if self.state.regulates() { self.control.limiting } else { Limiting::No }
+    }
+}

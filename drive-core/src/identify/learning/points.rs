@@ -1,0 +1,93 @@
+//! The points of a learning, and their order.
+
+use core::f32::consts::PI;
+
+use super::{Learning, LearningState, TURNING};
+
+/// Settling time of the torque current and the averages at every point, s, and of the slip, in rotor time constants.
+const SETTLE_S: f32 = 0.1;
+pub(super) const SETTLE_T: f32 = 0.2;
+/// Settling time at the first point, in rotor time constants, and what may be left of a change of the flux at any other,
+/// relative to the flux.
+const FIRST_T: f32 = 2.0;
+pub(super) const LEFT: f32 = 0.02;
+/// Averaging time at a point of the reference, and of the slope under load, s. One second reduces sensor noise of 5 mA to 0.2°.
+pub(super) const AVERAGE_S: f32 = 1.0;
+const SLOPE_S: f32 = 0.5;
+
+/// A point of the learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    /// Index of its current in the table.
+    pub n: usize,
+    /// Index of its lead in [`LEADS`].
+    pub lead: usize,
+    /// Whether it is the second of its pair, with torque current and lead of the opposite sign.
+    pub mirrored: bool,
+    /// Settling time, s, and least averaging time, s.
+    pub settle_s: f32,
+    pub average_s: f32,
+    /// Whether it lasts for whole half turns of the flux.
+    pub turns: bool,
+}
+
+impl Learning {
+    /// Number of points of a learning: two for every current, and two for every other one with either lead of the flux and for
+    /// a lead without current.
+    pub fn points(&self) -> usize {
+        let led = if self.normalised { 2 * self.led() + 1 } else { 0 };
+        2 * (self.points + led)
+    }
+
+    /// Number of currents with a lead: the last, and every other one below it.
+    fn led(&self) -> usize {
+        self.points.div_ceil(2)
+    }
+
+    /// The point that is being measured, from 1 on, and the number of points.
+    pub fn progress(&self, state: &LearningState) -> (usize, usize) {
+        (self.points().min(state.point + 1), self.points())
+    }
+
+    /// Expected time, s, from the beginning of a point, from 1 on, to the end of the learning.
+    pub fn seconds_left(&self, point: usize) -> f32 {
+        let seconds = |number| {
+            let Point { n, settle_s, average_s, turns, .. } = self.point(number);
+            let half_turn_s = PI * self.tau_r * self.i_d / self.grid.current(n);
+            let halves = if turns { libm::ceilf(average_s / half_turn_s) } else { 0.0 };
+            settle_s + average_s.max(halves * half_turn_s)
+        };
+        (point.max(1) - 1..self.points()).map(seconds).sum()
+    }
+
+    /// The point with this number. Pairs without lead come first, from the first current down, then from the largest down; then
+    /// those in which the flux is ahead, from no current up, and those in which it is behind, down again.
+    pub(super) fn point(&self, number: usize) -> Point {
+        let (pair, mirrored) = (number / 2, !number.is_multiple_of(2));
+        let (led, [step_t, turned_t]) = (self.led(), self.flux_t);
+        let (n, lead, flux_t, average_s) = match pair.checked_sub(self.points) {
+            None => {
+                let n = if pair < self.first { self.first } else { self.points + self.first };
+                (n - pair, 0, if pair == 0 { FIRST_T } else { 0.0 }, AVERAGE_S)
+            }
+            Some(0) => (0, 1, SETTLE_T, AVERAGE_S),
+            Some(up) if up <= led => (self.points - 2 * (led - up), 1, step_t, SLOPE_S),
+            Some(down) => {
+                let below = down - led - 1;
+                let flux_t = if below == 0 { turned_t } else { step_t };
+                (self.points - 2 * below, 2, flux_t, SLOPE_S)
+            }
+        };
+        // The mirrored point has the flux of the first.
+        let flux_t = if mirrored { SETTLE_T } else { flux_t.max(SETTLE_T) };
+        let settle_s = SETTLE_S.max(flux_t * self.tau_r);
+        Point {
+            n,
+            lead,
+            mirrored,
+            settle_s,
+            average_s,
+            turns: lead == 0 && n + TURNING > self.first,
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Records the runs of the board that `tests/replay.rs` gives to a host drive: `tests/recorded/NAME.samples` and
+//! `NAME.orders`; see the README there.
+//!
+//! `cargo run --release -p virtual-board --example record`, after `cargo firmware` and with the path that it prints in
+//! `INDUCTION_DRIVE_ELF`.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use drive_core::{Hardware, State};
+use hil_sim::Config;
+use hil_sim::config::LoadMode;
+use virtual_board::{Image, Options, Pair, Period};
+
+/// A typed line, the state that is waited for, and the periods that follow.
+type Step = (&'static str, Option<State>, u64);
+
+const SENSORLESS: [Step; 10] = [
+    ("start torque", Some(State::Torque), 0),
+    ("torque 1", None, 6600),
+    ("torque 1.25", None, 6600),
+    ("torque 1.5", None, 6600),
+    ("torque 1.75", None, 6600),
+    ("torque 2", None, 6600),
+    ("torque -1", None, 6600),
+    ("torque -2", None, 6600),
+    ("torque 0.5", None, 6600),
+    ("stop", Some(State::Off), 600),
+];
+
+const ENCODER: [Step; 5] = [
+    ("set angle_source encoder motor.r_r 1.3", None, 0),
+    ("start position", Some(State::Position), 0),
+    ("position 1", None, 6000),
+    ("position -0.5", None, 6000),
+    ("stop", Some(State::Off), 0),
+];
+
+/// The samples of consecutive interrupts, and the orders that the drive took between them.
+#[derive(Default)]
+struct Record {
+    samples: Vec<u8>,
+    orders: String,
+    interrupts: u64,
+    /// Orders that were given and not taken yet.
+    given: Vec<String>,
+}
+
+impl Record {
+    fn take(&mut self, period: &Period) -> Result<()> {
+        let s = &period.sample;
+        ensure!(
+            s.hardware == Hardware::empty(),
+            "a hardware event in interrupt {}",
+            self.interrupts
+        );
+        for code in [s.current_a, s.current_b, s.dc_link, s.heat_sink] {
+            self.samples.extend(code.to_le_bytes());
+        }
+        self.samples.extend(s.encoder.to_le_bytes());
+        if period.took_order {
+            self.orders += &format!("{} {}\n", self.interrupts, self.given.remove(0));
+        }
+        self.interrupts += 1;
+        Ok(())
+    }
+}
+
+fn record(name: &str, config: &Config, seed: u64, steps: &[Step]) -> Result<()> {
+    let mut pair = Pair::new(Image::built()?, Options::new(config, seed))?;
+    let mut record = Record::default();
+    for (line, state, periods) in steps {
+        if line.starts_with("start") && !pair.shadow.firmware_settings().command.wiring_checked {
+            record.given.push("check wiring".into());
+        }
+        record.given.push((*line).into());
+        pair.board.take_console();
+        pair.board.type_line(line);
+        pair.shadow.type_line(line)?;
+        let run = |pair: &mut Pair, periods: u64, record: &mut Record| -> Result<()> {
+            let mut failed = Ok(());
+            pair.run(periods, |_, period| {
+                if failed.is_ok() {
+                    failed = record.take(period);
+                }
+            })?;
+            failed
+        };
+        let mut answer = String::new();
+        while !answer.ends_with('\n') {
+            run(&mut pair, 1, &mut record)?;
+            answer += &pair.board.take_console();
+        }
+        println!("{name}: {line}: {}", answer.trim());
+        while state.is_some_and(|state| pair.shadow.drive.state() != state) {
+            run(&mut pair, 1, &mut record)?;
+        }
+        run(&mut pair, *periods, &mut record)?;
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/recorded");
+    fs::write(folder.join(format!("{name}.samples")), &record.samples)?;
+    fs::write(folder.join(format!("{name}.orders")), &record.orders)?;
+    println!("{name}: {} interrupts", record.interrupts);
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    record("sensorless", &Config::default(), 11, &SENSORLESS)?;
+    let mut free = Config::default();
+    free.load.mode = LoadMode::Free;
+    record("encoder", &free, 12, &ENCODER)
+}
