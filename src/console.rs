@@ -134,6 +134,9 @@ impl Console {
             && let Some(task) = self.task
         {
             self.perform(task, drive, now_ms);
+            // A design takes seconds: what has come meanwhile is heard at the next poll, with its time.
+            self.flushed(port);
+            return;
         }
         for _ in 0..BYTES_AT_ONCE {
             if !self.flushed(port) || self.task.is_some() {

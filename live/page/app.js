@@ -46,7 +46,7 @@ function heard(message) {
   if ('line' in message) { log(message.line); announced(message.line); }
   if ('hello' in message) greet(message.hello);
   if ('gone' in message) lost(message.gone);
-  if ('stopped' in message) { log(`# stopped: ${message.stopped}`); say(`stopped ${message.stopped}`); }
+  if ('stopped' in message) { log(`# stopped: ${message.stopped}`); announced(`stopped: ${message.stopped}`); }
   if ('refused' in message) log(`# refused: ${message.refused}`);
   const answer = answers.get(message.id);
   if (!answer) return;
@@ -93,6 +93,7 @@ const NUMBERS = { torque: [/torque (-?[\d.]+) Nm/, 'Nm'], speed: [/speed (-?[\d.
   current: [/i_q (-?[\d.]+)/, 'A'], link: [/dc link (-?[\d.]+) V/, 'V'] };
 function showStatus(line) {
   const now = line.split(';')[0];
+  heardStatus = performance.now();
   alarm('odd', /^[a-z]/.test(now) && /dc link/.test(line) ? [] :
     [`The page does not understand the drive's status, so torque and speed are missing: firmware and page do not fit each other. It says: ${line}`]);
   if (/^in fault/.test(now) && !alarms.fault?.length) showFault();
@@ -128,6 +129,8 @@ function takeFrames(view) {
     const period = view.getUint32(at, true);
     base ??= period;
     const time = ((period - base) >>> 0) * PERIOD_S;
+    // The drive was reset.
+    if (time < times.at(-1)) { times = []; columns = streamed.map(() => []); }
     const values = streamed.map((_, i) => view.getFloat32(at + 8 + 4 * i, true));
     times.push(time);
     values.forEach((value, i) => columns[i].push(value));
@@ -137,7 +140,18 @@ function takeFrames(view) {
   const keep = 62 * +$('rate').value;
   if (times.length > 2 * keep) { times.splice(0, times.length - keep); columns.forEach(column => column.splice(0, column.length - keep)); }
 }
+let counted = 0, flowed = 0, heardStatus = 0;
+/** Nothing came for some seconds, and no answer is awaited: the stream has ended, or the drive is gone. */
+function watch(count) {
+  const now = performance.now();
+  if (count !== counted || answers.size || gone) [counted, flowed, heardStatus] = [count, now, answers.size || gone ? now : heardStatus];
+  if (gone) return;
+  if (now - heardStatus > 3000) state('no answer');
+  if (streamed.length && now - flowed > 1500) { flowed = now; stream(streamed).catch(quiet); }
+}
+const stream = names => request({ stream: [++number, names, Math.round(+$('rate').value) || 200] });
 function tick({ tick: [count, missing, damaged, skipped], flux }) {
+  watch(count);
   $('count').textContent = streamed.length ? `${count} frames, ${missing} dropped${damaged ? `, ${damaged} damaged` : ''}${skipped ? `, ${skipped} skipped by the page` : ''}` : '';
   if (flux) drawFlux(flux[0], flux[1], flux[2]); else if (phi !== null && !truth) drawFlux(phi);
   if (!paused && times.length !== shown) requestAnimationFrame(draw);
@@ -187,7 +201,7 @@ async function restream() {
   localStorage.setItem('signals', JSON.stringify(names));
   endRecord();
   try {
-    await request({ stream: [++number, names, Math.round(+$('rate').value) || 200] });
+    await stream(names);
     [streamed, times, columns, base] = [names, [], names.map(() => []), null];
     plots = buildPlots($('curves'), names, 'live');
   } catch (error) { say(error.message, true); }
@@ -201,7 +215,7 @@ const header = (what, names, extra) => [`# induction-drive ${what}, schema 1`, `
 function download(name, text) {
   const link = make('a', { href: URL.createObjectURL(new Blob([text], { type: 'text/csv' })), download: name });
   link.click();
-  URL.revokeObjectURL(link.href);
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 function endRecord() {
   if (!recorded) return;

@@ -24,23 +24,31 @@ async function loadSettings() {
     showSettings();
   } catch (error) { sayOfSettings(error.message, true); }
 }
+/** A field that stages a setting; a refused value goes back. */
+function entry(s, to) {
+  const fixed = s.change === 'board';
+  const input = s.words.length ? make('select', { disabled: fixed }, ...s.words.map(word => make('option', { textContent: word, selected: word === s.value })))
+    : make('input', { value: number7(s.value), disabled: fixed, inputMode: 'decimal' });
+  input.setAttribute('aria-label', s.name);
+  input.onchange = () => tell(`set ${s.name} ${input.value}`, to).then(loadSettings, () => { input.value = number7(s.value); });
+  return input;
+}
+const sayOfPlate = (text, bad) => { $('plate-said').textContent = text; $('plate-said').className = bad ? 'error' : ''; };
 const number7 = value => typeof value === 'number' ? +value.toPrecision(7) : value ?? '';
 function showSettings() {
   const wanted = $('filter').value.toLowerCase();
   const rows = settings.filter(s => (s.name + s.help).toLowerCase().includes(wanted))
     .filter(s => !$('changed').checked || s.value !== s.default || s.staged || compared.has(s.name)).map(s => {
-    const fixed = s.change === 'board', effective = s.value === 'auto' && s.effective != null ? ` = ${number7(s.effective)}` : '';
-    const input = s.words.length ? make('select', { disabled: fixed }, ...s.words.map(word => make('option', { textContent: word, selected: word === s.value })))
-      : make('input', { value: number7(s.value), disabled: fixed, inputMode: 'decimal' });
-    input.setAttribute('aria-label', s.name);
-    input.onchange = () => tell(`set ${s.name} ${input.value}`, sayOfSettings).then(loadSettings, () => { input.value = number7(s.value); });
+    const effective = s.value === 'auto' && s.effective != null ? ` = ${number7(s.effective)}` : '';
     const range = s.min == null ? s.words.join(', ') : `${number7(s.min)} to ${number7(s.max)}${s.auto ? ', or auto' : ''}`;
     const note = [s.help, s.change === 'reset' ? 'from the next reset on' : '', s.learned ? 'a change forgets what was learned' : '',
       compared.has(s.name) ? `in the file: ${compared.get(s.name)}` : ''].filter(Boolean).join('; ');
-    return make('tr', { className: `${s.staged ? 'staged' : ''} ${compared.has(s.name) ? 'other' : ''}` }, make('td', { textContent: s.name }), make('td', {}, input, effective),
+    return make('tr', { className: `${s.staged ? 'staged' : ''} ${compared.has(s.name) ? 'other' : ''}` }, make('td', { textContent: s.name }), make('td', {}, entry(s, sayOfSettings), effective),
       ...[s.unit, range, number7(s.default), note].map(text => make('td', { textContent: text })));
   });
   document.querySelector('#settings tbody').replaceChildren(...rows);
+  $('nameplate').replaceChildren(...settings.filter(s => /^nameplate|^inverter.dc_link_v/.test(s.name)).map(s =>
+    make('label', {}, s.help.split(/[;,]/)[0], ' ', entry(s, sayOfPlate), ` ${s.unit}${s.staged ? ' (staged)' : ''}`)));
 }
 $('filter').oninput = $('changed').onchange = showSettings;
 $('to-file').onclick = async () => {
@@ -112,11 +120,14 @@ $('t-csv').onclick = () => download('trace.csv', traceText);
 const STEPS = [
   { name: 'Check the wiring', about: 'The drive starts once with a check of the phases, the sensors and the encoder, and stops again. The shaft may turn a little.',
     lines: ['set wiring_checked no', 'apply', 'start torque'], good: /^running: /, then: ['stop'], verdict: 'the wiring is as it should be' },
-  { name: 'Commission', about: 'First enter the nameplate of the motor: Settings, filter "nameplate". The drive measures the motor at rest; the shaft stays still. "Accept" puts what was found in force and saves it.',
+  { name: 'Commission', about: 'The drive measures the motor at rest, from its nameplate, in ten seconds; the shaft stays still. "Accept" puts what was found in force and saves it.',
     lines: ['commission'], good: /^commissioning: ended; `accept`/, bad: /^commissioning: ended; the settings/, after: [['Accept', 'accept']] },
-  { name: 'Learn', about: 'Lock the shaft. The drive learns how the angle follows from the carrier, about two minutes. "Save" keeps it over a reset; "Learn again" at another rotor position adds to it.',
+  { name: 'Learn', about: 'Lock the shaft. The drive learns how the angle follows from the carrier, about a minute. "Save" keeps it over a reset; "Learn again" at another rotor position adds to it.',
     lines: ['learn'], good: /^learned: /, bad: /^refused: /, after: [['Learn again', 'learn again'], ['Save', 'save']] },
+  { name: 'Measure the inertia', about: 'Optional, for speed and position. Release the shaft: it turns, at most two turns to and fro.',
+    lines: ['commission inertia'], good: /^commissioning: ended; `accept`/, bad: /^commissioning: ended; the settings/, after: [['Accept', 'accept']] },
 ];
+const MEASURED = ['nameplate', 'sensors', 'wiring', 'levels', 'leakage', 'staircase', 'current-loop'];
 $('steps').append(...STEPS.map(step => {
   const bar = make('progress', { max: 1, value: 0, hidden: true }), verdict = make('strong'), lines = make('pre', { hidden: true });
   const show = (text, bad) => { verdict.textContent = text; verdict.className = bad ? 'error' : ''; };
@@ -126,6 +137,9 @@ $('steps').append(...STEPS.map(step => {
     const point = line.match(/^learning: point (\d+) of (\d+), (.*)/);
     if (point) { bar.max = +point[2]; bar.value = +point[1]; return show(point[0]); }
     note(line);
+    const [, measured, found] = line.match(/^commissioning: ([a-z-]+): (sound|refused.*)/) || [];
+    if (MEASURED.includes(measured)) { bar.max = MEASURED.length; bar.value = MEASURED.indexOf(measured) + 1; }
+    if (found) show(`${measured}: ${found}`);
     if (step.good.test(line)) { end(`done: ${step.verdict || line}`); (step.then || []).forEach(next => tell(next, show).then(() => show(`done: ${step.verdict}`), quiet)); }
     else if (step.bad?.test(line) || /^(fault|stopped|off: the start)/.test(line)) end(`not done: ${line}`, true);
   }

@@ -110,19 +110,22 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
         }
         if asked.elapsed() >= STATUS {
             asked = Instant::now();
-            if let Some(status) = status(link) {
-                let rests = ["off", "in fault", "stopping"].iter().any(|s| status.starts_with(s));
-                if !rests && shared.is_abandoned() {
-                    shared.send("stop");
-                }
-                shared.tell(json!({ "status": status }));
+            match link.ask("status", |_| ()) {
+                Ok(mut answer) => show_status(shared, &answer.lines.pop().unwrap_or_default()),
+                // It was reset, or has another rate: connected anew.
+                Err(LinkError::Silence(..)) => return,
+                Err(_) => {}
             }
         }
     }
 }
 
-fn status(link: &mut Link) -> Option<String> {
-    link.ask("status", |_| ()).ok()?.lines.pop()
+fn show_status(shared: &Shared, status: &str) {
+    let rests = ["off", "in fault", "stopping"].iter().any(|state| status.starts_with(state));
+    if !rests && shared.is_abandoned() {
+        shared.send("stop");
+    }
+    shared.tell(json!({ "status": status }));
 }
 
 /// Tells the page who the drive is, and whether this program understands it.

@@ -257,6 +257,13 @@ impl Link {
     }
 }
 
+/// The thread that reads ends, and with it the port is closed, within the time limit of a read.
+impl Drop for Link {
+    fn drop(&mut self) {
+        locked(&self.route).closed = true;
+    }
+}
+
 /// A thread that panicked while it showed a line leaves the route whole.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -264,7 +271,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
     let (mut buffer, mut line, mut splitter) = ([0; 1024], Vec::new(), Splitter::new());
-    loop {
+    while !locked(route).closed {
         match reader.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => {

@@ -132,6 +132,25 @@ fn a_link_that_is_lost_stops_the_drive_if_the_stream_asks_for_it() {
     assert_eq!(talk.drive.streamed.0, 0);
 }
 
+/// A design takes seconds, during which nothing is read: what came meanwhile is a sign of life of its end.
+#[test]
+fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
+    let mut talk = Talk::new();
+    talk.ask("baud 2000000");
+    talk.ask("stream i_q_a 2000 alive 0.4");
+    assert_eq!(talk.ask("set motor.r_s 5.5"), "ok: staged");
+    talk.port.sent.extend(b"apply\n\n\n");
+    // One poll takes the line, the next designs.
+    talk.poll();
+    talk.poll();
+    talk.now_ms += 3000;
+    let answer = talk.say("");
+    assert_eq!(answer.last().map(String::as_str), Some("ok"));
+    assert_eq!((talk.drive.streamed.0, talk.port.baud), (3, 2_000_000));
+    talk.pass(401);
+    assert_eq!(talk.drive.streamed.0, 0, "the watch goes on");
+}
+
 #[test]
 fn the_signals_and_the_layout_are_described_as_json() {
     let lines = Talk::new().say("describe stream\n");
