@@ -112,8 +112,6 @@ impl Console {
 
     /// Reads received bytes and writes replies; never waits. `now_ms` wraps.
     pub fn poll(&mut self, port: &mut impl Port, drive: &mut impl DriveHandle, now_ms: u32) {
-        self.watch_silence(drive, now_ms);
-        self.watch_rate(port, drive, now_ms);
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
             self.settings.learned(result);
@@ -145,6 +143,9 @@ impl Console {
             let Some(byte) = port.read() else { break };
             self.take(byte, drive, now_ms);
         }
+        // What has come is heard first: the main loop may have designed for seconds.
+        self.watch_silence(drive, now_ms);
+        self.watch_rate(port, drive, now_ms);
         match self.began_ms {
             Some(_) if !self.reader.begun() => self.began_ms = None,
             Some(began) if now_ms.wrapping_sub(began) > LINE_MS => {

@@ -88,20 +88,21 @@ $('get-learned').onclick = async () => {
 // --- trace ---------------------------------------------------------------------------------------
 let tracePlots = [], traceText = '';
 const sayOfTrace = (text, bad) => { $('t-said').textContent = text; $('t-said').className = bad ? 'error' : ''; };
+/** Plots the lines of a trace; what there is to say of it. */
 function plotTrace(lines) {
   const [head, ...rest] = lines.filter(line => line !== 'ok');
-  if (!head?.startsWith('t_s')) return sayOfTrace(head || 'no records', true);
+  if (!head?.startsWith('t_s')) throw Error(head || 'no records');
   const names = head.split(',').slice(1), rows = rest.map(line => line.split(',').map(Number));
   tracePlots = buildPlots($('traced'), names, 'trace');
   const column = i => rows.map(row => row[i]);
   tracePlots.forEach(({ plot, indices }) => plot.setData([column(0), ...indices.map(i => column(i + 1))]));
   traceText = [...header('trace', names, ''), head, ...rest].join('\n') + '\n';
   $('t-csv').disabled = false;
-  sayOfTrace(`${rows.length} records from ${rows[0]?.[0]} s to ${rows.at(-1)?.[0]} s; 0 is the first record, or the trigger`);
+  return `${rows.length} records from ${rows[0]?.[0]} s to ${rows.at(-1)?.[0]} s; 0 is the first record, or the trigger`;
 }
 async function showTrace() {
   sayOfTrace('reading the trace');
-  try { plotTrace(await ask('trace')); } catch (error) { sayOfTrace(error.message, true); }
+  try { sayOfTrace(plotTrace(await ask('trace'))); } catch (error) { sayOfTrace(error.message, true); }
 }
 $('trace').onsubmit = async event => {
   event.preventDefault();
@@ -110,7 +111,7 @@ $('trace').onsubmit = async event => {
   sayOfTrace(trigger ? 'waiting for the trigger' : 'recording');
   try {
     const lines = await ask(`trace ${$('t-records').value} ${$('t-divider').value} ${chosen().join(' ')}${on}`);
-    if (!trigger) plotTrace(lines);
+    if (!trigger) sayOfTrace(plotTrace(lines));
   } catch (error) { sayOfTrace(error.message, true); }
 };
 $('t-off').onclick = () => tell('trace off', sayOfTrace).catch(quiet);

@@ -5,7 +5,7 @@
 mod chromium;
 
 use std::io::{BufRead as _, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -14,6 +14,8 @@ use chromium::{Browser, Page};
 
 /// Simulated time may pass at a tenth of the clock's: a start takes 2 s, a design as long.
 const PATIENCE: Duration = Duration::from_secs(90);
+/// A learning takes 50 s of simulated time.
+const LEARNING: Duration = Duration::from_secs(500);
 
 /// `cargo live` with the virtual board.
 struct Live {
@@ -66,8 +68,41 @@ fn state(page: &mut Page<'_>, wanted: &str) {
     page.until(&format!("$('state').textContent.startsWith('{wanted}')"), PATIENCE);
 }
 
+/// A file that the page has saved.
+fn saved(folder: &Path, name: &str) -> String {
+    let (file, began) = (folder.join(name), Instant::now());
+    while !file.is_file() && began.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::fs::read_to_string(file).expect(name)
+}
+
+/// Checks the head of a CSV file; its rows.
+fn rows(text: &str, what: &str, units: &str, names: &str) -> Vec<Vec<f64>> {
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some(&*format!("# induction-drive {what}, schema 1")));
+    let firmware = lines.next().unwrap();
+    let (_, build) = firmware.split_once("build ").expect(firmware);
+    assert!(build.len() >= 16 && u64::from_str_radix(&build[..16], 16).is_ok(), "{firmware}");
+    let rest: Vec<_> =
+        lines.filter(|line| !line.starts_with("# page") && !line.starts_with("# begun")).collect();
+    assert_eq!(rest[..2], [format!("# units {units}"), names.to_owned()]);
+    rest[2..].iter().map(|row| row.split(',').map(|n| n.parse().expect(row)).collect()).collect()
+}
+
+/// Presses the button of a guided step that has this text, and waits for its verdict.
+fn step(page: &mut Page<'_>, number: usize, button: &str, verdict: &str, patience: Duration) {
+    page.value(&format!("[...$('steps').children[{number}].querySelectorAll('button')].find(b => b.textContent == '{button}').click()"));
+    page.until(
+        &format!(
+            "/{verdict}/.test($('steps').children[{number}].querySelector('strong').textContent)"
+        ),
+        patience,
+    );
+}
+
 fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
-    for (width, dark) in [(1280, false), (390, false), (390, true)] {
+    for (width, dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
         page.shape(width, 900, dark);
         std::thread::sleep(Duration::from_millis(700));
         let suffix = if dark { "-dark" } else { "" };
@@ -84,81 +119,24 @@ fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
 #[ignore = "needs Chromium and the virtual board; cargo xtask pages runs it"]
 fn the_page_shows_and_drives_the_virtual_board() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap().join("pages");
-    std::fs::create_dir_all(&folder).unwrap();
-    let folder: PathBuf = folder;
+    let files = folder.join("saved");
+    let _ = std::fs::remove_dir_all(&files);
+    std::fs::create_dir_all(&files).unwrap();
     let live = Live::start(&folder);
-    let mut browser = Browser::start(&folder.join("profile-live"));
+    let mut browser = Browser::start(&folder.join("profile-live"), &files);
     let mut page = browser.open(&live.address);
-
-    // It opens.
     state(&mut page, "off");
     page.until("hello && !hello.misfit && settings.length > 50", PATIENCE);
 
-    // It starts the drive, and the curves move.
-    page.value("$('start').click()");
-    state(&mut page, "regulating torque");
-    page.until("plots.length > 1 && plots[0].plot.data[0].length > 20", PATIENCE);
-    let last = page.number("plots[0].plot.data[0].at(-1)");
-    page.until(&format!("plots[0].plot.data[0].at(-1) > {last} + 0.2"), PATIENCE);
-    assert_eq!(page.number("+$('count').textContent.match(/(\\d+) dropped/)[1]"), 0.0);
-
-    // A step of the torque, in the curve and in the number.
-    page.value("$('reference').value = 2; $('run').requestSubmit()");
-    page.until(
-        "(q => q.length > 20 && Math.abs(q.slice(-20).reduce((a, b) => a + b) / 20 - 2) < 0.1)(columns[streamed.indexOf('i_q_a')])",
-        PATIENCE,
-    );
-    page.until("parseFloat($('torque').textContent) > 0.3", PATIENCE);
-    page.until("/apart/.test($('flux-text').textContent)", PATIENCE);
-    pictures(&mut page, &folder, "running");
-
-    // A trace at the full rate.
-    page.value("view('view-trace'); $('trace').requestSubmit()");
-    page.until("tracePlots.length && tracePlots[0].plot.data[0].length == 500", PATIENCE);
-    pictures(&mut page, &folder, "trace");
-
-    // It stops by keyboard.
-    page.value("view('view-live')");
+    runs_and_shows(&mut page, &folder);
+    records(&mut page, &folder, &files);
+    // It stops by keyboard, from a field as well.
+    page.value("view('view-live'); $('reference').focus()");
     page.key("Escape", 27);
     state(&mut page, "off");
-
-    // A setting is changed, and put in force.
-    page.value("view('view-settings'); $('filter').value = 'motor.r_s'; showSettings()");
-    page.value("(i => { i.value = '5.5'; i.dispatchEvent(new Event('change')); })(document.querySelector('[aria-label=\"motor.r_s\"]'))");
-    page.until("settings.find(s => s.name == 'motor.r_s').staged", PATIENCE);
-    page.value("document.querySelector('[data-ask=apply]').click()");
-    page.until(
-        "(s => s.value == 5.5 && !s.staged)(settings.find(s => s.name == 'motor.r_s'))",
-        PATIENCE,
-    );
-    page.value("$('filter').value = ''; showSettings()");
-    pictures(&mut page, &folder, "settings");
-
-    // Files: what differs is marked, and a file is loaded line by line.
-    page.value("$('compare').onchange({ target: { files: [new File(['set motor.r_s 5.4'], 'mine.txt')] } })");
-    page.until("compared.get('motor.r_s') === '5.4' && !compared.has('motor.r_r')", PATIENCE);
-    page.value("$('from-file').onchange({ target: { files: [new File(['# mine\\nset motor.r_s 5.4\\napply\\nset motor.r_s -1'], 'mine.txt')] } })");
-    page.until("/line 3: set motor.r_s -1.*2 lines before it are set/.test($('settings-said').textContent)", PATIENCE);
-    page.until("settings.find(s => s.name == 'motor.r_s').value == 5.4", PATIENCE);
-
-    // The wiring is checked as a guided step.
-    page.value("view('view-setup'); document.querySelector('#steps button').click()");
-    page.until(
-        "/done: the wiring/.test(document.querySelector('#steps strong').textContent)",
-        PATIENCE,
-    );
-    state(&mut page, "off");
-    pictures(&mut page, &folder, "setup");
-
-    // A recording has its schema, units and image, and every frame.
-    page.value(
-        "download = (name, text) => { globalThis.saved = [name, text]; }; $('record').click()",
-    );
-    page.until("recorded.rows.length > 50", PATIENCE);
-    page.value("$('record').click()");
-    for part in ["schema 1", "build [0-9a-f]{16}", "# units s,1,", "\\nt_s,sequence,", "phi_deg"] {
-        assert_eq!(page.value(&format!("/{part}/.test(saved[1])")), true, "{part}");
-    }
+    settings(&mut page, &folder, &files);
+    sets_up(&mut page, &folder);
+    begins_again(&mut page);
 
     // Closed while the drive runs: it stops in time.
     page.value("view('view-live'); $('start').click()");
@@ -171,9 +149,170 @@ fn the_page_shows_and_drives_the_virtual_board() {
     assert!(after < Duration::from_millis(500), "{after:?}");
     let mut page = browser.open(&live.address);
     state(&mut page, "off");
+    fails(&mut page, &folder);
+}
 
-    // A fault, in words with what to do.
+/// The drive is started, the curves move, and a step of the torque shows in them and in the number.
+fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
+    page.value("$('start').click()");
+    state(page, "regulating torque");
+    page.until("plots.length > 1 && plots[0].plot.data[0].length > 20", PATIENCE);
+    let last = page.number("plots[0].plot.data[0].at(-1)");
+    page.until(&format!("plots[0].plot.data[0].at(-1) > {last} + 0.2"), PATIENCE);
+    assert_eq!(page.number("+$('count').textContent.match(/(\\d+) dropped/)[1]"), 0.0);
+    page.value("$('reference').value = 2; $('run').requestSubmit()");
+    page.until(
+        "(q => q.length > 20 && Math.abs(q.slice(-20).reduce((a, b) => a + b) / 20 - 2) < 0.1)(columns[streamed.indexOf('i_q_a')])",
+        PATIENCE,
+    );
+    page.until("parseFloat($('torque').textContent) > 0.3", PATIENCE);
+    page.until("/apart/.test($('flux-text').textContent)", PATIENCE);
+    pictures(page, folder, "running");
+    page.key("p", 80);
+    page.until("paused", PATIENCE);
+    page.key("p", 80);
+}
+
+/// A recording has every frame; a trace has the full rate, at once and around its trigger.
+fn records(page: &mut Page<'_>, folder: &Path, files: &Path) {
+    page.value("$('record').click()");
+    page.until("recorded.rows.length > 200", PATIENCE);
+    page.value("$('record').click()");
+    let names = "i_d_a,i_q_a,i_q_ref_a,phi_deg,speed_rpm";
+    let order = page.value("streamed.slice().sort().join()");
+    assert_eq!(order, names);
+    let (units, columns) = (page.value("streamed.map(unit)"), page.value("streamed.join()"));
+    let units: Vec<_> =
+        units.as_array().unwrap().iter().map(|unit| unit.as_str().unwrap()).collect();
+    let columns = format!("t_s,sequence,{}", columns.as_str().unwrap());
+    let rows_of =
+        rows(&saved(files, "record.csv"), "record", &format!("s,1,{}", units.join(",")), &columns);
+    assert!(rows_of.len() > 200);
+    // 200 frames a second, none missing; a frame may wait for two control periods.
+    for two in rows_of.windows(2) {
+        assert!((two[1][0] - two[0][0] - 0.005).abs() < 0.001, "{two:?}");
+        assert_eq!((two[0][1] + 1.0) % 65536.0, two[1][1]);
+    }
+    let torque = columns.split(',').position(|name| name == "i_q_a").unwrap();
+    let mean = rows_of.iter().map(|row| row[torque]).sum::<f64>() / rows_of.len() as f64;
+    assert!((mean - 2.0).abs() < 0.05, "{mean} A");
+
+    page.value("view('view-trace'); $('trace').requestSubmit()");
+    page.until("tracePlots.length && tracePlots[0].plot.data[0].length == 500", PATIENCE);
+    pictures(page, folder, "trace");
+    page.value("$('t-divider').value = 1; $('t-trigger').value = 'below'; $('t-signal').value = 'i_q_a'; $('t-level').value = 1.5; $('trace').requestSubmit()");
+    page.until("/waiting/.test($('t-said').textContent)", PATIENCE);
+    std::thread::sleep(Duration::from_secs(1));
+    page.value("tell('torque 1')");
+    page.until("tracePlots[0].plot.data[0][0] < 0", PATIENCE);
+    page.value("$('t-csv').click()");
+    let rows = rows(
+        &saved(files, "trace.csv"),
+        "trace",
+        &format!("s,{}", units.join(",")),
+        &columns.replace("sequence,", ""),
+    );
+    assert_eq!(rows.len(), 500);
+    assert!(rows.windows(2).all(|two| (two[1][0] - two[0][0] - 1.0 / 6000.0).abs() < 1e-6));
+    let below = rows.iter().find(|row| row[torque - 1] < 1.5).unwrap();
+    assert!(below[0].abs() < 1.5 / 6000.0, "triggered at {} s", below[0]);
+}
+
+/// A setting is changed and put in force; files are saved, compared and loaded.
+fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
+    page.value("view('view-settings'); $('filter').value = 'motor.r_s'; showSettings()");
+    let change = |page: &mut Page<'_>, value: &str| {
+        page.value(&format!("(i => {{ i.value = '{value}'; i.dispatchEvent(new Event('change')); }})(document.querySelector('#settings [aria-label=\"motor.r_s\"]'))"));
+    };
+    change(page, "-1");
+    page.until("/allowed is 0.001 to 1000 ohm/.test($('settings-said').textContent)", PATIENCE);
+    change(page, "5.5");
+    page.until("settings.find(s => s.name == 'motor.r_s').staged", PATIENCE);
+    page.value("document.querySelector('[data-ask=apply]').click()");
+    page.until(
+        "(s => s.value == 5.5 && !s.staged)(settings.find(s => s.name == 'motor.r_s'))",
+        PATIENCE,
+    );
+    page.value("$('filter').value = ''; showSettings(); $('to-file').click()");
+    let file = saved(files, "settings.txt");
+    assert!(file.starts_with("# 0.") && file.contains("motor.r_s 5.5"), "{file}");
+    pictures(page, folder, "settings");
+
+    // What differs is marked.
+    let with = |text: &str| {
+        format!("{{ target: {{ files: [new File([{}], 'mine.txt')] }} }}", serde_json::json!(text))
+    };
+    page.value(&format!("$('compare').onchange({})", with(&file)));
+    page.until("/same settings/.test($('settings-said').textContent)", PATIENCE);
+    page.value(&format!(
+        "$('compare').onchange({})",
+        with(&file.replace("motor.r_s 5.5", "motor.r_s 5.4"))
+    ));
+    page.until("/1 settings differ/.test($('settings-said').textContent) && compared.get('motor.r_s') === '5.4'", PATIENCE);
+    // A file is loaded line by line, up to a line that is refused.
+    page.value(&format!(
+        "$('from-file').onchange({})",
+        with("# mine\nset motor.r_s 5.4\napply\nset motor.r_s -1")
+    ));
+    page.until("/line 3: set motor.r_s -1.*2 lines before it are set/.test($('settings-said').textContent)", PATIENCE);
+    page.until("settings.find(s => s.name == 'motor.r_s').value == 5.4", PATIENCE);
+    page.value(&format!("$('from-file').onchange({})", with(&file)));
+    page.until("/lines are in force/.test($('settings-said').textContent)", PATIENCE);
+    page.until(
+        "(s => s.value == 5.5 && !s.staged)(settings.find(s => s.name == 'motor.r_s'))",
+        PATIENCE,
+    );
+}
+
+/// From the nameplate to a drive that has learned its motor.
+fn sets_up(page: &mut Page<'_>, folder: &Path) {
+    page.value("view('view-setup')");
+    page.value("(i => { i.value = '1715'; i.dispatchEvent(new Event('change')); })(document.querySelector('#nameplate [aria-label=\"nameplate.speed_rpm\"]'))");
+    page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged == 1715", PATIENCE);
+    step(page, 1, "Check the wiring", "^done: the wiring", PATIENCE);
+    state(page, "off");
+    // A step that is stopped says so.
+    step(page, 2, "Commission", "sensors: sound", PATIENCE);
+    page.key("Escape", 27);
+    page.until(
+        "/^not done: stopped/.test($('steps').children[2].querySelector('strong').textContent)",
+        PATIENCE,
+    );
+    std::thread::sleep(Duration::from_secs(3));
+    step(page, 2, "Commission", "^done: commissioning: ended; .accept.", PATIENCE);
+    assert_eq!(page.value("$('steps').children[2].querySelector('progress').value"), 7.0);
+    step(page, 2, "Accept", "^ok", PATIENCE);
+    // The simulated motor has 5.4 ohm; the commissioning is within 0.5 % of it.
+    page.until("Math.abs(settings.find(s => s.name == 'motor.r_s').value - 5.4) < 0.027", PATIENCE);
+    step(page, 3, "Learn", "^learning: point 3 of", PATIENCE);
+    pictures(page, folder, "setup");
+    step(page, 3, "Learn", "^done: learned: slope", LEARNING);
+    step(page, 3, "Save", "^ok", PATIENCE);
+    page.value("view('view-settings'); $('get-learned').click()");
+    page.until("$('learned').textContent.split('\\n').length > 5", PATIENCE);
+}
+
+/// A drive that was reset streams again: when it says so, and when that line is lost.
+fn begins_again(page: &mut Page<'_>) {
+    page.value("globalThis.kept = announced");
+    for deaf in [false, true] {
+        page.value(&format!("announced = {deaf} ? () => {{}} : kept; tell('reboot')"));
+        page.until("times.length && times.at(-1) < 0.5", PATIENCE);
+        page.until("times.at(-1) > 1", PATIENCE);
+        state(page, "off");
+    }
+    page.value("announced = kept");
+}
+
+/// A fault is shown in words with what to do; it is cleared. What does not fit is told.
+fn fails(page: &mut Page<'_>, folder: &Path) {
     page.value("tell('set limits.dc_over_v 300').then(() => tell('start torque'))");
     page.until("/Fault 4.*dc link/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);
-    pictures(&mut page, &folder, "fault");
+    state(page, "in fault");
+    pictures(page, folder, "fault");
+    page.value("tell('set limits.dc_over_v auto').then(() => tell('apply')).then(() => document.querySelector('[data-ask=clear]').click())");
+    state(page, "off");
+    page.until("$('alarm').hidden", PATIENCE);
+    page.value("heard({ status: 'READY 3 4' })");
+    assert_eq!(page.value("/does not understand.*READY 3 4/.test($('alarm').textContent)"), true);
 }

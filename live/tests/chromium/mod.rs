@@ -28,7 +28,8 @@ pub struct Page<'a> {
 }
 
 impl Browser {
-    pub fn start(profile: &Path) -> Self {
+    /// Files that a page saves go to `files`.
+    pub fn start(profile: &Path, files: &Path) -> Self {
         let mut child = Command::new("chromium")
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"])
             .arg(format!("--user-data-dir={}", profile.display()))
@@ -43,7 +44,10 @@ impl Browser {
         // It must not wait for a reader of its messages.
         std::thread::spawn(move || lines.for_each(drop));
         let (socket, _) = tungstenite::connect(address).expect("chromium answers");
-        Self { child, socket, number: 0 }
+        let mut browser = Self { child, socket, number: 0 };
+        let downloads = json!({ "behavior": "allow", "downloadPath": files });
+        browser.call(&Value::Null, "Browser.setDownloadBehavior", downloads);
+        browser
     }
 
     /// Calls a method; its result. Events are passed over.

@@ -147,6 +147,11 @@ fn a_design_that_takes_seconds_ends_neither_the_stream_nor_the_rate() {
     let answer = talk.say("");
     assert_eq!(answer.last().map(String::as_str), Some("ok"));
     assert_eq!((talk.drive.streamed.0, talk.port.baud), (3, 2_000_000));
+    // The commissioning designs outside of the console.
+    talk.port.sent.extend(b"\n\n");
+    talk.now_ms += 3000;
+    talk.poll();
+    assert_eq!((talk.drive.streamed.0, talk.port.baud), (3, 2_000_000));
     talk.pass(401);
     assert_eq!(talk.drive.streamed.0, 0, "the watch goes on");
 }
