@@ -81,17 +81,3 @@ impl Drive {
         }
     }
 }
-impl super::Drive {
-    #[doc(hidden)]
-    pub fn dbg(&self) -> [f32; 6] {
-        let s = &self.control;
-        [
-            s.hand_over.weight,
-            s.estimator.rotor_freq * 6000.0 * 30.0,
-            s.seen.flux_freq * 6000.0,
-            s.observer.resistance,
-            s.prediction.mean.d,
-            s.prediction.mean.q,
-        ]
-    }
-}
