@@ -52,7 +52,9 @@ pub fn stream(signals: &[String], rate: u32) -> String {
 pub fn watch(shared: &Shared) {
     loop {
         if shared.page_is_alive() {
-            shared.send("");
+            if shared.drive_listens() {
+                shared.send("");
+            }
         } else if shared.page_was_lost() {
             shared.stop("the page was closed, or did not answer");
         }
@@ -71,6 +73,7 @@ pub fn run(
             Ok(mut link) => {
                 link.begin();
                 shared.connect(Some(link.urgent()));
+                shared.heard();
                 hello(shared, &mut link);
                 converse(shared, asks, &mut link);
                 shared.connect(None);
@@ -103,6 +106,7 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
                 if line.starts_with("stream ") {
                     shared.new_stream();
                 }
+                shared.heard();
                 shared.tell(answer);
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -121,6 +125,7 @@ fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
 }
 
 fn show_status(shared: &Shared, status: &str) {
+    shared.heard();
     let rests = ["off", "in fault", "stopping"].iter().any(|state| status.starts_with(state));
     if !rests && shared.is_abandoned() {
         shared.send("stop");

@@ -13,6 +13,8 @@ use serde_json::{Value, json};
 
 /// A page that answers nothing for so long is lost, and the drive is stopped.
 pub const PAGE_LOST: Duration = Duration::from_millis(350);
+/// A drive that says nothing for so long is busy with a design: signs of life would only fill its memory for what comes in.
+const BUSY: Duration = Duration::from_secs(1);
 /// Most texts and frames that wait for a slow page; the oldest go first.
 const MOST_TEXTS: usize = 2000;
 const MOST_FRAMES: usize = 6000;
@@ -44,6 +46,8 @@ struct Inner {
     /// Whether the drive is to be stopped when no page is there.
     watched: bool,
     urgent: Option<Urgent>,
+    /// When the drive has said something last.
+    heard: Instant,
 }
 
 /// Frames so far.
@@ -73,6 +77,7 @@ impl Shared {
             answered: None,
             watched: false,
             urgent: None,
+            heard: Instant::now(),
         };
         (Arc::new(Self { inner: Mutex::new(inner), asks }), receive)
     }
@@ -93,6 +98,7 @@ impl Shared {
 
     /// Takes a frame of the drive; `None` for damaged bytes.
     pub fn frame(&self, frame: Option<Frame>) {
+        self.heard();
         let mut inner = self.inner();
         let Some(frame) = frame else { return inner.counts.damaged += 1 };
         let missing = frame.sequence.wrapping_sub(inner.next.unwrap_or(frame.sequence));
@@ -104,6 +110,16 @@ impl Shared {
             inner.counts.skipped += 1;
         }
         inner.frames.push_back(frame);
+    }
+
+    /// The drive has said something.
+    pub fn heard(&self) {
+        self.inner().heard = Instant::now();
+    }
+
+    /// Whether the drive has said something of late.
+    pub fn drive_listens(&self) -> bool {
+        self.inner().heard.elapsed() < BUSY
     }
 
     /// A new stream begins: its signals are others.

@@ -41,6 +41,10 @@ fn answer(line: &str) -> &'static str {
 }
 
 fn served() -> Served {
+    served_with(answer)
+}
+
+fn served_with(answer: fn(&str) -> &'static str) -> Served {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let lines = Lines::default();
     let (heard, mut out) = (lines.clone(), theirs.try_clone().unwrap());
@@ -273,6 +277,54 @@ fn a_slow_page_loses_frames_and_nothing_else() {
     assert_eq!((&counts[0], &counts[1], &counts[2]), (&json!(60_000), &json!(0), &json!(0)));
     assert_eq!(ask(&mut other, 1, "torque 1")["lines"], json!(["ok"]));
     assert!(served.shared.page_is_alive());
+}
+
+#[test]
+fn clients_that_send_slowly_or_too_much_hold_up_nobody() {
+    let served = served();
+    let mut page = served.own();
+    until(&mut page, "hello");
+    // A hundred that never end their request, and one with a head of a megabyte.
+    let _half: Vec<_> = (0..100)
+        .map(|_| {
+            let mut stream = TcpStream::connect(served.address).unwrap();
+            stream.write_all(b"GET /?token=").unwrap();
+            stream
+        })
+        .collect();
+    let mut stream = TcpStream::connect(served.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let sent = stream.write_all(format!("GET /?token={}", "0".repeat(1 << 20)).as_bytes());
+    let mut told = Vec::new();
+    let read = stream.read_to_end(&mut told);
+    let told = String::from_utf8_lossy(&told).into_owned();
+    assert!(sent.is_err() || read.is_err() || told.starts_with("HTTP/1.1 4"), "{told}");
+    assert_eq!(ask(&mut page, 1, "torque 1")["lines"], json!(["ok"]));
+    assert!(served.got("stop").is_none(), "the drive was stopped");
+}
+
+#[test]
+fn firmware_that_does_not_fit_is_told_in_words() {
+    let older = |line: &str| match line {
+        "describe stream" => "error: no such command: stream\r\n",
+        other => answer(other),
+    };
+    let newer = |line: &str| match line {
+        "describe stream" => "{\"frame\":[\"u32 sequence\",\"u32 period\"]}\r\nok\r\n",
+        other => answer(other),
+    };
+    for (answers, says, cure) in [
+        (older as fn(&str) -> &'static str, "older than the page", "cargo xtask flash"),
+        (newer, "a layout that the page does not know", "git pull"),
+    ] {
+        let served = served_with(answers);
+        let mut page = served.own();
+        let hello = until(&mut page, "hello")["hello"].clone();
+        let misfit = hello["misfit"].as_str().unwrap();
+        assert!(misfit.contains(says) && misfit.contains(cure), "{misfit}");
+        // All else works.
+        assert_eq!(ask(&mut page, 1, "torque 1")["lines"], json!(["ok"]));
+    }
 }
 
 #[test]

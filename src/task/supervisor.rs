@@ -152,6 +152,8 @@ impl Supervisor {
             self.log(status);
         }
         self.commission();
+        // It designs for seconds: the console needs the time behind it.
+        self.clock.update();
         self.clock.ms()
     }
 
