@@ -146,7 +146,6 @@ impl Supervisor {
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
     /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
-        self.clock.update();
         self.track();
         if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
             self.log(status);
