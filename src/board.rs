@@ -244,15 +244,26 @@ pub const ENCODER_FILTER: u8 = 0b1000;
 
 /// Alternate function of the pins that belong to LPUART1 (datasheet).
 pub const SERIAL_AF: u8 = 12;
-/// Bits per second; 8 data bits, no parity, 1 stop bit.
+/// Bits per second after a reset; 8 data bits, no parity, 1 stop bit.
 pub const SERIAL_BAUD: u32 = 115_200;
+/// Highest rate that `baud` takes, bits per second: a byte is 850 core cycles, so that the FIFO of eight bytes outlasts the
+/// longest control interrupt.
+pub const SERIAL_BAUD_MAX: u32 = 2_000_000;
 /// Clock ticks of LPUART1 per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
-pub const SERIAL_DIVIDER: u32 = {
-    let divider = (256 * CLOCK_HZ as u64 + SERIAL_BAUD as u64 / 2) / SERIAL_BAUD as u64;
-    // Range of the register.
-    assert!(divider >= 0x300 && divider <= 0xf_ffff);
-    divider as u32
+pub const fn serial_divider(baud: u32) -> u32 {
+    ((256 * CLOCK_HZ as u64 + baud as u64 / 2) / baud as u64) as u32
+}
+// Range of the register.
+const _: () = {
+    assert!(serial_divider(SERIAL_BAUD) <= 0xf_ffff);
+    assert!(serial_divider(SERIAL_BAUD_MAX) >= 0x300);
 };
+/// Without a valid line for so long the port goes back to [`SERIAL_BAUD`], ms.
+pub const SERIAL_FALL_BACK_MS: u32 = 1000;
+/// Share of the port's bytes that a stream may take, %: the rest is for the lines of the console.
+pub const STREAM_SHARE: u32 = 80;
+/// Samples for the stream that can wait: 7.5 ms at 2000 a second, longer than the watchdog allows the main loop to be late.
+pub const STREAM_SAMPLES: usize = 15;
 /// Size of the receive queue, which holds one byte less: 22 ms at full rate; the main loop reads a thousand times
 /// as often.
 pub const SERIAL_RECEIVE: usize = 256;

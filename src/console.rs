@@ -15,6 +15,7 @@ mod list;
 mod number;
 mod reply;
 mod restore;
+mod stream;
 mod suggest;
 #[cfg(test)]
 mod tests;
@@ -35,6 +36,7 @@ use handle::{DriveHandle, Port};
 use line::{LineError, LineReader, OutputLine};
 use list::List;
 use restore::Restore;
+use stream::Wire;
 
 /// Longest time from the first character of a line to its end, ms: a slow typist.
 pub const LINE_MS: u32 = 30_000;
@@ -67,6 +69,8 @@ pub struct Console {
     /// News of the commissioning, and the number of the next line about it.
     commissioned: Option<(News, usize)>,
     restore: Restore,
+    /// The stream, and the rate of the port.
+    wire: Wire,
     /// The board that the lines that come in belong to, if it is another than this one.
     foreign: Option<&'static str>,
 }
@@ -94,6 +98,7 @@ impl Console {
             ended: false,
             commissioned: None,
             restore: Restore::new(),
+            wire: Wire::new(),
             foreign: None,
         }
     }
@@ -107,7 +112,6 @@ impl Console {
 
     /// Reads received bytes and writes replies; never waits. `now_ms` wraps.
     pub fn poll(&mut self, port: &mut impl Port, drive: &mut impl DriveHandle, now_ms: u32) {
-        self.watch_silence(drive, now_ms);
         self.watch_wiring(drive);
         drive.learned(&mut |result| {
             self.settings.learned(result);
@@ -128,6 +132,9 @@ impl Console {
             && let Some(task) = self.task
         {
             self.perform(task, drive, now_ms);
+            // A design takes seconds: what has come meanwhile is heard at the next poll, with its time.
+            self.flushed(port);
+            return;
         }
         for _ in 0..BYTES_AT_ONCE {
             if !self.flushed(port) || self.task.is_some() {
@@ -136,6 +143,9 @@ impl Console {
             let Some(byte) = port.read() else { break };
             self.take(byte, drive, now_ms);
         }
+        // What has come is heard first: the main loop may have designed for seconds.
+        self.watch_silence(drive, now_ms);
+        self.watch_rate(port, drive, now_ms);
         match self.began_ms {
             Some(_) if !self.reader.begun() => self.began_ms = None,
             Some(began) if now_ms.wrapping_sub(began) > LINE_MS => {
@@ -146,8 +156,8 @@ impl Console {
             None if self.reader.begun() => self.began_ms = Some(now_ms),
             _ => {}
         }
-        // One line: what it costs to compute must not hold up the main loop.
-        if self.flushed(port) {
+        // One line: what it costs to compute must not hold up the main loop. Frames first: a list has time.
+        if self.flushed(port) && self.send_frames(port, drive) {
             self.next_of_list(drive);
             self.flushed(port);
         }
@@ -164,7 +174,7 @@ impl Console {
     /// Sends the waiting text; whether none waits any more.
     fn flushed(&mut self, port: &mut impl Port) -> bool {
         let text = self.out.as_str();
-        let sent = text.is_empty() || port.write(text);
+        let sent = text.is_empty() || port.write(text.as_bytes());
         if sent {
             self.out.clear();
         }
@@ -208,9 +218,13 @@ impl Console {
 
     /// Stops the drive when no valid line came for too long.
     fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        let limit = self.settings.in_force().command.timeout_s;
+        let (set, alive) = (self.settings.in_force().command.timeout_s, self.wire.alive_s());
+        let limit = if alive > 0.0 && (set == 0.0 || alive < set) { alive } else { set };
         let heard_ms = *self.heard_ms.get_or_insert(now_ms);
         let silence = now_ms.wrapping_sub(heard_ms) as f32 * 1e-3;
+        if alive > 0.0 && silence > alive {
+            self.stop_stream(drive);
+        }
         if limit > 0.0 && silence > limit && self.out.as_str().is_empty() && !drive.is_off() {
             self.heard_ms = Some(now_ms);
             self.announcer.stopping();
@@ -239,6 +253,10 @@ impl Console {
     fn take(&mut self, byte: u8, drive: &mut impl DriveHandle, now_ms: u32) {
         if self.settings.in_force().command.echo {
             self.reader.echo(byte, &mut self.out);
+        }
+        // An empty line is a sign of life, too.
+        if matches!(byte, b'\r' | b'\n') && !self.reader.begun() {
+            self.heard_ms = Some(now_ms);
         }
         let line = match self.reader.push(byte) {
             Ok(None) => return,

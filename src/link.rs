@@ -1,6 +1,7 @@
 //! Communication between the main loop and the control interrupt.
 
 pub mod mailbox;
+pub mod stream;
 pub mod trace;
 
 use drive_core::{Accepted, Excited, Hardware, Refused, Sample, State, Telemetry};

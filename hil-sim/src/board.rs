@@ -6,7 +6,7 @@
 mod build;
 
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 
 use clap::{Args, ValueEnum};
 
@@ -52,6 +52,10 @@ pub struct Options {
     /// Shows the commands of the firmware's build
     #[arg(long)]
     pub verbose: bool,
+    /// For a program that starts the board: ends with its standard input, and prints the drive's flux angle, the motor's
+    /// (turns) and the motor's flux (Wb) in lines `flux ...`
+    #[arg(long, hide = true)]
+    pub attached: bool,
 }
 
 /// Level of a line of the log, the most urgent first.
@@ -139,6 +143,23 @@ pub fn become_board(options: &Options) -> Result<(), Error> {
         command.arg("--elf").arg(image);
     }
     Err(replaced_by(command))
+}
+
+/// Builds the same and starts the board as a child of this process; its standard input and output are pipes.
+///
+/// # Errors
+/// As [`become_board`].
+pub fn attach(options: &Options, arguments: &[String]) -> Result<Child, Error> {
+    options.config()?;
+    let image =
+        options.elf.is_none().then(|| build::image(&options.board, options.verbose)).transpose()?;
+    let mut command = Command::new(build::virtual_board()?);
+    command.args(arguments).arg("--attached");
+    if let Some(image) = image {
+        command.arg("--elf").arg(image);
+    }
+    let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    child.map_err(|error| Error::Internal(format!("cannot run the virtual board: {error}")))
 }
 
 /// Replaces this process, so that one process gets the terminal and its Ctrl-C. Returns on failure only.

@@ -47,7 +47,7 @@ const READ: Duration = Duration::from_millis(100);
 /// [`Error::Refused`] when the port cannot be opened; [`Error::Internal`] when the drive does not answer or, without a
 /// person, answers with an error.
 pub fn run(options: &Options) -> Result<(), Error> {
-    let (reader, writer) = open(options)?;
+    let (reader, writer) = open(&options.port, options.baud)?;
     if options.commands.is_empty() && std::io::stdin().is_terminal() {
         return editor::run(&options.port, |show| Link::new(reader, writer, show));
     }
@@ -62,10 +62,14 @@ pub fn run(options: &Options) -> Result<(), Error> {
     }
 }
 
-type Port = Box<dyn serialport::SerialPort>;
+/// A serial port.
+pub type Port = Box<dyn serialport::SerialPort>;
 
-/// Both directions of the port.
-fn open(options: &Options) -> Result<(Port, Port), Error> {
+/// Both directions of a port.
+///
+/// # Errors
+/// [`Error::Refused`] when it cannot be opened.
+pub fn open(path: &str, baud: u32) -> Result<(Port, Port), Error> {
     let refused = |why: serialport::Error| {
         let ports = serialport::available_ports().unwrap_or_default();
         let names: Vec<_> = ports.into_iter().map(|port| port.port_name).collect();
@@ -73,9 +77,9 @@ fn open(options: &Options) -> Result<(Port, Port), Error> {
             [] => "no serial port is found".to_owned(),
             _ => format!("there are {}", names.join(", ")),
         };
-        Error::Refused(format!("--port {}: {why}; {known}", options.port))
+        Error::Refused(format!("--port {path}: {why}; {known}"))
     };
-    let builder = serialport::new(&options.port, options.baud).timeout(READ);
+    let builder = serialport::new(path, baud).timeout(READ);
     // A pseudo-terminal that was opened exclusively stays so when this program is killed.
     let port = builder.exclusive(false).open().map_err(refused)?;
     let other = port.try_clone().map_err(refused)?;

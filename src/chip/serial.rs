@@ -1,10 +1,10 @@
-//! The serial port of the console: LPUART1, 8N1, an interrupt per byte.
+//! The serial port of the console: LPUART1, 8N1, with its FIFOs of eight bytes.
 //!
-//! Only the interrupt accesses the registers. Its priority is below that of the control interrupt; at 115 200 bits
-//! a second a byte takes 87 us, half a control period.
+//! Only the interrupt accesses the registers. Its priority is below that of the control interrupt, during which the FIFOs
+//! go on: at 2 Mbaud eight bytes take 40 us.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -19,6 +19,8 @@ use induction_drive::console::handle;
 type ReceiveQueue = Queue<u8, { board::SERIAL_RECEIVE }>;
 type TransmitQueue = Queue<u8, { board::SERIAL_TRANSMIT }>;
 
+/// Bytes that each FIFO holds (RM0440, LPUART implementation).
+const FIFO: u32 = 8;
 /// Priority of the interrupt: the lowest. Only the four upper bits are implemented (datasheet).
 const PRIORITY: u8 = 0xf0;
 
@@ -33,8 +35,8 @@ struct PortInterrupt {
     port: pac::LPUART1,
     received: Producer<'static, u8, { board::SERIAL_RECEIVE }>,
     to_send: Consumer<'static, u8, { board::SERIAL_TRANSMIT }>,
-    /// A byte that waits for the transmitter.
-    next: Option<u8>,
+    /// The BRR register in force.
+    divider: u32,
 }
 
 /// The interrupt's own memory.
@@ -48,6 +50,10 @@ static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 
 /// Bytes were damaged on the wire, or came faster than they were read.
 static DAMAGED: AtomicBool = AtomicBool::new(false);
+/// The BRR register wanted, and in force.
+static DIVIDER: AtomicU32 = AtomicU32::new(INITIAL);
+static IN_FORCE: AtomicU32 = AtomicU32::new(INITIAL);
+const INITIAL: u32 = board::serial_divider(board::SERIAL_BAUD);
 
 impl Port {
     /// Sets the port up; `None` on a second call.
@@ -67,15 +73,15 @@ impl Port {
         // Pulled up: an open input stays idle.
         receive.into_alternate::<{ board::SERIAL_AF }>().set_internal_resistor(Pull::Up);
 
-        // SAFETY: the register takes 20 bits; `board` keeps the value inside.
-        port.brr().write(|w| unsafe { w.bits(board::SERIAL_DIVIDER) });
-        // 8 bits, no parity, one stop bit, as after reset. An interrupt per received byte.
-        port.cr1().write(|w| w.ue().enabled().re().enabled().te().enabled().rxneie().enabled());
         // The interrupt also at damaged bytes.
         port.cr3().write(|w| w.eie().enabled());
-
-        let end =
-            PortInterrupt { port, received: write_received, to_send: read_to_send, next: None };
+        let end = PortInterrupt {
+            port,
+            received: write_received,
+            to_send: read_to_send,
+            divider: INITIAL,
+        };
+        end.enable();
         // SAFETY: see `Owned`.
         unsafe { *INTERRUPT_END.0.get() = Some(end) };
         // SAFETY: no critical section relies on the priority or the mask of this interrupt.
@@ -96,17 +102,24 @@ impl handle::Port for Port {
         DAMAGED.swap(false, Ordering::Relaxed)
     }
 
-    fn write(&mut self, text: &str) -> bool {
-        if self.to_send.capacity() - self.to_send.len() < text.len() {
+    fn write(&mut self, bytes: &[u8]) -> bool {
+        if self.to_send.capacity() - self.to_send.len() < bytes.len() {
             return false;
         }
-        for byte in text.bytes() {
+        for byte in bytes {
             // There is room.
-            let _ = self.to_send.enqueue(byte);
+            let _ = self.to_send.enqueue(*byte);
         }
         // Lets the interrupt fetch the bytes.
         NVIC::pend(Interrupt::LPUART);
         true
+    }
+
+    fn change_rate(&mut self, baud: u32) -> bool {
+        let divider = board::serial_divider(baud);
+        DIVIDER.store(divider, Ordering::Relaxed);
+        NVIC::pend(Interrupt::LPUART);
+        IN_FORCE.load(Ordering::Relaxed) == divider
     }
 }
 
@@ -119,6 +132,19 @@ fn LPUART() {
 }
 
 impl PortInterrupt {
+    /// Sets the rate and switches the port on: 8 bits, no parity, one stop bit, as after reset; FIFOs, and an interrupt when
+    /// a byte is received.
+    fn enable(&self) {
+        // BRR and the FIFOs can be changed only while it is off (RM0440, LPUART_CR1).
+        self.port.cr1().reset();
+        // SAFETY: the register takes 20 bits; `board` keeps the value inside.
+        self.port.brr().write(|w| unsafe { w.bits(self.divider) });
+        self.port.cr1().write(|w| w.fifoen().set_bit());
+        self.port
+            .cr1()
+            .modify(|_, w| w.ue().enabled().re().enabled().te().enabled().rxneie().enabled());
+    }
+
     fn serve(&mut self) {
         let port = &self.port;
         let status = port.isr().read();
@@ -126,27 +152,33 @@ impl PortInterrupt {
             port.icr().write(|w| w.orecf().clear().fecf().clear().ncf().clear().pecf().clear());
             DAMAGED.store(true, Ordering::Relaxed);
         }
-        if status.rxne().bit() {
+        // At most as many as the FIFO holds: the main loop goes on.
+        for _ in 0..FIFO {
+            if !port.isr().read().rxne().bit() {
+                break;
+            }
             // The lower eight of nine bits.
             let byte = port.rdr().read().rdr().bits() as u8;
             if self.received.enqueue(byte).is_err() {
                 DAMAGED.store(true, Ordering::Relaxed);
             }
         }
-        if self.next.is_none() {
-            self.next = self.to_send.dequeue();
-        }
-        if status.txe().bit()
-            && let Some(byte) = self.next.take()
-        {
+        for _ in 0..FIFO {
+            if !port.isr().read().txe().bit() {
+                break;
+            }
+            let Some(byte) = self.to_send.dequeue() else { break };
             port.tdr().write(|w| w.tdr().set(u16::from(byte)));
-            self.next = self.to_send.dequeue();
         }
-        // Enabled only while a byte waits: the register is empty most of the time.
-        if self.next.is_some() {
-            port.cr1().modify(|_, w| w.txeie().enabled());
-        } else {
-            port.cr1().modify(|_, w| w.txeie().disabled());
+        // Enabled only while bytes wait: the FIFO is empty most of the time.
+        let more = self.to_send.ready();
+        port.cr1().modify(|_, w| w.txfeie().bit(more));
+        let wanted = DIVIDER.load(Ordering::Relaxed);
+        // At the end of the last byte; the main loop asks again until then.
+        if wanted != self.divider && !more && port.isr().read().tc().bit() {
+            self.divider = wanted;
+            self.enable();
+            IN_FORCE.store(wanted, Ordering::Relaxed);
         }
     }
 }

@@ -122,6 +122,11 @@ impl Console {
                 (self.armed, self.traced) = (false, None);
                 self.ok();
             }
+            Request::Stream(plan) => self.stream(plan, drive),
+            Request::StreamState => self.stream_state(),
+            Request::EndStream => self.end_stream(drive),
+            Request::Signals => self.begin(ListKind::Signals),
+            Request::Baud(baud) => self.baud(baud, drive),
             Request::Log(level) => {
                 drive.set_log_level(level);
                 self.ok();

@@ -20,6 +20,7 @@ use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
 
 pub use error::ParseError;
+pub use recording::Stream;
 
 /// Most records of a trace.
 const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
@@ -92,6 +93,16 @@ pub enum Request {
     ShowTrace,
     /// End the recording of a trace.
     EndTrace,
+    /// Stream signals.
+    Stream(Stream),
+    /// Show the stream.
+    StreamState,
+    /// End the stream.
+    EndStream,
+    /// List the signals and the layout of a frame as JSON.
+    Signals,
+    /// Set the bits per second of the port.
+    Baud(u32),
     /// Set how much is logged.
     Log(Level),
     /// Send typed characters back, or not.
@@ -133,7 +144,7 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 32] = [
+pub const COMMANDS: [&str; 34] = [
     "help",
     "status",
     "start",
@@ -158,6 +169,8 @@ pub const COMMANDS: [&str; 32] = [
     "faults",
     "clear",
     "trace",
+    "stream",
+    "baud",
     "log",
     "echo",
     "reboot",
@@ -250,7 +263,10 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
                 None => Request::List(prefix(name)?),
             },
         },
-        "describe" => Request::Describe(words.optional().map_or(Ok(""), prefix)?),
+        "describe" => match words.optional() {
+            Some("stream") => Request::Signals,
+            word => Request::Describe(word.map_or(Ok(""), prefix)?),
+        },
         "set" => Request::Set(assignments(&mut words)?),
         "apply" => Request::Apply,
         "revert" => Request::Revert,
@@ -269,6 +285,16 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             Some("off") => Request::EndTrace,
             Some(records) => Request::Trace(recording::plan(records, &mut words)?),
         },
+        "stream" => match words.optional() {
+            None => Request::StreamState,
+            Some("off") => Request::EndStream,
+            Some(signal) => Request::Stream(recording::stream(signal, &mut words)?),
+        },
+        "baud" => {
+            let word = words.next("the bits per second")?;
+            let (min, max) = (board::SERIAL_BAUD, board::SERIAL_BAUD_MAX);
+            Request::Baud(whole("the bits per second", word, min, max)?)
+        }
         "log" => Request::Log(words.one_of("the level", "off error warn info debug", &LEVELS)?),
         "echo" => {
             Request::Echo(words.one_of("on or off", "on off", &[("on", true), ("off", false)])?)
@@ -358,9 +384,13 @@ fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
     found.copied().ok_or(ParseError::OneOf { what: "the fault", word, all })
 }
 
-fn whole<'a>(what: &'static str, word: &'a str, min: u16, max: u16) -> Result<u16, ParseError<'a>> {
+fn whole<'a, T>(what: &'static str, word: &'a str, min: T, max: T) -> Result<T, ParseError<'a>>
+where
+    T: Copy + Into<u32> + PartialOrd + core::str::FromStr,
+{
+    let (min_u32, max_u32) = (min.into(), max.into());
     let value = word.parse().ok().filter(|value| (min..=max).contains(value));
-    value.ok_or(ParseError::Whole { what, word, min, max })
+    value.ok_or(ParseError::Whole { what, word, min: min_u32, max: max_u32 })
 }
 
 fn hexadecimal(word: &str) -> Result<u32, ParseError<'_>> {

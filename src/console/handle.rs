@@ -11,6 +11,7 @@ use thiserror::Error;
 use super::grammar::Level;
 use crate::commissioning::News;
 use crate::link::Status;
+use crate::link::stream::Sample;
 use crate::link::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
@@ -71,6 +72,10 @@ pub trait DriveHandle {
     fn tracing(&self) -> bool;
     /// Record number `i` of the last trace, and its number from the record of the trigger.
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)>;
+    /// Asks for a sample of the signals every `divider` control periods; 0 ends it.
+    fn stream(&mut self, divider: u16);
+    /// The next sample of the stream.
+    fn sampled(&mut self) -> Option<Sample>;
     /// Resets the chip. Only while the outputs are off.
     fn reboot(&mut self);
     /// Calls `show` with the result of a learning that ended since the last call, accepted or not.
@@ -97,6 +102,8 @@ pub trait Port {
     fn read(&mut self) -> Option<u8>;
     /// Whether bytes were lost or damaged since the last call.
     fn take_damage(&mut self) -> bool;
-    /// Sends the whole text; `false`, and nothing sent, if it does not fit now.
-    fn write(&mut self, text: &str) -> bool;
+    /// Sends all bytes; `false`, and nothing sent, if they do not fit now.
+    fn write(&mut self, bytes: &[u8]) -> bool;
+    /// Changes the bits per second as soon as all bytes are sent; `false` if that is still to come: call it again.
+    fn change_rate(&mut self, baud: u32) -> bool;
 }

@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 34] = [
+pub const HELP: [&str; 37] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
@@ -29,6 +29,9 @@ pub const HELP: [&str; 34] = [
     "trace N ... on fault      record until a fault; then `trace` prints it",
     "trace N ... on NAME above|below X  record around the moment when the signal passes X",
     "trace [off]               print the last trace, or end the recording",
+    "stream NAME ... [RATE] [alive S]  send frames of signals; alive: stop the drive after S seconds without a line",
+    "stream [off]              frames sent and dropped, or end it; `describe stream`: the layout",
+    "baud N                    bits per second; back to 115200 after a second without a valid line",
     "log off|error|warn|info|debug  how much goes to the log",
     "echo on|off               whether typed characters are sent back",
     "reboot [now]              reset the controller; `now` drops settings that were not saved",

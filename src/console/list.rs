@@ -37,6 +37,8 @@ pub(super) enum ListKind {
     Learned,
     Fault(Fault),
     Trace,
+    /// The signals and the layout of a frame.
+    Signals,
 }
 
 /// Significant digits of a trace.
@@ -77,6 +79,7 @@ impl Console {
             ListKind::Learned => learned
                 .and_then(|result| reply::learned(result, believable, next))
                 .map(|text| say(&text, next + 1)),
+            ListKind::Signals => super::stream::described(line).map(|text| say(&text, next + 1)),
             ListKind::Trace if drive.tracing() => return,
             ListKind::Trace => self.trace_line(next, drive),
         };

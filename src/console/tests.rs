@@ -4,6 +4,7 @@ mod doubles;
 mod learning;
 mod lists;
 mod staging;
+mod stream;
 mod typing;
 mod wrong;
 

@@ -139,20 +139,19 @@ impl<const N: usize> Inner<N> {
 }
 
 impl<const N: usize> Recorder<'_, N> {
-    /// Records the present control period, if one is due; `fault` says whether the drive is in a fault.
-    pub fn step(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) {
-        if self.0.stage.load(Ordering::Acquire) == RECORDING {
-            self.record(fault, telemetry);
-        }
+    /// Records the present control period, if one is due, and tells whether it was; `fault` says whether the drive is in a
+    /// fault.
+    pub fn step(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) -> bool {
+        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, telemetry)
     }
 
-    fn record(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) {
+    fn record(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) -> bool {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         // A fault is recorded at once: what follows it stands still.
         if inner.wait > 0 && !(fault && inner.plan.trigger == Trigger::Fault) {
             inner.wait -= 1;
-            return;
+            return false;
         }
         inner.wait = inner.plan.divider.saturating_sub(1);
         let t = telemetry();
@@ -172,6 +171,7 @@ impl<const N: usize> Recorder<'_, N> {
         if inner.left == Some(0) {
             self.0.stage.store(DONE, Ordering::Release);
         }
+        true
     }
 }
 

@@ -22,7 +22,7 @@ use induction_drive::boards::SELECTED;
 use induction_drive::commissioning::Session;
 use induction_drive::link::mailbox::Mailbox;
 use induction_drive::link::trace::Trace;
-use induction_drive::link::{Answer, Status};
+use induction_drive::link::{Answer, Status, stream};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Observation, Tracking};
@@ -236,6 +236,9 @@ fn start_control(
     let (recorder, trace) = TRACE_MEMORY.take().ok_or(TWICE)?;
     let observations = singleton!(: Queue<Observation, { board::OBSERVED_PERIODS }> = Queue::new());
     let (send_observations, observations) = observations.ok_or(TWICE)?.split();
+    type Samples = stream::Queue<{ board::STREAM_SAMPLES }>;
+    let samples = singleton!(: Samples = Samples::new(stream::Sample::default())).ok_or(TWICE)?;
+    let (send_samples, stream) = samples.split();
 
     pwm.start()?;
     let drive = Drive::new(coefficients);
@@ -249,11 +252,12 @@ fn start_control(
         answers: send_answers,
         learned: send_learned,
         trace: recorder,
+        stream: send_samples,
         observations: send_observations,
     }
     .run();
     if !comes_at_its_rate() {
         return Err("the control interrupt does not come at its rate");
     }
-    Ok(ControlLink { status, commands, answers, learned, trace, observations })
+    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations })
 }

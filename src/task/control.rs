@@ -24,6 +24,7 @@ use crate::chip::pwm::Pwm;
 use crate::chip::time;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
+use induction_drive::link::stream::Source;
 use induction_drive::link::trace::Recorder;
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::MemoryRange;
@@ -49,6 +50,8 @@ pub struct Control {
     pub learned: Sender<'static, Option<Learned>>,
     /// The trace.
     pub trace: Recorder<'static, { board::TRACE_RECORDS }>,
+    /// The stream.
+    pub stream: Source<'static, { board::STREAM_SAMPLES }>,
     /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Producer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
@@ -154,8 +157,18 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, commands, answers, trace, observations, .. } =
-            &mut self.control;
+        let Control {
+            drive,
+            pwm,
+            adc,
+            encoder,
+            commands,
+            answers,
+            trace,
+            observations,
+            stream,
+            ..
+        } = &mut self.control;
 
         // Over-current first: the outputs go off before anything is computed. The analog watchdogs interrupt
         // when the current is converted, before the sequence has ended.
@@ -221,13 +234,15 @@ impl Running {
         }
 
         // Between two steps: a command acts from the next step on.
-        if let Some(answer) = commands.take_with(|command| drive.command(command)) {
+        let answer = commands.take_with(|command| drive.command(command));
+        let commanded = answer.is_some();
+        if let Some(answer) = answer {
             // There is room: the main loop takes the last answer before it sends a command.
             answers.send(answer);
         }
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         let fault = matches!(drive.state(), State::Fault(_));
-        trace.step(fault, || drive.telemetry());
+        let traced = trace.step(fault, || drive.telemetry());
         let commissioned = OBSERVED.load(Ordering::Relaxed) && drive.state().regulates();
         if drive.tracks_rotor() || drive.excites() || commissioned {
             // Without room the period is missing, which the main loop detects by its number.
@@ -236,15 +251,17 @@ impl Running {
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
+        // A new state is reported immediately.
+        let reports = self.reported != Some(drive.state())
+            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        let busy = reports || traced || commanded;
+        stream.step(self.periods, busy, || drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         if cycles > self.worst_cycles {
             self.worst_cycles = cycles;
         }
-        // A new state is reported immediately.
-        if self.reported != Some(self.control.drive.state())
-            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS)
-        {
+        if reports {
             self.report(sample, cycles);
         }
     }

@@ -21,6 +21,7 @@ use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle};
 use induction_drive::link::mailbox::{Receiver, Sender};
+use induction_drive::link::stream::{Sample, Sink};
 use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
 use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
@@ -46,6 +47,8 @@ pub struct ControlLink {
     pub learned: Receiver<'static, Option<Learned>>,
     /// The trace.
     pub trace: trace::Reader<'static, { board::TRACE_RECORDS }>,
+    /// The stream.
+    pub stream: Sink<'static, { board::STREAM_SAMPLES }>,
     /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
@@ -143,12 +146,13 @@ impl Supervisor {
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
     /// since the start, ms, wrapping.
     pub fn listen(&mut self) -> u32 {
-        self.clock.update();
         self.track();
         if let Some(status) = self.link.as_mut().and_then(|link| link.status.take()) {
             self.log(status);
         }
         self.commission();
+        // It designs for seconds: the console needs the time behind it.
+        self.clock.update();
         self.clock.ms()
     }
 
@@ -330,6 +334,14 @@ impl DriveHandle for Supervisor {
 
     fn traced(&self, i: u16) -> Option<(i16, trace::Record)> {
         self.link.as_ref()?.trace.get(i)
+    }
+
+    fn stream(&mut self, divider: u16) {
+        self.link.iter_mut().for_each(|link| link.stream.ask(divider));
+    }
+
+    fn sampled(&mut self) -> Option<Sample> {
+        self.link.as_mut()?.stream.fetch()
     }
 
     fn learned(&mut self, show: &mut dyn FnMut(&Learned)) {

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 28] = [
+const ELSEWHERE: [(&str, &str); 29] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -23,6 +23,7 @@ const ELSEWHERE: [(&str, &str); 28] = [
     ("cargo run -p drive-core --example", "compiled by `cargo xtask test`; run by a person"),
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
+    ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
     ("cargo sim completion", "prints a script"),
     ("cargo sim report", "every experiment runs in the tests; minutes"),
     ("cargo sim run NAME", "a placeholder"),

@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use crate::run;
 
 /// The files in `fuzz/fuzz_targets`.
-pub const TARGETS: [&str; 2] = ["console", "settings"];
+pub const TARGETS: [&str; 3] = ["console", "settings", "stream"];
 
 /// Flags of the instrumentation: counters at every edge, and the comparisons.
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \

@@ -67,9 +67,9 @@ enum Task {
         #[command(flatten)]
         which: Which,
     },
-    /// Fuzzes the console and the saved settings
+    /// Fuzzes the console, the saved settings and the stream
     Fuzz {
-        /// Seconds for each of the two
+        /// Seconds for each of the three
         #[arg(default_value_t = 300)]
         seconds: u32,
     },
@@ -89,7 +89,7 @@ enum Task {
     /// Builds the pages in docs/. Gets mdbook from crates.io
     Book,
     /// Makes pages and pictures of them in Chromium, which it gets; fails if a page overflows at 420 pixels or
-    /// the text of a plot is too small
+    /// the text of a plot is too small. Drives the live page on the virtual board
     Pages,
     /// Runs every command that a document shows, except those of a list with reasons
     Documents,

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{run, sources, toolchain};
+use crate::{image, run, sources, toolchain};
 
 /// Pages, by the arguments of `cargo sim run` that make them.
 const PAGES: [&str; 4] =
@@ -48,9 +48,18 @@ pub fn pages() -> Result<()> {
         let page = folder.join(format!("{name}.html"));
         chromium(&folder, &page, &["--no-pdf-header-footer", &pdf])?;
     }
+    live()?;
     println!("\npictures: {}", folder.display());
     ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
     Ok(())
+}
+
+/// Drives the live page in Chromium, on the virtual board with the image of the reference board.
+fn live() -> Result<()> {
+    toolchain::ensure_c_compiler()?;
+    let elf = image::build()?;
+    let test = "test --release --package drive-live --test browser -- --ignored --nocapture";
+    run::step("live page", run::cargo(test).env("LIVE_ELF", elf))
 }
 
 /// A view of a page.

@@ -3,7 +3,7 @@
 
 /// Beginnings of lines that the drive says unasked, those of the firmware's announcements and of its greeting, and of
 /// the one that comes before an answer that takes a while.
-const UNASKED: [&str; 12] = [
+const UNASKED: [&str; 13] = [
     "induction-drive ",
     "fault ",
     "running: ",
@@ -14,6 +14,7 @@ const UNASKED: [&str; 12] = [
     "commissioning: ",
     "refused: ",
     "trace: ",
+    "link: ",
     "applied",
     "designing...",
 ];

@@ -1,10 +1,12 @@
 //! Moves lines between this program and the drive. A thread reads; its lines go to the command that awaits an answer, or
-//! are shown at once.
+//! are shown at once. Frames of a stream between the lines go their own way.
 
 use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+
+use drive_stream::{Frame, Piece, Splitter};
 
 use super::answer::{Awaited, Meaning, is_error};
 use super::trace::{Collector, Trace};
@@ -25,6 +27,9 @@ pub enum LinkError {
     /// The port is gone: unplugged, or the virtual board has ended.
     #[error("the port is closed")]
     Closed,
+    /// A line that could not wait was sent meanwhile; it ends a list.
+    #[error("`{0}`: cut short by another line")]
+    Cut(String),
 }
 
 /// The answer to a command.
@@ -55,24 +60,77 @@ struct Route {
     asked: Option<Sender<String>>,
     /// Or to the person.
     show: Box<dyn FnMut(&str) + Send>,
+    frames: Box<dyn FnMut(Option<Frame>) + Send>,
     traces: Collector,
     closed: bool,
+    /// Answers to urgent lines that come before that to the command, and behind it.
+    owed: u32,
+    owed_behind: u32,
 }
 
 impl Route {
     fn line(&mut self, line: String) {
         self.traces.push(&line);
         match &self.asked {
-            Some(asked) => drop(asked.send(line)),
-            None => (self.show)(&line),
+            Some(asked) if self.owed == 0 || !ends_answer(&line) => drop(asked.send(line)),
+            _ => self.unasked(&line),
         }
     }
+
+    /// Shows a line that answers no command.
+    fn unasked(&mut self, line: &str) {
+        if ends_answer(line) {
+            self.owed = self.owed.saturating_sub(1);
+        }
+        (self.show)(line);
+    }
+}
+
+/// The direction to the drive.
+type Port = Arc<Mutex<Outgoing>>;
+
+struct Outgoing(Box<dyn Write + Send>);
+
+impl Outgoing {
+    fn send(&mut self, line: &str) -> std::io::Result<()> {
+        self.0.write_all(format!("{line}\n").as_bytes())?;
+        self.0.flush()
+    }
+}
+
+/// Whether a line ends an answer, whatever the command was.
+fn ends_answer(line: &str) -> bool {
+    line == "ok" || line.starts_with("ok:") || is_error(line)
 }
 
 /// A connection to a drive.
 pub struct Link {
-    port: Box<dyn Write + Send>,
+    port: Port,
     route: Arc<Mutex<Route>>,
+}
+
+/// Sends lines that cannot wait for an answer that is awaited.
+#[derive(Clone)]
+pub struct Urgent(Port, Arc<Mutex<Route>>);
+
+impl Urgent {
+    /// Sends a line at once. Its answer is shown, unless a list is being answered: the line cuts that short.
+    ///
+    /// # Errors
+    /// The port is gone.
+    pub fn send(&self, line: &str) -> Result<(), LinkError> {
+        // Locked while it is noted as well: the answers come in the order of the lines.
+        let mut port = locked(&self.0);
+        // An empty line is a sign of life, which has no answer and cuts nothing short.
+        if !line.is_empty() {
+            let mut route = locked(&self.1);
+            match route.asked {
+                Some(_) => route.owed_behind += 1,
+                None => route.owed += 1,
+            }
+        }
+        port.send(line).map_err(|_| LinkError::Closed)
+    }
 }
 
 impl Link {
@@ -82,18 +140,47 @@ impl Link {
         port: impl Write + Send + 'static,
         show: impl FnMut(&str) + Send + 'static,
     ) -> Self {
-        let traces = Collector::default();
-        let route = Route { asked: None, show: Box::new(show), traces, closed: false };
+        Self::with_frames(reader, port, show, |_| ())
+    }
+
+    /// The same; `frames` gets the frames of a stream, and `None` for bytes that were damaged.
+    pub fn with_frames(
+        reader: impl Read + Send + 'static,
+        port: impl Write + Send + 'static,
+        show: impl FnMut(&str) + Send + 'static,
+        frames: impl FnMut(Option<Frame>) + Send + 'static,
+    ) -> Self {
+        let (show, frames) = (Box::new(show), Box::new(frames));
+        let route = Route {
+            asked: None,
+            show,
+            frames,
+            traces: Collector::default(),
+            closed: false,
+            owed: 0,
+            owed_behind: 0,
+        };
         let route = Arc::new(Mutex::new(route));
         let to = route.clone();
         std::thread::spawn(move || read_lines(reader, &to));
-        Self { port: Box::new(port), route }
+        let port = Arc::new(Mutex::new(Outgoing(Box::new(port))));
+        Self { port, route }
+    }
+
+    /// A way for lines that cannot wait.
+    pub fn urgent(&self) -> Urgent {
+        Urgent(self.port.clone(), self.route.clone())
+    }
+
+    /// Whether the port is gone.
+    pub fn is_closed(&self) -> bool {
+        locked(&self.route).closed
     }
 
     /// Ends a line that may have begun on the drive's side, and lets the answer go by.
     pub fn begin(&mut self) {
         // The port is found closed with the first command.
-        let _ = self.port.write_all(b"\n").and_then(|()| self.port.flush());
+        let _ = locked(&self.port).send("");
         std::thread::sleep(Duration::from_millis(100));
     }
 
@@ -103,21 +190,34 @@ impl Link {
     /// There is no whole answer.
     pub fn ask(&mut self, command: &str, mut show: impl FnMut(&str)) -> Result<Answer, LinkError> {
         let (send, lines) = channel();
-        {
+        let sent = {
+            let mut port = locked(&self.port);
             let mut route = locked(&self.route);
             if route.closed {
                 return Err(LinkError::Closed);
             }
             route.asked = Some(send);
-        }
-        let sent = self.port.write_all(format!("{command}\n").as_bytes());
-        let answer = match sent.and_then(|()| self.port.flush()) {
+            drop(route);
+            port.send(command)
+        };
+        let mut answer = match sent {
             Ok(()) => self.hear(command, &lines, &mut show),
             Err(_) => Err(LinkError::Closed),
         };
+        let _port = locked(&self.port);
         let mut route = locked(&self.route);
         route.asked = None;
-        lines.try_iter().for_each(|line| (route.show)(&line));
+        // The answer to an urgent line has ended a list.
+        let many = answer.as_ref().is_ok_and(|answer| answer.lines.len() > 1);
+        if route.owed_behind > 0 && many {
+            route.owed_behind -= 1;
+            answer = Err(LinkError::Cut(command.to_owned()));
+        }
+        route.owed += std::mem::take(&mut route.owed_behind);
+        if matches!(answer, Err(LinkError::Silence(..))) {
+            route.owed = 0;
+        }
+        lines.try_iter().for_each(|line| route.unasked(&line));
         answer
     }
 
@@ -157,20 +257,39 @@ impl Link {
     }
 }
 
+/// The thread that reads ends, and with it the port is closed, within the time limit of a read.
+impl Drop for Link {
+    fn drop(&mut self) {
+        locked(&self.route).closed = true;
+    }
+}
+
 /// A thread that panicked while it showed a line leaves the route whole.
-fn locked(route: &Mutex<Route>) -> MutexGuard<'_, Route> {
-    route.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn read_lines(mut reader: impl Read, route: &Mutex<Route>) {
-    let (mut buffer, mut line) = ([0; 1024], Vec::new());
-    loop {
+    let (mut buffer, mut line, mut splitter) = ([0; 1024], Vec::new(), Splitter::new());
+    while !locked(route).closed {
         match reader.read(&mut buffer) {
             Ok(0) => break,
             Ok(read) => {
                 for byte in &buffer[..read] {
+                    let byte = match splitter.push(*byte) {
+                        Piece::Text(byte) => byte,
+                        Piece::Nothing => continue,
+                        Piece::Frame(frame) => {
+                            (locked(route).frames)(Some(frame));
+                            continue;
+                        }
+                        Piece::Damaged => {
+                            (locked(route).frames)(None);
+                            continue;
+                        }
+                    };
                     if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST {
-                        line.push(*byte);
+                        line.push(byte);
                         continue;
                     }
                     let text = readable(&std::mem::take(&mut line));
@@ -209,6 +328,64 @@ fn readable(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A drive that answers each line with the next of these texts; what was shown unasked.
+    #[cfg(unix)]
+    fn talk(answers: &'static [&str], with: impl FnOnce(&mut Link, &Urgent)) -> Vec<String> {
+        use std::io::{BufRead as _, BufReader};
+        use std::os::unix::net::UnixStream;
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let (shown, unasked) = channel();
+        let show = move |line: &str| drop(shown.send(line.to_owned()));
+        let mut link = Link::new(ours.try_clone().unwrap(), ours, show);
+        let mut out = theirs.try_clone().unwrap();
+        let drive = std::thread::spawn(move || {
+            let lines = BufReader::new(theirs).lines().map_while(Result::ok);
+            // In this order: it does not wait for a line behind the last answer.
+            for (answer, _) in answers.iter().zip(lines.filter(|line| !line.is_empty())) {
+                std::thread::sleep(Duration::from_millis(30));
+                out.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        let urgent = link.urgent();
+        with(&mut link, &urgent);
+        drive.join().unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        unasked.try_iter().collect()
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_answer_to_an_urgent_line_is_no_answer_to_the_next_command() {
+        let shown = talk(&["ok\r\n", "off; dc link 311 V\r\n"], |link, urgent| {
+            urgent.send("stop").unwrap();
+            urgent.send("").unwrap();
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; dc link 311 V"]);
+        });
+        assert_eq!(shown, ["ok"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_urgent_line_cuts_a_list_short_and_nothing_else() {
+        let answers = &["a  b\r\nc  d\r\n", "ok\r\n", "off; x\r\n", "ok\r\n", "off; y\r\n"];
+        talk(answers, |link, urgent| {
+            let later = |urgent: Urgent| {
+                std::thread::spawn(move || {
+                    std::thread::sleep(Duration::from_millis(10));
+                    urgent.send("stop").unwrap();
+                })
+            };
+            let sent = later(urgent.clone());
+            let cut = link.ask("help", |_| ());
+            assert!(matches!(cut, Err(LinkError::Cut(_))), "{cut:?}");
+            sent.join().unwrap();
+            let sent = later(urgent.clone());
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; x"]);
+            sent.join().unwrap();
+            assert_eq!(link.ask("status", |_| ()).unwrap().lines, ["off; y"]);
+        });
+    }
 
     #[test]
     fn sequences_of_a_terminal_are_no_text() {

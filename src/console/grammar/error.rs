@@ -59,9 +59,9 @@ pub enum ParseError<'a> {
         /// The word.
         word: &'a str,
         /// Smallest.
-        min: u16,
+        min: u32,
         /// Largest.
-        max: u16,
+        max: u32,
     },
     /// Not eight hexadecimal digits.
     #[error("not eight hexadecimal digits: {0}")]

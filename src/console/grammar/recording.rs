@@ -1,6 +1,9 @@
-//! What a trace is to record.
+//! What a trace is to record, and a stream to send.
+
+use drive_core::settings::value;
 
 use super::{LARGEST_DIVIDER, LONGEST_TRACE, ParseError, Words, nearest, whole};
+use crate::board::PWM_HZ;
 use crate::link::trace::{self, Plan, SIGNALS, SignalChoice, Trigger};
 
 /// The trace with this number of records.
@@ -30,6 +33,47 @@ pub(super) fn plan<'a>(records: &'a str, words: &mut Words<'a>) -> Result<Plan, 
     }
     Ok(plan)
 }
+
+/// A stream that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stream {
+    /// Its signals.
+    pub choice: SignalChoice,
+    /// Control periods from one frame to the next.
+    pub divider: u16,
+    /// Without a line for so long the drive stops, s; 0: never.
+    pub alive_s: f32,
+}
+
+/// Frames a second of a stream without a rate.
+const USUAL_RATE: u16 = 100;
+
+/// The stream with this signal and others.
+pub(super) fn stream<'a>(first: &'a str, words: &mut Words<'a>) -> Result<Stream, ParseError<'a>> {
+    let (mut rate, mut alive_s, mut choice) = (USUAL_RATE, 0.0, SignalChoice::none());
+    let mut next = Some(first);
+    while let Some(word) = next {
+        if word == "alive" {
+            let word = words.next("the seconds")?;
+            let tenths = value::number(word).filter(|s| ALIVE_S.contains(s));
+            let (what, all) = ("the seconds without a line", "0.1 to 10");
+            alive_s = tenths.ok_or(ParseError::OneOf { what, word, all })?;
+        } else if word.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
+            rate = whole("the frames a second", word, 1, PWM_HZ as u16)?;
+        } else if !choice.add(signal(word)?) {
+            return Err(ParseError::TooMany { what: "signals", most: trace::MOST });
+        }
+        next = words.optional();
+    }
+    if choice.signals().next().is_none() {
+        return Err(ParseError::Missing("a signal"));
+    }
+    let divider = (PWM_HZ as u16 + rate / 2) / rate;
+    Ok(Stream { choice, divider, alive_s })
+}
+
+/// Limits of `alive`, s.
+const ALIVE_S: core::ops::RangeInclusive<f32> = 0.1..=10.0;
 
 fn signal(word: &str) -> Result<u8, ParseError<'_>> {
     let near = || nearest(word, SIGNALS.iter().map(|signal| signal.name));

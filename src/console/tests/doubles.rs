@@ -9,12 +9,13 @@ use drive_core::identify::learning::{Fitted, Learned, Verdict};
 use drive_core::settings::SettingsError;
 use drive_core::settings::table::{CarrierTable, Grid, ReferenceTable, SlopeTable};
 use drive_core::{Accepted, Coefficients, Command, Drive, Hardware, Sample, Settings, State};
+use drive_stream::{Frame, Piece, Splitter};
 use induction_drive::board;
 use induction_drive::commissioning::{News, Session};
 use induction_drive::console::grammar::Level;
 use induction_drive::console::handle::{CommandError, DriveHandle, Port};
-use induction_drive::link::Status;
 use induction_drive::link::trace::{self, Plan, Trigger};
+use induction_drive::link::{Status, stream};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
@@ -43,6 +44,8 @@ pub struct FakeDrive {
     pub found: Option<Learned>,
     /// Tracking of the rotor time constant.
     pub tracking: Option<Tracking>,
+    /// Divider of the stream, and its samples that were not fetched.
+    pub streamed: (u16, VecDeque<stream::Sample>),
     /// The commissioning.
     pub session: Session,
 }
@@ -62,6 +65,7 @@ impl FakeDrive {
             worn_out: false,
             found: None,
             tracking: None,
+            streamed: (0, VecDeque::new()),
             session: Session::new(&Settings::default()),
         }
     }
@@ -141,6 +145,12 @@ impl DriveHandle for FakeDrive {
         let from_trigger = if plan.trigger == Trigger::Now { i } else { i.wrapping_sub(2) };
         (i < plan.records).then_some((from_trigger as i16, [1.0 / 3.0; trace::MOST]))
     }
+    fn stream(&mut self, divider: u16) {
+        self.streamed = (divider, VecDeque::new());
+    }
+    fn sampled(&mut self) -> Option<stream::Sample> {
+        self.streamed.1.pop_front()
+    }
     fn reboot(&mut self) {
         self.reboots += 1;
     }
@@ -193,6 +203,14 @@ pub struct FakePort {
     pub room: usize,
     /// Replies of the console.
     pub received: String,
+    /// Frames of the console.
+    pub frames: Vec<Frame>,
+    /// Tells the two apart.
+    pub splitter: Splitter,
+    /// Bits per second that were set last; 0: none.
+    pub baud: u32,
+    /// Whether bytes are still on their way.
+    pub sending: bool,
 }
 
 impl Port for FakePort {
@@ -202,12 +220,27 @@ impl Port for FakePort {
     fn take_damage(&mut self) -> bool {
         std::mem::take(&mut self.damaged)
     }
-    fn write(&mut self, text: &str) -> bool {
-        let fits = text.len() <= self.room;
+    fn write(&mut self, bytes: &[u8]) -> bool {
+        let fits = bytes.len() <= self.room;
         if fits {
-            self.room -= text.len();
-            self.received.push_str(text);
+            self.room -= bytes.len();
+            let mut text = Vec::new();
+            for byte in bytes {
+                match self.splitter.push(*byte) {
+                    Piece::Text(byte) => text.push(byte),
+                    Piece::Frame(frame) => self.frames.push(frame),
+                    Piece::Nothing => {}
+                    Piece::Damaged => panic!("neither text nor a frame"),
+                }
+            }
+            self.received.push_str(std::str::from_utf8(&text).expect("text"));
         }
         fits
+    }
+    fn change_rate(&mut self, baud: u32) -> bool {
+        if !self.sending {
+            self.baud = baud;
+        }
+        !self.sending
     }
 }

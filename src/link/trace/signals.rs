@@ -28,6 +28,11 @@ impl Signal {
         Self { name, old, unit: Unit::Named }
     }
 
+    /// The unit that the name ends with; empty if there is none.
+    pub fn unit(&self) -> &'static str {
+        self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
+    }
+
     /// Factor from the recorded value to the unit of the name, for a motor with these pole pairs.
     pub fn factor(&self, pole_pairs: u8) -> f32 {
         match self.unit {
@@ -96,7 +101,7 @@ impl SignalChoice {
     }
 
     /// Values of the signals.
-    pub(super) fn values(&self, t: &Telemetry) -> Record {
+    pub fn values(&self, t: &Telemetry) -> Record {
         let mut record = [0.0; MOST];
         for (place, signal) in record.iter_mut().zip(&self.signals) {
             *place = value(*signal, t);

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 
 use anyhow::{Context, Result, anyhow};
@@ -71,13 +71,14 @@ fn run(mut options: Options) -> Result<()> {
         set_lines.iter().for_each(|line| say(&format!("    {line}")));
     }
     let inputs = Inputs {
-        terminal: typed_lines(),
+        terminal: typed_lines(options.attached.then(|| stop.clone())),
         stop,
         script,
         seconds: config.extent.seconds,
         paced: !options.fast,
         flash,
         log: options.log,
+        flux: options.attached,
     };
     let mut session = Session::new(board, pty, inputs);
     let end = session.run(|line| say(&line.to_string()));
@@ -97,8 +98,8 @@ fn image(stage: &PowerStage, elf: Option<&Path>) -> Result<Image> {
     image.map_err(|why| Error::Refused(format!("the firmware's ELF: {why:#}")).into())
 }
 
-/// Lines typed at the terminal, read by a thread of their own.
-fn typed_lines() -> Receiver<String> {
+/// Lines typed at the terminal, read by a thread of their own. Their end sets `stop`, if there is one.
+fn typed_lines(stop: Option<Arc<AtomicBool>>) -> Receiver<String> {
     let (send, receive) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lines() {
@@ -107,6 +108,7 @@ fn typed_lines() -> Receiver<String> {
                 break;
             }
         }
+        stop.into_iter().for_each(|stop| stop.store(true, Ordering::Relaxed));
     });
     receive
 }

@@ -1,5 +1,7 @@
 //! A session: the board goes on in small slices of time; between them bytes go to and fro.
 
+use std::f64::consts::TAU;
+use std::io::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -61,6 +63,8 @@ pub struct Inputs {
     pub flash: Option<FlashFile>,
     /// Least urgent lines of the log that are kept and shown.
     pub log: LogLevel,
+    /// Whether the flux is shown.
+    pub flux: bool,
 }
 
 /// A board that is talked to.
@@ -72,6 +76,8 @@ pub struct Session {
     said: Assembler,
     resets: usize,
     last: Option<Period>,
+    /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
+    flux: Option<[f64; 3]>,
     /// All lines so far.
     pub lines: Vec<Line>,
     /// All curves so far.
@@ -91,6 +97,7 @@ impl Session {
             said: Assembler::default(),
             resets: 0,
             last: None,
+            flux: None,
             lines: Vec::new(),
             record: Record::default(),
             behind_s: 0.0,
@@ -185,6 +192,10 @@ impl Session {
         }
         let went = (0..SLICE).try_for_each(|_| self.period());
         self.hear()?;
+        if let Some([drive, motor, flux]) = self.flux.take().filter(|_| self.inputs.flux) {
+            // A reader that has gone away is no reason to stop.
+            let _ = writeln!(std::io::stdout(), "flux {drive:.4} {motor:.4} {flux:.3}");
+        }
         self.keep_flash()?;
         went.map(|()| None)
     }
@@ -240,6 +251,9 @@ impl Session {
         while let Some(period) = self.board.next_period() {
             let readings = Readings::new(&self.board);
             let time = period.began as f64 / TICKS_PER_S as f64;
+            let truth =
+                [self.board.plant.rotor_flux_angle() / TAU, self.board.plant.rotor_flux().norm()];
+            self.flux = Some([readings.phi, truth[0], truth[1]]);
             self.record.take(time, &self.board.plant, &period, &readings);
             self.last = Some(period);
         }

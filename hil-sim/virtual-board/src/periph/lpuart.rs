@@ -1,4 +1,4 @@
-//! LPUART1 (RM0440, section 38), 8N1, without its FIFO; the wire to the console.
+//! LPUART1 (RM0440, section 38), 8N1, with or without its FIFOs; the wire to the console.
 
 use std::collections::VecDeque;
 
@@ -25,7 +25,13 @@ const ORE: u32 = 1 << 3;
 const RXNE: u32 = 1 << 5;
 const TC: u32 = 1 << 6;
 const TXE: u32 = 1 << 7;
+/// TXFE of ISR; RXFF is never asked for.
+const TXFE: u32 = 1 << 23;
 const FIFOEN: u32 = 1 << 29;
+/// The enable of TXFE in CR1.
+const TXFEIE: u32 = 1 << 30;
+/// Bytes that a FIFO holds.
+const FIFO: usize = 8;
 /// Start bit, eight data bits, stop bit.
 const BITS: u64 = 10;
 
@@ -42,9 +48,10 @@ pub struct Wire {
 #[derive(Clone, Debug)]
 pub struct Lpuart {
     store: Store,
+    /// TC, FE and ORE; the others follow from the FIFOs.
     status: u32,
-    received: u8,
-    to_send: Option<u8>,
+    received: VecDeque<u8>,
+    to_send: VecDeque<u8>,
     shifting: Option<u8>,
     sent_at: u64,
     arrives_at: u64,
@@ -56,9 +63,9 @@ impl Default for Lpuart {
     fn default() -> Self {
         Self {
             store: Store::new(KNOWN),
-            status: TXE | TC,
-            received: 0,
-            to_send: None,
+            status: TC,
+            received: VecDeque::new(),
+            to_send: VecDeque::new(),
             shifting: None,
             sent_at: NEVER,
             arrives_at: NEVER,
@@ -70,6 +77,20 @@ impl Default for Lpuart {
 impl Lpuart {
     fn on(&self, which: u32) -> bool {
         self.store.get(CR1) & (UE | which) == UE | which
+    }
+
+    /// Bytes that the receiver and the transmitter hold beside their shift registers.
+    fn depth(&self) -> usize {
+        if self.store.get(CR1) & FIFOEN != 0 { FIFO } else { 1 }
+    }
+
+    /// ISR but for the acknowledges.
+    fn flags(&self) -> u32 {
+        let rxne = if self.received.is_empty() { 0 } else { RXNE };
+        let txe = if self.to_send.len() < self.depth() { TXE } else { 0 };
+        let with_fifo = self.store.get(CR1) & FIFOEN != 0;
+        let txfe = if with_fifo && self.to_send.is_empty() { TXFE } else { 0 };
+        self.status | rxne | txe | txfe
     }
 
     /// Ticks per byte.
@@ -96,11 +117,10 @@ impl Lpuart {
             if let Some(byte) = self.wire.to_chip.pop_front()
                 && self.on(RE)
             {
-                if self.status & RXNE != 0 {
+                if self.received.len() >= self.depth() {
                     self.status |= ORE;
                 } else {
-                    self.status |= RXNE;
-                    self.received = byte;
+                    self.received.push_back(byte);
                 }
             }
             self.wake(now);
@@ -116,9 +136,9 @@ impl Lpuart {
         if self.shifting.is_some() {
             return;
         }
-        self.shifting = self.to_send.take();
+        self.shifting = self.to_send.pop_front();
         if self.shifting.is_some() {
-            self.status = self.status & !TC | TXE;
+            self.status &= !TC;
             self.sent_at = now + self.byte();
         } else {
             self.status |= TC;
@@ -128,21 +148,18 @@ impl Lpuart {
     /// Whether any enabled event asks for the interrupt.
     pub fn requests(&self) -> bool {
         let (cr1, cr3) = (self.store.get(CR1), self.store.get(CR3));
-        let asked = cr1 & (RXNE | TC | TXE);
+        let asked = cr1 & (RXNE | TC | TXE) | if cr1 & TXFEIE != 0 { TXFE } else { 0 };
         let errors =
             if cr3 & 1 != 0 { FE | ORE } else { 0 } | if cr1 & RXNE != 0 { ORE } else { 0 };
-        cr1 & UE != 0 && self.status & (asked | errors) != 0
+        cr1 & UE != 0 && self.flags() & (asked | errors) != 0
     }
 
     /// Reads a register, with its side effects.
     pub fn read(&mut self, offset: u32) -> Option<u32> {
         match offset {
             // REACK and TEACK follow RE and TE.
-            ISR => Some(self.status | self.store.get(CR1) << 18 & 3 << 21),
-            RDR => {
-                self.status &= !RXNE;
-                Some(u32::from(self.received))
-            }
+            ISR => Some(self.flags() | self.store.get(CR1) << 18 & 3 << 21),
+            RDR => Some(u32::from(self.received.pop_front().unwrap_or_default())),
             _ => self.store.read(offset),
         }
     }
@@ -150,12 +167,24 @@ impl Lpuart {
     /// Writes a register.
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
         match offset {
-            CR1 if value & FIFOEN != 0 => return None,
+            // Changed only while the port is off.
+            CR1 if self.on(0) && value & UE != 0 && (value ^ self.store.get(CR1)) & FIFOEN != 0 => {
+                return None;
+            }
+            BRR if self.on(0) => return None,
+            CR1 if value & UE == 0 => {
+                self.store.write(offset, value)?;
+                (self.received, self.to_send) = (VecDeque::new(), VecDeque::new());
+            }
             ICR => self.status &= !(value & (FE | ORE | 1 | 1 << 2)),
             TDR => {
                 if self.on(TE) {
-                    self.to_send = Some(value as u8);
-                    self.status &= !(TXE | TC);
+                    if self.to_send.len() < self.depth() {
+                        self.to_send.push_back(value as u8);
+                    } else if let Some(last) = self.to_send.back_mut() {
+                        *last = value as u8;
+                    }
+                    self.status &= !TC;
                     self.shift(now);
                 }
             }

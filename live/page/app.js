@@ -1,0 +1,275 @@
+'use strict';
+// The connection, the head of the page, and the live view. panels.js has the other views.
+const $ = id => document.getElementById(id), PERIOD_S = 1 / 6000;
+const make = (tag, attributes = {}, ...children) => {
+  const element = Object.assign(document.createElement(tag), attributes);
+  element.append(...children);
+  return element;
+};
+
+// --- connection ----------------------------------------------------------------------------------
+const token = new URLSearchParams(location.search).get('token');
+let socket, number = 0, hello = null, gone = 'connecting', answers = new Map(), listeners = [];
+
+/** Sends a line to the console; its lines, or an error with the text of the refusal. */
+function ask(line) { return request({ ask: [++number, line] }); }
+function request(message) {
+  return new Promise((resolve, reject) => {
+    if (!socket || socket.readyState !== 1) return reject(Error('not connected'));
+    answers.set(number, { resolve, reject });
+    socket.send(JSON.stringify(message));
+  });
+}
+function stopDrive() {
+  if (socket && socket.readyState === 1) socket.send('"stop"');
+  say('stop');
+}
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/ws?token=${token}`);
+  socket.binaryType = 'arraybuffer';
+  socket.onmessage = event => {
+    if (event.data instanceof ArrayBuffer) return takeFrames(new DataView(event.data));
+    for (const message of JSON.parse(event.data)) heard(message);
+    // It says that this page lives and shows what it gets: without it the drive is stopped.
+    socket.send('"ack"');
+  };
+  socket.onclose = () => {
+    lost(gone || 'the program that serves this page has ended, or the connection to it is lost: the drive is stopped');
+    answers.forEach(answer => answer.reject(Error('the connection is lost')));
+    answers.clear();
+    if (!/another page/.test(gone)) setTimeout(connect, 1000);
+  };
+}
+function heard(message) {
+  if ('tick' in message) return tick(message);
+  if ('status' in message) return showStatus(message.status);
+  if ('line' in message) { log(message.line); announced(message.line); }
+  if ('hello' in message) greet(message.hello);
+  if ('gone' in message) lost(message.gone);
+  if ('stopped' in message) { log(`# stopped: ${message.stopped}`); announced(`stopped: ${message.stopped}`); }
+  if ('refused' in message) log(`# refused: ${message.refused}`);
+  const answer = answers.get(message.id);
+  if (!answer) return;
+  answers.delete(message.id);
+  if (message.error) return answer.reject(Error(message.error));
+  const last = message.lines.at(-1) || '';
+  last.startsWith('error:') ? answer.reject(Error(last.slice(6).trim())) : answer.resolve(message.lines);
+}
+function greet(now) {
+  const fresh = !hello || hello.version !== now.version;
+  hello = now; gone = '';
+  $('who').textContent = `firmware ${now.version}; page ${now.program}`;
+  alarm('fit', now.misfit ? [now.misfit] : []);
+  alarm('gone', []);
+  if (fresh) signalsChoice();
+  if (now.signals.length) restream();
+  loadSettings();
+}
+function lost(why) { gone = why; state('not connected'); alarm('gone', [why]); }
+/** A line of the console: an announcement. */
+function announced(line) {
+  listeners.forEach(listener => listener(line));
+  if (line.startsWith('fault ')) showFault();
+  if (/^(off|stopped|running): /.test(line)) say(line);
+  if (line.startsWith('trace: ')) showTrace();
+  if (line.startsWith('link: ') || line.startsWith('induction-drive ')) request({ ask: [++number, 'version'] }).then(restream);
+}
+
+// --- head ----------------------------------------------------------------------------------------
+let alarms = {}, present = '';
+function alarm(name, lines) {
+  alarms[name] = lines;
+  const all = Object.values(alarms).filter(list => list.length);
+  $('alarm').hidden = !all.length;
+  $('alarm').replaceChildren(...all.map(([first, ...rest]) =>
+    make('div', {}, first, rest.length ? make('ul', {}, ...rest.map(text => make('li', { textContent: text }))) : '')));
+}
+function state(text) {
+  present = text;
+  $('state').textContent = text;
+  $('state').className = `state ${/fault|not conn/.test(text) ? 'fault' : /^off/.test(text) ? '' : 'run'}`;
+}
+const NUMBERS = { torque: [/torque (-?[\d.]+) Nm/, 'Nm'], speed: [/speed (-?[\d.]+) rpm/, 'rpm'],
+  current: [/i_q (-?[\d.]+)/, 'A'], link: [/dc link (-?[\d.]+) V/, 'V'] };
+function showStatus(line) {
+  const now = line.split(';')[0];
+  heardStatus = performance.now();
+  alarm('odd', /^[a-z]/.test(now) && /dc link/.test(line) ? [] :
+    [`The page does not understand the drive's status, so torque and speed are missing: firmware and page do not fit each other. It says: ${line}`]);
+  if (/^in fault/.test(now) && !alarms.fault?.length) showFault();
+  if (!/^in fault/.test(now) && alarms.fault?.length) alarm('fault', []);
+  state(now.replace(/ \(.*/, ''));
+  for (const [id, [pattern, unit]] of Object.entries(NUMBERS)) {
+    const found = line.match(pattern);
+    $(id).textContent = found ? `${found[1]} ${unit}` : '–';
+  }
+}
+async function showFault() {
+  try {
+    const [head, ...rest] = await ask('faults');
+    if (head.startsWith('latched')) alarm('fault', [head.split('; last run')[0].replace('latched: f', 'F'), ...rest.filter(line => line !== 'ok'), 'Then: Clear fault.']);
+  } catch (error) { log(`# ${error.message}`); }
+}
+function say(text, bad) { $('said').textContent = text; $('said').className = bad ? 'error' : ''; }
+async function tell(line, to = say) {
+  log(`> ${line}`);
+  try { const lines = await ask(line); to(lines.join(' ')); log(lines.join('\n')); return lines; }
+  catch (error) { to(error.message, true); log(`error: ${error.message}`); throw error; }
+}
+const quiet = () => {};
+
+// --- frames --------------------------------------------------------------------------------------
+// Legible on white and on black.
+const COLOURS = ['#3b82f6', '#ef4444', '#22a559', '#d97706', '#a855f7', '#0891b2', '#db2777', '#85888c'];
+const SYMBOLS = { a: 'A', v: 'V', hz: 'Hz', deg: '°' };
+let streamed = [], times = [], columns = [], paused = false, recorded = null, base = null, plots = [], shown = 0, phi = null;
+/** Keeps frames of ten little-endian words: period, sequence number, eight values. */
+function takeFrames(view) {
+  for (let at = 0; at + 40 <= view.byteLength; at += 40) {
+    const period = view.getUint32(at, true);
+    base ??= period;
+    const time = ((period - base) >>> 0) * PERIOD_S;
+    // The drive was reset.
+    if (time < times.at(-1)) { times = []; columns = streamed.map(() => []); }
+    const values = streamed.map((_, i) => view.getFloat32(at + 8 + 4 * i, true));
+    times.push(time);
+    values.forEach((value, i) => columns[i].push(value));
+    if (streamed[0] && streamed.includes('phi_deg')) phi = values[streamed.indexOf('phi_deg')] / 360;
+    recorded?.rows.push(`${time.toFixed(6)},${view.getUint16(at + 4, true)},${values.map(value => +value.toPrecision(7)).join(',')}`);
+  }
+  const keep = 62 * +$('rate').value;
+  if (times.length > 2 * keep) { times.splice(0, times.length - keep); columns.forEach(column => column.splice(0, column.length - keep)); }
+}
+let counted = 0, flowed = 0, heardStatus = 0;
+/** Nothing came for some seconds, and no answer is awaited: the stream has ended, or the drive is gone. */
+function watch(count) {
+  const now = performance.now();
+  if (count !== counted || answers.size || gone) [counted, flowed, heardStatus] = [count, now, answers.size || gone ? now : heardStatus];
+  if (gone) return;
+  if (now - heardStatus > 3000) state('no answer');
+  if (streamed.length && now - flowed > 1500) { flowed = now; stream(streamed).catch(quiet); }
+}
+const stream = names => request({ stream: [++number, names, Math.round(+$('rate').value) || 200] });
+function tick({ tick: [count, missing, damaged, skipped], flux }) {
+  watch(count);
+  $('count').textContent = streamed.length ? `${count} frames, ${missing} dropped${damaged ? `, ${damaged} damaged` : ''}${skipped ? `, ${skipped} skipped by the page` : ''}` : '';
+  if (flux) drawFlux(flux[0], flux[1], flux[2]); else if (phi !== null && !truth) drawFlux(phi);
+  if (!paused && times.length !== shown) requestAnimationFrame(draw);
+}
+function draw() {
+  if (paused || !times.length) return;
+  shown = times.length;
+  const end = times.at(-1), begin = end - +$('window').value;
+  let from = times.length - 1;
+  while (from > 0 && times[from - 1] >= begin) from--;
+  // More points than twice the pixels are not seen.
+  const step = Math.max(1, Math.floor((times.length - from) / 1600));
+  const thin = list => { const out = []; for (let i = from; i < list.length; i += step) out.push(list[i]); return out; };
+  plots.forEach(({ plot, indices }) => plot.setData([thin(times), ...indices.map(i => thin(columns[i]))]));
+}
+const unit = name => (u => SYMBOLS[u] || u || '')(hello?.signals.find(signal => signal.signal === name)?.unit);
+/** One plot a unit; they share the time at the cursor. */
+function buildPlots(into, names, group) {
+  into.replaceChildren();
+  const units = [...new Set(names.map(name => unit(name) || name))];
+  return units.map(u => {
+    const indices = names.flatMap((name, i) => (unit(name) || name) === u ? [i] : []);
+    const soft = getComputedStyle(document.documentElement).getPropertyValue('--soft'), line = getComputedStyle(document.documentElement).getPropertyValue('--line');
+    const axis = { stroke: soft, grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
+    const plot = new uPlot({
+      width: Math.max(240, into.clientWidth), height: innerWidth < 760 ? 190 : 220,
+      cursor: { sync: { key: group }, drag: { x: true, y: false } },
+      scales: { x: { time: false } },
+      axes: [{ ...axis, label: 's', labelSize: 16, size: 34 }, { ...axis, label: u, labelSize: 18, size: 60 }],
+      series: [{ label: 't', value: (_, v) => v == null ? '–' : `${v.toFixed(4)} s` }, ...indices.map(i => ({
+        label: names[i], stroke: COLOURS[i % 8], width: 1.5, dash: names[i].includes('_ref') ? [6, 4] : undefined, value: (_, v) => v == null ? '–' : v.toPrecision(4) }))],
+    }, [[], ...indices.map(() => [])], into);
+    return { plot, indices };
+  });
+}
+function chosen() { return [...document.querySelectorAll('#signals input:checked')].map(box => box.value); }
+function signalsChoice() {
+  const usual = ['i_q_a', 'i_q_ref_a', 'i_d_a', 'speed_rpm', 'phi_deg'];
+  let kept; try { kept = JSON.parse(localStorage.getItem('signals')); } catch { kept = null; }
+  $('signals').replaceChildren(...hello.signals.map(({ signal }) => make('label', {},
+    make('input', { type: 'checkbox', value: signal, checked: (kept || usual).includes(signal), onchange: restream }), ` ${signal}`)));
+  $('t-signal').replaceChildren(...hello.signals.map(({ signal }) => make('option', { textContent: signal })));
+}
+async function restream() {
+  const names = chosen();
+  if (!names.length || names.length > 8) return say(names.length ? 'at most eight signals' : 'choose a signal', true);
+  localStorage.setItem('signals', JSON.stringify(names));
+  endRecord();
+  try {
+    await stream(names);
+    [streamed, times, columns, base] = [names, [], names.map(() => []), null];
+    plots = buildPlots($('curves'), names, 'live');
+  } catch (error) { say(error.message, true); }
+}
+function pause() {
+  paused = !paused;
+  $('pause').setAttribute('aria-pressed', paused);
+}
+const header = (what, names, extra) => [`# induction-drive ${what}, schema 1`, `# firmware ${hello.version}`, `# page ${hello.program}`, `# begun ${new Date().toISOString()}`,
+  `# units s,${extra}${names.map(name => unit(name) || '1').join(',')}`];
+function download(name, text) {
+  const link = make('a', { href: URL.createObjectURL(new Blob([text], { type: 'text/csv' })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+function endRecord() {
+  if (!recorded) return;
+  download('record.csv', [...recorded.head, `t_s,sequence,${recorded.names.join(',')}`, ...recorded.rows].join('\n') + '\n');
+  recorded = null;
+  $('record').setAttribute('aria-pressed', false);
+}
+
+// --- flux ----------------------------------------------------------------------------------------
+let truth = false;
+/** Draws the drive's angle and the motor's, turns, and the motor's flux, Wb, where they are known. */
+function drawFlux(angle, motor, psi) {
+  truth ||= motor !== undefined;
+  const canvas = $('flux'), pen = canvas.getContext('2d'), style = getComputedStyle(document.documentElement);
+  const arrow = (turns, length, colour, width) => {
+    const x = 150 + length * Math.cos(turns * 2 * Math.PI), y = 150 - length * Math.sin(turns * 2 * Math.PI);
+    pen.strokeStyle = pen.fillStyle = colour; pen.lineWidth = width;
+    pen.beginPath(); pen.moveTo(150, 150); pen.lineTo(x, y); pen.stroke();
+    pen.beginPath(); pen.arc(x, y, width + 2, 0, 7); pen.fill();
+  };
+  pen.clearRect(0, 0, 300, 300);
+  pen.strokeStyle = style.getPropertyValue('--line'); pen.lineWidth = 1;
+  for (const r of [60, 120]) { pen.beginPath(); pen.arc(150, 150, r, 0, 7); pen.stroke(); }
+  pen.beginPath(); pen.moveTo(10, 150); pen.lineTo(290, 150); pen.moveTo(150, 10); pen.lineTo(150, 290); pen.stroke();
+  const on = !/^(off|not|in fault)/.test(present);
+  if (psi > 0.02) arrow(motor, Math.min(140, 120 * psi / (drawFlux.most = Math.max(drawFlux.most || 0.1, psi))), style.getPropertyValue('--good'), 6);
+  if (on) arrow(angle, 138, style.getPropertyValue('--blue'), 2);
+  const error = ((angle - motor + 1.5) % 1 - 0.5) * 360;
+  $('flux-text').textContent = motor === undefined ? 'rotor flux: the estimate of the drive'
+    : `rotor flux: estimate (thin), motor (thick) ${psi.toFixed(2)} Wb${on && psi > 0.02 ? `, apart ${error.toFixed(1)}°` : ''}`;
+}
+
+// --- controls ------------------------------------------------------------------------------------
+const WHAT = { torque: 'current, A peak', speed: 'speed, rpm', position: 'position, turns' };
+$('mode').onchange = () => { $('what').textContent = WHAT[$('mode').value]; };
+$('stop').onclick = stopDrive;
+$('start').onclick = () => tell(`start ${$('mode').value}`).catch(quiet);
+$('run').onsubmit = event => { event.preventDefault(); tell(`${$('mode').value} ${$('reference').value}`).catch(quiet); };
+$('pause').onclick = pause;
+$('rate').onchange = restream;
+$('record').onclick = () => {
+  if (recorded) return endRecord();
+  recorded = { head: header('record', streamed, '1,'), names: streamed, rows: [] };
+  $('record').setAttribute('aria-pressed', true);
+};
+document.querySelectorAll('[data-ask]').forEach(button => {
+  const settings = button.closest('#view-settings');
+  button.type = 'button';
+  button.onclick = () => tell(button.dataset.ask, settings ? sayOfSettings : say).then(() => settings && loadSettings(), quiet);
+});
+addEventListener('keydown', event => {
+  if (event.key === 'Escape') { event.preventDefault(); stopDrive(); }
+  else if (event.key === 'p' && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) pause();
+}, true);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { if (streamed.length) plots = buildPlots($('curves'), streamed, 'live'); if (traceText) plotTrace(traceText.split('\n').filter(line => line && !line.startsWith('#'))); });
+addEventListener('resize', () => document.querySelectorAll('.curves').forEach(into =>
+  [...plots, ...tracePlots].forEach(({ plot }) => into.contains(plot.root) && into.clientWidth && plot.setSize({ width: Math.max(240, into.clientWidth), height: plot.height }))));

@@ -1,0 +1,175 @@
+//! The connection to the drive: questions of the page one after the other, the drive's state between them, and a sign of
+//! life as long as the page is there.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
+use hil_sim::console::link::{Answer, Link, LinkError};
+use serde_json::{Value, json};
+
+use crate::shared::{Ask, Shared};
+
+/// From one question about the drive's state to the next.
+const STATUS: Duration = Duration::from_millis(200);
+/// From one sign of life to the next.
+const SIGN_OF_LIFE: Duration = Duration::from_millis(100);
+/// Without a line for so long the firmware stops the drive, s.
+const ALIVE_S: f64 = 0.4;
+/// From one try to open the port to the next.
+const RETRY: Duration = Duration::from_secs(1);
+/// Longest line that the console takes.
+const LONGEST: usize = 120;
+/// Layout of a frame that this program understands.
+const LAYOUT: [&str; 4] = ["u16 sequence", "u32 period", "f32 per signal", "u16 crc"];
+
+/// A line of the page that may go to the console.
+///
+/// # Errors
+/// The reason why it may not.
+pub fn checked(line: &str) -> Result<&str, String> {
+    let line = line.trim();
+    let word = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
+    if line.is_empty() || line.len() > LONGEST || !line.bytes().all(|b| (b' '..=b'~').contains(&b))
+    {
+        return Err(format!(
+            "a line has 1 to {LONGEST} printable characters, this has {}",
+            line.len()
+        ));
+    }
+    match word.as_str() {
+        "stream" | "baud" => Err(format!("`{word}` is sent by this program itself")),
+        _ => Ok(line),
+    }
+}
+
+/// The command for a stream of these signals, `rate` a second.
+pub fn stream(signals: &[String], rate: u32) -> String {
+    format!("stream {} {rate} alive {ALIVE_S}", signals.join(" "))
+}
+
+/// Sends signs of life while the page is there, and stops the drive when it is lost. Never returns.
+pub fn watch(shared: &Shared) {
+    loop {
+        if shared.page_is_alive() {
+            if shared.drive_listens() {
+                shared.send("");
+            }
+        } else if shared.page_was_lost() {
+            shared.stop("the page was closed, or did not answer");
+        }
+        std::thread::sleep(SIGN_OF_LIFE / 2);
+    }
+}
+
+/// Connects again and again, and answers the questions meanwhile. Never returns.
+pub fn run(
+    shared: &Arc<Shared>,
+    asks: &Receiver<Ask>,
+    mut connect: impl FnMut(&Arc<Shared>) -> Result<Link, String>,
+) {
+    loop {
+        match connect(shared) {
+            Ok(mut link) => {
+                link.begin();
+                shared.connect(Some(link.urgent()));
+                shared.heard();
+                hello(shared, &mut link);
+                converse(shared, asks, &mut link);
+                shared.connect(None);
+                shared.tell(json!({ "gone": "the connection to the drive is lost" }));
+            }
+            Err(why) => shared.tell(json!({ "gone": why })),
+        }
+        std::thread::sleep(RETRY);
+        // Nobody answers these any more.
+        for ask in asks.try_iter() {
+            if let Ask::Line(id, _) = ask {
+                shared.tell(json!({ "id": id, "error": "the drive is not connected" }));
+            }
+        }
+    }
+}
+
+/// Answers questions until the port is closed.
+fn converse(shared: &Shared, asks: &Receiver<Ask>, link: &mut Link) {
+    let mut asked = Instant::now();
+    while !link.is_closed() {
+        match asks.recv_timeout(STATUS.saturating_sub(asked.elapsed())) {
+            Ok(Ask::Hello) => hello(shared, link),
+            Ok(Ask::Line(id, line)) => {
+                let answer = match link.ask(&line, |_| ()) {
+                    Ok(answer) => json!({ "id": id, "lines": answer.lines }),
+                    Err(why) => json!({ "id": id, "error": why.to_string() }),
+                };
+                // Its frames come behind the answer.
+                if line.starts_with("stream ") {
+                    shared.new_stream();
+                }
+                shared.heard();
+                shared.tell(answer);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+        if asked.elapsed() >= STATUS {
+            asked = Instant::now();
+            match link.ask("status", |_| ()) {
+                Ok(mut answer) => show_status(shared, &answer.lines.pop().unwrap_or_default()),
+                // It was reset, or has another rate: connected anew.
+                Err(LinkError::Silence(..)) => return,
+                Err(_) => {}
+            }
+        }
+    }
+}
+
+fn show_status(shared: &Shared, status: &str) {
+    shared.heard();
+    let rests = ["off", "in fault", "stopping"].iter().any(|state| status.starts_with(state));
+    if !rests && shared.is_abandoned() {
+        shared.send("stop");
+    }
+    shared.tell(json!({ "status": status }));
+}
+
+/// Tells the page who the drive is, and whether this program understands it.
+fn hello(shared: &Shared, link: &mut Link) {
+    let mut ask = |line: &str| link.ask(line, |_| ());
+    match (ask("version"), ask("describe stream")) {
+        (Ok(version), Ok(described)) => {
+            let objects: Vec<Value> = described
+                .contents()
+                .iter()
+                .filter_map(|line| serde_json::from_str(line).ok())
+                .collect();
+            let signals: Vec<&Value> =
+                objects.iter().filter(|object| object["signal"].is_string()).collect();
+            shared.tell(json!({ "hello": {
+                "version": version.lines.last(),
+                "program": env!("CARGO_PKG_VERSION"),
+                "signals": signals,
+                "misfit": misfit(&described, &objects),
+            }}));
+        }
+        (Err(why), _) | (_, Err(why)) => shared.tell(silent(&why)),
+    }
+}
+
+fn silent(why: &LinkError) -> Value {
+    json!({ "gone": format!("the drive does not answer: {why}") })
+}
+
+/// Why firmware and page do not fit each other, in words.
+fn misfit(described: &Answer, objects: &[Value]) -> Option<String> {
+    if let Some(error) = described.error() {
+        return Some(format!(
+            "This firmware is older than the page: it has no live curves ({error}). All else works as far as the firmware \
+             knows it. To update it: cargo xtask flash."
+        ));
+    }
+    let layout = objects.iter().find(|object| object["frame"].is_array());
+    let fits = layout.is_some_and(|layout| layout["frame"] == json!(LAYOUT));
+    let newer = "This firmware sends its curves in a layout that the page does not know. To update the page: git pull.";
+    (!fits).then(|| newer.to_owned())
+}

@@ -1,0 +1,125 @@
+//! `cargo live`: see the library.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Parser;
+use drive_live::board::VirtualBoard;
+use drive_live::shared::Shared;
+use drive_live::{drive, server};
+use hil_sim::console::{self, link::Link};
+use tokio::net::TcpListener;
+
+/// A local web page for the drive: live curves, control, settings, traces, commissioning. Without --port it starts the
+/// virtual board
+#[derive(Parser)]
+#[command(bin_name = "cargo live")]
+struct Arguments {
+    /// Serial port of a board: /dev/ttyACM0, COM3
+    #[arg(long, value_name = "PATH")]
+    port: Option<String>,
+    /// Bits per second that the drive and the port are switched to, 115200 to 2000000
+    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(i64::from(USUAL_BAUD)..=2_000_000))]
+    baud: u32,
+    /// TCP port of the page at 127.0.0.1; 0 takes a free one
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    listen: u16,
+    /// Prints the address and opens no browser
+    #[arg(long)]
+    no_browser: bool,
+    /// Options of the virtual board, as of `cargo sim board`
+    #[arg(last = true, value_name = "OPTION")]
+    board: Vec<String>,
+}
+
+/// Bits per second of a drive that was reset, or that has heard nothing for a second.
+const USUAL_BAUD: u32 = 115_200;
+/// A drive that was left at another rate is back at the usual one after this.
+const FALLEN_BACK: Duration = Duration::from_millis(1200);
+/// The drive has changed its rate this long after its answer.
+const CHANGED: Duration = Duration::from_millis(30);
+/// The last lines are on their way, and the drive answers.
+const FAREWELL: Duration = Duration::from_millis(100);
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    match run(Arguments::parse()).await {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+async fn run(arguments: Arguments) -> Result<()> {
+    if arguments.port.is_some() && !arguments.board.is_empty() {
+        bail!("--port names a real board: it has no options of the virtual one");
+    }
+    let address = ("127.0.0.1", arguments.listen);
+    let listener = TcpListener::bind(address).await;
+    let listener = listener.with_context(|| format!("--listen {}: 127.0.0.1", arguments.listen))?;
+    let (shared, asks) = Shared::new();
+    let board = match arguments.port {
+        Some(_) => None,
+        None => Some(VirtualBoard::start(&arguments.board, &shared)?),
+    };
+    let port = match (&arguments.port, &board) {
+        (Some(port), _) => port.clone(),
+        (None, board) => board.as_ref().map(|board| board.port.clone()).unwrap_or_default(),
+    };
+    let (baud, real) = (arguments.baud, board.is_none());
+    let used = port.clone();
+    let worker = shared.clone();
+    std::thread::spawn(move || {
+        drive::run(&worker, &asks, |shared| connect(shared, &used, baud, real));
+    });
+    let watcher = shared.clone();
+    std::thread::spawn(move || drive::watch(&watcher));
+
+    let token = server::token().context("no random numbers")?;
+    let url = format!("http://127.0.0.1:{}/?token={token}", listener.local_addr()?.port());
+    println!("drive at {port}\npage: {url}\nCtrl-C ends it and stops the drive");
+    std::io::stdout().flush()?;
+    if !arguments.no_browser
+        && let Err(why) = open::that_detached(&url)
+    {
+        eprintln!("no browser opens ({why}): open the address yourself");
+    }
+    tokio::select! {
+        served = server::serve(listener, token, shared.clone()) => served?,
+        signal = tokio::signal::ctrl_c() => signal?,
+    }
+    for line in ["stop", "stream off", "baud 115200"] {
+        shared.send(line);
+    }
+    std::thread::sleep(FAREWELL);
+    drop(board);
+    Ok(())
+}
+
+/// Opens the port and switches the drive to a higher rate, if it knows one.
+fn connect(shared: &Arc<Shared>, port: &str, baud: u32, real: bool) -> Result<Link, String> {
+    let (reader, writer) = console::open(port, USUAL_BAUD).map_err(|why| why.to_string())?;
+    let mut own = writer.try_clone().map_err(|why| why.to_string())?;
+    if real {
+        std::thread::sleep(FALLEN_BACK);
+    }
+    let (lines, frames) = (shared.clone(), shared.clone());
+    let show = move |line: &str| lines.tell(serde_json::json!({ "line": line }));
+    let mut link = Link::with_frames(reader, writer, show, move |frame| frames.frame(frame));
+    if baud != USUAL_BAUD {
+        link.begin();
+        let answer = link.ask(&format!("baud {baud}"), |_| ()).map_err(|why| why.to_string())?;
+        // Firmware without the command stays as it is.
+        if answer.error().is_none() {
+            std::thread::sleep(CHANGED);
+            own.set_baud_rate(baud).map_err(|why| format!("{port}: {baud} baud: {why}"))?;
+        }
+    }
+    Ok(link)
+}

@@ -1,0 +1,210 @@
+//! One browser's page: HTTP and WebSocket at 127.0.0.1, with a token in the address.
+//!
+//! Refused are other hosts in the request (a name that somebody points to this computer), other origins, and requests
+//! without the token. Messages are short; one that is longer or not understood ends or changes nothing at the drive.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Query, Request, State};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, ORIGIN, REFERRER_POLICY,
+};
+use axum::http::{HeaderMap, StatusCode};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::Deserialize;
+use serde_json::json;
+use tokio::net::TcpListener;
+use tokio::time::{interval, timeout};
+
+use crate::drive;
+use crate::shared::{Ask, Shared};
+
+/// From one message to the page to the next.
+const TICK: Duration = Duration::from_millis(40);
+/// A page that takes nothing for so long is disconnected.
+const SLOW: Duration = Duration::from_secs(2);
+/// Longest message of the page, bytes.
+pub const LONGEST: usize = 8192;
+
+/// Access to the page.
+struct Access {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    token: String,
+}
+
+/// A new token: 128 random bits.
+///
+/// # Errors
+/// The system has no random numbers.
+pub fn token() -> Result<String, getrandom::Error> {
+    let mut bytes = [0_u8; 16];
+    getrandom::fill(&mut bytes)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Serves the page until the program ends.
+///
+/// # Errors
+/// Those of the listener.
+pub async fn serve(
+    listener: TcpListener,
+    token: String,
+    shared: Arc<Shared>,
+) -> std::io::Result<()> {
+    let access = Arc::new(Access { shared, address: listener.local_addr()?, token });
+    let router = Router::new()
+        .route("/", get(page))
+        .route("/ws", get(upgrade))
+        .layer(from_fn_with_state(access.clone(), guard))
+        .with_state(access);
+    axum::serve(listener, router).await
+}
+
+#[derive(Deserialize)]
+struct Token {
+    token: Option<String>,
+}
+
+/// Lets requests pass that come from this page.
+async fn guard(
+    State(access): State<Arc<Access>>,
+    Query(query): Query<Token>,
+    headers: HeaderMap,
+    request: Request,
+    next: Next,
+) -> Response {
+    let port = access.address.port();
+    let names = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let is = |name: axum::http::HeaderName, allowed: &dyn Fn(&str) -> bool| {
+        headers.get(name).and_then(|value| value.to_str().ok()).is_some_and(allowed)
+    };
+    let own_host = is(HOST, &|host| names.iter().any(|name| name == host));
+    let own_origin = is(ORIGIN, &|origin| {
+        origin.strip_prefix("http://").is_some_and(|host| names.iter().any(|name| name == host))
+    });
+    // A browser names the origin of every WebSocket; that of a page that is opened it does not name.
+    let origin_is_due = request.uri().path() == "/ws" || headers.contains_key(ORIGIN);
+    let refuse = |why: &'static str| (StatusCode::FORBIDDEN, why).into_response();
+    if query.token.as_deref() != Some(&*access.token) {
+        refuse("the address needs the token that `cargo live` prints\n")
+    } else if !own_host || (origin_is_due && !own_origin) {
+        refuse("only the page that `cargo live` serves may connect\n")
+    } else {
+        next.run(request).await
+    }
+}
+
+/// The whole page in one document, so that it needs nothing else.
+async fn page() -> Response {
+    let mut page = include_str!("../page/index.html").to_owned();
+    for (place, text) in [
+        ("/*uplot.css*/", include_str!("../page/uplot/uPlot.min.css")),
+        ("/*style.css*/", include_str!("../page/style.css")),
+        ("/*uplot.js*/", include_str!("../page/uplot/uPlot.iife.min.js")),
+        ("/*app.js*/", concat!(include_str!("../page/app.js"), include_str!("../page/panels.js"))),
+    ] {
+        page = page.replace(place, text);
+    }
+    let policy = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; \
+                  connect-src 'self'; img-src data:; frame-ancestors 'none'";
+    let headers = [
+        (CONTENT_TYPE, "text/html; charset=utf-8"),
+        (CACHE_CONTROL, "no-store"),
+        (REFERRER_POLICY, "no-referrer"),
+        (CONTENT_SECURITY_POLICY, policy),
+    ];
+    (headers, page).into_response()
+}
+
+async fn upgrade(State(access): State<Arc<Access>>, socket: WebSocketUpgrade) -> Response {
+    let shared = access.shared.clone();
+    socket
+        .max_message_size(LONGEST)
+        .max_frame_size(LONGEST)
+        .on_upgrade(move |socket| converse(socket, shared))
+}
+
+/// A message of the page: one of these.
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Said {
+    /// It has shown the last tick.
+    Ack,
+    /// Stop the drive, past everything that waits.
+    Stop,
+    /// A line for the console, with a number for the answer.
+    Ask(u64, String),
+    /// Stream these signals, so many times a second, with a number for the answer.
+    Stream(u64, Vec<String>, u32),
+}
+
+async fn converse(mut socket: WebSocket, shared: Arc<Shared>) {
+    let number = shared.page_comes();
+    let mut tick = interval(TICK);
+    loop {
+        tokio::select! {
+            _ = tick.tick() => {
+                if !shared.is_present(number) {
+                    let text = json!([{ "gone": "another page took over; reload to take it back" }]);
+                    let _ = timeout(SLOW, socket.send(Message::text(text.to_string()))).await;
+                    break;
+                }
+                let (texts, frames) = shared.take();
+                // Texts first: the answer to a new stream tells what its frames are.
+                let messages = [
+                    Some(Message::text(json!(texts).to_string())),
+                    (!frames.is_empty()).then(|| Message::binary(frames)),
+                ];
+                let mut sent = true;
+                for message in messages.into_iter().flatten() {
+                    sent &= matches!(timeout(SLOW, socket.send(message)).await, Ok(Ok(())));
+                }
+                if !sent {
+                    break;
+                }
+            }
+            message = socket.recv() => match message {
+                Some(Ok(Message::Text(text))) => take(&shared, number, &text),
+                Some(Ok(Message::Binary(_))) => {
+                    shared.tell(json!({ "refused": "binary messages are not understood" }));
+                }
+                Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                Some(Ok(Message::Close(_)) | Err(_)) | None => break,
+            },
+        }
+    }
+    shared.page_goes(number);
+}
+
+/// Does what a message of the page says.
+fn take(shared: &Shared, number: u64, text: &str) {
+    if !shared.is_present(number) {
+        return;
+    }
+    let refuse = |id: u64, why: String| shared.tell(json!({ "id": id, "error": why }));
+    match serde_json::from_str(text) {
+        Ok(Said::Ack) => shared.page_answers(number),
+        Ok(Said::Stop) => shared.stop("by the page"),
+        Ok(Said::Ask(id, line)) => match drive::checked(&line) {
+            Ok(line) => shared.ask(Ask::Line(id, line.to_owned())),
+            Err(why) => refuse(id, why),
+        },
+        Ok(Said::Stream(id, signals, rate)) => {
+            let plain = |name: &String| name.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
+            if signals.len() <= drive_stream::MOST_SIGNALS && signals.iter().all(plain) {
+                shared.ask(Ask::Line(id, drive::stream(&signals, rate)));
+            } else {
+                let most = drive_stream::MOST_SIGNALS;
+                refuse(id, format!("a stream has at most {most} signals, by their names"));
+            }
+        }
+        Err(why) => shared.tell(json!({ "refused": format!("not understood: {why}") })),
+    }
+}

@@ -1,0 +1,235 @@
+//! What the connection to the drive and the page have in common: what is to be told to the page, its questions, and
+//! whether it is there.
+
+use std::collections::VecDeque;
+use std::io::Write as _;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use drive_stream::Frame;
+use hil_sim::console::link::Urgent;
+use serde_json::{Value, json};
+
+/// A page that answers nothing for so long is lost, and the drive is stopped.
+pub const PAGE_LOST: Duration = Duration::from_millis(350);
+/// A drive that says nothing for so long is busy with a design: signs of life would only fill its memory for what comes in.
+const BUSY: Duration = Duration::from_secs(1);
+/// Most texts and frames that wait for a slow page; the oldest go first.
+const MOST_TEXTS: usize = 2000;
+const MOST_FRAMES: usize = 6000;
+
+/// A question of the page.
+#[derive(Debug)]
+pub enum Ask {
+    /// Who the drive is, for a new page.
+    Hello,
+    /// A line to the console; the answer gets this number.
+    Line(u64, String),
+}
+
+/// See the head of the module.
+pub struct Shared {
+    inner: Mutex<Inner>,
+    asks: Sender<Ask>,
+}
+
+struct Inner {
+    texts: VecDeque<Value>,
+    frames: VecDeque<Frame>,
+    counts: Counts,
+    next: Option<u16>,
+    flux: Option<[f64; 3]>,
+    /// Number of the page that is connected, and when it has answered last.
+    page: u64,
+    answered: Option<Instant>,
+    /// Whether the drive is to be stopped when no page is there.
+    watched: bool,
+    urgent: Option<Urgent>,
+    /// When the drive has said something last.
+    heard: Instant,
+}
+
+/// Frames so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Received.
+    pub frames: u64,
+    /// Missing between those received: dropped by the firmware, or damaged.
+    pub missing: u64,
+    /// Damaged on the wire.
+    pub damaged: u64,
+    /// Received, but not taken by a slow page.
+    pub skipped: u64,
+}
+
+impl Shared {
+    /// Nothing yet, and the end that takes the questions.
+    pub fn new() -> (Arc<Self>, Receiver<Ask>) {
+        let (asks, receive) = channel();
+        let inner = Inner {
+            texts: VecDeque::new(),
+            frames: VecDeque::new(),
+            counts: Counts::default(),
+            next: None,
+            flux: None,
+            page: 0,
+            answered: None,
+            watched: false,
+            urgent: None,
+            heard: Instant::now(),
+        };
+        (Arc::new(Self { inner: Mutex::new(inner), asks }), receive)
+    }
+
+    /// A thread that panicked leaves whole texts and frames.
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells the page something.
+    pub fn tell(&self, text: Value) {
+        let mut inner = self.inner();
+        if inner.texts.len() >= MOST_TEXTS {
+            inner.texts.pop_front();
+        }
+        inner.texts.push_back(text);
+    }
+
+    /// Takes a frame of the drive; `None` for damaged bytes.
+    pub fn frame(&self, frame: Option<Frame>) {
+        self.heard();
+        let mut inner = self.inner();
+        let Some(frame) = frame else { return inner.counts.damaged += 1 };
+        let missing = frame.sequence.wrapping_sub(inner.next.unwrap_or(frame.sequence));
+        inner.counts.missing += u64::from(missing);
+        inner.counts.frames += 1;
+        inner.next = Some(frame.sequence.wrapping_add(1));
+        if inner.frames.len() >= MOST_FRAMES {
+            inner.frames.pop_front();
+            inner.counts.skipped += 1;
+        }
+        inner.frames.push_back(frame);
+    }
+
+    /// The drive has said something.
+    pub fn heard(&self) {
+        self.inner().heard = Instant::now();
+    }
+
+    /// Whether the drive has said something of late.
+    pub fn drive_listens(&self) -> bool {
+        self.inner().heard.elapsed() < BUSY
+    }
+
+    /// A new stream begins: its signals are others.
+    pub fn new_stream(&self) {
+        let mut inner = self.inner();
+        inner.frames.clear();
+        (inner.next, inner.counts) = (None, Counts::default());
+    }
+
+    /// The flux of the virtual board: the drive's angle, the motor's, turns, and the motor's flux, Wb.
+    pub fn flux(&self, flux: [f64; 3]) {
+        self.inner().flux = Some(flux);
+    }
+
+    /// All that is to be told now: texts, and the frames with ten little-endian words each: period, sequence number, values.
+    pub fn take(&self) -> (Vec<Value>, Vec<u8>) {
+        let mut inner = self.inner();
+        let mut texts: Vec<Value> = inner.texts.drain(..).collect();
+        let Counts { frames, missing, damaged, skipped } = inner.counts;
+        let flux = inner.flux.take();
+        texts.push(json!({ "tick": [frames, missing, damaged, skipped], "flux": flux }));
+        let words = |frame: Frame| {
+            let head = [frame.period, frame.sequence.into()];
+            let mut values = [f32::NAN; drive_stream::MOST_SIGNALS];
+            values.iter_mut().zip(&frame.values).for_each(|(place, value)| *place = *value);
+            head.into_iter().chain(values.map(f32::to_bits)).flat_map(u32::to_le_bytes)
+        };
+        let bytes = inner.frames.drain(..).flat_map(words).collect();
+        (texts, bytes)
+    }
+
+    /// A page has come; its number. It takes over from another one. The drive is stopped then: nobody is to drive what
+    /// another has started.
+    pub fn page_comes(&self) -> u64 {
+        let taken_over = self.inner().answered.is_some();
+        if taken_over {
+            self.stop("another page took over");
+        }
+        let mut inner = self.inner();
+        inner.page += 1;
+        (inner.answered, inner.watched) = (Some(Instant::now()), true);
+        inner.texts.clear();
+        inner.frames.clear();
+        let page = inner.page;
+        drop(inner);
+        self.ask(Ask::Hello);
+        page
+    }
+
+    /// Whether this page is still the one.
+    pub fn is_present(&self, page: u64) -> bool {
+        self.inner().page == page
+    }
+
+    /// The page has answered.
+    pub fn page_answers(&self, page: u64) {
+        let mut inner = self.inner();
+        if inner.page == page {
+            (inner.answered, inner.watched) = (Some(Instant::now()), true);
+        }
+    }
+
+    /// The page has gone.
+    pub fn page_goes(&self, page: u64) {
+        let mut inner = self.inner();
+        if inner.page == page {
+            inner.answered = None;
+        }
+    }
+
+    /// Whether a page is there and answers.
+    pub fn page_is_alive(&self) -> bool {
+        self.inner().answered.is_some_and(|answered| answered.elapsed() < PAGE_LOST)
+    }
+
+    /// Whether a page was there and is lost; once for each loss.
+    pub fn page_was_lost(&self) -> bool {
+        let alive = self.page_is_alive();
+        !alive && std::mem::take(&mut self.inner().watched)
+    }
+
+    /// Whether the drive runs for nobody: there was a page, and there is none.
+    pub fn is_abandoned(&self) -> bool {
+        let inner = self.inner();
+        inner.page > 0 && !inner.watched
+    }
+
+    /// Puts a question to the drive.
+    pub fn ask(&self, ask: Ask) {
+        // Without a drive, the page knows that from another message.
+        let _ = self.asks.send(ask);
+    }
+
+    /// The way to the drive for what cannot wait; `None` while it is not connected.
+    pub fn connect(&self, urgent: Option<Urgent>) {
+        self.inner().urgent = urgent;
+    }
+
+    /// Stops the drive at once, for a reason that the page shows.
+    pub fn stop(&self, why: &str) {
+        self.tell(json!({ "stopped": why }));
+        // Whoever reads it may have gone.
+        let _ = writeln!(std::io::stdout(), "drive stopped: {why}");
+        self.send("stop");
+    }
+
+    /// Sends a line past all questions.
+    pub fn send(&self, line: &str) {
+        let urgent = self.inner().urgent.clone();
+        // A port that is gone is told by the thread that reads it.
+        urgent.map(|urgent| urgent.send(line));
+    }
+}

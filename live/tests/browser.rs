@@ -1,0 +1,318 @@
+//! The page in a real browser, on the virtual board: Chromium without a window, driven over its DevTools protocol.
+//!
+//! `cargo xtask pages` runs it: it needs Chromium and the virtual board. The pictures are in `target/pages`.
+
+mod chromium;
+
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use chromium::{Browser, Page};
+
+/// Simulated time may pass at a tenth of the clock's: a start takes 2 s, a design as long.
+const PATIENCE: Duration = Duration::from_secs(90);
+/// A learning takes 50 s of simulated time.
+const LEARNING: Duration = Duration::from_secs(500);
+
+/// `cargo live` with the virtual board.
+struct Live {
+    child: Child,
+    lines: Receiver<(Instant, String)>,
+    address: String,
+}
+
+impl Live {
+    fn start(folder: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drive-live"));
+        command.args(["--no-browser", "--", "--load", "locked", "--out"]).arg(folder);
+        if let Some(elf) = std::env::var_os("LIVE_ELF") {
+            command.arg("--elf").arg(elf);
+        }
+        let mut child = command.stdout(Stdio::piped()).spawn().expect("it runs");
+        let out = BufReader::new(child.stdout.take().unwrap());
+        let (send, lines) = channel();
+        std::thread::spawn(move || {
+            for line in out.lines().map_while(Result::ok) {
+                let _ = send.send((Instant::now(), line));
+            }
+        });
+        let mut live = Self { child, lines, address: String::new() };
+        live.address = live.line("page: ", Duration::from_secs(600)).1;
+        live
+    }
+
+    /// The rest of the next line that begins so, and when it came.
+    fn line(&self, beginning: &str, patience: Duration) -> (Instant, String) {
+        let until = Instant::now() + patience;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let (at, line) = self.lines.recv_timeout(left).expect(beginning);
+            if let Some(rest) = line.strip_prefix(beginning) {
+                return (at, rest.to_owned());
+            }
+        }
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn state(page: &mut Page<'_>, wanted: &str) {
+    page.until(&format!("$('state').textContent.startsWith('{wanted}')"), PATIENCE);
+}
+
+/// A file that the page has saved.
+fn saved(folder: &Path, name: &str) -> String {
+    let (file, began) = (folder.join(name), Instant::now());
+    while !file.is_file() && began.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::fs::read_to_string(file).expect(name)
+}
+
+/// Checks the head of a CSV file; its rows.
+fn rows(text: &str, what: &str, units: &str, names: &str) -> Vec<Vec<f64>> {
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some(&*format!("# induction-drive {what}, schema 1")));
+    let firmware = lines.next().unwrap();
+    let (_, build) = firmware.split_once("build ").expect(firmware);
+    assert!(build.len() >= 16 && u64::from_str_radix(&build[..16], 16).is_ok(), "{firmware}");
+    let rest: Vec<_> =
+        lines.filter(|line| !line.starts_with("# page") && !line.starts_with("# begun")).collect();
+    assert_eq!(rest[..2], [format!("# units {units}"), names.to_owned()]);
+    rest[2..].iter().map(|row| row.split(',').map(|n| n.parse().expect(row)).collect()).collect()
+}
+
+/// Presses the button of a guided step that has this text, and waits for its verdict.
+fn step(page: &mut Page<'_>, number: usize, button: &str, verdict: &str, patience: Duration) {
+    page.value(&format!("[...$('steps').children[{number}].querySelectorAll('button')].find(b => b.textContent == '{button}').click()"));
+    page.until(
+        &format!(
+            "/{verdict}/.test($('steps').children[{number}].querySelector('strong').textContent)"
+        ),
+        patience,
+    );
+}
+
+fn pictures(page: &mut Page<'_>, folder: &Path, name: &str) {
+    for (width, dark) in [(1280, false), (1280, true), (390, false), (390, true)] {
+        page.shape(width, 900, dark);
+        std::thread::sleep(Duration::from_millis(700));
+        let suffix = if dark { "-dark" } else { "" };
+        page.picture(&folder.join(format!("live-{name}-{width}{suffix}.png")));
+        let wide = page.value("document.documentElement.scrollWidth - innerWidth");
+        assert!(wide.as_f64() <= Some(0.0), "{name}, {width} px: {wide} px too wide");
+        let stop = page.value("(r => r.top >= 0 && r.bottom <= innerHeight && r.right <= innerWidth)($('stop').getBoundingClientRect())");
+        assert_eq!(stop, true, "{name}, {width} px: the stop is not in sight");
+    }
+    page.shape(1280, 900, false);
+}
+
+#[test]
+#[ignore = "needs Chromium and the virtual board; cargo xtask pages runs it"]
+fn the_page_shows_and_drives_the_virtual_board() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap().join("pages");
+    let files = folder.join("saved");
+    let _ = std::fs::remove_dir_all(&files);
+    std::fs::create_dir_all(&files).unwrap();
+    let live = Live::start(&folder);
+    let mut browser = Browser::start(&folder.join("profile-live"), &files);
+    let mut page = browser.open(&live.address);
+    state(&mut page, "off");
+    page.until("hello && !hello.misfit && settings.length > 50", PATIENCE);
+
+    runs_and_shows(&mut page, &folder);
+    records(&mut page, &folder, &files);
+    // It stops by keyboard, from a field as well.
+    page.value("view('view-live'); $('reference').focus()");
+    page.key("Escape", 27);
+    state(&mut page, "off");
+    settings(&mut page, &folder, &files);
+    sets_up(&mut page, &folder);
+    begins_again(&mut page);
+
+    // Closed while the drive runs: it stops in time.
+    page.value("view('view-live'); $('start').click()");
+    state(&mut page, "regulating torque");
+    let closed = Instant::now();
+    page.close();
+    let (stopped, why) = live.line("drive stopped: the page was ", PATIENCE);
+    let after = stopped - closed;
+    println!("stopped {} ms after the page was closed: {why}", after.as_millis());
+    assert!(after < Duration::from_millis(500), "{after:?}");
+    let mut page = browser.open(&live.address);
+    state(&mut page, "off");
+    fails(&mut page, &folder);
+}
+
+/// The drive is started, the curves move, and a step of the torque shows in them and in the number.
+fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
+    page.value("$('start').click()");
+    state(page, "regulating torque");
+    page.until("plots.length > 1 && plots[0].plot.data[0].length > 20", PATIENCE);
+    let last = page.number("plots[0].plot.data[0].at(-1)");
+    page.until(&format!("plots[0].plot.data[0].at(-1) > {last} + 0.2"), PATIENCE);
+    assert_eq!(page.number("+$('count').textContent.match(/(\\d+) dropped/)[1]"), 0.0);
+    page.value("$('reference').value = 2; $('run').requestSubmit()");
+    page.until(
+        "(q => q.length > 20 && Math.abs(q.slice(-20).reduce((a, b) => a + b) / 20 - 2) < 0.1)(columns[streamed.indexOf('i_q_a')])",
+        PATIENCE,
+    );
+    page.until("parseFloat($('torque').textContent) > 0.3", PATIENCE);
+    page.until("/apart/.test($('flux-text').textContent)", PATIENCE);
+    pictures(page, folder, "running");
+    page.key("p", 80);
+    page.until("paused", PATIENCE);
+    page.key("p", 80);
+}
+
+/// A recording has every frame; a trace has the full rate, at once and around its trigger.
+fn records(page: &mut Page<'_>, folder: &Path, files: &Path) {
+    page.value("$('record').click()");
+    page.until("recorded.rows.length > 200", PATIENCE);
+    page.value("$('record').click()");
+    let names = "i_d_a,i_q_a,i_q_ref_a,phi_deg,speed_rpm";
+    let order = page.value("streamed.slice().sort().join()");
+    assert_eq!(order, names);
+    let (units, columns) = (page.value("streamed.map(unit)"), page.value("streamed.join()"));
+    let units: Vec<_> =
+        units.as_array().unwrap().iter().map(|unit| unit.as_str().unwrap()).collect();
+    let columns = format!("t_s,sequence,{}", columns.as_str().unwrap());
+    let rows_of =
+        rows(&saved(files, "record.csv"), "record", &format!("s,1,{}", units.join(",")), &columns);
+    assert!(rows_of.len() > 200);
+    // 200 frames a second, none missing; a frame may wait for two control periods.
+    for two in rows_of.windows(2) {
+        assert!((two[1][0] - two[0][0] - 0.005).abs() < 0.001, "{two:?}");
+        assert_eq!((two[0][1] + 1.0) % 65536.0, two[1][1]);
+    }
+    let torque = columns.split(',').position(|name| name == "i_q_a").unwrap();
+    let mean = rows_of.iter().map(|row| row[torque]).sum::<f64>() / rows_of.len() as f64;
+    assert!((mean - 2.0).abs() < 0.05, "{mean} A");
+
+    page.value("view('view-trace'); $('trace').requestSubmit()");
+    page.until("tracePlots.length && tracePlots[0].plot.data[0].length == 500", PATIENCE);
+    pictures(page, folder, "trace");
+    page.value("$('t-divider').value = 1; $('t-trigger').value = 'below'; $('t-signal').value = 'i_q_a'; $('t-level').value = 1.5; $('trace').requestSubmit()");
+    page.until("/waiting/.test($('t-said').textContent)", PATIENCE);
+    std::thread::sleep(Duration::from_secs(1));
+    page.value("tell('torque 1')");
+    page.until("tracePlots[0].plot.data[0][0] < 0", PATIENCE);
+    page.value("$('t-csv').click()");
+    let rows = rows(
+        &saved(files, "trace.csv"),
+        "trace",
+        &format!("s,{}", units.join(",")),
+        &columns.replace("sequence,", ""),
+    );
+    assert_eq!(rows.len(), 500);
+    assert!(rows.windows(2).all(|two| (two[1][0] - two[0][0] - 1.0 / 6000.0).abs() < 1e-6));
+    let below = rows.iter().find(|row| row[torque - 1] < 1.5).unwrap();
+    assert!(below[0].abs() < 1.5 / 6000.0, "triggered at {} s", below[0]);
+}
+
+/// A setting is changed and put in force; files are saved, compared and loaded.
+fn settings(page: &mut Page<'_>, folder: &Path, files: &Path) {
+    page.value("view('view-settings'); $('filter').value = 'motor.r_s'; showSettings()");
+    let change = |page: &mut Page<'_>, value: &str| {
+        page.value(&format!("(i => {{ i.value = '{value}'; i.dispatchEvent(new Event('change')); }})(document.querySelector('#settings [aria-label=\"motor.r_s\"]'))"));
+    };
+    change(page, "-1");
+    page.until("/allowed is 0.001 to 1000 ohm/.test($('settings-said').textContent)", PATIENCE);
+    change(page, "5.5");
+    page.until("settings.find(s => s.name == 'motor.r_s').staged", PATIENCE);
+    page.value("document.querySelector('[data-ask=apply]').click()");
+    page.until(
+        "(s => s.value == 5.5 && !s.staged)(settings.find(s => s.name == 'motor.r_s'))",
+        PATIENCE,
+    );
+    page.value("$('filter').value = ''; showSettings(); $('to-file').click()");
+    let file = saved(files, "settings.txt");
+    assert!(file.starts_with("# 0.") && file.contains("motor.r_s 5.5"), "{file}");
+    pictures(page, folder, "settings");
+
+    // What differs is marked.
+    let with = |text: &str| {
+        format!("{{ target: {{ files: [new File([{}], 'mine.txt')] }} }}", serde_json::json!(text))
+    };
+    page.value(&format!("$('compare').onchange({})", with(&file)));
+    page.until("/same settings/.test($('settings-said').textContent)", PATIENCE);
+    page.value(&format!(
+        "$('compare').onchange({})",
+        with(&file.replace("motor.r_s 5.5", "motor.r_s 5.4"))
+    ));
+    page.until("/1 settings differ/.test($('settings-said').textContent) && compared.get('motor.r_s') === '5.4'", PATIENCE);
+    // A file is loaded line by line, up to a line that is refused.
+    page.value(&format!(
+        "$('from-file').onchange({})",
+        with("# mine\nset motor.r_s 5.4\napply\nset motor.r_s -1")
+    ));
+    page.until("/line 3: set motor.r_s -1.*2 lines before it are set/.test($('settings-said').textContent)", PATIENCE);
+    page.until("settings.find(s => s.name == 'motor.r_s').value == 5.4", PATIENCE);
+    page.value(&format!("$('from-file').onchange({})", with(&file)));
+    page.until("/lines are in force/.test($('settings-said').textContent)", PATIENCE);
+    page.until(
+        "(s => s.value == 5.5 && !s.staged)(settings.find(s => s.name == 'motor.r_s'))",
+        PATIENCE,
+    );
+}
+
+/// From the nameplate to a drive that has learned its motor.
+fn sets_up(page: &mut Page<'_>, folder: &Path) {
+    page.value("view('view-setup')");
+    page.value("(i => { i.value = '1715'; i.dispatchEvent(new Event('change')); })(document.querySelector('#nameplate [aria-label=\"nameplate.speed_rpm\"]'))");
+    page.until("settings.find(s => s.name == 'nameplate.speed_rpm').staged", PATIENCE);
+    step(page, 1, "Check the wiring", "^done: the wiring", PATIENCE);
+    state(page, "off");
+    // A step that is stopped says so.
+    step(page, 2, "Commission", "sensors: sound", PATIENCE);
+    page.key("Escape", 27);
+    page.until(
+        "/^not done: stopped/.test($('steps').children[2].querySelector('strong').textContent)",
+        PATIENCE,
+    );
+    std::thread::sleep(Duration::from_secs(3));
+    step(page, 2, "Commission", "^done: commissioning: ended; .accept.", PATIENCE);
+    assert_eq!(page.value("$('steps').children[2].querySelector('progress').value"), 7.0);
+    step(page, 2, "Accept", "^ok", PATIENCE);
+    // The simulated motor has 5.4 ohm; the commissioning is within 0.5 % of it.
+    page.until("Math.abs(settings.find(s => s.name == 'motor.r_s').value - 5.4) < 0.027", PATIENCE);
+    step(page, 3, "Learn", "^learning: point 3 of", PATIENCE);
+    pictures(page, folder, "setup");
+    step(page, 3, "Learn", "^done: learned: slope", LEARNING);
+    step(page, 3, "Save", "^ok", PATIENCE);
+    page.value("view('view-settings'); $('get-learned').click()");
+    page.until("$('learned').textContent.split('\\n').length > 5", PATIENCE);
+}
+
+/// A drive that was reset streams again: when it says so, and when that line is lost.
+fn begins_again(page: &mut Page<'_>) {
+    page.value("globalThis.kept = announced");
+    for deaf in [false, true] {
+        page.value(&format!("announced = {deaf} ? () => {{}} : kept; tell('reboot')"));
+        page.until("times.length && times.at(-1) < 0.5", PATIENCE);
+        page.until("times.at(-1) > 1", PATIENCE);
+        state(page, "off");
+    }
+    page.value("announced = kept");
+}
+
+/// A fault is shown in words with what to do; it is cleared. What does not fit is told.
+fn fails(page: &mut Page<'_>, folder: &Path) {
+    page.value("tell('set limits.heat_sink_c 10').then(() => tell('start torque'))");
+    page.until("/Fault 18.*heat sink/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);
+    state(page, "in fault");
+    pictures(page, folder, "fault");
+    page.value("tell('set limits.heat_sink_c 85').then(() => tell('apply')).then(() => document.querySelector('[data-ask=clear]').click())");
+    state(page, "off");
+    page.until("$('alarm').hidden", PATIENCE);
+    page.value("heard({ status: 'READY 3 4' })");
+    assert_eq!(page.value("/does not understand.*READY 3 4/.test($('alarm').textContent)"), true);
+}

@@ -1,0 +1,183 @@
+//! The stream of frames beside the lines, and the bits per second of the port.
+
+use core::fmt;
+
+use drive_core::io::PERIOD_S;
+use drive_stream::{Frame, LONGEST, MOST_SIGNALS, wire_bytes};
+use thiserror::Error;
+
+use super::Console;
+use super::grammar::Stream;
+use super::handle::{DriveHandle, Port};
+use crate::board;
+use crate::link::stream::Sample;
+use crate::link::trace::{self, SIGNALS};
+
+const _: () = assert!(trace::MOST == MOST_SIGNALS);
+
+/// The stream, and the rate of the port.
+pub(super) struct Wire {
+    stream: Option<Stream>,
+    frame: [u8; LONGEST],
+    /// Bytes of a frame that waits for room.
+    waiting: usize,
+    sent: u32,
+    dropped: u32,
+    /// Sequence number of the next frame; `None` before the first.
+    next: Option<u16>,
+    /// Bits per second in force, and those wanted.
+    baud: u32,
+    wanted: u32,
+}
+
+impl Wire {
+    pub const fn new() -> Self {
+        let baud = board::SERIAL_BAUD;
+        let (frame, wanted) = ([0; LONGEST], baud);
+        Self { stream: None, frame, waiting: 0, sent: 0, dropped: 0, next: None, baud, wanted }
+    }
+
+    /// Without a line for so long the drive stops, s; 0: never.
+    pub fn alive_s(&self) -> f32 {
+        self.stream.as_ref().map_or(0.0, |stream| stream.alive_s)
+    }
+
+    /// Asks for a rate, bits per second.
+    pub fn want(&mut self, baud: u32) {
+        self.wanted = baud;
+    }
+
+    /// Makes the frame of a sample, and counts those before it that were dropped.
+    fn make(&mut self, sample: &Sample, pole_pairs: u8) {
+        let Some(stream) = &self.stream else { return };
+        let values = stream.choice.values(&sample.telemetry);
+        let values = values.iter().zip(stream.choice.signals());
+        let values = values.map(|(value, signal)| value * signal.factor(pole_pairs)).collect();
+        let Sample { sequence, period, .. } = *sample;
+        let missing = sequence.wrapping_sub(self.next.unwrap_or(sequence));
+        self.dropped = self.dropped.wrapping_add(missing.into());
+        self.next = Some(sequence.wrapping_add(1));
+        self.waiting = Frame { sequence, period, values }.write(&mut self.frame);
+    }
+}
+
+/// Reason why a stream is refused.
+#[derive(Debug, Error)]
+#[error("the stream needs {wanted} bytes/s; {baud} baud has room for {room}: `baud`, or fewer")]
+struct TooMuch {
+    wanted: u32,
+    baud: u32,
+    room: u32,
+}
+
+impl Console {
+    /// Begins a stream.
+    pub(super) fn stream(&mut self, stream: Stream, drive: &mut impl DriveHandle) {
+        let (signals, baud) = (stream.choice.signals().count(), self.wire.wanted);
+        let rate = board::PWM_HZ / u32::from(stream.divider).max(1);
+        let wanted = rate * wire_bytes(signals) as u32;
+        // Ten bits a byte.
+        let room = baud / 10 * board::STREAM_SHARE / 100;
+        if wanted > room {
+            return self.error(&TooMuch { wanted, baud, room });
+        }
+        drive.stream(0);
+        drive.stream(stream.divider);
+        let (divider, baud, wanted) = (stream.divider, self.wire.baud, self.wire.wanted);
+        self.wire = Wire { stream: Some(stream), baud, wanted, ..Wire::new() };
+        self.out.line(format_args!("ok: every {divider} periods"));
+    }
+
+    /// Tells the state of the stream.
+    pub(super) fn stream_state(&mut self) {
+        let Wire { sent, dropped, .. } = self.wire;
+        let on = if self.wire.stream.is_some() { "on" } else { "off" };
+        self.out.line(format_args!("ok: {on}, {sent} frames, {dropped} dropped"));
+    }
+
+    /// Asks for a rate; a stream ends.
+    pub(super) fn baud(&mut self, baud: u32, drive: &mut impl DriveHandle) {
+        self.stop_stream(drive);
+        self.wire.want(baud);
+        self.ok();
+    }
+
+    /// Ends the stream and tells its state.
+    pub(super) fn end_stream(&mut self, drive: &mut impl DriveHandle) {
+        self.stop_stream(drive);
+        self.stream_state();
+    }
+
+    /// Ends the stream.
+    pub(super) fn stop_stream(&mut self, drive: &mut impl DriveHandle) {
+        drive.stream(0);
+        self.wire.stream = None;
+    }
+
+    /// Sends the frames for which there is room; whether none waits any more.
+    pub(super) fn send_frames(
+        &mut self,
+        port: &mut impl Port,
+        drive: &mut impl DriveHandle,
+    ) -> bool {
+        let pole_pairs = self.settings.in_force().drive.motor.pole_pairs;
+        let wire = &mut self.wire;
+        // As many as the queue holds at most: the main loop goes on.
+        for _ in 0..=board::STREAM_SAMPLES {
+            if wire.waiting == 0 {
+                let Some(sample) = drive.sampled() else { return true };
+                wire.make(&sample, pole_pairs);
+            }
+            if !port.write(wire.frame.get(..wire.waiting).unwrap_or_default()) {
+                return false;
+            }
+            wire.waiting = 0;
+            wire.sent = wire.sent.wrapping_add(1);
+        }
+        false
+    }
+
+    /// Changes the rate that was asked for, when the answer is sent; falls back without a valid line.
+    pub(super) fn watch_rate(
+        &mut self,
+        port: &mut impl Port,
+        drive: &mut impl DriveHandle,
+        now_ms: u32,
+    ) {
+        let usual = board::SERIAL_BAUD;
+        if self.wire.wanted != self.wire.baud {
+            let wanted = self.wire.wanted;
+            if self.flushed(port) && port.change_rate(wanted) {
+                self.wire.baud = wanted;
+                self.heard_ms = Some(now_ms);
+                if wanted == usual {
+                    self.out.line(format_args!("link: {usual} baud"));
+                }
+            }
+        } else if self.wire.baud != usual
+            && self
+                .heard_ms
+                .is_some_and(|heard| now_ms.wrapping_sub(heard) > board::SERIAL_FALL_BACK_MS)
+        {
+            self.stop_stream(drive);
+            self.wire.want(usual);
+        }
+    }
+}
+
+/// A line of `describe stream`: the signals, then the layout.
+pub(super) fn described(line: usize) -> Option<impl fmt::Display> {
+    (line <= SIGNALS.len()).then(|| {
+        fmt::from_fn(move |f| match SIGNALS.get(line) {
+            Some(signal) => {
+                write!(f, "{{\"signal\":\"{}\",\"unit\":\"{}\"}}", signal.name, signal.unit())
+            }
+            None => write!(
+                f,
+                "{{\"frame\":[\"u16 sequence\",\"u32 period\",\"f32 per signal\",\"u16 crc\"],\
+                 \"order\":\"little-endian\",\"crc\":\"CRC-16/IBM-3740\",\"framing\":\"00 COBS 00\",\
+                 \"most\":{MOST_SIGNALS},\"period_s\":{PERIOD_S}}}"
+            ),
+        })
+    })
+}
