@@ -6,6 +6,7 @@
 
 pub mod announce;
 mod answer;
+mod bus;
 mod commissioning;
 pub mod grammar;
 pub mod handle;
@@ -26,10 +27,12 @@ use drive_core::{Command, State};
 
 use crate::commissioning::News;
 use crate::link::trace::Plan;
+use crate::modbus::Commander;
 use crate::settings::FirmwareSettings;
 use crate::settings::staging::Staging;
 use announce::Announcer;
 use answer::Task;
+use bus::Bus;
 use grammar::ParseError;
 use handle::{DriveHandle, Port};
 use line::{LineError, LineReader, OutputLine};
@@ -38,6 +41,9 @@ use restore::Restore;
 
 /// Longest time from the first character of a line to its end, ms: a slow typist.
 pub const LINE_MS: u32 = 30_000;
+
+const BUS_COMMANDS: &str =
+    "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over";
 
 /// The console.
 pub struct Console {
@@ -69,6 +75,8 @@ pub struct Console {
     restore: Restore,
     /// The board that the lines that come in belong to, if it is another than this one.
     foreign: Option<&'static str>,
+    /// The field bus.
+    bus: Bus,
 }
 
 /// Most bytes read in one poll: a flood must not hold up the main loop.
@@ -95,6 +103,7 @@ impl Console {
             commissioned: None,
             restore: Restore::new(),
             foreign: None,
+            bus: Bus::new(),
         }
     }
 
@@ -125,6 +134,7 @@ impl Console {
             self.announce(drive, now_ms);
         }
         if self.flushed(port)
+            && !self.bus.has_task()
             && let Some(task) = self.task
         {
             self.perform(task, drive, now_ms);
@@ -198,6 +208,8 @@ impl Console {
         } else if self.armed && !drive.tracing() {
             self.armed = false;
             self.out.line(format_args!("trace: recorded; `trace` prints it"));
+        } else if let Some(why) = self.bus.news() {
+            self.out.line(format_args!("bus: refused: {why}"));
         }
         if self.out.as_str().len() == empty {
             self.out.clear();
@@ -254,7 +266,10 @@ impl Console {
         line.make_ascii_lowercase();
         match grammar::parse(&line) {
             Ok(request) => {
-                self.heard_ms = Some(now_ms);
+                self.heard(Commander::Console, now_ms);
+                if self.is_for_the_bus(&request) {
+                    return self.error(&BUS_COMMANDS);
+                }
                 self.answer(request, drive);
             }
             Err(why) => self.refuse(&why),

@@ -20,7 +20,7 @@ type ReceiveQueue = Queue<u8, { board::SERIAL_RECEIVE }>;
 type TransmitQueue = Queue<u8, { board::SERIAL_TRANSMIT }>;
 
 /// Priority of the interrupt: the lowest. Only the four upper bits are implemented (datasheet).
-const PRIORITY: u8 = 0xf0;
+pub const PRIORITY: u8 = 0xf0;
 
 /// The main loop's end of the port.
 pub struct Port {

@@ -9,7 +9,7 @@ use crate::link::Status;
 
 /// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
 /// for an answer passes over them.
-pub const ANNOUNCEMENTS: [&str; 11] = [
+pub const ANNOUNCEMENTS: [&str; 12] = [
     "fault ",
     "running: ",
     "off: ",
@@ -19,6 +19,7 @@ pub const ANNOUNCEMENTS: [&str; 11] = [
     "commissioning: ",
     "refused: ",
     "trace: ",
+    "bus: ",
     "applied: ",
     "designing...",
 ];
