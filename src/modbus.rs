@@ -9,6 +9,8 @@ pub mod faults;
 pub mod line;
 pub mod registers;
 pub mod slave;
+#[cfg(test)]
+mod tests;
 
 use drive_core::settings::value::Words;
 
