@@ -27,8 +27,8 @@ use drive_core::{Command, State};
 
 use crate::commissioning::News;
 use crate::link::trace::Plan;
-use crate::modbus::Commander;
 use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
 use crate::settings::staging::Staging;
 use announce::Announcer;
 use answer::Task;

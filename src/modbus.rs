@@ -6,15 +6,13 @@
 
 pub mod cia402;
 pub mod faults;
-pub mod line;
+pub mod float;
 pub mod registers;
 pub mod slave;
 #[cfg(test)]
 mod tests;
 
-use drive_core::settings::value::Words;
-
-pub use line::{Baud, Format};
+use crate::settings::bus::{Baud, Format};
 
 /// Bytes of the longest frame (Modbus over serial line V1.02, 2.5.1).
 pub const LONGEST: usize = 256;
@@ -42,46 +40,5 @@ impl<P: Port> Port for Option<P> {
     }
     fn send(&mut self, frame: &Frame) {
         self.iter_mut().for_each(|port| port.send(frame));
-    }
-}
-
-/// Who starts the drive and gives it references. Anybody may stop it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Commander {
-    /// The console.
-    #[default]
-    Console,
-    /// The bus.
-    Bus,
-}
-
-impl Words for Commander {
-    const WORDS: &'static [&'static str] = &["console", "bus"];
-    fn place(self) -> usize {
-        self as usize
-    }
-    fn at(place: usize) -> Self {
-        if place == 1 { Self::Bus } else { Self::Console }
-    }
-}
-
-/// Settings of the bus.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Address of the drive, 1 to 247.
-    pub address: u32,
-    /// Bits per second.
-    pub baud: Baud,
-    /// Format of a byte.
-    pub format: Format,
-    /// Who commands.
-    pub commander: Commander,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        // Rate and parity that the specification recommends (Modbus over serial line V1.02, 2.4.2).
-        let (baud, format) = (Baud::B19200, Format::Even);
-        Self { address: 1, baud, format, commander: Commander::Console }
     }
 }

@@ -1,6 +1,7 @@
 //! The settings of the firmware: those of the drive, those of the firmware around it, and what was learned on the
 //! motor. [`keys`] lists them by name.
 
+pub mod bus;
 pub mod keys;
 pub mod staging;
 #[cfg(test)]
@@ -12,7 +13,6 @@ use drive_core::{Coefficients, Settings};
 
 use crate::board;
 use crate::boards::{Board, SELECTED};
-use crate::modbus;
 
 /// All settings of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct FirmwareSettings {
     /// Settings of the firmware around it.
     pub command: CommandSettings,
     /// Settings of the field bus.
-    pub bus: modbus::Settings,
+    pub bus: bus::Settings,
     /// Accepted result of a learning with these settings; it overrides them where both give a value.
     pub learned: Option<Learned>,
 }
@@ -51,7 +51,7 @@ impl FirmwareSettings {
     /// The same for any board.
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
-        let (command, bus) = (CommandSettings::default(), modbus::Settings::default());
+        let (command, bus) = (CommandSettings::default(), bus::Settings::default());
         Self { board, drive, command, bus, learned: None }
     }
 

@@ -18,7 +18,8 @@ use crate::chip::serial::PRIORITY;
 use induction_drive::boards::pin::{USART3_RX, USART3_TX};
 use induction_drive::boards::{Level, Rs485};
 use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
-use induction_drive::modbus::{self, Baud, Format, Frame};
+use induction_drive::modbus::{self, Frame};
+use induction_drive::settings::bus::{Baud, Format};
 
 /// The main loop's end of the port.
 pub struct Port {

@@ -13,11 +13,11 @@ use super::grammar::Request;
 use super::handle::DriveHandle;
 use super::line::OutputLine;
 use crate::modbus::faults::FaultLog;
-use crate::modbus::registers::{
-    COMMAND, FREQUENCY, RESET, SETTINGS, SETTINGS_END, STAGED, View, from_float,
-};
+use crate::modbus::float::from_float;
+use crate::modbus::registers::{COMMAND, FREQUENCY, RESET, SETTINGS, SETTINGS_END, STAGED, View};
 use crate::modbus::slave::{self, Registers};
-use crate::modbus::{Commander, Frame, Port};
+use crate::modbus::{Frame, Port};
+use crate::settings::bus::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST};
 
@@ -92,7 +92,7 @@ impl Bus {
 
     /// Notes a refusal; a master that repeats itself is announced once.
     fn refused(&mut self, why: &str) {
-        let why = &why[..why.floor_char_boundary(LONGEST_REFUSAL)];
+        let why = why.get(..why.floor_char_boundary(LONGEST_REFUSAL)).unwrap_or_default();
         if self.refusal != why {
             self.refusal.clear();
             // It fits.

@@ -1,21 +1,20 @@
 //! The registers that the master reads: a table from which the manual's is made.
 //!
-//! A value of 32 bits takes two registers, the upper half first. A number of the settings is a float of IEEE 754 in two
-//! registers: their ranges depend on other settings, so that no scale would fit them all.
+//! A value of 32 bits takes two registers, the upper half first; a setting is a float, see [`float`](super::float).
 
 use drive_core::State;
 use drive_core::io::PERIOD_S;
-use drive_core::settings::value::{Value, Words as _};
+use drive_core::settings::value::Words as _;
 use modbus_core::Exception;
 
-use super::Commander;
 use super::cia402::{self, Power};
 use super::faults::{self, FaultLog};
-use crate::boards;
+use super::float::to_float;
 use crate::hash;
 use crate::link::Status;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::{self, Key};
+use crate::settings::bus::Commander;
+use crate::settings::keys;
 
 /// The command; see the manual.
 pub const COMMAND: u16 = 0x2000;
@@ -32,7 +31,7 @@ pub const FAULTS: u16 = 0x5100;
 /// Registers of a fault.
 const PER_FAULT: u16 = 3;
 const FAULTS_END: u16 = FAULTS + PER_FAULT * faults::KEPT as u16;
-/// Registers behind the last setting.
+/// End of the settings.
 pub const SETTINGS_END: u16 = SETTINGS + 2 * keys::COUNT as u16;
 const _: () = assert!(SETTINGS_END <= STAGED);
 
@@ -188,7 +187,7 @@ pub static ROWS: [Row; 28] = [
         "version of the firmware: major in the upper byte, minor in the lower",
     ),
     word(0x5005, |_| version(env!("CARGO_PKG_VERSION_PATCH")), "its patch level"),
-    word(0x5006, |v| v.board(), "board, as `board` in the settings"),
+    word(0x5006, |v| board(v.settings), "board, as `board` in the settings"),
     double(0x5007, "s", |v| v.seconds, "time since the start"),
     word(0x5009, |v| v.settings.bus.commander.place() as u16, "who commands: 0 console, 1 bus"),
     word(0x500a, |v| v.settings.learned.is_some().into(), "1 if learned values are in force"),
@@ -290,11 +289,6 @@ impl View<'_> {
         self.status.map_or(0.0, |status| scales.ntc.celsius(status.sample.heat_sink))
     }
 
-    fn board(&self) -> u16 {
-        let own = self.settings.board.name;
-        boards::NAMES.iter().position(|name| *name == own).unwrap_or(0) as u16
-    }
-
     fn power(&self) -> Power {
         let startable =
             self.settings.bus.commander == Commander::Bus && self.settings.board_is_confirmed();
@@ -365,39 +359,12 @@ fn version(text: &str) -> u16 {
     text.parse().unwrap_or(u16::MAX)
 }
 
+/// Place of the board in its list.
+fn board(settings: &FirmwareSettings) -> u16 {
+    keys::find(keys::BOARD).map_or(0, |key| to_float(key, settings) as u16)
+}
+
 /// Hash of the names of all settings, in their order.
 fn names() -> u32 {
     hash::of(keys::all().flat_map(|key| key.name().bytes().chain([b'\n'])))
-}
-
-/// A setting as the float in its registers: `auto` is not a number, a word its place, from 0 on.
-fn to_float(key: Key, settings: &FirmwareSettings) -> f32 {
-    match key.get(settings) {
-        Value::Number(value) => value,
-        Value::Auto => f32::NAN,
-        Value::Whole(value) => value as f32,
-        Value::Word(word) => {
-            key.words().iter().position(|known| *known == word).unwrap_or(0) as f32
-        }
-    }
-}
-
-/// The value of a setting that a float in its registers stands for.
-///
-/// # Errors
-/// [`Exception::IllegalDataValue`]. The range is checked when the value is staged.
-pub fn from_float(key: Key, settings: &FirmwareSettings, float: f32) -> Result<Value, Exception> {
-    // The casts saturate, and a fraction is seen in the way back.
-    let whole = float as u32;
-    let is_whole = whole as f32 == float;
-    match key.get(settings) {
-        Value::Number(_) | Value::Auto if float.is_finite() => Ok(Value::Number(float)),
-        Value::Number(_) | Value::Auto if float.is_nan() && key.has_rule() => Ok(Value::Auto),
-        Value::Whole(_) if is_whole => Ok(Value::Whole(whole)),
-        Value::Word(_) if is_whole => {
-            let word = key.words().get(whole as usize);
-            word.map(|word| Value::Word(word)).ok_or(Exception::IllegalDataValue)
-        }
-        _ => Err(Exception::IllegalDataValue),
-    }
 }

@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use drive_core::settings::value::Words as _;
 use modbus_core::Exception;
 
+use super::Frame;
 use super::cia402::Power;
 use super::registers::{FAULTS, ROWS, SETTINGS, Shown};
 use super::slave::{self, Registers};
-use super::{Baud, Format, Frame};
 use crate::board::CLOCK_HZ;
+use crate::settings::bus::{Baud, Format};
 use crate::settings::keys;
 
 /// Registers 0x2000 to 0x20ff, of which the last cannot be written.

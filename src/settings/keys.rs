@@ -8,9 +8,9 @@ use drive_core::settings::value::{Value, ValueError, Words};
 use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
+use super::bus::{Baud, Commander, Format};
 use crate::boards;
 use crate::hash;
-use crate::modbus::{Baud, Commander, Format};
 
 /// Longest time-out of commands, s.
 const LONGEST_TIMEOUT_S: f32 = 3600.0;

@@ -1,4 +1,4 @@
-//! Rate and format of the bytes, and what the USART makes of them.
+//! The settings of the field bus, and what the USART makes of rate and format.
 
 use drive_core::settings::value::Words;
 
@@ -85,5 +85,46 @@ impl Format {
     /// Bits of a byte on the line, with start, parity and stop bits.
     pub fn bits(self) -> u32 {
         if self == Self::None { 10 } else { 11 }
+    }
+}
+
+/// Who starts the drive and gives it references. Anybody may stop it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Commander {
+    /// The console.
+    #[default]
+    Console,
+    /// The bus.
+    Bus,
+}
+
+impl Words for Commander {
+    const WORDS: &'static [&'static str] = &["console", "bus"];
+    fn place(self) -> usize {
+        self as usize
+    }
+    fn at(place: usize) -> Self {
+        if place == 1 { Self::Bus } else { Self::Console }
+    }
+}
+
+/// Settings of the bus.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Address of the drive, 1 to 247.
+    pub address: u32,
+    /// Bits per second.
+    pub baud: Baud,
+    /// Format of a byte.
+    pub format: Format,
+    /// Who commands.
+    pub commander: Commander,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        // Rate and parity that the specification recommends (Modbus over serial line V1.02, 2.4.2).
+        let (baud, format) = (Baud::B19200, Format::Even);
+        Self { address: 1, baud, format, commander: Commander::Console }
     }
 }
