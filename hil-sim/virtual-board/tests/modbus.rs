@@ -233,7 +233,7 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
     chip.usart3.line.to_chip.extend(&request);
     chip.usart3.line.to_chip[3] |= virtual_board::periph::usart::WRONG_PARITY;
     chip.usart3.wake(chip.now);
-    assert_eq!(master.send(&[])?, []);
+    assert!(master.send(&[])?.is_empty());
     // The next is.
     assert_eq!(master.read(COMMAND, 1)?, [1]);
     Ok(())
