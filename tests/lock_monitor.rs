@@ -29,10 +29,11 @@ fn a_lost_lock_is_noticed_and_a_sound_one_left_alone() {
     assert!(outcome.metrics.get("healthy_loss_max").unwrap() < 0.35);
 }
 
-/// Without the monitor the same trials end in false locks.
+/// Without the monitor and the observer the same trials end in false locks.
 #[test]
 fn without_the_monitor_a_false_lock_stays() {
-    let outcome = run("lock-monitor", &["runs=6", "injection.monitor=false"], 32);
+    let blind = ["runs=6", "injection.monitor=false", "observer.enabled=false"];
+    let outcome = run("lock-monitor", &blind, 32);
     println!("{:?}", outcome.metrics);
     let missed = ["p120", "m120", "180"].map(|n| outcome.metrics.get(&format!("not_in_time_{n}")));
     assert!(missed.into_iter().flatten().sum::<f64>() >= 4.0, "{missed:?}");

@@ -60,7 +60,7 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
         if drive.state() == State::CheckingWiring {
             peak = plant.phase_currents().iter().fold(peak, |p, i| p.max(i.abs()));
         }
-        if matches!(drive.state(), State::Magnetising | State::Fault(_)) {
+        if matches!(drive.state(), State::Catching | State::Fault(_)) {
             break;
         }
     }
@@ -98,7 +98,7 @@ fn the_right_wiring_is_accepted_over_motors_and_seeds() {
                 ];
                 let motor: Vec<&str> = motor.iter().map(String::as_str).collect();
                 let (state, peak) = check(Wiring::Right, &motor, seed);
-                assert_eq!(state, State::Magnetising, "{motor:?}, seed {seed}");
+                assert_eq!(state, State::Catching, "{motor:?}, seed {seed}");
                 largest = largest.max(peak);
             }
         }

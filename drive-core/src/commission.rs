@@ -257,7 +257,9 @@ impl Commissioning {
             State::Off => !self.on,
             State::Calibrating | State::Precharge | State::CheckingWiring => true,
             State::Exciting => self.step != Step::Inertia,
-            State::Magnetising | State::Verifying | State::Torque => self.step == Step::Inertia,
+            State::Catching | State::Magnetising | State::Verifying | State::Torque => {
+                self.step == Step::Inertia
+            }
             _ => false,
         };
         let result = if !excites {

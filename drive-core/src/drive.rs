@@ -301,7 +301,9 @@ impl Drive {
                 signs: signs.to_abc().to_alpha_beta().to_dq(applied),
                 dc_link: measured.dc_link,
             };
-            c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample);
+            if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample) {
+                s.observer.resistance = ratio - 1.0;
+            }
         }
 
         // Angles for the next sample.

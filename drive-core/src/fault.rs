@@ -111,10 +111,10 @@ faults! {
     OverSpeed = 6, "speed above its limit",
         &[
             "the load drives the shaft, or a constant torque accelerates a free one",
-            "without an encoder: faster than injection.tracked_rpm, where the angle is tracked",
+            "without encoder and observer: faster than injection.tracked_rpm, where the angle is tracked",
             "scales.encoder_counts or motor.pole_pairs wrong",
         ],
-        "use the speed mode; for higher speeds use the encoder";
+        "use the speed mode; for higher speeds set observer.enabled, or use the encoder";
     SensorSaturatedA = 7, "current sensor a at the end of its range, shorted or open", SENSOR_RANGE.0, SENSOR_RANGE.1;
     SensorSaturatedB = 8, "current sensor b at the end of its range, shorted or open", SENSOR_RANGE.0, SENSOR_RANGE.1;
     CarrierMissingA = 9, "no carrier current in sensor a where there must be some: open or stuck", CARRIER_MISSING.0, CARRIER_MISSING.1;

@@ -191,11 +191,13 @@ pub struct ObserverSettings {
     pub enabled: bool,
     /// Relative change of the mean leakage inductance per ampere of stator current, 1/A.
     pub leakage_slope: f32,
+    /// Stator current at which the leakage inductance is that of the motor's parameters, A peak.
+    pub leakage_at_a: f32,
 }
 
 impl Default for ObserverSettings {
     fn default() -> Self {
-        Self { enabled: false, leakage_slope: 0.0 }
+        Self { enabled: true, leakage_slope: 0.0, leakage_at_a: 0.0 }
     }
 }
 

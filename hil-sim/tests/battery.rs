@@ -124,7 +124,8 @@ fn sound_runs_that_are_stopped_are_told_from_others() {
     assert!(get(&wrong, "sound_runs_stopped") <= 0.25 * get(&wrong, "trips"), "{wrong:?}");
 }
 
-/// The flux turned at once: the drive finds it again or stops. Without saliency and lock monitor it stays wrong for seconds.
+/// The flux turned at once: the drive finds it again or stops. Without saliency, lock monitor and observer it stays wrong for
+/// seconds.
 #[test]
 fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
     let (watched, faults) = battery(&["battery.runs=forced", "runs=27"]);
@@ -137,6 +138,7 @@ fn a_turned_flux_is_found_again_unless_nothing_is_there_to_find() {
         "saliency.a_psi=0",
         "injection.check=no",
         "injection.monitor=no",
+        "observer.enabled=no",
     ];
     let (blind, _) = battery(&blind);
     let longest = get(&blind, "wrong_longest_s");

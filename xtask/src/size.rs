@@ -109,9 +109,9 @@ mod tests {
         let map = " 80001d8  80001d8     faa0     8 .text
 20008800  8012edc       48     4 .data
 20008848 20008848     9364     8 .bss
-10000000  8038000     5100     8 .ccm
-10000000  8038000      3ba     4         a.o:(.text.ADC1_2)
-10000000  8038000       a0     1                 .Lanon.8c1de73ce14781661d140f7ad80739f2.20
+10000000  8040000     5100     8 .ccm
+10000000  8040000      3ba     4         a.o:(.text.ADC1_2)
+10000000  8040000       a0     1                 .Lanon.8c1de73ce14781661d140f7ad80739f2.20
 20011bac 20011bac      c50     8 .control_data
        0        0    7aa1f     1 .debug_loc";
         let taken = map::entries(map, Level::Output).into_iter().map(|section| {

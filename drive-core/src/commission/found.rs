@@ -50,6 +50,10 @@ pub struct Leakage {
     pub inductance: f32,
     /// Saliency at standstill, (across - along)/(across + along), with half the test current along phase a.
     pub saliency: f32,
+    /// Relative change of the mean inductance, along and across the current, per ampere, 1/A.
+    pub slope: f32,
+    /// Current, A peak, at which it is `inductance`.
+    pub at: f32,
 }
 
 /// Result of the staircase.
@@ -127,6 +131,10 @@ impl Found {
                     CurrentPlant { source: PlantSource::Identified, d: set(d), q: set(q) };
             }
             None => new.current_plant.source = PlantSource::Motor,
+        }
+        if let Some(leakage) = self.leakage {
+            new.observer.leakage_slope = leakage.slope;
+            new.observer.leakage_at_a = leakage.at;
         }
         // The direct current of the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);

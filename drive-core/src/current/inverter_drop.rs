@@ -11,7 +11,8 @@
 //!
 //! with the magnetising current i_m and the direct component g of the signs of the phase currents (4/3
 //! along the axis of a phase). The means at the two levels give r_s and v_drop, independent of the
-//! temperature of the stator. An error of r_r of 30 % causes an error of 0.17 V.
+//! temperature of the stator. An error of r_r of 30 % causes an error of 0.17 V. With a known drop the lower level
+//! alone gives r_s.
 
 use crate::io::periods;
 use crate::math::frames::Dq;
@@ -51,7 +52,6 @@ pub struct InverterDrop {
 /// Sums over the periods of one current level.
 #[derive(Clone, Copy, Debug, Default)]
 struct Level {
-    count: f32,
     voltage: f32,
     current: f32,
     signs: f32,
@@ -109,45 +109,54 @@ impl InverterDrop {
         if elapsed < self.until { self.forced } else { 1.0 }
     }
 
-    /// Processes period `elapsed` of the magnetisation; the last one computes the drop.
-    pub fn step(&self, state: &mut InverterDropState, elapsed: u32, sample: &DropSample) {
+    /// Processes period `elapsed` of the magnetisation. The last one computes the drop, and returns the stator
+    /// resistance relative to the settings if it is plausible.
+    pub fn step(
+        &self,
+        state: &mut InverterDropState,
+        elapsed: u32,
+        sample: &DropSample,
+    ) -> Option<f32> {
         let level = if elapsed < self.until {
             // The current settles in the first half.
             if 2 * elapsed < self.until { None } else { Some(0) }
-        } else if self.until > 0 && elapsed >= self.from {
+        } else if elapsed >= self.from {
             Some(1)
         } else {
             None
         };
         if let Some(level) = level.and_then(|n| state.levels.get_mut(n)) {
-            level.count += 1.0;
             level.voltage +=
                 sample.voltage.d - self.rotor * (sample.current.d - sample.magnetising);
             level.current += sample.current.d;
             level.signs += sample.signs.d;
         }
-        if elapsed.saturating_add(1) == self.end {
-            let measured = || self.solve(&state.levels, LARGEST * sample.dc_link);
-            state.volts = self.known.unwrap_or_else(measured);
+        if elapsed.saturating_add(1) != self.end {
+            return None;
         }
-    }
-
-    /// The drop, V, from two equations with the unknowns r_s and drop; 0 if either is implausible. Sums
-    /// replace the means: the count is a common factor of a row.
-    fn solve(&self, [high, low]: &[Level; 2], largest: f32) -> f32 {
-        let determinant = high.current * low.signs - low.current * high.signs;
-        let (r_s, volts) = (
-            (high.voltage * low.signs - low.voltage * high.signs) / determinant,
-            (high.current * low.voltage - low.current * high.voltage) / determinant,
-        );
+        let (volts, ratio) = match self.known {
+            Some(volts) => (volts, self.resistance(&state.levels, volts)),
+            None => self.solve(&state.levels),
+        };
         let (least, most) = RESISTANCE;
         // NaN, as without a measurement, fails the comparisons.
-        let believed = high.count > 0.0
-            && low.count > 0.0
-            && r_s >= least * self.r_s
-            && r_s <= most * self.r_s
-            && volts.abs() <= largest;
-        if believed { volts } else { 0.0 }
+        let believed = volts.abs() <= LARGEST * sample.dc_link && ratio >= least && ratio <= most;
+        state.volts = if believed || self.known.is_some() { volts } else { 0.0 };
+        believed.then_some(ratio)
+    }
+
+    /// The drop, V, and r_s relative to the settings, from two equations; not finite without a measurement of both
+    /// levels. Sums replace the means: the count is a common factor of a row.
+    fn solve(&self, [high, low]: &[Level; 2]) -> (f32, f32) {
+        let per_determinant = 1.0 / (high.current * low.signs - low.current * high.signs);
+        let r_s = (high.voltage * low.signs - low.voltage * high.signs) * per_determinant;
+        let volts = (high.current * low.voltage - low.current * high.voltage) * per_determinant;
+        (volts, r_s / self.r_s)
+    }
+
+    /// r_s relative to the settings behind a drop of `volts`.
+    fn resistance(&self, [_, low]: &[Level; 2], volts: f32) -> f32 {
+        (low.voltage - volts * low.signs) / (low.current * self.r_s)
     }
 }
 
@@ -164,7 +173,11 @@ mod tests {
 
     /// The drop found on a motor of `r_s` ohm behind a drop of `volts`.
     fn found(r_s: f32, volts: f32, i_d: f32, largest: f32) -> f32 {
-        let drop = inverter_drop(i_d, largest);
+        magnetised(&inverter_drop(i_d, largest), r_s, volts, i_d).0
+    }
+
+    /// Drop and relative resistance found on a motor of `r_s` ohm behind a drop of `volts`.
+    fn magnetised(drop: &InverterDrop, r_s: f32, volts: f32, i_d: f32) -> (f32, Option<f32>) {
         let (tau_r, rotor) = (Motor::default().tau_r(), drop.rotor);
         let mut state = InverterDropState::default();
         let mut magnetising = 0.0;
@@ -179,9 +192,13 @@ mod tests {
                 signs: Dq::new(4.0 / 3.0, 0.0),
                 dc_link: 311.0,
             };
-            drop.step(&mut state, k, &sample);
+            let ratio = drop.step(&mut state, k, &sample);
+            if k == 4799 {
+                return (state.volts, ratio);
+            }
+            assert_eq!(ratio, None);
         }
-        state.volts
+        unreachable!()
     }
 
     #[test]
@@ -193,6 +210,24 @@ mod tests {
                 assert!((v - volts).abs() < 0.01, "{r_s} ohm, {volts} V: {v}");
             }
         }
+    }
+
+    #[test]
+    fn finds_the_resistance_with_the_drop_or_beside_a_known_one() {
+        for (r_s, believed) in [(4.0, true), (5.4, true), (7.0, true), (2.6, false), (11.0, false)]
+        {
+            for known in [None, Some(1.64)] {
+                let drop = inverter_drop(0.7, 3.5).known(known);
+                let (volts, ratio) = magnetised(&drop, r_s, 1.64, 0.7);
+                assert_eq!(ratio.is_some(), believed, "{r_s} ohm");
+                if let Some(ratio) = ratio {
+                    assert!((ratio - r_s / 5.4).abs() < 0.003, "{r_s} ohm: {ratio}");
+                }
+                assert!(known.is_none() || volts == 1.64);
+            }
+        }
+        // One level does not tell a drop from a resistance.
+        assert_eq!(magnetised(&inverter_drop(0.7, 0.75), 5.4, 1.64, 0.7).1, None);
     }
 
     #[test]

@@ -42,8 +42,8 @@ const STANDING_HZ: f32 = 1.0;
 pub(super) const THERMAL_EVERY: u32 = 60;
 const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
 /// Allowed mean of the unexplained voltage in the frame of the flux, as a share of the unexplained voltage: 6 V with the
-/// dissertation's motor.
-const UNEXPLAINED_MEAN: f32 = 0.5;
+/// dissertation's motor, and 3 V beside the observer, which tracks the stator resistance.
+const UNEXPLAINED_MEAN: [f32; 2] = [0.5, 0.25];
 /// Change of the torque current in a carrier period from which on the lock monitor rests, with the dissertation's motor, A:
 /// 18 A/s.
 const MOVED_A: f32 = 0.03;
@@ -195,12 +195,6 @@ impl Settings {
             self.angle_source == AngleSource::Injection || self.injection.beside_encoder;
         let t = &self.injection.synchronous;
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
-        let speed_trip = self.speed_trip_rpm();
-        let highest_rpm = if self.tracks_synchronously() && !self.uses_observer() {
-            f32::min(self.tracked_rpm(), speed_trip)
-        } else {
-            speed_trip
-        };
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
         let motion_design = self.motion_design()?;
@@ -239,7 +233,12 @@ impl Settings {
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
-            indirect: Indirect::new(m, self.scales.encoder_counts, i_d, 2.0 * speed_trip / 60.0),
+            indirect: Indirect::new(
+                m,
+                self.scales.encoder_counts,
+                i_d,
+                2.0 * self.speed_trip_rpm() / 60.0,
+            ),
             inject: injecting && carrier_v > 0.0,
             demodulate: injecting,
             injection,
@@ -261,7 +260,7 @@ impl Settings {
             estimator: self.estimator(
                 lag_share,
                 current_lag + estimator::carrier_lag(motor_plant),
-                self.freq_of_rpm(speed_trip),
+                self.freq_of_rpm(self.speed_trip_rpm()),
                 (carrier_v, injection.current_amplitude),
             ),
             current_loop: DqPi { d: pi(&designs[0]), q: pi(&designs[1]) },
@@ -292,7 +291,8 @@ impl Settings {
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {
                 let allowed_v = self.unexplained_v();
-                Prediction::new(m, motor_plant, allowed_v, UNEXPLAINED_MEAN * allowed_v)
+                let mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
+                Prediction::new(m, motor_plant, allowed_v, mean_v)
             },
             catching: self.catching(),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
@@ -303,7 +303,7 @@ impl Settings {
                 trip_a: self.trip_a(),
                 dc_over: self.dc_over_v(),
                 dc_under: self.dc_under_v(),
-                rotor_freq: self.freq_of_rpm(highest_rpm),
+                rotor_freq: self.freq_of_rpm(self.highest_rpm()),
                 current_squared: current_limit * current_limit,
                 i_q: current_limit,
             },
@@ -312,6 +312,7 @@ impl Settings {
                     flux_saliency: 0.5 * self.slope().at_rest(),
                     current_saliency: self.current_saliency(),
                     slope: self.observer.leakage_slope,
+                    at: self.observer.leakage_at_a,
                 };
                 let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
                 Observer::new(m, &leakage, i_d, ages)

@@ -29,8 +29,8 @@ impl Coefficients {
         let filtered = !s.hand_over.silent;
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
         observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
-        if weight == 0.0 && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
-            observer.track_resistance(state, held);
+        if weight == 0.0 && !held && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
+            observer.track_resistance(state);
         }
         const PER_RADIAN: f32 = 1.0 / TAU;
         let (turned, slip) = (state.turned * PER_RADIAN, state.slip * PER_RADIAN);

@@ -7,10 +7,10 @@
 //! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
-//! | 4 | lock monitor; torque that the dc link bears | saliency (0) |
+//! | 4 | lock monitor | saliency (0) |
 //! | 5 | reference current of the saliency; the slowly turning axes | - |
 //! | 6 | gains of the observer; carrier current in both channels; voltages for the prediction at 8 | sums (9) |
-//! | 7 | rotor voltage for the prediction at 8 | magnetising current (0) |
+//! | 7 | torque that the dc link bears; rotor voltage for the prediction at 8 | magnetising current (0) |
 //! | 8 | over-speed; judgement of the prediction | voltages (6), rotor voltage (7) |
 //! | 9 | currents that the voltage allows; averages of the demodulation; the sums begin anew | ten samples mixed |
 //!
@@ -28,7 +28,7 @@ use crate::fault::Fault;
 use crate::io::Sample;
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
-use crate::protect::plausibility::RotorFlux;
+use crate::protect::plausibility::{Resistance, RotorFlux};
 use crate::settings::AngleSource;
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
@@ -95,10 +95,7 @@ impl Coefficients {
                 self.check_carrier_headroom(s, step)?;
                 self.judge(s, step)
             }
-            4 => {
-                self.limit_torque(s, step);
-                self.check_lock(s, step)
-            }
+            4 => self.check_lock(s, step),
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
                 if self.observer.is_some() && !step.learning {
@@ -119,6 +116,7 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
+                self.limit_torque(s, step);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.sample)
             }
@@ -147,8 +145,13 @@ impl Coefficients {
 
     /// Computes the rotor voltage that the next judgement of the current reckons with.
     fn predict(&self, s: &mut ControlState, step: &StepResults) {
+        // On iron a weakened flux is larger than the current model says: the observer measures it.
+        let magnetising = match &self.observer {
+            Some(observer) if !step.learning => observer.magnetising(&s.observer),
+            _ => s.indirect.magnetising,
+        };
         let flux = RotorFlux {
-            magnetising: s.indirect.magnetising,
+            magnetising,
             rotor_freq: step.rotor_freq,
             axis: step.flux_axis,
             flux_freq: step.flux_freq,
@@ -193,7 +196,13 @@ impl Coefficients {
 
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        let judged = self.prediction.judge(&mut s.prediction, step.measured.current);
+        if step.held {
+            // The flux is still building up, and the drop of the inverter is not known.
+            s.prediction.forget_mean();
+        }
+        let tracked = self.observer.is_some() && !step.learning;
+        let resistance = Resistance { deviation: s.observer.resistance, tracked };
+        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
         if step.looking { Ok(()) } else { judged }
     }
 
@@ -206,8 +215,11 @@ impl Coefficients {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                // The baseline of the monitor is measured while the angle does not come from the injection.
-                let led = step.held || step.building || s.hand_over.weight >= 1.0;
+                // The baseline of the monitor is measured while the angle does not come from the injection. Once it is
+                // there, the monitor also watches the observer.
+                let led = step.held
+                    || step.building
+                    || s.hand_over.weight >= 1.0 && !s.lock.is_measured();
                 if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
                 }

@@ -6,14 +6,14 @@
 //! currents `di` and the voltage between them,
 //!
 //! ```text
-//! e   = T (v - r_s i) - sigma L_s ((1 + m |i|) di - s conj(di))      s = a f(psi) + b i^2/|i|
+//! e   = T (v - r_s i) - sigma L_s ((1 + m (|i| - i_m)) di - s conj(di))      s = a f(psi) + b i^2/|i|
 //! eps = T (R_R i_d - alpha psi) - e_d
 //! g   = 2 (s_0 alpha + c |w_r|)/(alpha^2 + w_r^2)
 //! x   = (e_q + g w_r eps)/(psi + e_d + g alpha eps)                  turned = x - x^3/3
 //! ```
 //!
 //! `s` is the saliency that the injection sees, in the fundamental wave: without it the angle errs by 7 degrees. `m` is the
-//! change of the mean leakage per ampere. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
+//! change of the mean leakage per ampere, and `i_m` the current at which it is sigma L_s. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
 //! 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The length follows the current model by the
 //! share that the injection has of the angle, and the voltage by the rest.
 //!
@@ -37,9 +37,9 @@ const WITH_SPEED: f32 = 0.4;
 const LARGEST_TANGENT: f32 = 0.5;
 /// Least flux, as a share of the nominal one.
 const LEAST_FLUX: f32 = 0.01;
-/// Time constants in which the stator resistance is tracked, s: while the motor is magnetised, and at low speed. (The flux also
-/// shows an angle error where it turns: a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
-const RESISTANCE_S: [f32; 2] = [0.15, 5.0];
+/// Time constant in which the stator resistance is tracked at low speed, s. (The flux also shows an angle error where it turns:
+/// a start of 600 rpm/s moves a resistance that is tracked within 1 s by 4 %.)
+const RESISTANCE_S: f32 = 5.0;
 /// Accepted range of the stator resistance relative to the settings.
 const RESISTANCE: (f32, f32) = (0.6, 1.6);
 /// Share of the resistance that a carrier period takes from the angle error that the injection sees beside the observer.
@@ -58,9 +58,10 @@ const KEPT: usize = 4;
 pub struct Observer {
     /// T r_s, V s/A.
     r_s: f32,
-    /// sigma L_s, H, its relative change per ampere, and the saliency per ampere, 1/A.
+    /// sigma L_s, H, its relative change per ampere, 1/A, the current at which it holds, A, and the saliency per ampere, 1/A.
     leakage: f32,
     leakage_slope: f32,
+    leakage_at: f32,
     current_saliency: f32,
     /// Saliency fixed to the flux, at nominal flux.
     flux_saliency: f32,
@@ -70,8 +71,8 @@ pub struct Observer {
     coupled: f32,
     /// Flux of the nominal direct current, V s.
     nominal: f32,
-    /// Shares of the resistance per V s of `eps` in a period.
-    resistance_gains: [f32; 2],
+    /// Share of the resistance per V s of `eps` in a period.
+    resistance_gain: f32,
     /// Age of the current in samples, without and behind the filter.
     pub ages: [f32; 2],
 }
@@ -104,7 +105,7 @@ pub struct ObserverState {
 struct Slow {
     /// g alpha and g w_r.
     gain: Dq,
-    /// `b/|i|`, 1/A^2, saliency fixed to the flux, and `1 + m |i|`.
+    /// `b/|i|`, 1/A^2, saliency fixed to the flux, and `1 + m (|i| - i_m)`.
     per_current: f32,
     flux_saliency: f32,
     leakage: f32,
@@ -119,6 +120,8 @@ pub struct Leakage {
     pub current_saliency: f32,
     /// Relative change of the mean leakage inductance per ampere, 1/A.
     pub slope: f32,
+    /// Stator current at which it is that of the motor's parameters, A.
+    pub at: f32,
 }
 
 impl ObserverState {
@@ -137,12 +140,13 @@ impl Observer {
             r_s: PERIOD_S * motor.r_s,
             leakage: motor.sigma_l_s(),
             leakage_slope: leakage.slope,
+            leakage_at: leakage.at,
             current_saliency: leakage.current_saliency,
             flux_saliency: leakage.flux_saliency,
             rate: PERIOD_S / motor.tau_r(),
             coupled,
             nominal: coupled * i_d,
-            resistance_gains: RESISTANCE_S.map(|tau| 1.0 / (tau * motor.r_s * i_d)),
+            resistance_gain: 1.0 / (RESISTANCE_S * motor.r_s * i_d),
             ages,
         }
     }
@@ -229,14 +233,14 @@ impl Observer {
             gain: Dq { d: gain * a, q: gain * w },
             per_current: if length > 0.0 { self.current_saliency / length } else { 0.0 },
             flux_saliency: self.flux_saliency * (state.flux / self.nominal),
-            leakage: 1.0 + self.leakage_slope * length,
+            leakage: 1.0 + self.leakage_slope * (length - self.leakage_at),
         };
     }
 
-    /// Tracks the stator resistance by the flux, `held` along phase a or at low speed; every period.
-    pub fn track_resistance(&self, state: &mut ObserverState, held: bool) {
-        let [fast, slow] = self.resistance_gains;
-        self.turn_resistance(state, -if held { fast } else { slow } * state.deviation);
+    /// Tracks the stator resistance by the flux at low speed; every period. It starts from the one that the magnetisation
+    /// measured (see [`InverterDrop`](crate::current::inverter_drop::InverterDrop)).
+    pub fn track_resistance(&self, state: &mut ObserverState) {
+        self.turn_resistance(state, -self.resistance_gain * state.deviation);
     }
 
     /// Tracks it by the angle `error`, rad, that the injection sees, flux less estimate, with the observer's `weight` in the
@@ -263,6 +267,11 @@ impl Observer {
         } else {
             resistance
         };
+    }
+
+    /// Current that makes the flux, A, with the magnetising inductance of the settings.
+    pub fn magnetising(&self, state: &ObserverState) -> f32 {
+        state.flux / self.coupled
     }
 
     /// Voltage that the flux and the leakage induce at these references, V, `flux_freq` in electrical turns per period.

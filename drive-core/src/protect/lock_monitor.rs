@@ -127,10 +127,21 @@ pub struct LockMonitorState {
     allowance: u8,
     /// Consecutive carrier periods with too little carrier current.
     weak: u8,
+    /// Carrier periods in the baseline since the start.
+    measured: u8,
+}
+
+impl LockMonitorState {
+    /// Whether the baseline has been measured since the start.
+    pub fn is_measured(&self) -> bool {
+        self.measured >= MEASURED
+    }
 }
 
 /// Time constant of the baseline mean, s: noise of 5 mA causes 0.1 % of error in it, 0.03 in the loss.
 const BASELINE_S: f32 = 0.1;
+/// Carrier periods that make a baseline: 0.1 s.
+const MEASURED: u8 = 60;
 /// Minimum carrier current as a share of the expected one. With an open phase the carrier current is
 /// reduced by the squared cosine of the angle between the injection axis and the remaining current axis.
 const LEAST_CARRIER: f32 = 0.5;
@@ -210,6 +221,7 @@ impl LockMonitor {
             state.baseline += share * (carrier - state.baseline);
             *state = LockMonitorState {
                 baseline: state.baseline,
+                measured: state.measured.saturating_add(1),
                 weak: state.weak,
                 i_q: saliency.i_q,
                 rested: REST,
@@ -253,148 +265,4 @@ impl LockMonitor {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Nominal 0.26 A of carrier, 120 ms, with the slope of a saliency `a` that is fixed to the flux.
-    fn monitor_of(a: f32) -> LockMonitor {
-        LockMonitor::new(
-            &CarrierTable::default(),
-            &LockMonitorSettings {
-                slope: SlopeTable::of_flux_saliency(Grid::REFERENCE, a),
-                smoothing_s: 0.12,
-                allowed: 0.55,
-                carrier_a: 0.26,
-                moved_a: 0.03,
-                standing_freq: 1e-4,
-                period_s: 1.0 / 600.0,
-            },
-        )
-    }
-
-    fn monitor() -> LockMonitor {
-        monitor_of(-0.035)
-    }
-
-    fn seen(carrier_a: f32, i_q: f32) -> Saliency {
-        Saliency { q: 0.0, carrier_squared: carrier_a * carrier_a, i_q }
-    }
-
-    /// A state with the baseline taken at 0.27 A.
-    fn ready(monitor: &LockMonitor) -> LockMonitorState {
-        let mut state = LockMonitorState::default();
-        for _ in 0..600 {
-            assert_eq!(monitor.step(&mut state, &seen(0.27, 0.0), 1.0, true), Ok(None));
-        }
-        state
-    }
-
-    /// Steps until the fault: how many, and which.
-    fn until(monitor: &LockMonitor, state: &mut LockMonitorState, seen: Saliency) -> (u32, Fault) {
-        for n in 1..=6000 {
-            if let Err(fault) = monitor.step(state, &seen, 1.0, false) {
-                return (n, fault);
-            }
-        }
-        panic!("no fault")
-    }
-
-    #[test]
-    fn a_lost_flux_is_seen_in_the_time_the_mean_takes() {
-        let monitor = monitor();
-        for i_q in [0.0_f32, 0.6, -1.0, 3.0, -3.6] {
-            let table = [(0.0, 1.0), (0.6, 1.0192), (1.0, 1.04167), (3.0, 1.14488), (3.6, 1.15781)];
-            let ratio = table.iter().find(|p| p.0 == i_q.abs()).unwrap().1;
-            let mut state = ready(&monitor);
-            for _ in 0..600 {
-                let right = monitor.step(&mut state, &seen(0.27 * ratio, i_q), 1.0, false);
-                assert!(right.unwrap().is_none_or(|deviation| deviation.abs() < 1e-3), "{right:?}");
-            }
-            assert!(state.loss.abs() < 0.02, "{i_q}: {}", state.loss);
-            // Without flux: 120 ms ln(1 / 0.45) = 96 ms.
-            let gone = seen(0.27 * ratio * (1.0 - 0.035), i_q);
-            let (n, fault) = until(&monitor, &mut state, gone);
-            assert_eq!(fault, Fault::LostLock);
-            assert!((55..=61).contains(&n), "{i_q}: {n} carrier periods");
-        }
-    }
-
-    #[test]
-    fn too_much_flux_is_wrong_as_well_and_the_limit_depends_on_the_sign() {
-        // Loss that lasts, the saliency, and after how many carrier periods of 1/600 s with 120 ms: 72 ln(1 / (1 - limit/loss)).
-        for (a, loss, periods) in [
-            (-0.035, -1.0, Some(66.0)),
-            (-0.035, -0.55, None),
-            (0.035, -1.0, Some(25.7)),
-            (0.035, -0.45, Some(79.0)),
-            (0.035, 1.0, Some(57.5)),
-            (0.035, 0.5, None),
-        ] {
-            let monitor = monitor_of(a);
-            let mut state = ready(&monitor);
-            let wrong = seen(0.27 * libm::sqrtf(1.0 - 2.0 * -a * loss), 0.0);
-            let tripped =
-                (1..=6000).find(|_| monitor.step(&mut state, &wrong, 1.0, false).is_err());
-            match (tripped, periods) {
-                (None, None) => {}
-                (Some(n), Some(expected)) => {
-                    assert!((f64::from(n) - expected).abs() < 3.0, "{a} {loss}: {n}");
-                }
-                other => panic!("{a} {loss}: {other:?}"),
-            }
-        }
-    }
-
-    #[test]
-    fn it_rests_while_the_current_moves_but_not_for_long() {
-        let monitor = monitor();
-        // Without flux from a step of 1 A on: 12 carrier periods later than at rest.
-        let mut state = ready(&monitor);
-        let gone = |i_q| seen(0.27 * (1.0 - 0.035) * if i_q == 0.0 { 1.0 } else { 1.04167 }, i_q);
-        let (n, _) = until(&monitor, &mut state, gone(1.0));
-        assert!((67..=73).contains(&n), "{n} carrier periods");
-        // A command that never rests: judged 60 % of the time at least.
-        let mut state = ready(&monitor);
-        let n = (0..6000_u16)
-            .find(|n| {
-                let i_q = f32::from(n % 2);
-                monitor.step(&mut state, &gone(i_q), 1.0, false).is_err()
-            })
-            .unwrap();
-        assert!((92..=130).contains(&n), "{n} carrier periods");
-    }
-
-    #[test]
-    fn a_smaller_carrier_on_purpose_is_no_loss() {
-        let monitor = monitor();
-        let mut state = ready(&monitor);
-        for _ in 0..600 {
-            let deviation =
-                monitor.step(&mut state, &seen(0.6 * 0.27, 0.0), 1.0 / 0.36, false).unwrap();
-            assert!(deviation.is_some_and(|deviation| deviation.abs() < 1e-4), "{deviation:?}");
-        }
-        assert!(state.loss.abs() < 1e-3, "{}", state.loss);
-    }
-
-    #[test]
-    fn no_carrier_and_no_number_are_faults() {
-        let monitor = monitor();
-        let mut state = ready(&monitor);
-        let mut result = Ok(None);
-        for n in 0..WEAK_PERIODS {
-            assert_eq!(result, Ok(None), "{n}");
-            result = monitor.step(&mut state, &seen(0.12, 0.0), 1.0, true);
-        }
-        assert_eq!(result, Err(Fault::CarrierWeak));
-        // A number that is not finite, and a baseline that was never taken.
-        for (mut state, carrier) in [
-            (ready(&monitor), f32::NAN),
-            (ready(&monitor), f32::INFINITY),
-            (LockMonitorState::default(), 0.27),
-        ] {
-            let mut steps =
-                (0..600).map(|_| monitor.step(&mut state, &seen(carrier, 0.0), 1.0, false));
-            assert!(steps.any(|result| result == Err(Fault::LostLock)), "{carrier}");
-        }
-    }
-}
+mod tests;

@@ -75,6 +75,8 @@ impl CarrierWatch {
 /// Coefficients of the comparison between measured and predicted current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
+    /// Stator resistance of the settings, ohm.
+    r_s: f32,
     /// 1/k of the current response, V/A.
     per_ampere: f32,
     /// Pole of the current response.
@@ -85,8 +87,8 @@ pub struct Prediction {
     emf: f32,
     /// Allowed unexplained voltage at standstill, V peak.
     allowed: f32,
-    /// Allowed mean of it in the frame of the flux, V peak.
-    allowed_mean: f32,
+    /// Allowed mean of it in the frame of the flux, V peak: with a resistance as of the start, and with a tracked one.
+    allowed_mean: [f32; 2],
 }
 
 /// Rotor flux in a sample. Frequencies in electrical turns per period.
@@ -100,6 +102,15 @@ pub struct RotorFlux {
     pub axis: UnitVector,
     /// Frequency of the flux.
     pub flux_freq: f32,
+}
+
+/// Stator resistance of the comparison.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Resistance {
+    /// Deviation from the settings, relative.
+    pub deviation: f32,
+    /// Whether it is tracked; otherwise it is as of the start.
+    pub tracked: bool,
 }
 
 /// State of the comparison.
@@ -139,10 +150,12 @@ const MEAN_EMF_SHARE: f32 = 0.5;
 
 impl Prediction {
     /// Comparison for a motor with the current response `plant`, A/V, and an allowed unexplained voltage at
-    /// standstill of `allowed_v`, V peak, and of `allowed_mean_v` in the mean of 50 ms.
-    pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32, allowed_mean_v: f32) -> Self {
+    /// standstill of `allowed_v`, V peak, and of `allowed_mean_v` in the mean of 50 ms: with the stator resistance of the
+    /// start, and with a tracked one.
+    pub fn new(motor: &Motor, plant: FirstOrder, allowed_v: f32, allowed_mean_v: [f32; 2]) -> Self {
         let coupled = motor.coupled_inductance();
         Self {
+            r_s: motor.r_s,
             per_ampere: (1.0 / plant.k) as f32,
             pole: plant.p as f32,
             decay: coupled / motor.tau_r(),
@@ -173,10 +186,17 @@ impl Prediction {
     /// [`Fault::CurrentNotAsPredicted`] when the unexplained voltage exceeds its limit, [`Fault::FluxNotAsPredicted`]
     /// when its mean in the frame of the flux does: the flux is not where, or not as large as, it is believed to be. At rest
     /// and without slip no voltage shows that.
-    pub fn judge(&self, state: &mut PredictionState, current: AlphaBeta) -> Result<(), Fault> {
+    pub fn judge(
+        &self,
+        state: &mut PredictionState,
+        current: AlphaBeta,
+        resistance: Resistance,
+    ) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
-        let unexplained = (changed * self.per_ampere - state.taken) * MEAN - state.rotor;
+        let explained =
+            changed * self.per_ampere + state.currents * (self.r_s * resistance.deviation);
+        let unexplained = (explained - state.taken) * MEAN - state.rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         (state.last, state.currents) = (current, AlphaBeta::ZERO);
         // The two uncertainties are independent: their squares add.
@@ -189,7 +209,8 @@ impl Prediction {
         }
         let (axis, emf) = state.flux;
         state.mean += (unexplained.to_dq(axis) - state.mean) * MEAN_SMOOTHING;
-        let allowed = self.allowed_mean + MEAN_EMF_SHARE * emf.abs();
+        let allowed =
+            self.allowed_mean[usize::from(resistance.tracked)] + MEAN_EMF_SHARE * emf.abs();
         let explained = state.mean.length_squared() <= allowed * allowed;
         if explained { Ok(()) } else { Err(Fault::FluxNotAsPredicted) }
     }
@@ -205,7 +226,13 @@ impl PredictionState {
 
     /// Forgets what was unexplained so far: the model was that of another speed.
     pub fn forget(&mut self) {
-        (self.unexplained, self.mean) = (AlphaBeta::ZERO, Dq::ZERO);
+        self.unexplained = AlphaBeta::ZERO;
+        self.forget_mean();
+    }
+
+    /// Forgets the mean in the frame of the flux: the flux was not there.
+    pub fn forget_mean(&mut self) {
+        self.mean = Dq::ZERO;
     }
 
     /// Latches the sum of the voltages; called two samples before [`Prediction::judge`]. The voltage
@@ -217,164 +244,4 @@ impl PredictionState {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::disallowed_methods)] // std functions are the reference here
-    use super::*;
-    use crate::math::angle::Angle;
-    use crate::math::frames::Abc;
-
-    /// Carrier of 0.26 A, 30° behind its voltage, as sensors of these gains see it on the axis.
-    fn seen(axis: UnitVector, gain_a: f32, gain_b: f32) -> CarrierCurrent {
-        let component = |amplitude: f32| {
-            let Abc { a, b, .. } = AlphaBeta::along(axis, amplitude).to_abc();
-            AlphaBeta::from_two_phases(gain_a * a, gain_b * b).seen_from(axis)
-        };
-        let (re, im) = (component(0.26 * 0.866), component(-0.26 * 0.5));
-        CarrierCurrent { along: (re.0, im.0), across: (re.1, im.1) }
-    }
-
-    /// The carrier period in which a fault shows, and the fault.
-    fn watched(degrees: f32, gain_a: f32, gain_b: f32) -> Option<(usize, Fault)> {
-        let axis = Angle::from_degrees(degrees).unit_vector();
-        let mut watch = CarrierWatch::default();
-        (1..100).find_map(|n| {
-            watch.step(seen(axis, gain_a, gain_b), axis, 0.26).err().map(|fault| (n, fault))
-        })
-    }
-
-    #[test]
-    fn a_channel_below_a_quarter_of_its_carrier_is_silent() {
-        // Two periods to settle, and three.
-        let (a, b) = (Some((5, Fault::CarrierMissingA)), Some((5, Fault::CarrierMissingB)));
-        for degrees in [60.0, -120.0, 64.0] {
-            assert_eq!(watched(degrees, 1.0, 1.0), None);
-            assert_eq!(watched(degrees, 0.26, 0.26), None);
-            assert_eq!(watched(degrees, 0.24, 1.0), a, "{degrees}");
-            assert_eq!(watched(degrees, 1.0, 0.24), b, "{degrees}");
-            assert_eq!(watched(degrees, 0.0, 0.0), a, "{degrees}");
-        }
-        // Across its phase there is no carrier to be missed: 0.4 of it at 66.4°.
-        for (degrees, judged) in [(90.0, false), (67.0, false), (66.0, true), (113.0, false)] {
-            assert_eq!(watched(degrees, 0.0, 1.0).is_some(), judged, "{degrees}");
-            assert_eq!(watched(120.0 - degrees, 1.0, 0.0).is_some(), judged, "{degrees}");
-        }
-        assert_eq!(watched(0.0, 1.0, 0.0), b);
-    }
-
-    #[test]
-    fn a_channel_must_be_silent_in_a_row() {
-        let axis = Angle::from_degrees(60.0).unit_vector();
-        let mut watch = CarrierWatch::default();
-        for n in 0..100 {
-            let gain = if n % 3 == 0 { 1.0 } else { 0.0 };
-            assert_eq!(watch.step(seen(axis, gain, gain), axis, 0.26), Ok(()));
-        }
-    }
-
-    const PLANT: FirstOrder = FirstOrder { k: 0.003_205_2, p: 0.980_053 };
-    /// Electrical turns per period: 600 and 630 rpm with two pole pairs.
-    const ROTOR: f32 = 20.0 / 6000.0;
-    const FLUX: f32 = 21.0 / 6000.0;
-
-    /// Unexplained voltage, V, of the motor with its rotor at [`ROTOR`], an applied voltage that turns, and
-    /// `more` volts along phase a that nobody knows of; and when the fault came. The drive believes
-    /// `believed` of the speed of the rotor.
-    fn unexplained(more: f32, believed: f32) -> (AlphaBeta, Option<u32>) {
-        let motor = Motor::default();
-        // The mean in the frame of the flux is not judged.
-        let prediction = Prediction::new(&motor, PLANT, 15.0, 1e3);
-        let (rest, fault) = run(&prediction, more, believed, 1.0);
-        assert!(fault.is_none_or(|(_, fault)| fault == Fault::CurrentNotAsPredicted));
-        (rest, fault.map(|(n, _)| n))
-    }
-
-    /// As [`unexplained`], with the fault; the motor has the share `flux` of the rotor flux that is believed.
-    fn run(
-        prediction: &Prediction,
-        more: f32,
-        believed: f32,
-        flux: f32,
-    ) -> (AlphaBeta, Option<(u32, Fault)>) {
-        let motor = Motor::default();
-        let (mut state, mut current) = (PredictionState::default(), AlphaBeta::ZERO);
-        let (k_g, pole) = (PLANT.k as f32, PLANT.p as f32);
-        let (mut acting, mut pending) = (AlphaBeta::ZERO, AlphaBeta::ZERO);
-        let coupled = motor.coupled_inductance();
-        let coupled = coupled * flux;
-        let of_flux =
-            Dq { d: coupled * 0.7 / motor.tau_r(), q: -coupled * 0.7 * ROTOR * TAU / PERIOD_S };
-        for n in 0..3000_u32 {
-            let axis = |k: f32| Angle::from_turns(k * FLUX % 1.0).unit_vector();
-            state.collect(current, pending);
-            match n % 10 {
-                1 | 6 => state.latch_voltage(),
-                2 | 7 => prediction.predict(
-                    &mut state,
-                    &RotorFlux {
-                        magnetising: 0.7,
-                        rotor_freq: believed * ROTOR,
-                        axis: axis(n as f32),
-                        flux_freq: FLUX,
-                    },
-                ),
-                3 | 8 => {
-                    if let Err(fault) = prediction.judge(&mut state, current) {
-                        return (state.unexplained, Some((n, fault)));
-                    }
-                }
-                _ => {}
-            }
-            let emf = of_flux.to_alpha_beta(axis(n as f32 + 0.5));
-            let total = acting + emf + AlphaBeta::new(more, 0.0);
-            current = current * pole + total * k_g;
-            acting = pending;
-            pending = Dq::new(4.0, 20.0).to_alpha_beta(axis(n as f32 + 2.5));
-        }
-        (state.unexplained, None)
-    }
-
-    /// Back-emf of the rotor flux, V.
-    fn emf() -> f32 {
-        Motor::default().coupled_inductance() * 0.7 * TAU * 20.0
-    }
-
-    #[test]
-    fn applied_voltage_and_rotor_explain_the_current() {
-        let (rest, fault) = unexplained(0.0, 1.0);
-        assert_eq!(fault, None);
-        assert!(rest.length_squared() < 0.1 * 0.1, "{rest:?} of {}", emf());
-        let (rest, fault) = unexplained(3.0, 1.0);
-        assert!(fault.is_none() && (rest - AlphaBeta::new(3.0, 0.0)).length_squared() < 0.01);
-    }
-
-    #[test]
-    fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
-        // The dissertation's motor: 12 V, and 6 V in the mean beside half of the back-emf of 13 V.
-        let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, 6.0);
-        for (flux, seen) in [(1.0, false), (0.5, false), (0.0, true), (-1.0, true), (2.2, true)] {
-            let (_, fault) = run(&prediction, 0.0, 1.0, flux);
-            assert_eq!(fault.is_some(), seen, "{flux}: {fault:?} of {}", emf());
-        }
-        // 50 ms ln(1 / (1 - share)) with what is allowed as a share of the back-emf.
-        let (_, fault) = run(&prediction, 0.0, 1.0, -0.2);
-        let (n, fault) = fault.unwrap();
-        assert_eq!(fault, Fault::FluxNotAsPredicted);
-        let share = (6.0 + 0.5 * emf() * FLUX / ROTOR) / (1.2 * emf());
-        let expected = -0.050 * 6000.0 * (1.0 - share).ln();
-        assert!((n as f32 / expected - 1.0).abs() < 0.2, "{n} for {expected}");
-    }
-
-    #[test]
-    fn voltage_beyond_the_allowed_one_and_the_back_emf_is_a_fault() {
-        // The squares add: 15 V, and all of the back-emf.
-        let most = (15.0 * 15.0 + emf() * emf()).sqrt();
-        assert_eq!(unexplained(0.98 * most, 1.0).1, None);
-        assert!(unexplained(1.02 * most, 1.0).1.is_some());
-        // A speed believed at standstill leaves the back-emf unexplained, and does not widen the bound.
-        let (rest, fault) = unexplained(0.0, 0.0);
-        assert_eq!(fault.is_some(), emf() > 15.0);
-        // A mean of 2.6 ms leaves 95 % of what turns at 21 Hz.
-        assert!((rest.length_squared().sqrt() / emf() - 0.947).abs() < 0.01, "{rest:?}");
-        assert!(unexplained(f32::NAN, 1.0).1.is_some());
-    }
-}
+mod tests;

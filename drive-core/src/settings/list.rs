@@ -82,6 +82,7 @@ pub static SETTINGS: &[Entry<Settings>] = &[
 
     word!("observer.enabled", observer.enabled: bool, "whether the voltage of the motor gives the angle at speed, where the injection ends"),
     number!("observer.leakage_slope", observer.leakage_slope, "1/A", "relative change of the mean leakage inductance per ampere").from_to(-1.0, 1.0),
+    number!("observer.leakage_at_a", observer.leakage_at_a, "A", "stator current at which it is that of motor.*, peak").from_to(0.0, 1000.0),
 
     // A trip level beyond the sensors' range would never be reached.
     auto!("limits.trip_a", limits.trip_a, Settings::trip_a, "A", "phase current that trips").beside(|s| (0.05, s.sensor_range_a())),

@@ -19,7 +19,8 @@
 //! | `injection.full_reference_iq_a` | 1 A | rated current |
 //! | `injection.current_saliency` | 0.0338 1/A | inverse of the rated current |
 //! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
-//! | `speed.limit_rpm`, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
+//! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed |
+//! | `speed.limit_rpm` without it, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
 //! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range |
@@ -250,10 +251,12 @@ impl Settings {
         or_rule(self.injection.synchronous.tracked_rpm, || self.share_of_poles(700.0))
     }
 
-    /// Largest speed that is asked for, rpm. Without a sensor the angle is good to 300 rpm on four poles; with an
-    /// encoder it may be larger.
+    /// Largest speed that is asked for, rpm: the rated speed with the observer. The injection alone is good to 300 rpm on
+    /// four poles; with an encoder it may be larger.
     pub fn speed_limit_rpm(&self) -> f32 {
-        or_rule(self.speed.limit_rpm, || self.share_of_poles(300.0))
+        or_rule(self.speed.limit_rpm, || {
+            if self.uses_observer() { self.nameplate.speed_rpm } else { self.share_of_poles(300.0) }
+        })
     }
 
     /// Largest acceleration that is asked for, rpm/s. Without a sensor the angle lags by 5.7 degrees while the speed
@@ -266,6 +269,14 @@ impl Settings {
     pub fn speed_trip_rpm(&self) -> f32 {
         let rule = || 2000.0 / RATED_RPM * self.nameplate.speed_rpm;
         or_rule(self.limits.speed_rpm, rule)
+    }
+
+    /// Speed above which the drive trips, rpm: that of the shaft's limit, or of the range in which the injection alone tracks
+    /// the angle.
+    pub fn highest_rpm(&self) -> f32 {
+        let alone = self.tracks_synchronously() && !self.uses_observer();
+        let tracked = if alone { self.tracked_rpm() } else { f32::INFINITY };
+        f32::min(tracked, self.speed_trip_rpm())
     }
 
     /// Largest voltage that the model of the motor does not explain at standstill, V: an error of 26 % of the stator
@@ -325,7 +336,7 @@ mod tests {
             (s.full_reference_iq_a(), 1.0),
             (s.current_saliency(), 0.0338),
             (s.tracked_rpm(), 700.0),
-            (s.speed_limit_rpm(), 300.0),
+            (s.speed_limit_rpm(), 1720.0),
             (s.ramp_rpm_per_s(), 300.0),
             (s.speed_trip_rpm(), 2000.0),
             (s.dc_over_v(), 400.0),

@@ -69,7 +69,7 @@ impl LockMonitor {
 
     /// Speed of the over-speed trials, rpm.
     fn over_speed_limit(&self) -> f64 {
-        f64::from(self.config.drive.tracked_rpm()) + ESTIMATE_RPM
+        f64::from(self.config.drive.highest_rpm()) + ESTIMATE_RPM
     }
 }
 
@@ -256,7 +256,7 @@ impl LockMonitor {
         let heads =
             ["limit (rpm)", "trials", "off before the limit", "latest after it (s)", "not in time"];
         let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &heads)
-            .note("The drive goes by its estimate, `injection.tracked_rpm`, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
+            .note("The drive goes by its estimate, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
         table.row([
             Cell::fixed(limit, 0),
             Cell::fixed(trials.len() as f64, 0),

@@ -64,7 +64,7 @@ const PERIOD: u32 = TICKS_PER_PERIOD as u32;
 const MOST_WHOLE: u32 = PERIOD * 15 / 100;
 /// Most cycles from the entry to the last compare value. The deadline is the next period; a tenth of it leaves
 /// room for an interrupt that starts late or waits for the bus.
-const MOST_TO_COMPARES: u32 = 2500;
+const MOST_TO_COMPARES: u32 = 3000;
 
 /// The function of the main loop that takes a control period into the identification.
 const IDENTIFICATION: &str = "drive_core::identify::online::Online::sample";

@@ -19,13 +19,13 @@ fn built(source: AngleSource) -> Coefficients {
 #[test]
 fn limits_and_times_are_those_of_the_settings_in_periods() {
     let c = built(AngleSource::Encoder);
-    // Two pole pairs and 6 kHz; with the injection alone 700 rpm.
+    // Two pole pairs and 6 kHz; with the injection alone 700 rpm, and with the observer beside it any.
     let (any, tracked) = (2000.0 / 60.0 * 2.0 / 6000.0, 700.0 / 60.0 * 2.0 / 6000.0);
     near(c.protection.rotor_freq, any);
-    near(built(AngleSource::Injection).protection.rotor_freq, tracked);
-    let mut observed = Settings::default();
-    observed.observer.enabled = true;
-    near(observed.build().unwrap().protection.rotor_freq, any);
+    near(built(AngleSource::Injection).protection.rotor_freq, any);
+    let mut alone = Settings::default();
+    alone.observer.enabled = false;
+    near(alone.build().unwrap().protection.rotor_freq, tracked);
     near(c.freq_per_speed, 2.0 / 6000.0);
     near(c.protection.current_squared, 3.5 * 3.5);
     near(c.current_lag, 0.18);
