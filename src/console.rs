@@ -168,7 +168,9 @@ impl Console {
     }
 
     fn error(&mut self, why: &dyn fmt::Display) {
-        self.out.line(format_args!("error: {why}"));
+        if !self.bus.takes_error(why) {
+            self.out.line(format_args!("error: {why}"));
+        }
     }
 
     /// Sends the waiting text; whether none waits any more.

@@ -1,22 +1,24 @@
 //! The console's other wire: requests of the field bus.
 //!
-//! A write becomes a [`Request`] that is answered as if it were a line; what it would have been told in words, if it is
-//! refused, is announced once. A run command holds until a stop; when the drive stopped for another reason (console,
+//! A write goes the way of a line: the same commands, staging, checks and words, which are announced once if it is
+//! refused. A run command holds until a stop; when the drive stopped for another reason (console,
 //! time-out, fault), a master that repeats its run command does not start it again before it has written a stop.
 
+use core::fmt::{self, Write as _};
+
 use drive_core::{Command, Mode, State};
-use heapless::String;
 use modbus_core::Exception;
 
 use super::Console;
+use super::answer::{MUST_BE_OFF, Task};
 use super::grammar::Request;
 use super::handle::DriveHandle;
 use super::line::OutputLine;
+use crate::modbus::Port;
 use crate::modbus::faults::FaultLog;
 use crate::modbus::float::from_float;
 use crate::modbus::registers::{COMMAND, FREQUENCY, RESET, SETTINGS, SETTINGS_END, STAGED, View};
-use crate::modbus::slave::{self, Registers};
-use crate::modbus::{Frame, Port};
+use crate::modbus::slave::{self, Registers, Words};
 use crate::settings::bus::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST};
@@ -30,8 +32,8 @@ const REVERSE: u16 = 1 << 5;
 /// Bit of the reset register.
 const CLEAR: u16 = 1 << 1;
 
-/// The longest refusal that is announced.
-const LONGEST_REFUSAL: usize = 120;
+/// A refusal, of as many bytes as are announced.
+type Refusal = OutputLine<120>;
 
 /// The run command of the bus.
 #[derive(Clone, Copy, PartialEq)]
@@ -56,11 +58,14 @@ pub(super) struct Bus {
     given: Option<f32>,
     /// Whether the task of the console is the bus's.
     has_task: bool,
+    /// Whether what the console says is an answer to the bus, and whether it was an error.
+    quiet: bool,
+    failed: bool,
     faults: FaultLog,
     seconds: u32,
     second_ms: u32,
     /// The last refusal, and whether it was announced.
-    refusal: String<LONGEST_REFUSAL>,
+    refusal: Refusal,
     announced: bool,
 }
 
@@ -72,10 +77,12 @@ impl Bus {
             frequency: 0,
             given: None,
             has_task: false,
+            quiet: false,
+            failed: false,
             faults: FaultLog::new(),
             seconds: 0,
             second_ms: 0,
-            refusal: String::new(),
+            refusal: Refusal::new(),
             announced: true,
         }
     }
@@ -90,15 +97,22 @@ impl Bus {
         (!core::mem::replace(&mut self.announced, true)).then_some(self.refusal.as_str())
     }
 
-    /// Notes a refusal; a master that repeats itself is announced once.
-    fn refused(&mut self, why: &str) {
-        let why = why.get(..why.floor_char_boundary(LONGEST_REFUSAL)).unwrap_or_default();
-        if self.refusal != why {
-            self.refusal.clear();
-            // It fits.
-            let _ = self.refusal.push_str(why);
-            self.announced = false;
+    /// Takes an error of the console, if it is an answer to the bus; whether it was.
+    pub(super) fn takes_error(&mut self, why: &dyn fmt::Display) -> bool {
+        if self.quiet {
+            self.failed = true;
+            self.refused(why);
         }
+        self.quiet
+    }
+
+    /// Notes a refusal; a master that repeats itself is announced once.
+    fn refused(&mut self, why: &dyn fmt::Display) {
+        let mut text = Refusal::new();
+        // What is too long is cut off.
+        let _ = write!(text, "{why}");
+        self.announced &= text.as_str() == self.refusal.as_str();
+        self.refusal = text;
     }
 
     fn command(&self) -> u16 {
@@ -148,7 +162,7 @@ impl Console {
         }
         if let (true, Some(task)) = (self.bus.has_task, self.task) {
             self.bus.has_task = false;
-            self.quietly(|console| console.perform(task, drive, now_ms));
+            let _ = self.quietly(|console| console.perform(task, drive, now_ms));
         }
         // A task of the console comes first.
         if self.task.is_some() {
@@ -156,14 +170,11 @@ impl Console {
         }
         self.follow_order(drive);
         let Some(frame) = port.receive() else { return };
-        let mut out = Frame::new();
         let mut access = Access { console: self, drive };
         // The setting is 1 to 247.
-        if slave::answer(&frame, settings.address as u8, &mut access, &mut out) {
+        let own = settings.address as u8;
+        if slave::answer(&frame, own, &mut access, |answer| port.send(answer)) {
             self.heard(Commander::Bus, now_ms);
-        }
-        if !out.is_empty() {
-            port.send(&out);
         }
     }
 
@@ -192,24 +203,37 @@ impl Console {
             return Ok(());
         }
         self.bus.given = Some(rpm);
-        self.ask(Request::Speed(rpm), drive)
+        self.quietly(|console| console.give(Command::Speed(rpm), "rpm", drive))
     }
 
-    /// Answers a request of the bus as if it were a line.
-    fn ask(&mut self, request: Request, drive: &mut impl DriveHandle) -> Result<(), Exception> {
-        let free = self.task.is_none();
-        let taken = self.quietly(|console| console.answer(request, drive));
-        self.bus.has_task |= free && self.task.is_some();
-        if taken { Ok(()) } else { Err(Exception::ServerDeviceFailure) }
+    /// Begins a task. What takes long is done when the answer is on its way.
+    fn begin_task(&mut self, task: Task, drive: &mut impl DriveHandle) -> Result<(), Exception> {
+        self.quietly(|console| {
+            let off = drive.is_off();
+            if off && !console.may_begin(task, drive) {
+                return;
+            }
+            match task {
+                // The drive says why it does not start.
+                Task::Start(mode) if !off => console.start(mode, drive),
+                // Nothing to be put in force.
+                Task::Start(mode) if !console.settings.is_staged() && !console.designs(task) => {
+                    console.start(mode, drive);
+                }
+                _ if !off => console.error(&MUST_BE_OFF),
+                _ => (console.task, console.bus.has_task) = (Some(task), true),
+            }
+        })
     }
 
-    /// Does something whose answer is not for the console's wire; whether it was not refused.
-    fn quietly(&mut self, work: impl FnOnce(&mut Self)) -> bool {
-        let waiting = core::mem::replace(&mut self.out, OutputLine::new());
+    /// Does something whose answer is not for the console's wire. A refusal is announced.
+    fn quietly(&mut self, work: impl FnOnce(&mut Self)) -> Result<(), Exception> {
+        (self.bus.quiet, self.bus.failed) = (true, false);
+        self.out.mute(true);
         work(self);
-        let said = core::mem::replace(&mut self.out, waiting);
-        let refused = said.as_str().trim_end().strip_prefix("error: ");
-        refused.inspect(|why| self.bus.refused(why)).is_none()
+        self.out.mute(false);
+        self.bus.quiet = false;
+        if self.bus.failed { Err(Exception::ServerDeviceFailure) } else { Ok(()) }
     }
 
     fn run(&mut self, drive: &mut impl DriveHandle) -> Result<(), Exception> {
@@ -217,11 +241,11 @@ impl Console {
             Order::Starting => Ok(()),
             Order::Run => self.refer(drive),
             Order::Ended => {
-                self.bus.refused("the drive has stopped for another reason: write a stop first");
+                self.bus.refused(&"the drive has stopped for another reason: write a stop first");
                 Err(Exception::ServerDeviceFailure)
             }
             Order::Stop => {
-                self.ask(Request::Start(Mode::Speed), drive)?;
+                self.begin_task(Task::Start(Mode::Speed), drive)?;
                 (self.bus.order, self.bus.given) = (Order::Starting, None);
                 Ok(())
             }
@@ -276,39 +300,41 @@ impl<D: DriveHandle> Access<'_, D> {
         if self.console.commander() == Commander::Bus {
             return Ok(());
         }
-        self.console.bus.refused("the console commands: `set bus.commands bus` lets the bus");
+        self.console.bus.refused(&"the console commands: `set bus.commands bus` lets the bus");
         Err(Exception::ServerDeviceFailure)
     }
 
     /// Stages settings, whole ones.
-    fn stage(&mut self, at: u16, words: &[u16]) -> Result<(), Exception> {
+    fn stage(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
         self.may_command()?;
         let first = usize::from(at - SETTINGS);
         if !first.is_multiple_of(2) || !words.len().is_multiple_of(2) || words.len() > 2 * MOST {
             return Err(Exception::IllegalDataValue);
         }
         let mut values = Assignments::new();
-        for (n, pair) in words.chunks_exact(2).enumerate() {
+        for n in 0..words.len() / 2 {
             let key = keys::number(first / 2 + n).ok_or(Exception::IllegalDataAddress)?;
-            let float = f32::from_bits(u32::from(pair[0]) << 16 | u32::from(pair[1]));
+            let half = |place| u32::from(words.get(2 * n + place).unwrap_or(0));
+            let float = f32::from_bits(half(0) << 16 | half(1));
             // There is room.
             let _ = values.push((key, from_float(key, self.console.settings.latest(), float)?));
         }
-        if !self.drive.is_off() {
-            return self.console.ask(Request::Set(values), self.drive);
-        }
-        self.console.ask(Request::Set(values), self.drive).or(Err(Exception::IllegalDataValue))
+        let taken = self.console.quietly(|console| console.set(&values, self.drive));
+        // While it is off, only a value can be wrong.
+        if self.drive.is_off() { taken.or(Err(Exception::IllegalDataValue)) } else { taken }
     }
 
     fn staged(&mut self, word: u16) -> Result<(), Exception> {
         self.may_command()?;
-        let request = match word {
-            1 => Request::Apply,
-            2 => Request::Save,
-            3 => Request::Revert,
-            _ => return Err(Exception::IllegalDataValue),
-        };
-        self.console.ask(request, self.drive)
+        match word {
+            1 => self.console.begin_task(Task::Apply, self.drive),
+            2 => self.console.begin_task(Task::Save, self.drive),
+            3 => {
+                self.console.settings.revert();
+                Ok(())
+            }
+            _ => Err(Exception::IllegalDataValue),
+        }
     }
 }
 
@@ -328,25 +354,28 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
         view.read(at)
     }
 
-    fn write(&mut self, at: u16, words: &[u16]) -> Result<(), Exception> {
-        match (at, words) {
-            (COMMAND, [word]) => self.command(*word),
-            (FREQUENCY, [word]) => self.frequency(*word),
-            // The frequency first: a run command begins with it.
-            (COMMAND, [word, frequency]) => {
-                if *word & ACTION == RUN {
-                    self.frequency(*frequency)?;
-                }
-                self.command(*word)
-            }
-            (RESET, [0]) => Ok(()),
-            (RESET, [CLEAR]) => {
-                self.may_command()?;
-                self.console.ask(Request::Clear, self.drive)
-            }
-            (RESET, [_]) => Err(Exception::IllegalDataValue),
+    fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
+        let word = words.get(0).unwrap_or(0);
+        match (at, words.get(1)) {
             (SETTINGS..SETTINGS_END, _) => self.stage(at, words),
-            (STAGED, [word]) => self.staged(*word),
+            // The frequency first: a run command begins with it.
+            (COMMAND, Some(frequency)) if words.len() == 2 => {
+                if word & ACTION == RUN {
+                    self.frequency(frequency)?;
+                }
+                self.command(word)
+            }
+            (COMMAND, None) => self.command(word),
+            (FREQUENCY, None) => self.frequency(word),
+            (RESET, None) => match word {
+                0 => Ok(()),
+                CLEAR => {
+                    self.may_command()?;
+                    self.console.quietly(|console| console.give(Command::Clear, "", self.drive))
+                }
+                _ => Err(Exception::IllegalDataValue),
+            },
+            (STAGED, None) => self.staged(word),
             _ => Err(Exception::IllegalDataAddress),
         }
     }

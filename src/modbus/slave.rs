@@ -23,6 +23,23 @@ const DIAGNOSTICS: u8 = 8;
 /// Highest code of a function; above it stand exceptions.
 const LAST_FUNCTION: u8 = 0x7f;
 
+/// The words of a write.
+#[derive(Clone, Copy)]
+pub struct Words<'a>(&'a [u8]);
+
+impl Words<'_> {
+    /// Number of words, from 1 on.
+    pub fn len(self) -> usize {
+        self.0.len() / 2
+    }
+
+    /// The word at a place.
+    pub fn get(self, place: usize) -> Option<u16> {
+        let bytes = self.0.get(2 * place..)?.first_chunk()?;
+        Some(u16::from_be_bytes(*bytes))
+    }
+}
+
 /// The registers of a slave.
 pub trait Registers {
     /// The word of a register.
@@ -34,47 +51,58 @@ pub trait Registers {
     ///
     /// # Errors
     /// The exception that the master gets.
-    fn write(&mut self, at: u16, words: &[u16]) -> Result<(), Exception>;
+    fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception>;
 }
 
-/// Carries out a frame that came in, if it is whole and for the address `own` or for all; whether it was. The answer is put
-/// in `out`, which stays empty if there is none.
-pub fn answer(frame: &[u8], own: u8, registers: &mut impl Registers, out: &mut Frame) -> bool {
-    out.clear();
-    let pdu_len = frame.len().saturating_sub(AROUND);
-    if pdu_len == 0 || frame.len() > LONGEST {
-        return false;
-    }
-    let Ok(Some(rtu::DecodedFrame { slave, pdu })) = rtu::extract_frame(frame, pdu_len) else {
-        return false;
-    };
+/// What a request asks for.
+#[derive(Clone, Copy)]
+enum Asked<'a> {
+    /// The registers from this to that.
+    Read(u16, u16),
+    /// The function and the words from this register on.
+    Write(FunctionCode, u16, Words<'a>),
+    /// The same data.
+    Echo(FunctionCode, &'a [u8]),
+}
+
+/// Carries out a frame that came in, if it is whole and for the address `own` or for all, and sends the answer, if there is
+/// one; whether it was.
+pub fn answer(
+    frame: &[u8],
+    own: u8,
+    registers: &mut impl Registers,
+    send: impl FnOnce(&Frame),
+) -> bool {
+    let Some((slave, pdu)) = whole(frame) else { return false };
     let function = pdu[0];
     // A read of all has no answer.
     let for_us = slave == own || (slave == BROADCAST && matches!(function, 6 | 16));
     if !for_us || function > LAST_FUNCTION {
         return false;
     }
-    let mut bytes = [0; 2 * MOST_READ as usize];
-    let done = carry_out(pdu, registers, &mut bytes);
+    let asked = match asked(pdu) {
+        Ok(Asked::Write(_, at, words)) => {
+            registers.write(at, words).and_then(|()| self::asked(pdu))
+        }
+        asked => asked,
+    };
     if slave != BROADCAST {
-        let pdu = ResponsePdu(done.map_err(|exception| ExceptionResponse {
-            function: FunctionCode::new(function),
-            exception,
-        }));
-        // As long as the longest frame, which every answer fits in.
-        let _ = out.resize_default(LONGEST);
-        let length = server::encode_response(ResponseAdu { hdr: Header { slave }, pdu }, out);
-        out.truncate(length.unwrap_or(0));
+        reply(slave, function, asked, registers, send);
     }
     true
 }
 
-/// Carries out a request. `bytes` holds the registers of a read.
-fn carry_out<'a>(
-    pdu: &'a [u8],
-    registers: &mut impl Registers,
-    bytes: &'a mut [u8],
-) -> Result<Response<'a>, Exception> {
+/// Address and request of a frame; `None` if it is damaged.
+fn whole(frame: &[u8]) -> Option<(u8, &[u8])> {
+    let pdu_len = frame.len().checked_sub(AROUND).filter(|pdu_len| *pdu_len > 0)?;
+    if frame.len() > LONGEST {
+        return None;
+    }
+    let decoded = rtu::extract_frame(frame, pdu_len).ok()??;
+    Some((decoded.slave, decoded.pdu))
+}
+
+fn asked(pdu: &[u8]) -> Result<Asked<'_>, Exception> {
     let exact = |length: usize| {
         if pdu.len() == length { Ok(()) } else { Err(Exception::IllegalDataValue) }
     };
@@ -85,18 +113,11 @@ fn carry_out<'a>(
                 return Err(Exception::IllegalDataValue);
             }
             let last = at.checked_add(count - 1).ok_or(Exception::IllegalDataAddress)?;
-            let mut words = [0; MOST_READ as usize];
-            for (word, at) in words.iter_mut().zip(at..=last) {
-                *word = registers.read(at)?;
-            }
-            let words = &words[..usize::from(count)];
-            let data = Data::from_words(words, bytes).or(Err(Exception::ServerDeviceFailure))?;
-            Ok(Response::ReadHoldingRegisters(data))
+            Ok(Asked::Read(at, last))
         }
-        Ok(Request::WriteSingleRegister(at, word)) => {
+        Ok(Request::WriteSingleRegister(at, _)) => {
             exact(5)?;
-            registers.write(at, &[word])?;
-            Ok(Response::WriteSingleRegister(at, word))
+            Ok(Asked::Write(FunctionCode::WriteSingleRegister, at, Words(&pdu[3..])))
         }
         Ok(Request::WriteMultipleRegisters(at, data)) => {
             let count = data.len();
@@ -104,17 +125,53 @@ fn carry_out<'a>(
                 return Err(Exception::IllegalDataValue);
             }
             exact(6 + 2 * count)?;
-            let mut words = [0; MOST_WRITTEN];
-            words.iter_mut().zip(data).for_each(|(word, value)| *word = value);
-            registers.write(at, &words[..count])?;
-            // At most 123.
-            Ok(Response::WriteMultipleRegisters(at, count as u16))
+            Ok(Asked::Write(FunctionCode::WriteMultipleRegisters, at, Words(&pdu[6..])))
         }
         Ok(Request::Custom(function, [0, 0, ..])) if function.value() == DIAGNOSTICS => {
-            Ok(Response::Custom(function, &pdu[1..]))
+            Ok(Asked::Echo(function, &pdu[1..]))
         }
         // Too short for its function.
         Err(_) if matches!(pdu[0], 3 | 6 | 16) => Err(Exception::IllegalDataValue),
         _ => Err(Exception::IllegalFunction),
+    }
+}
+
+/// Sends the answer. Not inlined: its buffers must not lie below what a write calls.
+#[inline(never)]
+fn reply(
+    slave: u8,
+    function: u8,
+    asked: Result<Asked<'_>, Exception>,
+    registers: &mut impl Registers,
+    send: impl FnOnce(&Frame),
+) {
+    let mut bytes = [0; 2 * MOST_READ as usize];
+    let response = asked.and_then(|asked| match asked {
+        Asked::Read(at, last) => {
+            for (place, at) in bytes.chunks_exact_mut(2).zip(at..=last) {
+                place.copy_from_slice(&registers.read(at)?.to_be_bytes());
+            }
+            let bytes = &bytes[..2 * (usize::from(last - at) + 1)];
+            let data = Data::try_from(bytes).or(Err(Exception::ServerDeviceFailure))?;
+            Ok(Response::ReadHoldingRegisters(data))
+        }
+        Asked::Write(FunctionCode::WriteSingleRegister, at, words) => {
+            Ok(Response::WriteSingleRegister(at, words.get(0).unwrap_or(0)))
+        }
+        // At most 123.
+        Asked::Write(_, at, words) => Ok(Response::WriteMultipleRegisters(at, words.len() as u16)),
+        Asked::Echo(function, data) => Ok(Response::Custom(function, data)),
+    });
+    let pdu = ResponsePdu(response.map_err(|exception| ExceptionResponse {
+        function: FunctionCode::new(function),
+        exception,
+    }));
+    let mut out = Frame::new();
+    // As long as the longest frame, which every answer fits in.
+    let _ = out.resize_default(LONGEST);
+    let length = server::encode_response(ResponseAdu { hdr: Header { slave }, pdu }, &mut out);
+    out.truncate(length.unwrap_or(0));
+    if !out.is_empty() {
+        send(&out);
     }
 }

@@ -127,7 +127,10 @@ fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
     let mut master = Master::new(&BUS)?;
     // Ready to switch on, quick stop not active, dc link there, remote.
     assert_eq!(master.read(0x6041, 1)?, [0x231]);
-    assert_eq!(master.read(0x211b, 1)?, [1000], "300 rpm are 10 Hz");
+    // `speed.limit_rpm` of the image, 0.01 Hz.
+    let settings = induction_drive::board::settings();
+    let largest = settings.speed_limit_rpm() * f32::from(settings.motor.pole_pairs) / 0.6;
+    assert_eq!(master.read(0x211b, 1)?, [largest.round() as u16]);
     // Command and frequency in one block.
     let answer = master.ask(&[16, 0x20, 0, 0, 2, 4, 0, 18, 500_u16.to_be_bytes()[0], 244])?;
     assert_eq!(answer, [16, 0x20, 0, 0, 2]);

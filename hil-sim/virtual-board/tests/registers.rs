@@ -45,6 +45,7 @@ const RESETS: &[(&str, u32, &str)] = &[
     ("FLASH_ACR", 0x600, "DBG_SWEN is set after reset (RM0440, FLASH_ACR: 0x0004_0600)"),
     ("TIM1_AF1", 0, "BKINE is set after reset (RM0440)"),
     ("TIM1_AF2", 0, "BK2INE is set after reset (RM0440)"),
+    ("USART3_ISR", 0, "TXE and TC are set after reset (RM0440)"),
     ("DBGMCU_IDCODE", 0, "the identity of this chip, not a value of reset"),
     ("GPIOA_IDR", 0, "levels: JTMS and JTDI are pulled up"),
     ("GPIOB_IDR", 0, "levels: NJTRST is pulled up"),
