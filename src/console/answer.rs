@@ -269,6 +269,7 @@ impl Console {
             return;
         }
         self.task = None;
+        self.bus.performed();
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
         let Some(applied) = self.apply(drive) else { return };

@@ -58,6 +58,8 @@ pub(super) struct Bus {
     given: Option<f32>,
     /// Whether the task of the console is the bus's.
     has_task: bool,
+    /// Whether a task was performed, which may have taken so long that the master has given up a request.
+    late: bool,
     /// Whether what the console says is an answer to the bus, and whether it was an error.
     quiet: bool,
     failed: bool,
@@ -77,6 +79,7 @@ impl Bus {
             frequency: 0,
             given: None,
             has_task: false,
+            late: false,
             quiet: false,
             failed: false,
             faults: FaultLog::new(),
@@ -90,6 +93,11 @@ impl Bus {
     /// Whether the task of the console is the bus's.
     pub(super) fn has_task(&self) -> bool {
         self.has_task
+    }
+
+    /// Notes that a task was performed.
+    pub(super) fn performed(&mut self) {
+        self.late = true;
     }
 
     /// The refusal that is to be announced, once.
@@ -169,7 +177,10 @@ impl Console {
             return;
         }
         self.follow_order(drive);
-        let Some(frame) = port.receive() else { return };
+        let frame = port.receive();
+        // An answer to a request that the master has given up would be taken for that to another.
+        let late = core::mem::take(&mut self.bus.late);
+        let Some(frame) = frame.filter(|_| !late) else { return };
         let mut access = Access { console: self, drive };
         // The setting is 1 to 247.
         let own = settings.address as u8;
@@ -308,11 +319,12 @@ impl<D: DriveHandle> Access<'_, D> {
     fn stage(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
         self.may_command()?;
         let first = usize::from(at - SETTINGS);
-        if !first.is_multiple_of(2) || !words.len().is_multiple_of(2) || words.len() > 2 * MOST {
+        if !first.is_multiple_of(2) || !words.count().is_multiple_of(2) || words.count() > 2 * MOST
+        {
             return Err(Exception::IllegalDataValue);
         }
         let mut values = Assignments::new();
-        for n in 0..words.len() / 2 {
+        for n in 0..words.count() / 2 {
             let key = keys::number(first / 2 + n).ok_or(Exception::IllegalDataAddress)?;
             let half = |place| u32::from(words.get(2 * n + place).unwrap_or(0));
             let float = f32::from_bits(half(0) << 16 | half(1));
@@ -359,7 +371,7 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
         match (at, words.get(1)) {
             (SETTINGS..SETTINGS_END, _) => self.stage(at, words),
             // The frequency first: a run command begins with it.
-            (COMMAND, Some(frequency)) if words.len() == 2 => {
+            (COMMAND, Some(frequency)) if words.count() == 2 => {
                 if word & ACTION == RUN {
                     self.frequency(frequency)?;
                 }

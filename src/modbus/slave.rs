@@ -29,7 +29,7 @@ pub struct Words<'a>(&'a [u8]);
 
 impl Words<'_> {
     /// Number of words, from 1 on.
-    pub fn len(self) -> usize {
+    pub fn count(self) -> usize {
         self.0.len() / 2
     }
 
@@ -159,7 +159,9 @@ fn reply(
             Ok(Response::WriteSingleRegister(at, words.get(0).unwrap_or(0)))
         }
         // At most 123.
-        Asked::Write(_, at, words) => Ok(Response::WriteMultipleRegisters(at, words.len() as u16)),
+        Asked::Write(_, at, words) => {
+            Ok(Response::WriteMultipleRegisters(at, words.count() as u16))
+        }
         Asked::Echo(function, data) => Ok(Response::Custom(function, data)),
     });
     let pdu = ResponsePdu(response.map_err(|exception| ExceptionResponse {

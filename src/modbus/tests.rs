@@ -24,7 +24,7 @@ impl Registers for Memory {
     }
 
     fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
-        let words: Vec<_> = (0..words.len()).filter_map(|place| words.get(place)).collect();
+        let words: Vec<_> = (0..words.count()).filter_map(|place| words.get(place)).collect();
         let first = usize::from(at).wrapping_sub(0x2000);
         match self.0.get_mut(first..first.saturating_add(words.len())) {
             None => Err(Exception::IllegalDataAddress),
