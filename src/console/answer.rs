@@ -269,7 +269,6 @@ impl Console {
             return;
         }
         self.task = None;
-        self.bus.performed();
         // The time that it takes is not silence of the user.
         self.heard_ms = None;
         let Some(applied) = self.apply(drive) else { return };
@@ -303,9 +302,12 @@ impl Console {
     fn apply(&mut self, drive: &mut impl DriveHandle) -> Option<Applied> {
         let designs = self.settings.needs_design();
         let Some(settings) = self.settings.prepare() else { return Some(Applied::default()) };
-        if designs && let Err(why) = configure(drive, settings) {
-            self.error(&why);
-            return None;
+        if designs {
+            self.bus.designed();
+            if let Err(why) = configure(drive, settings) {
+                self.error(&why);
+                return None;
+            }
         }
         let applied = self.settings.adopt();
         self.unsaved = true;

@@ -58,7 +58,7 @@ pub(super) struct Bus {
     given: Option<f32>,
     /// Whether the task of the console is the bus's.
     has_task: bool,
-    /// Whether a task was performed, which may have taken so long that the master has given up a request.
+    /// Whether controllers were designed, which takes so long that the master has given up a request.
     late: bool,
     /// Whether what the console says is an answer to the bus, and whether it was an error.
     quiet: bool,
@@ -95,8 +95,8 @@ impl Bus {
         self.has_task
     }
 
-    /// Notes that a task was performed.
-    pub(super) fn performed(&mut self) {
+    /// Notes that controllers were designed.
+    pub(super) fn designed(&mut self) {
         self.late = true;
     }
 
