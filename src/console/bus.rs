@@ -208,7 +208,7 @@ impl Console {
     /// Gives the speed, if it is another than before.
     fn refer(&mut self, drive: &mut impl DriveHandle) -> Result<(), Exception> {
         let pole_pairs = f32::from(self.settings.in_force().drive.motor.pole_pairs);
-        let rpm = f32::from(self.bus.frequency) * (0.01 * 60.0) / pole_pairs;
+        let rpm = f32::from(self.bus.frequency) * 60.0 / (100.0 * pole_pairs);
         let rpm = if self.bus.reverse { -rpm } else { rpm };
         if self.bus.given == Some(rpm) {
             return Ok(());
