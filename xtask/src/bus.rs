@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 use std::{fs, thread};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::{run, toolchain};
 
@@ -165,7 +165,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
     let mut component = Command::new("vfdb_vfd");
     component.args(["-n", "vfd", "-S", "VFD", "-I"]).arg(&ini);
     let mut component = component.stdout(Stdio::null()).spawn()?;
-    let run = || -> Result<f64> {
+    let session = || -> Result<f64> {
         thread::sleep(Duration::from_secs(1));
         for (name, value) in [
             ("nameplate-HZ", "50"),
@@ -180,16 +180,15 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
         let pin = |name: &str| -> Result<String> {
             Ok(halcmd(&["-s", "getp", &format!("vfd.{name}")])?.trim().to_owned())
         };
-        let (rpm, ok, reached) = (pin("motor-RPM")?, pin("modbus-ok")?, pin("error-count")?);
-        if ok != "TRUE" || reached != "0" {
-            bail!("modbus-ok {ok}, error-count {reached}");
-        }
+        let (rpm, ok, errors) = (pin("motor-RPM")?, pin("modbus-ok")?, pin("error-count")?);
+        ensure!(ok == "TRUE" && errors == "0", "modbus-ok {ok}, error-count {errors}");
         halcmd(&["setp", "vfd.enable", "0"])?;
         thread::sleep(Duration::from_secs(1));
         Ok(rpm.parse()?)
     };
-    let rpm = run();
-    component.kill()?;
+    let rpm = session();
+    // Asked to end, so that it gives its name in the HAL back.
+    run::output("kill", &[&component.id().to_string()]);
     component.wait()?;
     rpm
 }
