@@ -271,6 +271,13 @@ faults! {
             "limits.inverter_a or limits.inverter_s not those of the power stage",
         ],
         "let it cool; reduce the torque, or sequence.i_d";
+    NotCaught = 47, "the turning shaft was not caught",
+        &[
+            "the shaft turns too fast: beyond 2700 rpm of four poles",
+            "flux left from the run before, or a load that changes the speed quickly",
+            "motor.* of another motor",
+        ],
+        "let the shaft slow down, then clear and start again";
 }
 
 impl Fault {

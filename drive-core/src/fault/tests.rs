@@ -47,6 +47,7 @@ fn codes_never_change() {
         (42, Fault::SlopeTooSmall),
         (43, Fault::MotorOverload),
         (44, Fault::InverterOverload),
+        (47, Fault::NotCaught),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);
