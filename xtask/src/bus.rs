@@ -29,7 +29,9 @@ struct Board {
 
 impl Board {
     fn start(elf: &Path, out: &Path) -> Result<Self> {
-        let mut command = run::cargo("run --release --package virtual-board --bin board --");
+        let build = "build --release --package virtual-board --bin board";
+        run::step("virtual board", &mut run::cargo(build))?;
+        let mut command = run::command(run::target_dir()?.join("release/board"));
         command.args(["--set", "load.mode=free", "--set", "injection.allow_unlearned=yes"]);
         command.arg("--elf").arg(elf).arg("--out").arg(out);
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
@@ -172,6 +174,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
             ("nameplate-RPM", "1500"),
             ("loop-time", "0.1"),
             ("speed-command", "150"),
+            ("spindle-on", "1"),
             ("enable", "1"),
         ] {
             halcmd(&["setp", &format!("vfd.{name}"), value])?;
