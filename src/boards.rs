@@ -187,8 +187,21 @@ pub struct Board {
     pub flux: Flux,
     /// Highest voltage that the power stage stands, V.
     pub highest_dc_link_v: Stated<f32>,
+    /// The port of the field bus, on pins that the power stage leaves free; `None` is a board without a bus.
+    pub bus: Option<Rs485>,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
     pub pulls: &'static str,
+}
+
+/// The port of the field bus: USART3 and the pin that switches the RS-485 driver on, at a high level.
+#[derive(Clone, Copy, Debug)]
+pub struct Rs485 {
+    /// Data to the transceiver (DI).
+    pub transmit: Pin,
+    /// Data from it (RO).
+    pub receive: Pin,
+    /// Driver enable (DE, with its inverse at /RE: one wire to both).
+    pub driver: Pin,
 }
 
 impl core::fmt::Debug for Board {
@@ -234,6 +247,16 @@ const fn check(board: &Board) {
             && longest <= 6e-6,
         "dead time"
     );
+    if let Some(Rs485 { transmit, receive, driver }) = board.bus {
+        assert!(
+            transmit.is(&pin::USART3_TX) && receive.is(&pin::USART3_RX),
+            "a pin of the bus is not one of USART3"
+        );
+        assert!(
+            !driver.equals(transmit) && !driver.equals(receive),
+            "two wires of the bus on one pin"
+        );
+    }
     let range_v = board.dc_link.line.value.gain * 4095.0 + board.dc_link.line.value.offset;
     assert!(board.dc_link_v > 0.0 && board.dc_link_v < board.highest_dc_link_v.value);
     assert!(

@@ -6,6 +6,7 @@
 
 pub mod announce;
 mod answer;
+mod bus;
 mod commissioning;
 pub mod grammar;
 pub mod handle;
@@ -28,9 +29,11 @@ use drive_core::{Command, State};
 use crate::commissioning::News;
 use crate::link::trace::Plan;
 use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
 use crate::settings::staging::Staging;
 use announce::Announcer;
 use answer::Task;
+use bus::Bus;
 use grammar::ParseError;
 use handle::{DriveHandle, Port};
 use line::{LineError, LineReader, OutputLine};
@@ -40,6 +43,9 @@ use stream::Wire;
 
 /// Longest time from the first character of a line to its end, ms: a slow typist.
 pub const LINE_MS: u32 = 30_000;
+
+const BUS_COMMANDS: &str =
+    "the bus commands: `stop` and `clear` work here, `set bus.commands console` takes over";
 
 /// The console.
 pub struct Console {
@@ -73,6 +79,8 @@ pub struct Console {
     wire: Wire,
     /// The board that the lines that come in belong to, if it is another than this one.
     foreign: Option<&'static str>,
+    /// The field bus.
+    bus: Bus,
 }
 
 /// Most bytes read in one poll: a flood must not hold up the main loop.
@@ -100,6 +108,7 @@ impl Console {
             restore: Restore::new(),
             wire: Wire::new(),
             foreign: None,
+            bus: Bus::new(),
         }
     }
 
@@ -129,6 +138,7 @@ impl Console {
             self.announce(drive, now_ms);
         }
         if self.flushed(port)
+            && !self.bus.has_task()
             && let Some(task) = self.task
         {
             self.perform(task, drive, now_ms);
@@ -168,7 +178,9 @@ impl Console {
     }
 
     fn error(&mut self, why: &dyn fmt::Display) {
-        self.out.line(format_args!("error: {why}"));
+        if !self.bus.takes_error(why) {
+            self.out.line(format_args!("error: {why}"));
+        }
     }
 
     /// Sends the waiting text; whether none waits any more.
@@ -208,6 +220,8 @@ impl Console {
         } else if self.armed && !drive.tracing() {
             self.armed = false;
             self.out.line(format_args!("trace: recorded; `trace` prints it"));
+        } else if let Some(why) = self.bus.news() {
+            self.out.line(format_args!("bus: refused: {why}"));
         }
         if self.out.as_str().len() == empty {
             self.out.clear();
@@ -272,7 +286,10 @@ impl Console {
         line.make_ascii_lowercase();
         match grammar::parse(&line) {
             Ok(request) => {
-                self.heard_ms = Some(now_ms);
+                self.heard(Commander::Console, now_ms);
+                if self.is_for_the_bus(&request) {
+                    return self.error(&BUS_COMMANDS);
+                }
                 self.answer(request, drive);
             }
             Err(why) => self.refuse(&why),

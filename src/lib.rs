@@ -11,6 +11,7 @@ pub mod commissioning;
 pub mod console;
 mod hash;
 pub mod link;
+pub mod modbus;
 pub mod monitor;
 pub mod rotor_tracking;
 pub mod settings;

@@ -6,7 +6,7 @@
 //!   drive (`task/bring_up.rs`).
 //! * the control interrupt (`task/control.rs`), 6000 times a second, at the highest priority: samples in,
 //!   `Drive::step`, compare values out, then one command from the console if there is one.
-//! * the interrupt of the serial port (`chip/serial.rs`): a byte in, a byte out.
+//! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`chip/rs485.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console (`console.rs`), the log ten times a second, the
 //!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory
 //!   (`monitor/memory_check.rs`).
@@ -32,7 +32,7 @@ fn main() -> ! {
 
     chip::memory::paint_stack();
     defmt::info!("induction-drive {}", task::supervisor::VERSION);
-    let Ok(task::bring_up::Board { settings, mut port, mut supervisor }) =
+    let Ok(task::bring_up::Board { settings, mut port, mut bus, mut supervisor }) =
         task::bring_up::bring_up()
     else {
         chip::stop::end(Reason::Panic, [line!(), 0, 0, 0])
@@ -43,6 +43,7 @@ fn main() -> ! {
     loop {
         let now_ms = supervisor.listen();
         console.poll(&mut port, &mut supervisor, now_ms);
+        console.serve(&mut bus, &mut supervisor, now_ms);
         supervisor.check_memory();
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the

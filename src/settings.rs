@@ -1,6 +1,7 @@
 //! The settings of the firmware: those of the drive, those of the firmware around it, and what was learned on the
 //! motor. [`keys`] lists them by name.
 
+pub mod bus;
 pub mod keys;
 pub mod staging;
 #[cfg(test)]
@@ -22,6 +23,8 @@ pub struct FirmwareSettings {
     pub drive: Settings,
     /// Settings of the firmware around it.
     pub command: CommandSettings,
+    /// Settings of the field bus.
+    pub bus: bus::Settings,
     /// Accepted result of a learning with these settings; it overrides them where both give a value.
     pub learned: Option<Learned>,
 }
@@ -48,7 +51,8 @@ impl FirmwareSettings {
     /// The same for any board.
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
-        Self { board, drive, command: CommandSettings::default(), learned: None }
+        let (command, bus) = (CommandSettings::default(), bus::Settings::default());
+        Self { board, drive, command, bus, learned: None }
     }
 
     /// Whether the bench steps for the board's assumptions were done, with the values that it has.

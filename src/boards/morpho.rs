@@ -5,7 +5,7 @@ use drive_core::settings::{Line, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Currents, FaultInput, Gates, Level, Stated, assumed};
+use super::{Analog, Currents, FaultInput, Gates, Level, Rs485, Stated, assumed};
 
 /// High sides.
 pub const HIGH: [Pin; 3] = [pa(8), pa(9), pa(10)];
@@ -15,6 +15,8 @@ pub const LOW: [Pin; 3] = [pa(7), pb(0), pb(1)];
 pub const CURRENTS: [Pin; 3] = [pa(0), pc(1), pc(0)];
 /// Thermistor.
 pub const HEAT_SINK: Pin = pc(2);
+/// The port of the field bus: three pins beside each other on CN7, which the boards here do not use.
+pub const BUS: Rs485 = Rs485 { transmit: pc(10), receive: pc(11), driver: pc(12) };
 /// The thermistor of the dissertation.
 pub const NTC: Stated<Ntc> =
     assumed(Ntc::DEFAULT, "room temperature: `status` must show it within 5 degC");

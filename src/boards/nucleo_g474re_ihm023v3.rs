@@ -30,5 +30,7 @@ pub const BOARD: Board = Board {
     dc_link_v: 311.0,
     flux: Flux::High,
     highest_dc_link_v: read(400.0, "STEVAL-IHM023V3, supply range"),
+    // Whether the adapter leaves pins of USART3 free is not known.
+    bus: None,
     pulls: morpho::PULLS,
 };

@@ -32,5 +32,6 @@ pub const BOARD: Board = Board {
     dc_link_v: 48.0,
     flux: Flux::High,
     highest_dc_link_v: read(60.0, "STL220N6F7 data sheet, drain to source"),
+    bus: Some(morpho::BUS),
     pulls: morpho::PULLS,
 };

@@ -54,6 +54,10 @@ pub const TIM1_CH3N: [Reach; 3] = [(pb(1), 6), (pb(9), 12), (pb(15), 4)];
 /// Break input of TIM1.
 pub const TIM1_BKIN: [Reach; 6] =
     [(pa(6), 6), (pa(14), 6), (pb(8), 12), (pb(10), 12), (pb(12), 6), (pc(13), 2)];
+/// Output of USART3.
+pub const USART3_TX: [Reach; 3] = [(pb(9), 7), (pb(10), 7), (pc(10), 7)];
+/// Input of USART3.
+pub const USART3_RX: [Reach; 3] = [(pb(8), 7), (pb(11), 7), (pc(11), 7)];
 /// Positive input of comparator 1.
 pub const COMP1_INPUT: Pin = pa(1);
 

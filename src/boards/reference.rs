@@ -49,5 +49,6 @@ pub const BOARD: Board = Board {
     dc_link_v: 311.0,
     flux: Flux::Low,
     highest_dc_link_v: assumed(450.0, "the voltage of the capacitors and of the switches"),
+    bus: Some(morpho::BUS),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

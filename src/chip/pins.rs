@@ -20,6 +20,7 @@ fn registers(port: Port) -> &'static RegisterBlock {
 
 /// Fields of MODER.
 const INPUT: u32 = 0b00;
+const OUTPUT: u32 = 0b01;
 const ALTERNATE: u32 = 0b10;
 const ANALOG: u32 = 0b11;
 
@@ -39,6 +40,26 @@ pub fn alternate(pin: Pin, function: u8, pull: Option<Level>) {
     }
     resistor(pin, pull);
     mode(pin, ALTERNATE);
+}
+
+/// A pin that software drives.
+pub struct Output(Pin);
+
+impl Output {
+    /// Makes a pin an output at this level.
+    pub fn new(pin: Pin, level: Level) -> Self {
+        let output = Self(pin);
+        output.set(level);
+        mode(pin, OUTPUT);
+        output
+    }
+
+    /// Sets the level.
+    pub fn set(&self, level: Level) {
+        let shift = if level == Level::High { 0 } else { 16 };
+        // SAFETY: sets or resets one pin, which this owns.
+        registers(self.0.port).bsrr().write(|w| unsafe { w.bits(1 << (self.0.number + shift)) });
+    }
 }
 
 /// Makes a pin an analog input, without a resistor.

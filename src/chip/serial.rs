@@ -22,7 +22,7 @@ type TransmitQueue = Queue<u8, { board::SERIAL_TRANSMIT }>;
 /// Bytes that each FIFO holds (RM0440, LPUART implementation).
 const FIFO: u32 = 8;
 /// Priority of the interrupt: the lowest. Only the four upper bits are implemented (datasheet).
-const PRIORITY: u8 = 0xf0;
+pub const PRIORITY: u8 = 0xf0;
 
 /// The main loop's end of the port.
 pub struct Port {

@@ -9,7 +9,7 @@ use crate::link::Status;
 
 /// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
 /// for an answer passes over them.
-pub const ANNOUNCEMENTS: [&str; 12] = [
+pub const ANNOUNCEMENTS: [&str; 13] = [
     "fault ",
     "running: ",
     "off: ",
@@ -20,6 +20,7 @@ pub const ANNOUNCEMENTS: [&str; 12] = [
     "refused: ",
     "trace: ",
     "link: ",
+    "bus: ",
     "applied: ",
     "designing...",
 ];

@@ -173,7 +173,7 @@ impl Console {
     }
 
     /// Gives the drive a command; `unit` is that of its reference.
-    fn give(&mut self, command: Command, unit: &str, drive: &mut impl DriveHandle) {
+    pub(super) fn give(&mut self, command: Command, unit: &str, drive: &mut impl DriveHandle) {
         match drive.command(command) {
             Ok(Accepted::AsGiven) => self.ok(),
             Ok(Accepted::Limited(value)) => {
@@ -196,7 +196,7 @@ impl Console {
         false
     }
 
-    fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) {
+    pub(super) fn set(&mut self, values: &Assignments, drive: &impl DriveHandle) {
         if !self.may_stage(drive) {
             return;
         }
@@ -225,12 +225,29 @@ impl Console {
     /// Performs a task that needs the staged settings in force. The design of the controllers takes more than a moment:
     /// the console says so first, and does it when that is on its way.
     pub(super) fn design_for(&mut self, task: Task, drive: &mut impl DriveHandle) {
-        let in_force = self.settings.in_force();
-        let anew = matches!(task, Task::Learn { again: false }) && in_force.learned.is_some();
         match task {
             // The drive says why it does not start.
             Task::Start(mode) if !drive.is_off() => self.start(mode, drive),
             Task::Learn { .. } if !drive.is_off() => self.start(Mode::Learning, drive),
+            _ if !self.may_begin(task, drive) => {}
+            _ if self.designs(task) && drive.status().is_some() => {
+                self.out.line(format_args!("designing..."));
+                self.task = Some(task);
+            }
+            _ => self.perform(task, drive, 0),
+        }
+    }
+
+    /// Whether a task needs the controllers designed.
+    pub(super) fn designs(&self, task: Task) -> bool {
+        let learned = self.settings.in_force().learned.is_some();
+        self.settings.needs_design() || (matches!(task, Task::Learn { again: false }) && learned)
+    }
+
+    /// Whether a task may begin now; answers if not.
+    pub(super) fn may_begin(&mut self, task: Task, drive: &impl DriveHandle) -> bool {
+        let in_force = self.settings.in_force();
+        match task {
             _ if !drive.is_off() => self.error(&MUST_BE_OFF),
             _ if let Some(other) = self.foreign => {
                 self.error(&WrongBoard(other, in_force.board.name));
@@ -240,12 +257,9 @@ impl Console {
             {
                 self.error(&NOT_CONFIRMED);
             }
-            _ if (anew || self.settings.needs_design()) && drive.status().is_some() => {
-                self.out.line(format_args!("designing..."));
-                self.task = Some(task);
-            }
-            _ => self.perform(task, drive, 0),
+            _ => return true,
         }
+        false
     }
 
     /// Performs a task.
@@ -293,9 +307,12 @@ impl Console {
     fn apply(&mut self, drive: &mut impl DriveHandle) -> Option<Applied> {
         let designs = self.settings.needs_design();
         let Some(settings) = self.settings.prepare() else { return Some(Applied::default()) };
-        if designs && let Err(why) = configure(drive, settings) {
-            self.error(&why);
-            return None;
+        if designs {
+            self.bus.designed();
+            if let Err(why) = configure(drive, settings) {
+                self.error(&why);
+                return None;
+            }
         }
         let applied = self.settings.adopt();
         self.unsaved = true;
@@ -397,4 +414,4 @@ pub(super) fn configure(
 struct WrongBoard(&'static str, &'static str);
 
 const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed: do the bench steps that `board` lists, then `confirm board`";
-const MUST_BE_OFF: &str = "the drive must be off: `stop` first";
+pub(super) const MUST_BE_OFF: &str = "the drive must be off: `stop` first";

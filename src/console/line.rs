@@ -133,23 +133,34 @@ impl LineReader {
 }
 
 /// Text that goes out. What does not fit is cut off, between characters.
-pub struct OutputLine<const N: usize = OUTPUT>(String<N>);
+pub struct OutputLine<const N: usize = OUTPUT> {
+    text: String<N>,
+    muted: bool,
+}
 
 impl<const N: usize> OutputLine<N> {
     /// No text.
     pub const fn new() -> Self {
-        Self(String::new())
+        Self { text: String::new(), muted: false }
+    }
+
+    /// Drops what is added from now on, or no more.
+    pub fn mute(&mut self, muted: bool) {
+        self.muted = muted;
     }
 
     /// Adds a line.
     pub fn line(&mut self, text: fmt::Arguments<'_>) {
         const END: &str = "\r\n";
+        if self.muted {
+            return;
+        }
         // Writing to it never fails.
         let _ = fmt::Write::write_fmt(self, text);
-        while self.0.len() + END.len() > N {
-            self.0.pop();
+        while self.text.len() + END.len() > N {
+            self.text.pop();
         }
-        let _ = self.0.push_str(END);
+        let _ = self.text.push_str(END);
     }
 
     /// Adds text without the end of a line.
@@ -159,20 +170,20 @@ impl<const N: usize> OutputLine<N> {
 
     /// The text.
     pub fn as_str(&self) -> &str {
-        &self.0
+        &self.text
     }
 
     /// Removes the text.
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.text.clear();
     }
 }
 
 impl<const N: usize> fmt::Write for OutputLine<N> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        let fits = text.floor_char_boundary(N - self.0.len());
+        let fits = text.floor_char_boundary(N - self.text.len());
         let fits = text.get(..fits).unwrap_or_default();
-        self.0.push_str(fits).map_err(|()| fmt::Error)
+        self.text.push_str(fits).map_err(|()| fmt::Error)
     }
 }
 

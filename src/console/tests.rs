@@ -1,4 +1,5 @@
 mod announcements;
+mod bus;
 mod commission;
 mod doubles;
 mod learning;

@@ -8,6 +8,7 @@ use drive_core::settings::value::{Value, ValueError, Words};
 use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
+use super::bus::{Baud, Commander, Format};
 use crate::boards;
 use crate::hash;
 
@@ -20,7 +21,7 @@ const AUTO_BITS: u32 = 0x7fc0_0000;
 pub const BOARD: &str = "board";
 
 /// The firmware's own settings, in the order in which they are shown.
-static OWN: [Entry<FirmwareSettings>; 5] = [
+static OWN: [Entry<FirmwareSettings>; 9] = [
     Entry::new(
         "command.timeout_s",
         "s",
@@ -42,6 +43,46 @@ static OWN: [Entry<FirmwareSettings>; 5] = [
         |s: &FirmwareSettings| s.command.echo.place(),
         |s, place| s.command.echo = bool::at(place),
         "whether the console sends typed characters back",
+    ),
+    Entry::new(
+        "bus.commands",
+        "",
+        Access::Word {
+            words: Commander::WORDS,
+            get: |s: &FirmwareSettings| s.bus.commander.place(),
+            set: |s, place| s.bus.commander = Commander::at(place),
+        },
+        "who starts the drive and gives it references; anybody may stop it",
+    ),
+    Entry::new(
+        "bus.address",
+        "",
+        Access::Whole {
+            get: |s: &FirmwareSettings| s.bus.address,
+            set: |s, value| s.bus.address = value,
+        },
+        "address of the drive on the bus",
+    )
+    .from_to(1.0, 247.0),
+    Entry::new(
+        "bus.baud",
+        "bit/s",
+        Access::Word {
+            words: Baud::WORDS,
+            get: |s: &FirmwareSettings| s.bus.baud.place(),
+            set: |s, place| s.bus.baud = Baud::at(place),
+        },
+        "rate of the bus",
+    ),
+    Entry::new(
+        "bus.parity",
+        "",
+        Access::Word {
+            words: Format::WORDS,
+            get: |s: &FirmwareSettings| s.bus.format.place(),
+            set: |s, place| s.bus.format = Format::at(place),
+        },
+        "data bits, parity and stop bits of the bus",
     ),
     Entry::new(
         BOARD,

@@ -14,7 +14,7 @@ use crate::chip::StartError;
 use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, stop, time};
+use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
@@ -36,6 +36,8 @@ pub struct Board {
     pub settings: FirmwareSettings,
     /// The serial port of the console.
     pub port: Port,
+    /// The port of the field bus, if the board has one.
+    pub bus: Option<rs485::Port>,
     /// The drive.
     pub supervisor: Supervisor,
 }
@@ -86,6 +88,9 @@ pub fn bring_up() -> Result<Board, StartError> {
     // First, because the drivers are switched off from here on.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc).ok_or(TWICE)?;
+    let bus = SELECTED
+        .bus
+        .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     // Before the control runs: it is made with the interrupts masked.
     let commissioning = singleton!(: Session = Session::new(&start.settings.drive)).ok_or(TWICE)?;
@@ -118,7 +123,7 @@ pub fn bring_up() -> Result<Board, StartError> {
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
     let supervisor =
         Supervisor::new(link.ok(), watchdog, chip, tracking, commissioning, &settings.drive);
-    Ok(Board { settings, port, supervisor })
+    Ok(Board { settings, port, bus, supervisor })
 }
 
 /// Settings at start.

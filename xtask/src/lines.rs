@@ -13,7 +13,7 @@ use anyhow::Result;
 use crate::{run, sources};
 
 /// Most lines of code without tests, in the whole repository.
-const LIMIT: usize = 47_500;
+const LIMIT: usize = 49_200;
 /// Most lines of code without tests in the control code: `drive-core` with all below it.
 const CONTROL_LIMIT: usize = 10_900;
 /// A longer file gives its reason in its head. A person reads the reason.

@@ -4,6 +4,7 @@ mod before;
 mod bench;
 mod board;
 mod budget;
+mod bus;
 mod control;
 mod documents;
 mod elf;
@@ -52,6 +53,8 @@ enum Task {
     /// Estimates the cycles of the control interrupt on the virtual board; fails above 15 % of the period on
     /// the worst path, and above 2500 to the last compare value
     Cycles,
+    /// Runs mbpoll, pymodbus and LinuxCNC's vfdb_vfd, where they are installed, on the bus of the virtual board
+    Bus,
     /// Injects faults into the image on the virtual board
     Campaign {
         /// Number of faults
@@ -139,6 +142,7 @@ fn run(task: Task) -> Result<()> {
         Task::BenchDump(which) => bench::dump(&which.image()?, &which.board, image::CHIP),
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
+        Task::Bus => bus::test(&image::build()?),
         Task::Campaign { count, seed, class, which } => {
             board::campaign(&which.image()?, &which.board, count, seed, &class)
         }

@@ -20,8 +20,8 @@ use crate::elf::{self, Instruction};
 const NESTED: usize = 4;
 /// Bytes that the core pushes for an interrupt, with floating point and alignment.
 const EXCEPTION: u32 = 104 + 4;
-/// The interrupts by rising priority: each can interrupt main and those before it, once.
-const INTERRUPTS: [&str; 3] = ["LPUART", "ADC1_2", "NonMaskableInt"];
+/// The interrupts by rising priority: one of each priority can interrupt main and those before it, once.
+const INTERRUPTS: [&[&str]; 3] = [&["LPUART", "USART3"], &["ADC1_2"], &["NonMaskableInt"]];
 /// Part of the name of the panic handler, which panics only once: it comes on top of everything else,
 /// once, and what it calls may call it without end only in appearance.
 const PANIC: &str = "rust_begin_unwind";
@@ -59,9 +59,10 @@ pub fn worst_case(image: &[u8]) -> Result<u32> {
     let main = depth_of(&functions, MAIN)?;
     let panic = functions.values().find(|function| function.name.contains(PANIC));
     let panic = panic.map_or(Ok(0), |function| depth_of(&functions, &function.name))?;
-    INTERRUPTS
-        .iter()
-        .try_fold(main + panic, |sum, name| Ok(sum + EXCEPTION + depth_of(&functions, name)?))
+    INTERRUPTS.iter().try_fold(main + panic, |sum, names| {
+        let depths = names.iter().map(|name| depth_of(&functions, name));
+        Ok(sum + EXCEPTION + depths.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
+    })
 }
 
 fn functions(image: &[u8]) -> Result<Functions> {
@@ -88,7 +89,9 @@ fn functions(image: &[u8]) -> Result<Functions> {
 }
 
 fn is_entry(name: &str) -> bool {
-    name == MAIN || INTERRUPTS.contains(&name) || BY_PROCESSOR.contains(&name)
+    name == MAIN
+        || INTERRUPTS.iter().any(|names| names.contains(&name))
+        || BY_PROCESSOR.contains(&name)
 }
 
 /// Adds the effect of an instruction to a function that begins at `begin`.

@@ -15,6 +15,7 @@ const UNASKED: [&str; 13] = [
     "refused: ",
     "trace: ",
     "link: ",
+    "bus: ",
     "applied",
     "designing...",
 ];

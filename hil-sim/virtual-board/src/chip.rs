@@ -27,6 +27,7 @@ use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
 use crate::periph::time_base::TimeBase;
+use crate::periph::usart::Usart;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
@@ -41,6 +42,7 @@ const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.
 const IRQ_ADC1_2: u16 = 18;
+const IRQ_USART3: u16 = 39;
 const IRQ_LPUART: u16 = 91;
 /// Exception number of the control interrupt, which is the converters'.
 pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
@@ -138,6 +140,8 @@ pub struct Chip {
     pub dac: Dacs,
     /// Console.
     pub lpuart: Lpuart,
+    /// Field bus.
+    pub usart3: Usart,
     /// Watchdog.
     pub iwdg: Iwdg,
     /// Debug support.
@@ -193,6 +197,7 @@ impl Default for Chip {
             comp: Comparators::default(),
             dac: Dacs::default(),
             lpuart: Lpuart::default(),
+            usart3: Usart::default(),
             iwdg: Iwdg::default(),
             debug: Store::new(plain::DEBUG),
             gates,
@@ -234,6 +239,7 @@ impl Chip {
         self.adc.inputs = old.adc.inputs;
         self.adc.lose_triggers = old.adc.lose_triggers;
         self.lpuart.wire = old.lpuart.wire;
+        self.usart3.line = old.usart3.line;
         self.gates = old.gates;
         self.look_at_gates();
     }
@@ -251,6 +257,8 @@ impl Chip {
         self.scs.set_line(IRQ_ADC1_2, adc);
         let serial = self.lpuart.requests();
         self.scs.set_line(IRQ_LPUART, serial);
+        let bus = self.usart3.requests();
+        self.scs.set_line(IRQ_USART3, bus);
     }
 
     /// Time of the next event.
@@ -259,6 +267,7 @@ impl Chip {
             self.tim1.next_event(),
             self.adc.next_event(),
             self.lpuart.next_event(),
+            self.usart3.next_event(),
             if self.frozen_watchdog { NEVER } else { self.iwdg.next_event() },
             self.scs.systick.next_event(),
             self.rcc.next_event(),
@@ -356,6 +365,9 @@ impl Chip {
         self.check_outputs_back();
         self.compare_now();
         self.lpuart.happen(now);
+        let driver = self.drives_bus();
+        let lost = self.usart3.happen(now, driver);
+        self.rules.require(!lost, Rule::BusDriver, || "a byte ended with PC12 not high".to_owned());
         if !self.frozen_watchdog && self.iwdg.expired(now) {
             self.reset = Some(Reset::Watchdog);
         }

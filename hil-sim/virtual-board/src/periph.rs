@@ -13,6 +13,7 @@ pub mod pwr;
 pub mod rcc;
 pub mod tim1;
 pub mod time_base;
+pub mod usart;
 
 use std::fmt;
 

@@ -52,6 +52,8 @@ rules! {
     PinMode: "DS12288, pins and alternate functions; RM0440, GPIOx_MODER",
     /// After a halt by a debugger that stopped TIM1, the outputs came back without the program, and it let them.
     ResumedOutputs: "RM0440, TIM1 debug mode: outputs off as if MOE was reset, MOE unchanged",
+    /// A byte is sent on the RS-485 line while the pin that enables the driver is not high: nobody hears it.
+    BusDriver: "TIA-485 transceivers: DE is high from the first start bit to the last stop bit",
     /// The supply monitor is locked while it is off, so that it cannot be switched on any more.
     SupplyMonitor: "RM0440, SYSCFG_CFGR2.PVDL locks PVDE and PVDLS",
     /// The mode of a converter to analog is written before its first data, or while it is on.

@@ -14,13 +14,14 @@ use virtual_board::chip::{Chip, clock_of, pins};
 use virtual_board::dump;
 
 /// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is as ADC1.
-const BLOCKS: [(&str, &str, u32); 21] = [
+const BLOCKS: [(&str, &str, u32); 22] = [
     ("tim1", "TIM1", 0x4001_2c00),
     ("tim2", "TIM2", 0x4000_0000),
     ("tim5", "TIM5", 0x4000_0c00),
     ("iwdg", "IWDG", 0x4000_3000),
     ("pwr", "PWR", 0x4000_7000),
     ("lpuart1", "LPUART1", 0x4000_8000),
+    ("usart1", "USART3", 0x4000_4800),
     ("syscfg", "SYSCFG", 0x4001_0000),
     ("comp", "COMP", 0x4001_0200),
     ("exti", "EXTI", 0x4001_0400),
@@ -44,6 +45,7 @@ const RESETS: &[(&str, u32, &str)] = &[
     ("FLASH_ACR", 0x600, "DBG_SWEN is set after reset (RM0440, FLASH_ACR: 0x0004_0600)"),
     ("TIM1_AF1", 0, "BKINE is set after reset (RM0440)"),
     ("TIM1_AF2", 0, "BK2INE is set after reset (RM0440)"),
+    ("USART3_ISR", 0, "TXE and TC are set after reset (RM0440)"),
     ("DBGMCU_IDCODE", 0, "the identity of this chip, not a value of reset"),
     ("GPIOA_IDR", 0, "levels: JTMS and JTDI are pulled up"),
     ("GPIOB_IDR", 0, "levels: NJTRST is pulled up"),
@@ -63,6 +65,8 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
     ("IWDG_WINR", 0xfff, KEY),
     ("LPUART1_CR1", 0xf3ff_7fff, "FIFOEN is not modelled: the write is refused as unknown"),
     ("LPUART1_TDR", 0x1ff, "write-only"),
+    ("USART3_CR1", u32::MAX, "FIFOEN is not modelled: the write is refused as unknown"),
+    ("USART3_TDR", 0x1ff, "write-only"),
     ("SYSCFG_CFGR2", 0x100, FLAGS),
     ("EXTI_PR1", 0x7b_ffff, FLAGS),
     ("EXTI_PR2", 0x303, FLAGS),
@@ -227,7 +231,7 @@ fn clocks_are_those_of_the_second_source() {
 #[test]
 fn pins_are_those_of_the_second_source() {
     let signals = pins::OUTPUTS.iter().chain([&pins::BREAK]).chain(&pins::ENCODER);
-    for signal in signals.chain(&pins::SERIAL) {
+    for signal in signals.chain(&pins::SERIAL).chain(&pins::BUS) {
         let mut ours: Vec<_> = pins::pins_of(*signal).collect();
         let mut theirs = metapac::pins_of(signal.0);
         ours.sort_unstable();

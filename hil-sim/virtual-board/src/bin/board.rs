@@ -49,6 +49,7 @@ fn run(mut options: Options) -> Result<()> {
     let script = script.map(|script| if options.lenient { script } else { script.strict() });
     let image = image(stage, options.elf.as_deref())?;
     let pty = Pty::open()?;
+    let bus = Pty::open()?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
@@ -60,6 +61,7 @@ fn run(mut options: Options) -> Result<()> {
 
     let port = pty.path().display();
     say(&format!("console: {port}"));
+    say(&format!("bus: {}", bus.path().display()));
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
@@ -80,7 +82,7 @@ fn run(mut options: Options) -> Result<()> {
         log: options.log,
         flux: options.attached,
     };
-    let mut session = Session::new(board, pty, inputs);
+    let mut session = Session::new(board, pty, bus, inputs);
     let end = session.run(|line| say(&line.to_string()));
     let path = write(options, &config, &session)?;
     say(&format!("Report: {}", path.display()));

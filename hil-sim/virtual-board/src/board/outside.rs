@@ -21,6 +21,19 @@ impl Board {
         chip.lpuart.wake(chip.now);
     }
 
+    /// Puts bytes on the line of the field bus, one behind the other.
+    pub fn send_bus(&mut self, bytes: &[u8]) {
+        let chip = self.chip();
+        chip.usart3.line.to_chip.extend(bytes.iter().map(|byte| u16::from(*byte)));
+        chip.usart3.wake(chip.now);
+    }
+
+    /// The bytes that the board sent on the field bus since the last call.
+    pub fn take_bus(&mut self) -> Vec<u8> {
+        let sent = std::mem::take(&mut self.chip().usart3.line.from_chip);
+        sent.into_iter().map(|(_, byte)| byte).collect()
+    }
+
     /// The output of the console since the last call.
     pub fn take_console(&mut self) -> String {
         let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);

@@ -5,13 +5,14 @@ use std::fmt;
 use super::Chip;
 use crate::memory;
 use crate::periph::rcc::On;
-use crate::periph::{Effect, Reset, plain};
+use crate::periph::{Effect, Reset, plain, usart};
 use crate::scs;
 
 pub(super) const TIM2: u32 = 0x4000_0000;
 pub(super) const TIM5: u32 = 0x4000_0c00;
 const IWDG: u32 = 0x4000_3000;
 pub(super) const PWR: u32 = 0x4000_7000;
+pub(super) const USART3: u32 = 0x4000_4800;
 pub(super) const LPUART1: u32 = 0x4000_8000;
 pub(super) const SYSCFG: u32 = 0x4001_0000;
 const BDTR: u32 = 0x4001_2c44;
@@ -110,7 +111,7 @@ impl Chip {
     /// The value of a register, without the side effects of a read.
     fn peek(&mut self, address: u32) -> Option<u32> {
         match address & !0x3ff {
-            IWDG | LPUART1 => Some(0),
+            IWDG | LPUART1 | USART3 => Some(0),
             _ if (0xe000_e400..0xe000_e4f0).contains(&address) => self.scs.read(address, self.now),
             _ => self.read_word(address),
         }
@@ -158,6 +159,11 @@ impl Chip {
                 self.update_lines();
                 value
             }
+            USART3 => {
+                let value = self.usart3.read(offset);
+                self.update_lines();
+                value
+            }
             IWDG => self.iwdg.read(offset, now),
             SYSCFG => match offset {
                 0x200..0x220 => self.comp.read(offset - 0x200),
@@ -200,6 +206,7 @@ impl Chip {
             }
             FLASH_REGISTERS => self.flash.write(offset, value, rules)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
+            USART3 => self.usart3.write(offset, value, now)?,
             IWDG => self.iwdg.write(offset, value, rules)?,
             SYSCFG => match offset {
                 0x200..0x220 => self.comp.write(offset - 0x200, value, now)?,
@@ -226,6 +233,7 @@ impl Chip {
             }
             TIM2 => self.check_encoder_pins(),
             LPUART1 if address & 0x3ff == 0x28 => self.check_serial_pin(),
+            USART3 if address & 0x3ff == usart::SEND => self.check_bus_pins(),
             RCC | FLASH_REGISTERS => {
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
                 self.scs.systick.cycle = self.rcc.ticks_per_cycle();

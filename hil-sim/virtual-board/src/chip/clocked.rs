@@ -3,7 +3,7 @@
 use super::Chip;
 use super::bus::{
     ADC1, DAC1, DAC3, FLASH_REGISTERS, GPIO_FIRST, GPIO_LAST, LPUART1, PWR, SYSCFG, TIM1, TIM2,
-    TIM5,
+    TIM5, USART3,
 };
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR};
 use crate::rules::Rule;
@@ -31,6 +31,7 @@ pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
         }
         PWR => ("PWR", APB1ENR1, 28),
         LPUART1 => ("LPUART1", APB1ENR2, 0),
+        USART3 => ("USART3", APB1ENR1, 18),
         SYSCFG => ("SYSCFG", APB2ENR, 0),
         DAC1 => ("DAC1", AHB2ENR, 16),
         DAC3 => ("DAC3", AHB2ENR, 18),

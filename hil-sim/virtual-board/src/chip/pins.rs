@@ -25,6 +25,10 @@ pub const ENCODER: [Signal; 2] = [("TIM2_CH1", "A0:1 A5:1 A15:1"), ("TIM2_CH2", 
 /// The console.
 pub const SERIAL: [Signal; 2] =
     [("LPUART1_TX", "A2:12 B11:8 C1:8"), ("LPUART1_RX", "A3:12 B10:8 C0:8")];
+/// The field bus.
+pub const BUS: [Signal; 2] = [("USART3_TX", "B9:7 B10:7 C10:7"), ("USART3_RX", "B8:7 B11:7 C11:7")];
+/// The pin that enables the driver of the bus.
+const BUS_DRIVER: Pin = (2, 12);
 /// The pins of the channels of ADC1 and ADC2 from channel 1 on; `-` is inside the chip.
 const ANALOG: [&str; 2] = [
     "A0 A1 A2 A3 B14 C0 C1 C2 C3 F0 B12 B1 - B11 B0",
@@ -87,6 +91,22 @@ impl Chip {
     /// A byte was given to the port.
     pub(super) fn check_serial_pin(&mut self) {
         self.require_pin(SERIAL[0], "LPUART1_TDR is written");
+    }
+
+    /// Whether the transceiver of the bus drives the line.
+    pub(super) fn drives_bus(&self) -> bool {
+        self.gpio[BUS_DRIVER.0].pad(BUS_DRIVER.1) == Pad::Output(true)
+    }
+
+    /// A byte was given to the port of the bus.
+    pub(super) fn check_bus_pins(&mut self) {
+        for signal in BUS {
+            self.require_pin(signal, "USART3_TDR is written");
+        }
+        let drives = self.drives_bus();
+        self.rules.require(drives, Rule::BusDriver, || {
+            "USART3_TDR is written with PC12 not high".to_owned()
+        });
     }
 
     /// Channels were converted.

@@ -71,6 +71,7 @@ pub struct Inputs {
 pub struct Session {
     board: Board,
     pty: Pty,
+    bus: Pty,
     inputs: Inputs,
     typed: Assembler,
     said: Assembler,
@@ -88,10 +89,11 @@ pub struct Session {
 
 impl Session {
     /// A session with a board that has just been powered.
-    pub fn new(board: Board, pty: Pty, inputs: Inputs) -> Self {
+    pub fn new(board: Board, pty: Pty, bus: Pty, inputs: Inputs) -> Self {
         Self {
             board,
             pty,
+            bus,
             inputs,
             typed: Assembler::default(),
             said: Assembler::default(),
@@ -171,6 +173,8 @@ impl Session {
         }
         let typed = self.pty.read()?;
         self.send(&typed);
+        let asked = self.bus.read()?;
+        self.board.send_bus(&asked);
         // Without the terminal, script and pseudo-terminal go on.
         while let Ok(line) = self.inputs.terminal.try_recv() {
             if let Some(end) = self.enter(&line) {
@@ -274,7 +278,9 @@ impl Session {
         for line in self.said.push(&bytes) {
             self.add(Source::Said, line);
         }
-        self.pty.write(&bytes)
+        self.pty.write(&bytes)?;
+        let answered = self.board.take_bus();
+        self.bus.write(&answered)
     }
 
     fn add(&mut self, source: Source, text: String) {

@@ -1,0 +1,309 @@
+//! The field bus of the image: a master that these tests write starts, runs, reads and stops the drive, and the rotor of
+//! the simulated motor shows it.
+
+use std::f64::consts::TAU;
+
+use anyhow::{Context, Result, ensure};
+use hil_sim::Config;
+use hil_sim::config::LoadMode;
+use virtual_board::{Board, Image, Options};
+
+/// Periods from a frame to the end of its answer: 8 bytes, 3.5 characters of silence, and 30 bytes at 19 200 bit/s are 27 ms.
+const ANSWERED: u64 = 240;
+/// The same at 115 200 bit/s.
+const ANSWERED_FAST: u64 = 60;
+/// Largest time from the end of a frame to the first byte of its answer, s: the silence of 2.03 ms, the interrupts, a
+/// pass of the main loop, and the byte itself, 0.57 ms.
+const LATEST_S: f64 = 0.004;
+const COMMAND: u16 = 0x2000;
+const STATUS: u16 = 0x2101;
+/// Operation enabled, by the bus.
+const RUNS: u16 = 0x503;
+const SERVER_FAILURE: u8 = 4;
+
+fn crc(bytes: &[u8]) -> [u8; 2] {
+    let mut crc = 0xffff_u16;
+    for byte in bytes {
+        crc ^= u16::from(*byte);
+        for _ in 0..8 {
+            crc = crc >> 1 ^ if crc & 1 == 1 { 0xa001 } else { 0 };
+        }
+    }
+    crc.to_le_bytes()
+}
+
+fn framed(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc(bytes)].concat()
+}
+
+/// A board with a free shaft, and the master of its bus.
+struct Master {
+    board: Board,
+    answered: u64,
+}
+
+impl Master {
+    /// A board that has started, and was told these lines.
+    fn new(lines: &[&str]) -> Result<Self> {
+        let mut config = Config::default();
+        config.load.mode = LoadMode::Free;
+        config.drive.injection.synchronous.allow_unlearned = true;
+        let board = Board::new(Image::built()?, Options::new(&config, 7))?;
+        let mut master = Self { board, answered: ANSWERED };
+        master.until_said("last run")?;
+        for line in lines {
+            master.board.type_line(line);
+            master.until_said("ok")?;
+        }
+        Ok(master)
+    }
+
+    fn until_said(&mut self, text: &str) -> Result<String> {
+        let mut said = String::new();
+        for _ in 0..300 {
+            self.board.run_periods(100)?;
+            said += &self.board.take_console();
+            if said.contains(text) && said.ends_with('\n') {
+                return Ok(said);
+            }
+        }
+        anyhow::bail!("no {text:?} in {said:?}")
+    }
+
+    /// Sends bytes; what the board sends meanwhile.
+    fn send(&mut self, frame: &[u8]) -> Result<Vec<u8>> {
+        self.board.send_bus(frame);
+        self.board.run_periods(self.answered)?;
+        Ok(self.board.take_bus())
+    }
+
+    /// Sends a request to slave 1; its answer without address and checksum, which are checked.
+    fn ask(&mut self, pdu: &[u8]) -> Result<Vec<u8>> {
+        let answer = self.send(&framed(&[&[1], pdu].concat()))?;
+        let body = answer.len().checked_sub(2).context("no answer")?;
+        ensure!(answer[0] == 1 && answer[body..] == crc(&answer[..body]), "{answer:x?}");
+        Ok(answer[1..body].to_vec())
+    }
+
+    fn read(&mut self, at: u16, count: u8) -> Result<Vec<u16>> {
+        let [high, low] = at.to_be_bytes();
+        let answer = self.ask(&[3, high, low, 0, count])?;
+        ensure!(answer.len() == 2 + 2 * usize::from(count) && answer[0] == 3, "{answer:x?}");
+        Ok(answer[2..].chunks(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
+    }
+
+    /// Writes a register: the exception, if there is one.
+    fn write(&mut self, at: u16, word: u16) -> Result<Option<u8>> {
+        let request = [&[6], &at.to_be_bytes()[..], &word.to_be_bytes()].concat();
+        let answer = self.ask(&request)?;
+        ensure!(answer == request || answer[0] == 0x86, "{answer:x?}");
+        Ok((answer[0] == 0x86).then(|| answer[1]))
+    }
+
+    /// Goes on for some time, while a read keeps the bus alive.
+    fn run(&mut self, seconds: f64) -> Result<()> {
+        for _ in 0..(seconds / 0.25) as u32 {
+            self.read(STATUS, 1)?;
+            self.board.run_periods(1500 - self.answered)?;
+        }
+        Ok(())
+    }
+
+    fn rpm(&self) -> f64 {
+        self.board.plant.mechanical_speed() * 60.0 / TAU
+    }
+
+    fn outputs_on(&mut self) -> bool {
+        self.board.chip().tim1.outputs_on()
+    }
+}
+
+const BUS: [&str; 2] = ["set bus.commands bus command.timeout_s 1", "save"];
+
+/// Start, run to speed, read, reverse, stop: 5 Hz of two pole pairs are 150 rpm. The speed of the simulated rotor within 3 % is
+/// what the drive reaches without a sensor; the registers agree with it within 3 % and a count.
+#[test]
+fn the_bus_starts_runs_reads_and_stops_the_drive() -> Result<()> {
+    let mut master = Master::new(&BUS)?;
+    // Ready to switch on, quick stop not active, dc link there, remote.
+    assert_eq!(master.read(0x6041, 1)?, [0x231]);
+    // `speed.limit_rpm` of the image, 0.01 Hz.
+    let settings = induction_drive::board::settings();
+    let largest = settings.speed_limit_rpm() * f32::from(settings.motor.pole_pairs) / 0.6;
+    assert_eq!(master.read(0x211b, 1)?, [largest.round() as u16]);
+    // Command and frequency in one block.
+    let answer = master.ask(&[16, 0x20, 0, 0, 2, 4, 0, 18, 500_u16.to_be_bytes()[0], 244])?;
+    assert_eq!(answer, [16, 0x20, 0, 0, 2]);
+    master.run(4.5)?;
+    let rpm = master.rpm();
+    assert!((rpm / 150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
+    let page = master.read(0x2100, 13)?;
+    println!("{rpm:.2} rpm at the rotor; 0x2100: {page:?}");
+    assert_eq!((page[0], page[1], page[2]), (0, RUNS, 500));
+    assert!((f64::from(page[3]) - 500.0).abs() < 20.0, "output frequency {}", page[3]);
+    assert!((f64::from(page[5]) - 3110.0).abs() < 60.0, "dc link {}", page[5]);
+    for n in [7, 12] {
+        assert!((f64::from(page[n]) - rpm).abs() < 0.03 * rpm + 1.0, "{} rpm", page[n]);
+    }
+    // Holes read as 0.
+    assert_eq!(page[8..11], [0, 0, 0]);
+    // Operation enabled, target reached.
+    assert_eq!(master.read(0x6041, 1)?, [0x637]);
+    assert_eq!(master.write(COMMAND, 34)?, None);
+    master.run(3.5)?;
+    let rpm = master.rpm();
+    assert!((rpm / -150.0 - 1.0).abs() < 0.03, "{rpm} rpm");
+    assert_eq!(master.read(STATUS, 1)?, [RUNS | 3 << 3]);
+    // Settings are not written meanwhile.
+    let set = [16, 0x40, 0, 0, 2, 4, 0x40, 0xb0, 0, 0];
+    assert_eq!(master.ask(&set)?, [0x90, SERVER_FAILURE]);
+    assert_eq!(master.write(COMMAND, 1)?, None);
+    master.run(1.0)?;
+    assert!(!master.outputs_on());
+    assert_eq!(master.read(STATUS, 1)?, [0x500]);
+    assert!(master.board.resets.is_empty());
+    Ok(())
+}
+
+/// The answer begins within the bound behind the request, its bytes have no gap that ends a frame, and the line is free
+/// again behind it.
+#[test]
+fn the_answer_comes_at_once_and_in_one_piece() -> Result<()> {
+    let mut master = Master::new(&[])?;
+    let request = framed(&[1, 3, 0x21, 0, 0, 13]);
+    for _ in 0..20 {
+        let byte_s = master.board.chip().usart3.byte() as f64 / 170e6;
+        let end = master.board.time() + byte_s * request.len() as f64;
+        master.board.send_bus(&request);
+        master.board.run_periods(ANSWERED)?;
+        let sent = std::mem::take(&mut master.board.chip().usart3.line.from_chip);
+        let times: Vec<_> = sent.iter().map(|(ticks, _)| *ticks as f64 / 170e6).collect();
+        assert_eq!(sent.len(), 5 + 26);
+        assert!((end..end + LATEST_S).contains(&times[0]), "{} s behind", times[0] - end);
+        // 1.5 characters.
+        assert!(times.windows(2).all(|pair| pair[1] - pair[0] < 2.5 * byte_s));
+        // PC12.
+        let driver = master.board.chip().gpio[2].pad(12);
+        assert_eq!(driver, virtual_board::periph::gpio::Pad::Output(false));
+    }
+    Ok(())
+}
+
+/// The console stops the drive although the bus commands, and a master that repeats its run command does not start it before
+/// it has written a stop. Without frames the drive stops after the time-out of commands.
+#[test]
+fn one_commands_anybody_stops_and_a_lost_bus_stops_the_drive() -> Result<()> {
+    let mut master = Master::new(&[])?;
+    assert_eq!(master.write(COMMAND, 18)?, Some(SERVER_FAILURE));
+    assert!(master.until_said("bus: ")?.contains("bus: refused: the console commands"));
+    let mut master = Master::new(&BUS)?;
+    master.board.type_line("start");
+    assert!(master.until_said("error")?.contains("error: the bus commands"));
+    for last in ["stop", "silence"] {
+        assert_eq!(master.write(COMMAND, 1)?, None);
+        assert_eq!(master.write(COMMAND, 18)?, None);
+        assert_eq!(master.write(0x2001, 300)?, None);
+        master.run(3.0)?;
+        assert!(master.outputs_on() && master.rpm() > 60.0, "{} rpm", master.rpm());
+        if last == "stop" {
+            master.board.type_line("stop");
+            master.run(1.0)?;
+        } else {
+            // The time-out of 1 s, then the torque goes to zero, at once without load.
+            master.board.run_periods(6000 * 3 / 4)?;
+            assert!(master.outputs_on());
+            master.board.run_periods(6000 * 3 / 4)?;
+        }
+        assert!(!master.outputs_on(), "{last}");
+        assert_eq!(master.write(COMMAND, 18)?, Some(SERVER_FAILURE), "{last}");
+        assert!(!master.outputs_on());
+    }
+    Ok(())
+}
+
+/// Rate, format and address are settings; what comes with another parity is not taken.
+#[test]
+fn rate_format_and_address_follow_the_settings() -> Result<()> {
+    let mut master = Master::new(&["set bus.address 9 bus.baud 115200 bus.parity 8n2", "apply"])?;
+    // 11 bits.
+    assert_eq!(master.board.chip().usart3.byte(), 11 * 1476);
+    let request = framed(&[9, 3, 0x20, 0, 0, 1]);
+    assert_eq!(master.send(&request)?, framed(&[9, 3, 2, 0, 1]));
+    assert!(master.ask(&[3, 0x20, 0, 0, 1]).is_err(), "address 1");
+    let mut master = Master::new(&[])?;
+    let chip = master.board.chip();
+    let request: Vec<_> = framed(&[1, 3, 0x20, 0, 0, 1]).into_iter().map(u16::from).collect();
+    chip.usart3.line.to_chip.extend(&request);
+    chip.usart3.line.to_chip[3] |= virtual_board::periph::usart::WRONG_PARITY;
+    chip.usart3.wake(chip.now);
+    assert!(master.send(&[])?.is_empty());
+    // The next is.
+    assert_eq!(master.read(COMMAND, 1)?, [1]);
+    Ok(())
+}
+
+/// Settings as floats: written, read back, refused out of range, put in force and saved; they outlast a reset.
+#[test]
+fn settings_are_written_and_saved() -> Result<()> {
+    let mut master = Master::new(&BUS)?;
+    let read = |master: &mut Master| -> Result<f32> {
+        let words = master.read(0x4000, 2)?;
+        Ok(f32::from_bits(u32::from(words[0]) << 16 | u32::from(words[1])))
+    };
+    assert_eq!(read(&mut master)?, 5.4);
+    let write = |ohm: f32| [&[16, 0x40, 0, 0, 2, 4][..], &ohm.to_be_bytes()].concat();
+    assert_eq!(master.ask(&write(5.5))?, [16, 0x40, 0, 0, 2]);
+    assert_eq!(master.ask(&write(1e9))?, [0x90, 3]);
+    assert_eq!(master.read(0x4fff, 1)?, [1], "staged");
+    assert_eq!(master.write(0x4fff, 2)?, None);
+    // The design of the controllers.
+    master.board.run_periods(18_000)?;
+    assert_eq!((read(&mut master)?, master.read(0x4fff, 1)?), (5.5, vec![0]));
+    master.board.reset(virtual_board::periph::Reset::Pin);
+    master.until_said("last run")?;
+    assert_eq!(read(&mut master)?, 5.5);
+    Ok(())
+}
+
+/// Frames of noise, and valid requests with changed bits, among valid ones: no reset, no effect of what is not valid, an
+/// answer to what is.
+#[test]
+fn three_thousand_frames_of_noise() -> Result<()> {
+    let mut master = Master::new(&["set bus.commands bus bus.baud 115200", "save"])?;
+    master.answered = ANSWERED_FAST;
+    let mut seed = 19_u64;
+    let mut random = move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        (seed >> 32) as u32
+    };
+    let (mut answered, mut ignored) = (0, 0);
+    for n in 0..3000 {
+        let mut frame = match n % 3 {
+            0 => (0..random() % 60).map(|_| random() as u8).collect(),
+            1 => framed(&[1, 3, 0x21, 0, 0, 1]),
+            // Would start the drive.
+            _ => framed(&[1, 6, 0x20, 0, 0, 18]),
+        };
+        if n % 3 == 2 || (n % 3 == 1 && random() % 2 == 0) {
+            let place = random() as usize % frame.len();
+            frame[place] ^= 1 << (random() % 8);
+        }
+        let body = frame.len().saturating_sub(2);
+        let valid = body > 1 && frame[0] == 1 && frame[body..] == crc(&frame[..body]);
+        let answer = master.send(&frame)?;
+        assert_eq!(answer.is_empty(), !valid, "{frame:x?} gave {answer:x?}");
+        if valid {
+            answered += 1
+        } else {
+            ignored += 1
+        }
+        assert!(!master.outputs_on(), "{frame:x?}");
+    }
+    println!("{answered} answered, {ignored} ignored");
+    assert!(answered > 400 && ignored > 2000 && master.board.resets.is_empty());
+    assert_eq!(master.read(COMMAND, 3)?, [1, 0, 0]);
+    assert_eq!(master.read(0x4fff, 1)?, [0]);
+    Ok(())
+}

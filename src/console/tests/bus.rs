@@ -1,0 +1,270 @@
+//! The bus beside the console.
+
+use std::collections::VecDeque;
+
+use super::*;
+use crate::modbus::{self, Frame};
+use crate::settings::bus::{Baud, Format};
+
+/// The port of the bus.
+#[derive(Default)]
+struct FakeBus {
+    asked: VecDeque<Frame>,
+    answers: VecDeque<Frame>,
+    line: Option<(Baud, Format)>,
+}
+
+impl modbus::Port for FakeBus {
+    fn set_line(&mut self, baud: Baud, format: Format) {
+        self.line = Some((baud, format));
+    }
+    fn receive(&mut self) -> Option<Frame> {
+        self.asked.pop_front()
+    }
+    fn send(&mut self, frame: &Frame) {
+        self.answers.push_back(frame.clone());
+    }
+}
+
+/// A console with a bus; the bus commands if `lines` say so.
+struct Both {
+    talk: Talk,
+    bus: FakeBus,
+}
+
+impl Both {
+    fn new(lines: &str) -> Self {
+        let mut talk = Talk::new();
+        talk.say(lines);
+        talk.drive.commands.clear();
+        Self { talk, bus: FakeBus::default() }
+    }
+
+    fn by_bus() -> Self {
+        Self::new("set bus.commands bus\napply\n")
+    }
+
+    fn serve(&mut self) {
+        self.talk.console.serve(&mut self.bus, &mut self.talk.drive, self.talk.now_ms);
+    }
+
+    /// The answer to a request: without address and checksum.
+    fn ask(&mut self, pdu: &[u8]) -> Vec<u8> {
+        let body = [&[1], pdu].concat();
+        let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
+        self.bus.asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+        self.serve();
+        let answer = self.bus.answers.pop_front().expect("an answer");
+        answer[1..answer.len() - 2].to_vec()
+    }
+
+    /// Writes a register: the exception, 0 if there is none.
+    fn write(&mut self, at: u16, word: u16) -> u8 {
+        let pdu = [&[6], &at.to_be_bytes()[..], &word.to_be_bytes()].concat();
+        let answer = self.ask(&pdu);
+        if answer == pdu { 0 } else { answer[1] }
+    }
+
+    fn read(&mut self, at: u16) -> u16 {
+        let [high, low] = at.to_be_bytes();
+        let answer = self.ask(&[3, high, low, 0, 1]);
+        assert_eq!(answer[..2], [3, 2]);
+        u16::from_be_bytes([answer[2], answer[3]])
+    }
+
+    /// Stages a setting, by its name.
+    fn set(&mut self, name: &str, value: f32) -> u8 {
+        let place = keys::all().position(|key| key.name() == name).unwrap() as u16;
+        let at = (0x4000 + 2 * place).to_be_bytes();
+        let answer = self.ask(&[&[16], &at[..], &[0, 2, 4], &value.to_be_bytes()].concat());
+        if answer[0] == 16 { 0 } else { answer[1] }
+    }
+}
+
+#[test]
+fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
+    let mut both = Both::new("");
+    for (at, word) in
+        [(0x2000, 18), (0x2000, 34), (0x2001, 500), (0x2002, 2), (0x4fff, 1), (0x2000, 16)]
+    {
+        assert_eq!(both.write(at, word), 4, "{at:#x} {word}");
+    }
+    assert_eq!(both.set("motor.r_s", 5.5), 4);
+    assert!(both.talk.drive.commands.is_empty());
+    // A refusal that is repeated is told once.
+    let said = both.talk.say("");
+    let words = "bus: refused: the console commands: `set bus.commands bus` lets the bus";
+    assert_eq!(said.iter().filter(|line| *line == words).count(), 1, "{said:?}");
+    assert!(ANNOUNCEMENTS.iter().any(|first| words.starts_with(first)));
+    // Switch on disabled, and not remote.
+    assert_eq!((both.read(0x6041) & 0x26f, both.read(0x5009)), (0x40, 0));
+    // The release that LinuxCNC writes all the time does not stop the console's run; a stop does.
+    both.talk.say("start speed\n");
+    assert_eq!((both.write(0x2000, 0), both.write(0x2000, 1)), (0, 0));
+    assert_eq!(both.talk.drive.commands, [Command::Start(Mode::Speed), Command::Stop]);
+}
+
+#[test]
+fn the_bus_commands_with_frequencies() {
+    let mut both = Both::by_bus();
+    assert_eq!(both.bus.line, None);
+    for line in ["start", "torque 1", "speed 1", "position 1", "relock", "learn", "commission"] {
+        assert!(both.talk.ask(line).starts_with("error: the bus commands"), "{line}");
+    }
+    assert_eq!(both.read(0x6041) & 0x26f, 0x221, "ready to switch on, remote");
+    assert_eq!(both.bus.line, Some((Baud::B19200, Format::Even)));
+    // The frequency first, as grblHAL does; then a run, which is repeated.
+    assert_eq!((both.write(0x2001, 250), both.write(0x2000, 18)), (0, 0));
+    both.serve();
+    assert_eq!((both.write(0x2000, 18), both.read(0x2000)), (0, 18));
+    assert_eq!(both.write(0x2001, 500), 0);
+    assert_eq!((both.write(0x2000, 34), both.read(0x2000)), (0, 34));
+    // Only the direction; both directions turn it round.
+    assert_eq!((both.write(0x2000, 16), both.write(0x2000, 0x32)), (0, 0));
+    assert_eq!(both.write(0x2000, 1), 0);
+    let speed = Command::Speed;
+    // 60 / 2 pole pairs.
+    let given = [speed(75.0), speed(150.0), speed(-150.0), speed(150.0), speed(-150.0)];
+    let commands = &both.talk.drive.commands;
+    assert_eq!(commands[0], Command::Start(Mode::Speed));
+    assert_eq!(commands[1..6], given);
+    assert_eq!(commands[6..], [Command::Stop]);
+    // A jog, bits of no meaning, an external fault.
+    for (at, word) in [(0x2000, 3), (0x2000, 0x80), (0x2002, 1)] {
+        assert_eq!(both.write(at, word), 3, "{at:#x} {word}");
+    }
+    // Read-only, and nowhere.
+    assert_eq!((both.write(0x2103, 0), both.write(0x3000, 0)), (2, 2));
+}
+
+#[test]
+fn a_stop_from_elsewhere_holds_until_the_bus_writes_a_stop() {
+    let mut both = Both::by_bus();
+    both.write(0x2000, 18);
+    both.serve();
+    assert_eq!(both.talk.ask("stop"), "ok");
+    both.serve();
+    assert_eq!((both.write(0x2000, 18), both.read(0x2000)), (4, 1));
+    assert!(both.talk.say("").concat().contains("stopped for another reason: write a stop first"));
+    assert_eq!((both.write(0x2000, 0), both.write(0x2000, 18)), (0, 0));
+    assert_eq!(both.talk.drive.drive.state(), State::Calibrating);
+}
+
+#[test]
+fn silence_of_the_one_that_commands_stops_the_drive() {
+    let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
+    both.write(0x2000, 18);
+    // The console does not keep it alive.
+    for _ in 0..15 {
+        both.talk.now_ms += 100;
+        both.talk.ask("status");
+        both.serve();
+    }
+    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop));
+    // Reads do.
+    let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
+    both.write(0x2000, 18);
+    for _ in 0..15 {
+        both.talk.now_ms += 100;
+        both.read(0x2101);
+        both.talk.poll();
+    }
+    assert!(!both.talk.drive.commands.contains(&Command::Stop));
+    // Frames of others do not.
+    for _ in 0..15 {
+        both.talk.now_ms += 100;
+        let other = [2, 3, 0x20, 0, 0, 1];
+        let sum = modbus_core::rtu::crc16(&other).to_be_bytes();
+        both.bus.asked.push_back(Frame::from_slice(&[&other[..], &sum].concat()).unwrap());
+        both.serve();
+        both.talk.poll();
+    }
+    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop));
+}
+
+#[test]
+fn settings_by_the_bus_go_the_way_of_the_console() {
+    let mut both = Both::by_bus();
+    assert_eq!((both.set("motor.r_s", 5.5), both.read(0x4fff)), (0, 1));
+    assert_eq!(
+        both.talk.ask("get motor.r_s"),
+        "motor.r_s = 5.5 ohm (0.001 to 1000); staged, in force: 5.4; stator resistance of a phase"
+    );
+    // Out of range, no number, no whole number, no such word, of the board; nothing of it is staged.
+    for (name, value) in [
+        ("motor.r_s", 1e9),
+        ("motor.r_s", f32::NAN),
+        ("motor.pole_pairs", 1.5),
+        ("angle_source", 2.0),
+        ("bus.address", 0.0),
+        ("board.confirmed", 0.0),
+    ] {
+        assert_eq!(both.set(name, value), 3, "{name} {value}");
+    }
+    assert_eq!(both.read(0x4fff), 1);
+    // Half a setting.
+    assert_eq!(
+        (both.write(0x4000, 0), both.ask(&[16, 0x40, 1, 0, 2, 4, 0, 0, 0, 0])),
+        (3, vec![0x90, 3])
+    );
+    // A start puts it in force: taken at once, done behind the answer, and the console hears nothing.
+    both.talk.say("");
+    assert_eq!((both.write(0x2001, 300), both.write(0x2000, 18)), (0, 0));
+    assert!(both.talk.drive.commands.is_empty());
+    assert_eq!(both.talk.say(""), [""; 0]);
+    // What came meanwhile is not answered: the master has given it up.
+    let sum = modbus_core::rtu::crc16(&[1, 8, 0, 0, 1, 2]).to_be_bytes();
+    both.bus.asked.push_back(Frame::from_slice(&[&[1, 8, 0, 0, 1, 2], &sum[..]].concat()).unwrap());
+    both.serve();
+    assert!(both.bus.asked.is_empty() && both.bus.answers.is_empty());
+    let started = &both.talk.drive.commands[1..];
+    assert_eq!(started, [Command::Start(Mode::Speed), Command::Speed(90.0)]);
+    // Not while it runs; dropped, set to `auto` again and saved while it is off.
+    assert_eq!((both.set("motor.r_s", 5.4), both.write(0x4fff, 1)), (4, 4));
+    both.write(0x2000, 1);
+    assert_eq!(
+        (both.set("limits.trip_a", 4.0), both.write(0x4fff, 3), both.read(0x4fff)),
+        (0, 0, 0)
+    );
+    assert_eq!((both.set("limits.trip_a", f32::NAN), both.write(0x4fff, 2)), (0, 0));
+    both.serve();
+    assert_eq!(both.talk.drive.saved.unwrap().drive.motor.r_s, 5.5);
+    assert_eq!(both.write(0x4fff, 9), 3);
+}
+
+#[test]
+fn faults_are_listed_and_cleared() {
+    let mut both = Both::by_bus();
+    both.talk.now_ms = 12_345;
+    both.write(0x2000, 18);
+    // Pulled by the power stage.
+    let sample = Sample { hardware: Hardware::BREAK, ..both.talk.drive.sample };
+    both.talk.drive.drive.step(&sample);
+    let State::Fault(fault) = both.talk.drive.drive.state() else { panic!() };
+    let code = u16::from(fault.code());
+    assert_eq!((both.read(0x2100), both.read(0x603f)), (code, 0xff00 | code));
+    assert_eq!((both.read(0x5100), both.read(0x5102), both.read(0x5103)), (code, 12, 0));
+    assert_eq!(both.read(0x6041) & 0x4f, 8);
+    assert_eq!(both.write(0x2000, 18), 4, "latched");
+    assert_eq!((both.write(0x2002, 2), both.read(0x2100)), (0, 0));
+    // Cleared, and stopped before the next run.
+    assert_eq!((both.write(0x2000, 18), both.write(0x2000, 1), both.write(0x2000, 18)), (4, 0, 0));
+    assert_eq!(both.read(0x5100), code);
+}
+
+proptest! {
+    /// Whatever frames come, the slave answers afterwards, and only the commander starts the drive.
+    #[test]
+    fn any_frames_leave_a_bus_that_answers(frames: Vec<(u8, Vec<u8>)>, by_bus: bool) {
+        let mut both = if by_bus { Both::by_bus() } else { Both::new("") };
+        for (function, rest) in frames {
+            let body = [&[1, function % 20], &rest[..rest.len().min(250)]].concat();
+            let sum = modbus_core::rtu::crc16(&body).to_be_bytes();
+            both.bus.asked.push_back(Frame::from_slice(&[&body[..], &sum].concat()).unwrap());
+            both.serve();
+        }
+        both.bus.answers.clear();
+        prop_assert!(by_bus || both.talk.drive.drive.state() == State::Off);
+        prop_assert_eq!(both.write(0x2000, 1), 0);
+    }
+}

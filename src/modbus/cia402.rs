@@ -1,0 +1,90 @@
+//! The state of the drive under the names of CiA 402 (IEC 61800-7-201), and its status word.
+
+use drive_core::State;
+
+/// A state of the CiA 402 state machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Power {
+    /// The control does not run.
+    NotReadyToSwitchOn,
+    /// Off, and the bus cannot start the drive.
+    SwitchOnDisabled,
+    /// Off; a run command starts the drive.
+    ReadyToSwitchOn,
+    /// The start is under way.
+    SwitchedOn,
+    /// The drive regulates, learns or measures.
+    OperationEnabled,
+    /// The drive is stopping.
+    QuickStopActive,
+    /// Off with a latched fault.
+    Fault,
+}
+
+impl Power {
+    /// All, in the order of the state machine.
+    pub const ALL: [Self; 7] = [
+        Self::NotReadyToSwitchOn,
+        Self::SwitchOnDisabled,
+        Self::ReadyToSwitchOn,
+        Self::SwitchedOn,
+        Self::OperationEnabled,
+        Self::QuickStopActive,
+        Self::Fault,
+    ];
+
+    /// The state of a drive; `startable` tells whether the bus may start it.
+    pub fn of(state: Option<State>, startable: bool) -> Self {
+        match state {
+            None => Self::NotReadyToSwitchOn,
+            Some(State::Off) if startable => Self::ReadyToSwitchOn,
+            Some(State::Off) => Self::SwitchOnDisabled,
+            Some(
+                State::Calibrating
+                | State::Precharge
+                | State::CheckingWiring
+                | State::Catching
+                | State::Magnetising
+                | State::Verifying,
+            ) => Self::SwitchedOn,
+            Some(
+                State::Torque | State::Speed | State::Position | State::Learning | State::Exciting,
+            ) => Self::OperationEnabled,
+            Some(State::Stopping) => Self::QuickStopActive,
+            Some(State::Fault(_)) => Self::Fault,
+        }
+    }
+
+    /// Name in the standard.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotReadyToSwitchOn => "not ready to switch on",
+            Self::SwitchOnDisabled => "switch on disabled",
+            Self::ReadyToSwitchOn => "ready to switch on",
+            Self::SwitchedOn => "switched on",
+            Self::OperationEnabled => "operation enabled",
+            Self::QuickStopActive => "quick stop active",
+            Self::Fault => "fault",
+        }
+    }
+
+    /// Bits 0 to 3, 5 and 6 of the status word.
+    pub const fn bits(self) -> u16 {
+        match self {
+            Self::NotReadyToSwitchOn => 0x00,
+            Self::SwitchOnDisabled => 0x40,
+            Self::ReadyToSwitchOn => 0x21,
+            Self::SwitchedOn => 0x23,
+            Self::OperationEnabled => 0x27,
+            Self::QuickStopActive => 0x07,
+            Self::Fault => 0x08,
+        }
+    }
+}
+
+/// Bit of the status word: the dc link is above its lower limit.
+pub const VOLTAGE_ENABLED: u16 = 1 << 4;
+/// Bit of the status word: the bus commands.
+pub const REMOTE: u16 = 1 << 9;
+/// Bit of the status word: the speed is within 1 % of `speed.limit_rpm` of its reference.
+pub const TARGET_REACHED: u16 = 1 << 10;

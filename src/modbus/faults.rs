@@ -1,0 +1,40 @@
+//! The last faults since the start.
+
+use drive_core::State;
+use heapless::Deque;
+
+/// Faults that are kept.
+pub const KEPT: usize = 8;
+
+/// The last faults.
+pub struct FaultLog {
+    /// Code and time since the start, s; the newest first.
+    entries: Deque<(u8, u32), KEPT>,
+    faulty: bool,
+}
+
+impl FaultLog {
+    /// No fault so far.
+    pub const fn new() -> Self {
+        Self { entries: Deque::new(), faulty: false }
+    }
+
+    /// Notes a fault when the state becomes one, `seconds` after the start.
+    pub fn watch(&mut self, state: State, seconds: u32) {
+        let was = core::mem::replace(&mut self.faulty, matches!(state, State::Fault(_)));
+        if let State::Fault(fault) = state
+            && !was
+        {
+            if self.entries.is_full() {
+                self.entries.pop_back();
+            }
+            // There is room.
+            let _ = self.entries.push_front((fault.code(), seconds));
+        }
+    }
+
+    /// Code and time of the fault with this number, 0 the newest; zeros if there is none.
+    pub fn get(&self, number: usize) -> (u8, u32) {
+        self.entries.iter().nth(number).copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,370 @@
+//! The registers that the master reads: a table from which the manual's is made.
+//!
+//! A value of 32 bits takes two registers, the upper half first; a setting is a float, see [`float`](super::float).
+
+use drive_core::State;
+use drive_core::io::PERIOD_S;
+use drive_core::settings::value::Words as _;
+use modbus_core::Exception;
+
+use super::cia402::{self, Power};
+use super::faults::{self, FaultLog};
+use super::float::to_float;
+use crate::hash;
+use crate::link::Status;
+use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
+use crate::settings::keys;
+
+/// The command; see the manual.
+pub const COMMAND: u16 = 0x2000;
+/// The frequency that is asked for, 0.01 Hz.
+pub const FREQUENCY: u16 = 0x2001;
+/// Bit 1 clears the latched fault.
+pub const RESET: u16 = 0x2002;
+/// The first setting; two registers each.
+pub const SETTINGS: u16 = 0x4000;
+/// Order about the staged settings: 1 puts them in force, 2 also saves, 3 drops them.
+pub const STAGED: u16 = 0x4fff;
+/// The faults since the start, the newest first: code, and seconds since the start.
+pub const FAULTS: u16 = 0x5100;
+/// Registers of a fault.
+const PER_FAULT: u16 = 3;
+const FAULTS_END: u16 = FAULTS + PER_FAULT * faults::KEPT as u16;
+/// End of the settings.
+pub const SETTINGS_END: u16 = SETTINGS + 2 * keys::COUNT as u16;
+const _: () = assert!(SETTINGS_END <= STAGED);
+
+/// Pages: what lies in one and has no meaning reads as 0, so that a block may have holes.
+const PAGES: [(u16, u16); 6] = [
+    (0x0000, 0x01ff),
+    (0x2000, 0x21ff),
+    (SETTINGS, SETTINGS_END - 1),
+    (STAGED, STAGED),
+    (0x5000, 0x51ff),
+    (0x6000, 0x60ff),
+];
+
+/// Bits of the register 0x2101.
+const STATE_RUNS: u16 = 0b11;
+const STATE_STARTS: u16 = 0b10;
+const STATE_STOPS: u16 = 0b01;
+const TURNS_REVERSE: u16 = 0b11 << 3;
+const BY_BUS: u16 = 1 << 8 | 1 << 10;
+
+/// Speed counts as reached within this share of the largest.
+const REACHED: f32 = 0.01;
+
+/// What the registers show.
+pub struct View<'a> {
+    /// Last report of the control; `None` if it does not run.
+    pub status: Option<Status>,
+    /// The settings in force.
+    pub settings: &'a FirmwareSettings,
+    /// Those with what is staged.
+    pub latest: &'a FirmwareSettings,
+    /// Number of staged settings.
+    pub staged: usize,
+    /// The command in force, as it would be written.
+    pub command: u16,
+    /// The frequency asked for, 0.01 Hz.
+    pub frequency: u16,
+    /// The faults.
+    pub faults: &'a FaultLog,
+    /// Seconds since the start.
+    pub seconds: u32,
+}
+
+/// The way to a value.
+pub enum Shown {
+    /// A number in parts of its unit: 10 for 0.1.
+    Number(u16, fn(&View<'_>) -> f32),
+    /// A word.
+    Word(fn(&View<'_>) -> u16),
+    /// 32 bits.
+    Double(fn(&View<'_>) -> u32),
+}
+
+/// A register, or two.
+pub struct Row {
+    /// Number of the (first) register.
+    pub at: u16,
+    /// Whether it can be written.
+    pub written: bool,
+    /// Unit; empty if there is none.
+    pub unit: &'static str,
+    /// Its value.
+    pub shown: Shown,
+    /// Meaning, one sentence without its full stop.
+    pub help: &'static str,
+}
+
+const fn number(
+    at: u16,
+    parts: u16,
+    unit: &'static str,
+    value: fn(&View<'_>) -> f32,
+    help: &'static str,
+) -> Row {
+    Row { at, written: false, unit, shown: Shown::Number(parts, value), help }
+}
+
+const fn word(at: u16, value: fn(&View<'_>) -> u16, help: &'static str) -> Row {
+    Row { at, written: false, unit: "", shown: Shown::Word(value), help }
+}
+
+const fn double(
+    at: u16,
+    unit: &'static str,
+    value: fn(&View<'_>) -> u32,
+    help: &'static str,
+) -> Row {
+    Row { at, written: false, unit, shown: Shown::Double(value), help }
+}
+
+const fn written(row: Row) -> Row {
+    Row { written: true, ..row }
+}
+
+/// The registers but for settings and faults, by number.
+pub static ROWS: [Row; 28] = [
+    number(0x0100, 100, "Hz", |v| v.largest_hz(), "largest frequency that is asked for, as 0x211B"),
+    written(word(
+        COMMAND,
+        |v| v.command,
+        "command: 1 stop, 18 run forward, 34 run reverse, 0 release",
+    )),
+    written(number(
+        FREQUENCY,
+        100,
+        "Hz",
+        |v| f32::from(v.frequency) * 0.01,
+        "frequency that is asked for",
+    )),
+    written(word(RESET, |_| 0, "bit 1 clears the latched fault; reads as 0")),
+    word(0x2100, |v| v.fault(), "number of the latched fault, 0 for none"),
+    word(0x2101, |v| v.delta_status(), "status, see below"),
+    number(0x2102, 100, "Hz", |v| f32::from(v.frequency) * 0.01, "frequency that is asked for"),
+    number(0x2103, 100, "Hz", |v| v.output_hz(), "output frequency (of the flux), magnitude"),
+    number(0x2104, 10, "A", |v| v.current(), "current of a line, rms of the fundamental"),
+    number(0x2105, 10, "V", |v| v.dc_link(), "dc link"),
+    number(
+        0x2106,
+        10,
+        "V",
+        |v| v.voltage(),
+        "output voltage between lines, rms of the fundamental",
+    ),
+    number(0x2107, 1, "rpm", |v| v.rpm().abs(), "speed of the shaft, magnitude"),
+    number(0x210b, 1, "%", |v| v.torque(), "torque in per cent of the rated one, signed"),
+    number(0x210c, 1, "rpm", |v| v.rpm().abs(), "speed of the shaft, magnitude"),
+    number(0x210e, 1, "degC", |v| v.heat_sink(), "heat sink, signed"),
+    number(
+        0x211b,
+        100,
+        "Hz",
+        |v| v.largest_hz(),
+        "largest frequency that is asked for: `speed.limit_rpm` times pole pairs",
+    ),
+    written(word(
+        STAGED,
+        |v| v.staged as u16,
+        "number of staged settings; 1 puts them in force, 2 also saves them, 3 drops them",
+    )),
+    word(0x5000, |_| 1, "layout of the pages"),
+    double(
+        0x5001,
+        "",
+        |_| names(),
+        "hash of the settings' names: the numbers of their registers hold for this value",
+    ),
+    word(0x5003, |_| keys::COUNT as u16, "number of settings"),
+    word(
+        0x5004,
+        |_| {
+            version(env!("CARGO_PKG_VERSION_MAJOR")) << 8 | version(env!("CARGO_PKG_VERSION_MINOR"))
+        },
+        "version of the firmware: major in the upper byte, minor in the lower",
+    ),
+    word(0x5005, |_| version(env!("CARGO_PKG_VERSION_PATCH")), "its patch level"),
+    word(0x5006, |v| board(v.settings), "board, as `board` in the settings"),
+    double(0x5007, "s", |v| v.seconds, "time since the start"),
+    word(0x5009, |v| v.settings.bus.commander.place() as u16, "who commands: 0 console, 1 bus"),
+    word(0x500a, |v| v.settings.learned.is_some().into(), "1 if learned values are in force"),
+    word(0x603f, |v| v.error_code(), "fault as in CiA 402: 0xFF00 plus its number, 0 for none"),
+    word(0x6041, |v| v.status_word(), "status word of CiA 402, see below"),
+];
+
+impl View<'_> {
+    /// The word of a register.
+    ///
+    /// # Errors
+    /// [`Exception::IllegalDataAddress`] outside the pages.
+    pub fn read(&self, at: u16) -> Result<u16, Exception> {
+        if !PAGES.iter().any(|(first, last)| (*first..=*last).contains(&at)) {
+            return Err(Exception::IllegalDataAddress);
+        }
+        if (SETTINGS..SETTINGS_END).contains(&at) {
+            let key = keys::number(usize::from(at - SETTINGS) / 2);
+            let bits = key.map_or(0, |key| to_float(key, self.latest).to_bits());
+            return Ok(half(bits, at - SETTINGS));
+        }
+        if (FAULTS..FAULTS_END).contains(&at) {
+            let (code, seconds) = self.faults.get(usize::from((at - FAULTS) / PER_FAULT));
+            return Ok(match (at - FAULTS) % PER_FAULT {
+                0 => code.into(),
+                place => half(seconds, place - 1),
+            });
+        }
+        Ok(ROWS.iter().find_map(|row| row.word(at, self)).unwrap_or(0))
+    }
+
+    /// The state, if the motor has current or had it at the moment of a fault.
+    fn active(&self) -> Option<&Status> {
+        self.status.as_ref().filter(|status| status.state != State::Off)
+    }
+
+    fn largest_hz(&self) -> f32 {
+        self.settings.drive.speed_limit_rpm() * self.hz_per_rpm()
+    }
+
+    fn hz_per_rpm(&self) -> f32 {
+        f32::from(self.settings.drive.motor.pole_pairs) / 60.0
+    }
+
+    fn fault(&self) -> u16 {
+        match self.status.map(|status| status.state) {
+            Some(State::Fault(fault)) => fault.code().into(),
+            _ => 0,
+        }
+    }
+
+    fn error_code(&self) -> u16 {
+        match self.fault() {
+            0 => 0,
+            code => 0xff00 | code,
+        }
+    }
+
+    fn output_hz(&self) -> f32 {
+        self.active().map_or(0.0, |status| (status.telemetry.flux_freq / PERIOD_S).abs())
+    }
+
+    /// Of the shaft, signed.
+    fn rpm(&self) -> f32 {
+        self.active().map_or(0.0, |s| s.telemetry.rotor_freq / PERIOD_S / self.hz_per_rpm())
+    }
+
+    fn current(&self) -> f32 {
+        self.active().map_or(0.0, |status| {
+            let i = status.telemetry.current;
+            libm::sqrtf(0.5 * (i.d * i.d + i.q * i.q))
+        })
+    }
+
+    fn voltage(&self) -> f32 {
+        self.active().map_or(0.0, |status| {
+            let v = status.telemetry.voltage;
+            libm::sqrtf(1.5 * (v.d * v.d + v.q * v.q))
+        })
+    }
+
+    /// By 3/2 P L_m/L_r psi i_q (Eq. 2.7), as at the console.
+    fn torque(&self) -> f32 {
+        let (motor, plate) = (&self.settings.drive.motor, &self.settings.drive.nameplate);
+        let rated = plate.power_w / (plate.speed_rpm * core::f32::consts::TAU / 60.0);
+        self.active().map_or(0.0, |status| {
+            let i = status.telemetry.current;
+            100.0 * motor.torque_per_ampere(i.d) * i.q / rated
+        })
+    }
+
+    fn dc_link(&self) -> f32 {
+        let scales = &self.settings.drive.scales;
+        self.status.map_or(0.0, |status| scales.dc_link.at(status.sample.dc_link))
+    }
+
+    fn heat_sink(&self) -> f32 {
+        let scales = &self.settings.drive.scales;
+        self.status.map_or(0.0, |status| scales.ntc.celsius(status.sample.heat_sink))
+    }
+
+    fn power(&self) -> Power {
+        let startable =
+            self.settings.bus.commander == Commander::Bus && self.settings.board_is_confirmed();
+        Power::of(self.status.map(|status| status.state), startable)
+    }
+
+    fn delta_status(&self) -> u16 {
+        let state = match self.power() {
+            Power::OperationEnabled => STATE_RUNS,
+            Power::SwitchedOn => STATE_STARTS,
+            Power::QuickStopActive => STATE_STOPS,
+            _ => 0,
+        };
+        let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
+        let by_bus = if self.settings.bus.commander == Commander::Bus { BY_BUS } else { 0 };
+        state | reverse | by_bus
+    }
+
+    fn status_word(&self) -> u16 {
+        let mut word = self.power().bits();
+        if self.status.is_some() && self.dc_link() > self.settings.drive.dc_under_v() {
+            word |= cia402::VOLTAGE_ENABLED;
+        }
+        if self.settings.bus.commander == Commander::Bus {
+            word |= cia402::REMOTE;
+        }
+        let wanted = f32::from(self.frequency) * 0.01 / self.hz_per_rpm();
+        let error = self.rpm().abs() - wanted.min(self.settings.drive.speed_limit_rpm());
+        let near = error.abs() <= REACHED * self.settings.drive.speed_limit_rpm();
+        if near && self.status.is_some_and(|status| status.state == State::Speed) {
+            word |= cia402::TARGET_REACHED;
+        }
+        word
+    }
+}
+
+impl Row {
+    /// The word at this number, if it belongs to the row.
+    fn word(&self, at: u16, view: &View<'_>) -> Option<u16> {
+        let place = at.checked_sub(self.at).filter(|place| *place < self.words())?;
+        Some(match self.shown {
+            Shown::Number(parts, value) => counts(value(view), parts),
+            Shown::Word(value) => value(view),
+            Shown::Double(value) => half(value(view), place),
+        })
+    }
+
+    /// Number of its registers.
+    pub fn words(&self) -> u16 {
+        if matches!(self.shown, Shown::Double(_)) { 2 } else { 1 }
+    }
+}
+
+/// A number in parts of its unit, rounded; a negative one as two's complement.
+fn counts(value: f32, parts: u16) -> u16 {
+    let counts = libm::roundf(value * f32::from(parts));
+    // The casts saturate.
+    if counts < 0.0 { counts as i16 as u16 } else { counts as u16 }
+}
+
+/// The upper half of 32 bits at an even place, the lower at an odd one.
+fn half(bits: u32, place: u16) -> u16 {
+    if place.is_multiple_of(2) { (bits >> 16) as u16 } else { bits as u16 }
+}
+
+/// A part of the version.
+fn version(text: &str) -> u16 {
+    text.parse().unwrap_or(u16::MAX)
+}
+
+/// Place of the board in its list.
+fn board(settings: &FirmwareSettings) -> u16 {
+    keys::find(keys::BOARD).map_or(0, |key| to_float(key, settings) as u16)
+}
+
+/// Hash of the names of all settings, in their order.
+fn names() -> u32 {
+    hash::of(keys::all().flat_map(|key| key.name().bytes().chain([b'\n'])))
+}

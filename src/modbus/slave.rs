@@ -1,0 +1,179 @@
+//! The slave: a request frame in, the answer frame out. No hardware and no state.
+//!
+//! Functions 03 (read), 06 and 16 (write one or several), 08 with subfunction 0 (echo). `modbus-core` checks, takes apart
+//! and builds frames. Three things are done here: the function 08, which the crate does not decode; the exact lengths, since
+//! it passes over what is too much; and the frame's bounds. Its `decode_request` looks for a frame anywhere in the bytes,
+//! where an RTU frame is all between two silences, and panics on a frame that it cannot decode (0.2.0).
+
+use modbus_core::rtu::{self, Header, ResponseAdu, server};
+use modbus_core::{
+    Data, Exception, ExceptionResponse, FunctionCode, Request, Response, ResponsePdu,
+};
+
+use super::{Frame, LONGEST};
+
+/// Address of a request to all.
+const BROADCAST: u8 = 0;
+/// Most registers of a read (Modbus application protocol V1.1b3, 6.3) and of a write (6.12).
+const MOST_READ: u16 = 125;
+const MOST_WRITTEN: usize = 123;
+/// Bytes of a frame beside the function and its data: address and checksum.
+const AROUND: usize = 3;
+const DIAGNOSTICS: u8 = 8;
+/// Highest code of a function; above it stand exceptions.
+const LAST_FUNCTION: u8 = 0x7f;
+
+/// The words of a write.
+#[derive(Clone, Copy)]
+pub struct Words<'a>(&'a [u8]);
+
+impl Words<'_> {
+    /// Number of words, from 1 on.
+    pub fn count(self) -> usize {
+        self.0.len() / 2
+    }
+
+    /// The word at a place.
+    pub fn get(self, place: usize) -> Option<u16> {
+        let bytes = self.0.get(2 * place..)?.first_chunk()?;
+        Some(u16::from_be_bytes(*bytes))
+    }
+}
+
+/// The registers of a slave.
+pub trait Registers {
+    /// The word of a register.
+    ///
+    /// # Errors
+    /// [`Exception::IllegalDataAddress`].
+    fn read(&mut self, at: u16) -> Result<u16, Exception>;
+    /// Writes words from this register on: all or none of them.
+    ///
+    /// # Errors
+    /// The exception that the master gets.
+    fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception>;
+}
+
+/// What a request asks for.
+#[derive(Clone, Copy)]
+enum Asked<'a> {
+    /// The registers from this to that.
+    Read(u16, u16),
+    /// The function and the words from this register on.
+    Write(FunctionCode, u16, Words<'a>),
+    /// The same data.
+    Echo(FunctionCode, &'a [u8]),
+}
+
+/// Carries out a frame that came in, if it is whole and for the address `own` or for all, and sends the answer, if there is
+/// one; whether it was.
+pub fn answer(
+    frame: &[u8],
+    own: u8,
+    registers: &mut impl Registers,
+    send: impl FnOnce(&Frame),
+) -> bool {
+    let Some((slave, pdu)) = whole(frame) else { return false };
+    let function = pdu[0];
+    // A read of all has no answer.
+    let for_us = slave == own || (slave == BROADCAST && matches!(function, 6 | 16));
+    if !for_us || function > LAST_FUNCTION {
+        return false;
+    }
+    let asked = match asked(pdu) {
+        Ok(Asked::Write(_, at, words)) => {
+            registers.write(at, words).and_then(|()| self::asked(pdu))
+        }
+        asked => asked,
+    };
+    if slave != BROADCAST {
+        reply(slave, function, asked, registers, send);
+    }
+    true
+}
+
+/// Address and request of a frame; `None` if it is damaged.
+fn whole(frame: &[u8]) -> Option<(u8, &[u8])> {
+    let pdu_len = frame.len().checked_sub(AROUND).filter(|pdu_len| *pdu_len > 0)?;
+    if frame.len() > LONGEST {
+        return None;
+    }
+    let decoded = rtu::extract_frame(frame, pdu_len).ok()??;
+    Some((decoded.slave, decoded.pdu))
+}
+
+fn asked(pdu: &[u8]) -> Result<Asked<'_>, Exception> {
+    let exact = |length: usize| {
+        if pdu.len() == length { Ok(()) } else { Err(Exception::IllegalDataValue) }
+    };
+    match Request::try_from(pdu) {
+        Ok(Request::ReadHoldingRegisters(at, count)) => {
+            exact(5)?;
+            if !(1..=MOST_READ).contains(&count) {
+                return Err(Exception::IllegalDataValue);
+            }
+            let last = at.checked_add(count - 1).ok_or(Exception::IllegalDataAddress)?;
+            Ok(Asked::Read(at, last))
+        }
+        Ok(Request::WriteSingleRegister(at, _)) => {
+            exact(5)?;
+            Ok(Asked::Write(FunctionCode::WriteSingleRegister, at, Words(&pdu[3..])))
+        }
+        Ok(Request::WriteMultipleRegisters(at, data)) => {
+            let count = data.len();
+            if !(1..=MOST_WRITTEN).contains(&count) || data.payload().len() != 2 * count {
+                return Err(Exception::IllegalDataValue);
+            }
+            exact(6 + 2 * count)?;
+            Ok(Asked::Write(FunctionCode::WriteMultipleRegisters, at, Words(&pdu[6..])))
+        }
+        Ok(Request::Custom(function, [0, 0, ..])) if function.value() == DIAGNOSTICS => {
+            Ok(Asked::Echo(function, &pdu[1..]))
+        }
+        // Too short for its function.
+        Err(_) if matches!(pdu[0], 3 | 6 | 16) => Err(Exception::IllegalDataValue),
+        _ => Err(Exception::IllegalFunction),
+    }
+}
+
+/// Sends the answer. Not inlined: its buffers must not lie below what a write calls.
+#[inline(never)]
+fn reply(
+    slave: u8,
+    function: u8,
+    asked: Result<Asked<'_>, Exception>,
+    registers: &mut impl Registers,
+    send: impl FnOnce(&Frame),
+) {
+    let mut bytes = [0; 2 * MOST_READ as usize];
+    let response = asked.and_then(|asked| match asked {
+        Asked::Read(at, last) => {
+            for (place, at) in bytes.chunks_exact_mut(2).zip(at..=last) {
+                place.copy_from_slice(&registers.read(at)?.to_be_bytes());
+            }
+            let bytes = &bytes[..2 * (usize::from(last - at) + 1)];
+            let data = Data::try_from(bytes).or(Err(Exception::ServerDeviceFailure))?;
+            Ok(Response::ReadHoldingRegisters(data))
+        }
+        Asked::Write(FunctionCode::WriteSingleRegister, at, words) => {
+            Ok(Response::WriteSingleRegister(at, words.get(0).unwrap_or(0)))
+        }
+        // At most 123.
+        Asked::Write(_, at, words) => {
+            Ok(Response::WriteMultipleRegisters(at, words.count() as u16))
+        }
+        Asked::Echo(function, data) => Ok(Response::Custom(function, data)),
+    });
+    let pdu = ResponsePdu(response.map_err(|exception| ExceptionResponse {
+        function: FunctionCode::new(function),
+        exception,
+    }));
+    let mut out = Frame::new();
+    // As long as the longest frame, which every answer fits in.
+    let _ = out.resize_default(LONGEST);
+    let length = server::encode_response(ResponseAdu { hdr: Header { slave }, pdu }, &mut out);
+    out.truncate(length.unwrap_or(0));
+    if !out.is_empty() {
+        send(&out);
+    }
+}

@@ -1,0 +1,260 @@
+//! The slave against frames of the specification and against random ones, and the manual against the table.
+
+use std::fmt::Write as _;
+
+use drive_core::settings::value::Words as _;
+use modbus_core::Exception;
+
+use super::Frame;
+use super::cia402::Power;
+use super::registers::{FAULTS, ROWS, SETTINGS, Shown};
+use super::slave::{self, Registers, Words};
+use crate::board::CLOCK_HZ;
+use crate::settings::bus::{Baud, Format};
+use crate::settings::keys;
+
+/// Registers 0x2000 to 0x20ff, of which the last cannot be written.
+#[derive(Clone, Debug, PartialEq)]
+struct Memory(Vec<u16>);
+
+impl Registers for Memory {
+    fn read(&mut self, at: u16) -> Result<u16, Exception> {
+        let word = self.0.get(usize::from(at).wrapping_sub(0x2000));
+        word.copied().ok_or(Exception::IllegalDataAddress)
+    }
+
+    fn write(&mut self, at: u16, words: Words<'_>) -> Result<(), Exception> {
+        let words: Vec<_> = (0..words.count()).filter_map(|place| words.get(place)).collect();
+        let first = usize::from(at).wrapping_sub(0x2000);
+        match self.0.get_mut(first..first.saturating_add(words.len())) {
+            None => Err(Exception::IllegalDataAddress),
+            Some(_) if first + words.len() == 0x100 => Err(Exception::ServerDeviceFailure),
+            Some(place) => {
+                place.copy_from_slice(&words);
+                Ok(())
+            }
+        }
+    }
+}
+
+fn memory() -> Memory {
+    Memory((0..0x100).map(|n| 3 * n).collect())
+}
+
+/// The checksum by the table-free algorithm of the specification (V1.02, appendix B), written anew.
+fn crc(bytes: &[u8]) -> [u8; 2] {
+    let mut crc = 0xffff_u16;
+    for bit in bytes.iter().flat_map(|byte| (0..8).map(move |n| byte >> n & 1)) {
+        let carry = crc & 1 ^ u16::from(bit);
+        crc = crc >> 1 ^ if carry == 1 { 0xa001 } else { 0 };
+    }
+    crc.to_le_bytes()
+}
+
+/// A frame with its checksum.
+fn framed(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc(bytes)].concat()
+}
+
+/// The answer of slave 17 to a frame, without its checksum, which is checked.
+fn ask(frame: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
+    let mut out = Frame::new();
+    slave::answer(frame, 17, memory, |frame| out = frame.clone());
+    let (bytes, sum) = out.split_at_checked(out.len().checked_sub(2)?)?;
+    assert_eq!(sum, crc(bytes));
+    Some(bytes.to_vec())
+}
+
+#[test]
+fn frames_of_the_specification() {
+    // Application protocol V1.1b3, 6.3, 6.6, 6.8, 6.12, with other addresses.
+    for (request, answer) in [
+        (&[17, 3, 0x20, 0x01, 0, 2][..], &[17, 3, 4, 0, 3, 0, 6][..]),
+        (&[17, 6, 0x20, 0x02, 0xab, 0xcd], &[17, 6, 0x20, 0x02, 0xab, 0xcd]),
+        (&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2], &[17, 16, 0x20, 0x01, 0, 2]),
+        (&[17, 8, 0, 0, 0xa5, 0x37], &[17, 8, 0, 0, 0xa5, 0x37]),
+        // Illegal function: coils, another subfunction, a function of the user.
+        (&[17, 1, 0x20, 0, 0, 1], &[17, 0x81, 1]),
+        (&[17, 5, 0x20, 0, 1, 2], &[17, 0x85, 1]),
+        (&[17, 8, 0, 1, 0, 0], &[17, 0x88, 1]),
+        (&[17, 0x41], &[17, 0xc1, 1]),
+        // Illegal address: outside, and a block that leaves the registers or the 16 bits.
+        (&[17, 3, 0, 0, 0, 1], &[17, 0x83, 2]),
+        (&[17, 3, 0x20, 0xff, 0, 2], &[17, 0x83, 2]),
+        (&[17, 3, 0xff, 0xff, 0, 2], &[17, 0x83, 2]),
+        (&[17, 6, 0x30, 0, 0, 0], &[17, 0x86, 2]),
+        // Illegal value: none or too many registers, byte counts and lengths that do not fit.
+        (&[17, 3, 0x20, 0, 0, 0], &[17, 0x83, 3]),
+        (&[17, 3, 0x20, 0, 0, 126], &[17, 0x83, 3]),
+        (&[17, 3, 0x20, 0, 0], &[17, 0x83, 3]),
+        (&[17, 6, 0x20, 0, 0, 1, 0], &[17, 0x86, 3]),
+        (&[17, 16, 0x20, 0, 0, 2, 2, 0, 1], &[17, 0x90, 3]),
+        (&[17, 16, 0x20, 0, 0, 1, 3, 0, 1, 2], &[17, 0x90, 3]),
+        (&[17, 16, 0x20, 0, 0, 0, 0], &[17, 0x90, 3]),
+        (&[17, 16, 0x20, 0, 0, 2, 4, 0, 1], &[17, 0x90, 3]),
+        // The slave cannot.
+        (&[17, 6, 0x20, 0xff, 0, 0], &[17, 0x86, 4]),
+    ] {
+        let answered = ask(&framed(request), &mut memory());
+        assert_eq!(answered.as_deref(), Some(answer), "{request:x?}");
+    }
+    let mut written = memory();
+    ask(&framed(&[17, 16, 0x20, 0x01, 0, 2, 4, 0, 10, 1, 2]), &mut written);
+    assert_eq!(written.0[..4], [0, 10, 0x102, 9]);
+}
+
+#[test]
+fn the_longest_read_fits_and_frames_for_others_have_no_effect() {
+    let longest = ask(&framed(&[17, 3, 0x20, 0, 0, 125]), &mut memory()).unwrap();
+    assert_eq!((longest.len(), longest[2]), (253, 250));
+    let mut written = memory();
+    let write = [17, 6, 0x20, 2, 0xab, 0xcd];
+    // Of another slave, damaged, with a response's function, too short.
+    let damaged = framed(&write).iter().enumerate().map(|(n, b)| b ^ u8::from(n == 4)).collect();
+    for frame in [
+        framed(&[&[18], &write[1..]].concat()),
+        damaged,
+        framed(&[17, 0x86, 1]),
+        vec![17, 6],
+        vec![],
+    ] {
+        assert_eq!(ask(&frame, &mut written), None);
+        assert_eq!(written, memory());
+    }
+    // To all: written without an answer; not read.
+    assert_eq!(ask(&framed(&[&[0], &write[1..]].concat()), &mut written), None);
+    assert_eq!(written.0[2], 0xabcd);
+    assert!(!slave::answer(&framed(&[0, 3, 0x20, 0, 0, 1]), 17, &mut written, |_| {}));
+}
+
+/// Marsaglia's xorshift of 64 bits, its upper half.
+struct Random(u64);
+
+impl Random {
+    fn next_u32(&mut self) -> u32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 32) as u32
+    }
+}
+
+/// 100 000 frames: random bytes, valid requests, and valid ones with changed bits. What is answered is what an independent
+/// reading of the frame says; what is not valid changes nothing.
+#[test]
+fn random_and_mutated_frames() {
+    let mut rng = Random(7);
+    let (mut memory, mut answered, mut refused) = (memory(), 0, 0);
+    for n in 0..100_000 {
+        let mut bytes = vec![0; rng.next_u32() as usize % 40];
+        bytes.fill_with(|| rng.next_u32() as u8);
+        let (at, count) = (rng.next_u32() as u8, rng.next_u32() as u8 % 130);
+        let mut frame = match n % 4 {
+            0 => bytes,
+            1 => framed(&[17, 3, 0x20, at, 0, count]),
+            2 => framed(&[17, 6, 0x20, at, count, at]),
+            _ => {
+                let count = count % 4 + 1;
+                let values = vec![at; 2 * usize::from(count)];
+                framed(&[&[17, 16, 0x20, at, 0, count, 2 * count][..], &values].concat())
+            }
+        };
+        let mutate = rng.next_u32() % 2 == 0 && !frame.is_empty();
+        if mutate {
+            let place = rng.next_u32() as usize % frame.len();
+            frame[place] ^= 1 << (rng.next_u32() % 8);
+        }
+        let before = memory.clone();
+        let answer = ask(&frame, &mut memory);
+        let whole = frame.len() >= 4
+            && frame.len() <= 256
+            && frame[frame.len() - 2..] == crc(&frame[..frame.len() - 2]);
+        let ours = whole && frame[0] == 17 && frame[1] < 0x80;
+        assert_eq!(answer.is_some(), ours, "{frame:x?}");
+        // One flipped bit never passes the checksum.
+        assert!(!mutate || n % 4 == 0 || !whole);
+        match answer {
+            Some(answer) if answer[1] == frame[1] => answered += 1,
+            Some(answer) => {
+                assert_eq!(answer[1], frame[1] | 0x80);
+                assert!((1..=4).contains(&answer[2]));
+                assert_eq!(memory, before);
+                refused += 1;
+            }
+            None => assert!(memory == before || (whole && frame[0] == 0)),
+        }
+    }
+    assert!(answered > 10_000 && refused > 1000, "{answered} answered, {refused} refused");
+}
+
+/// The rate within 0.1 %: of the 2 % that a receiver of ten bits bears. The silence is 3.5 characters, or 1.75 ms above 19 200
+/// bit/s, rounded up to a bit.
+#[test]
+fn rates_and_silences() {
+    for place in 0..Baud::WORDS.len() {
+        let baud = Baud::at(place);
+        let wanted: f64 = Baud::WORDS[place].parse().unwrap();
+        let rate = f64::from(CLOCK_HZ) / f64::from(baud.divider());
+        assert!((rate / wanted - 1.0).abs() < 1e-3, "{rate} for {wanted}");
+        for (format, bits) in [(Format::None, 10.0), (Format::Even, 11.0), (Format::TwoStops, 11.0)]
+        {
+            let silence_s = f64::from(baud.silence_bits(format)) / wanted;
+            let least = if wanted > 19_200.0 { 1.75e-3 } else { 3.5 * bits / wanted };
+            assert!((least..least + 1.0 / wanted).contains(&silence_s), "{silence_s} at {wanted}");
+        }
+    }
+    assert_eq!(Format::WORDS.len(), 3);
+}
+
+/// A row of a table of the manual.
+fn rows() -> String {
+    let mut text = String::new();
+    for row in &ROWS {
+        let unit = match row.shown {
+            Shown::Number(parts, _) => format!("{} {}", 1.0 / f64::from(parts), row.unit),
+            _ => row.unit.to_owned(),
+        };
+        let kind = if matches!(row.shown, Shown::Double(_)) { "32 bits" } else { "16 bits" };
+        let access = if row.written { "read, write" } else { "read" };
+        writeln!(text, "| `0x{:04X}` | {kind} | {unit} | {access} | {} |", row.at, row.help)
+            .unwrap();
+    }
+    text
+}
+
+fn settings() -> String {
+    let mut text = String::new();
+    for (n, key) in keys::all().enumerate() {
+        let words: Vec<_> =
+            key.words().iter().enumerate().map(|(n, word)| format!("{n} {word}")).collect();
+        let auto = if key.has_rule() { "NaN auto" } else { "" };
+        let at = usize::from(SETTINGS) + 2 * n;
+        writeln!(
+            text,
+            "| `0x{at:04X}` | `{}` | {} | {}{auto} |",
+            key.name(),
+            key.unit(),
+            words.join(", ")
+        )
+        .unwrap();
+    }
+    text
+}
+
+fn states() -> String {
+    let mut text = String::new();
+    for power in Power::ALL {
+        writeln!(text, "| {} | `0x{:02X}` |", power.name(), power.bits()).unwrap();
+    }
+    text
+}
+
+/// On a difference the message is the table as it should be.
+#[test]
+fn the_manual_lists_the_registers() {
+    let manual = include_str!("../../docs/modbus.md");
+    let mut missing = vec![rows(), settings(), states()];
+    missing.retain(|table| !manual.contains(table));
+    assert!(missing.is_empty(), "docs/modbus.md has to list:\n{}", missing.join("\n"));
+    assert_eq!(FAULTS, 0x5100);
+}
