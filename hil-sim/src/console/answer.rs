@@ -3,7 +3,7 @@
 
 /// Beginnings of lines that the drive says unasked, those of the firmware's announcements and of its greeting, and of
 /// the one that comes before an answer that takes a while.
-const UNASKED: [&str; 13] = [
+const UNASKED: [&str; 14] = [
     "induction-drive ",
     "fault ",
     "running: ",
