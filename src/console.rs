@@ -8,6 +8,7 @@ pub mod announce;
 mod answer;
 mod bus;
 mod commissioning;
+mod design;
 pub mod grammar;
 pub mod handle;
 pub mod help;

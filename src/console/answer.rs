@@ -3,13 +3,13 @@
 use core::fmt;
 
 use drive_core::commission::Step;
-use drive_core::settings::SettingsError;
 use drive_core::settings::entry::Change;
 use drive_core::{Accepted, Command, Mode, State};
 use thiserror::Error;
 
+use super::design::configure;
 use super::grammar::Request;
-use super::handle::{CommandError, DriveHandle};
+use super::handle::DriveHandle;
 use super::list::ListKind;
 use super::number::Significant;
 use super::{Console, reply};
@@ -384,28 +384,6 @@ impl Console {
             self.task = Some(Task::Reboot(None));
         }
     }
-}
-
-/// Reason why the drive has not taken settings.
-#[derive(Error, Debug)]
-pub(super) enum NotTaken {
-    #[error("{0}; not in force, still staged")]
-    Design(SettingsError),
-    #[error(transparent)]
-    Command(CommandError),
-}
-
-/// Designs the controllers for settings, and gives them to the drive. Once in the code: the coefficients take much stack.
-#[inline(never)]
-pub(super) fn configure(
-    drive: &mut impl DriveHandle,
-    settings: &FirmwareSettings,
-) -> Result<(), NotTaken> {
-    let taken = match drive.build(settings) {
-        Ok(coefficients) => drive.command(Command::Configure(coefficients)),
-        Err(why) => return Err(NotTaken::Design(why)),
-    };
-    taken.map(|_| ()).map_err(NotTaken::Command)
 }
 
 /// Settings of another board.

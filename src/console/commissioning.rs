@@ -7,7 +7,8 @@ use drive_core::settings::value::Words as _;
 use drive_core::{Mode, Refused, State};
 
 use super::Console;
-use super::answer::{Task, configure};
+use super::answer::Task;
+use super::design::configure;
 use super::handle::DriveHandle;
 use crate::commissioning::News;
 
