@@ -132,7 +132,7 @@ const MEASURED = ['nameplate', 'sensors', 'wiring', 'levels', 'leakage', 'stairc
 $('steps').append(...STEPS.map(step => {
   const bar = make('progress', { max: 1, value: 0, hidden: true }), verdict = make('strong'), lines = make('pre', { hidden: true });
   const show = (text, bad) => { verdict.textContent = text; verdict.className = bad ? 'error' : ''; };
-  const note = text => { lines.hidden = false; lines.textContent += `${text}\n`; };
+  const note = text => { lines.hidden = false; lines.textContent += `${text}\n`; lines.scrollTop = lines.scrollHeight; };
   const end = (text, bad) => { listeners = listeners.filter(known => known !== hear); bar.hidden = true; show(text, bad); };
   function hear(line) {
     const point = line.match(/^learning: point (\d+) of (\d+), (.*)/);
@@ -145,7 +145,9 @@ $('steps').append(...STEPS.map(step => {
     else if (step.bad?.test(line) || /^(fault|stopped|off: the start)/.test(line)) end(`not done: ${line}`, true);
   }
   async function begin(all) {
-    listeners = listeners.filter(known => known !== hear).concat(hear);
+    // It runs already.
+    if (listeners.includes(hear)) return;
+    listeners = listeners.concat(hear);
     lines.textContent = ''; bar.hidden = false; bar.removeAttribute('value'); show('running');
     try { for (const line of all) await tell(line, text => note(`${line}: ${text}`)); } catch (error) { end(`not done: ${error.message}`, true); }
   }

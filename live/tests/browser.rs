@@ -286,6 +286,7 @@ fn sets_up(page: &mut Page<'_>, folder: &Path) {
     page.until("Math.abs(settings.find(s => s.name == 'motor.r_s').value - 5.4) < 0.027", PATIENCE);
     step(page, 3, "Learn", "^learning: point 3 of", PATIENCE);
     pictures(page, folder, "setup");
+    // Pressed again while it runs: nothing.
     step(page, 3, "Learn", "^done: learned: slope", LEARNING);
     step(page, 3, "Save", "^ok", PATIENCE);
     page.value("view('view-settings'); $('get-learned').click()");
