@@ -47,6 +47,8 @@ fn codes_never_change() {
         (42, Fault::SlopeTooSmall),
         (43, Fault::MotorOverload),
         (44, Fault::InverterOverload),
+        (45, Fault::ThermistorOpen),
+        (46, Fault::ThermistorShorted),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);
