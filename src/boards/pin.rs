@@ -54,6 +54,8 @@ pub const TIM1_CH3N: [Reach; 3] = [(pb(1), 6), (pb(9), 12), (pb(15), 4)];
 /// Break input of TIM1.
 pub const TIM1_BKIN: [Reach; 6] =
     [(pa(6), 6), (pa(14), 6), (pb(8), 12), (pb(10), 12), (pb(12), 6), (pc(13), 2)];
+/// Output of channel 1 of TIM8.
+pub const TIM8_CH1: [Reach; 3] = [(pa(15), 2), (pb(6), 5), (pc(6), 4)];
 /// Positive input of comparator 1.
 pub const COMP1_INPUT: Pin = pa(1);
 

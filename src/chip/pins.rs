@@ -20,6 +20,7 @@ fn registers(port: Port) -> &'static RegisterBlock {
 
 /// Fields of MODER.
 const INPUT: u32 = 0b00;
+const OUTPUT: u32 = 0b01;
 const ALTERNATE: u32 = 0b10;
 const ANALOG: u32 = 0b11;
 
@@ -51,6 +52,20 @@ pub fn analog(pin: Pin) {
 pub fn pulled_input(pin: Pin, pull: Level) {
     resistor(pin, Some(pull));
     mode(pin, INPUT);
+}
+
+/// Makes a pin an output: the level first, so that it never shows another.
+pub fn output(pin: Pin, level: Level) {
+    set(pin, level);
+    mode(pin, OUTPUT);
+}
+
+/// Sets the level of an output, from any context: one write.
+#[inline(always)]
+pub fn set(pin: Pin, level: Level) {
+    let shift = u32::from(pin.number) + if level == Level::Low { 16 } else { 0 };
+    // SAFETY: the bit that sets or resets one pin.
+    registers(pin.port).bsrr().write(|w| unsafe { w.bits(1 << shift) });
 }
 
 fn mode(pin: Pin, mode: u32) {

@@ -19,6 +19,7 @@ use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
 use crate::chip::adc::Adc;
+use crate::chip::dc_link::DcLink;
 use crate::chip::encoder::Encoder;
 use crate::chip::pwm::Pwm;
 use crate::chip::time;
@@ -35,6 +36,8 @@ pub struct Control {
     pub drive: Drive,
     /// The power stage.
     pub pwm: Pwm,
+    /// Chopper and precharge relay.
+    pub dc_link: DcLink,
     /// The converters.
     pub adc: Adc,
     /// The encoder.
@@ -154,8 +157,18 @@ fn is_off(drive: &Drive) -> bool {
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
-        let Control { drive, pwm, adc, encoder, commands, answers, trace, observations, .. } =
-            &mut self.control;
+        let Control {
+            drive,
+            pwm,
+            dc_link,
+            adc,
+            encoder,
+            commands,
+            answers,
+            trace,
+            observations,
+            ..
+        } = &mut self.control;
 
         // Over-current first: the outputs go off before anything is computed. The analog watchdogs interrupt
         // when the current is converted, before the sequence has ended.
@@ -220,6 +233,9 @@ impl Running {
             MISSED.store(true, Ordering::Relaxed);
         }
 
+        let relay = drive.after_step(&sample);
+        dc_link.set(drive.brake_duty(), relay);
+
         // Between two steps: a command acts from the next step on.
         if let Some(answer) = commands.take_with(|command| drive.command(command)) {
             // There is room: the main loop takes the last answer before it sends a command.
@@ -269,6 +285,8 @@ impl Running {
             report.worst_latency = self.worst_latency;
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
+            report.limiting = drive.limiting();
+            report.stator_resistance = drive.stator_resistance();
             report.excited = drive.excited();
         });
         if sent {
