@@ -111,6 +111,7 @@ impl Console {
                 }
             }
             Request::Faults(fault) => self.faults(fault, drive),
+            Request::History => self.begin(ListKind::History),
             Request::Trace(plan) => self.trace(plan, drive),
             Request::ShowTrace if drive.tracing() => {
                 self.error(&"a trace is being recorded; `trace off` ends it");
@@ -162,6 +163,9 @@ impl Console {
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
+            let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
+            let settings = &self.settings.in_force().drive;
+            reply::temperatures(f, status.stator_resistance, rotor, settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
         self.out.line(format_args!("{line}"));

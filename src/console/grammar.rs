@@ -84,6 +84,8 @@ pub enum Request {
     Restored(u32),
     /// Show the latched fault and the last reset, or the text of a fault.
     Faults(Option<Fault>),
+    /// Show operating hours, starts and the last faults.
+    History,
     /// Clear the latched fault.
     Clear,
     /// Record a trace.
@@ -133,7 +135,7 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 32] = [
+pub const COMMANDS: [&str; 33] = [
     "help",
     "status",
     "start",
@@ -156,6 +158,7 @@ pub const COMMANDS: [&str; 32] = [
     "backup",
     "learned",
     "faults",
+    "history",
     "clear",
     "trace",
     "log",
@@ -207,6 +210,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
     let request = match words.next("a command")? {
         "help" | "h" | "?" => Request::Help,
         "status" => Request::Status,
+        "history" => Request::History,
         "start" => match words.optional() {
             None | Some("torque") => Request::Start(Mode::Torque),
             Some("speed") => Request::Start(Mode::Speed),

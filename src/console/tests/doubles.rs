@@ -18,6 +18,7 @@ use induction_drive::link::trace::{self, Plan, Trigger};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
+use induction_drive::store::history::History;
 
 /// A drive without hardware.
 pub struct FakeDrive {
@@ -45,6 +46,8 @@ pub struct FakeDrive {
     pub tracking: Option<Tracking>,
     /// The commissioning.
     pub session: Session,
+    /// Operating hours, starts and faults.
+    pub history: History,
 }
 
 impl FakeDrive {
@@ -63,6 +66,7 @@ impl FakeDrive {
             found: None,
             tracking: None,
             session: Session::new(&Settings::default()),
+            history: History::default(),
         }
     }
 }
@@ -89,6 +93,8 @@ impl DriveHandle for FakeDrive {
             worst_latency: u32::MAX,
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
+            limiting: self.drive.limiting(),
+            stator_resistance: self.drive.stator_resistance(),
             excited: self.drive.excited(),
         })
     }
@@ -120,6 +126,9 @@ impl DriveHandle for FakeDrive {
         }
         self.saved = Some(*settings);
         Ok(())
+    }
+    fn history(&self) -> &History {
+        &self.history
     }
     fn begin_trace(&mut self, plan: &Plan) -> bool {
         assert!(usize::from(plan.records) <= board::TRACE_RECORDS);
