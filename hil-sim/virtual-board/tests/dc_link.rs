@@ -28,8 +28,9 @@ fn braked(change: impl Fn(&mut Config), more: &[&str]) -> Result<Pair> {
     Ok(pair)
 }
 
-/// Capacitor behind a rectifier, which takes no energy back, and twice the inertia. Without the chopper the drive would
-/// have to give up torque from 340 V on and brake for longer: 180 J come back from the shaft, 8 J fit into the capacitor.
+/// Capacitor behind a rectifier, which takes no energy back, and twice the inertia: 296 J at 1500 rpm. With 1.93 Nm the shaft
+/// stops in 2 s; above 570 rpm it gives more than the 115 W that the copper takes, 114 J in all, of which 11 J fit into the
+/// capacitor up to 378 V.
 #[test]
 fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     let link = |config: &mut Config| {
@@ -39,11 +40,11 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
         (link.capacitor_f, link.source, link.load_w, link.pulses) = (470e-6, 2.0, 5.0, 0);
     };
     let lines =
-        ["set motor.inertia 0.024 speed.limit_rpm 1500 speed.ramp_rpm_per_s 1500", "start speed"];
+        ["set motor.inertia 0.024 sequence.i_d 1.4 speed.limit_rpm 1500 speed.ramp_rpm_per_s 1500", "start speed"];
     let mut pair = braked(link, &lines)?;
     pair.until_state(State::Speed)?;
     pair.order("speed 1500")?;
-    pair.run(30_000, |_, _| {})?;
+    pair.run(18_000, |_, _| {})?;
     let rpm = |pair: &Pair| pair.board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
     assert!(rpm(&pair) > 1400.0, "{} rpm", rpm(&pair));
     pair.order("speed 0")?;
@@ -63,8 +64,8 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
     println!("{:.2} s, {highest:.1} V, duty up to {most:.2}, {burnt:.0} J", n as f64 / 6000.0);
     assert_eq!(pair.shadow.drive.state(), State::Speed);
     assert!(highest < TRIP_V - 5.0, "{highest} V");
-    // What the copper and the friction leave of 0.024 kg m2 at 1500 rpm, 296 J.
-    assert!(most > 0.1 && burnt > 30.0 && burnt < 296.0, "{most}, {burnt} J");
+    // Magnetic energy and slip are not in the estimate.
+    assert!(most > 0.05 && (60.0..140.0).contains(&burnt), "{most}, {burnt} J");
     Ok(())
 }
 
