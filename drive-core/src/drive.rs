@@ -219,6 +219,7 @@ impl Drive {
         self.elapsed = self.elapsed.wrapping_add(1);
         let result = result.and_then(|compare| self.watch_load().map(|()| compare));
         let compare = result.unwrap_or_else(|off| {
+            let off = self.why_not_caught(off);
             let measured = off == State::Off && self.control.all_measured;
             let off = if measured { self.evaluate_learning() } else { off };
             self.enter(off);

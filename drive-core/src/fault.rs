@@ -280,6 +280,13 @@ faults! {
         "let it cool; reduce the torque, or sequence.i_d";
     ThermistorOpen = 45, "thermistor of the heat sink open: colder than -40 degC", THERMISTOR.0, THERMISTOR.1;
     ThermistorShorted = 46, "thermistor of the heat sink shorted: hotter than 200 degC", THERMISTOR.0, THERMISTOR.1;
+    NotCaught = 47, "the turning shaft was not caught",
+        &[
+            "the shaft turns too fast: beyond 2700 rpm of four poles",
+            "flux left from the run before, or a load that changes the speed quickly",
+            "motor.* of another motor",
+        ],
+        "let the shaft slow down, then clear and start again";
 }
 
 impl Fault {

@@ -2,10 +2,11 @@
 
 use super::Drive;
 use crate::drive::state::State;
+use crate::fault::Fault;
 use crate::flux::catch::{CatchState, Caught};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::io::periods;
+use crate::io::{PERIOD_S, periods};
 use crate::math::frames::Dq;
 use crate::settings::Settings;
 
@@ -14,6 +15,9 @@ const SHARE: f32 = 0.714;
 /// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
 const BUILT_S: f32 = 0.35;
 const ALONE_S: f32 = 0.2;
+/// Highest frequency of a rotor that is caught, electrical turns per period: 2700 rpm of four poles, with the error of the
+/// search. Above it the voltage of the rotor drowns in the noise of the sensors.
+const HIGHEST: f32 = 91.0 * PERIOD_S;
 /// Rotor time constants after which no flux is left in a motor that was switched off.
 const FLUX_GONE_T: f32 = 4.0;
 
@@ -70,16 +74,19 @@ impl Drive {
     }
 
     /// The current while a turning shaft is looked for and magnetised, A.
-    pub(super) fn catch(&mut self) -> Dq {
+    ///
+    /// # Errors
+    /// [`Fault::NotCaught`] for a shaft that turns too fast.
+    pub(super) fn catch(&mut self) -> Result<Dq, Fault> {
         let Some(c) = self.c.catching else {
             self.magnetising_from_here(0);
-            return Dq::ZERO;
+            return Ok(Dq::ZERO);
         };
         let (s, elapsed) = (&mut self.control, self.elapsed);
         let Some(found) = s.catching.found else {
             // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
             let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
-                return Dq::ZERO;
+                return Ok(Dq::ZERO);
             };
             match s.catching.search.step(n, s.observer.change) {
                 Caught::Searching => {}
@@ -87,6 +94,7 @@ impl Drive {
                     s.hand_over = HandOver::default();
                     self.magnetising_from_here(0);
                 }
+                Caught::Turning(freq) if freq.abs() > HIGHEST => return Err(Fault::NotCaught),
                 Caught::Turning(freq) => {
                     s.catching.found = Some(elapsed);
                     s.estimator.turn_with(freq);
@@ -96,16 +104,28 @@ impl Drive {
                     }
                 }
             }
-            // Nothing was judged.
-            self.control.prediction.forget();
-            return Dq { d: c.current, q: 0.0 };
+            return Ok(Dq { d: c.current, q: 0.0 });
         };
         let since = elapsed.wrapping_sub(found);
         if since >= c.built {
             self.c.motion.start(&mut s.motion, s.seen.rotor_count);
             self.enter(State::of_mode(self.mode));
         }
-        Dq { d: if since < c.forced { c.current } else { self.c.sequence.i_d }, q: 0.0 }
+        Ok(Dq { d: if since < c.forced { c.current } else { self.c.sequence.i_d }, q: 0.0 })
+    }
+
+    /// The state to go to when the start on a turning shaft ends so: a wrong speed shows as a voltage or a current that it does
+    /// not explain.
+    pub(super) fn why_not_caught(&self, off: State) -> State {
+        use Fault::{CurrentNotAsPredicted, FluxNotAsPredicted, LostLock, NotCaught};
+        match off {
+            State::Fault(CurrentNotAsPredicted | FluxNotAsPredicted | LostLock)
+                if self.state == State::Catching =>
+            {
+                NotCaught.into()
+            }
+            _ => off,
+        }
     }
 
     /// Whether the observer is still to keep its hands off the angle.

@@ -202,14 +202,19 @@ impl Coefficients {
 
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        if step.held {
-            // The flux is still building up, and the drop of the inverter is not known.
+        if step.held || step.building {
+            // The flux is still building up, and the drop of the inverter may not be known.
             s.prediction.forget_mean();
         }
         let tracked = self.observer.is_some() && !step.learning;
         let resistance = Resistance { deviation: s.observer.resistance, tracked };
         let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
-        if step.looking { Ok(()) } else { judged }
+        // Flux that was left turns beside that which builds up.
+        if step.looking || step.alone {
+            s.prediction.forget();
+            return Ok(());
+        }
+        judged
     }
 
     /// Checks that the tracked angle is that of the flux.

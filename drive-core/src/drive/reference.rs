@@ -14,7 +14,7 @@ impl Drive {
     pub(super) fn reference(&mut self) -> Result<Dq, State> {
         let r = &mut self.control.references;
         let i_q = match self.state {
-            State::Catching => return Ok(self.catch()),
+            State::Catching => return Ok(self.catch()?),
             State::Magnetising => return Ok(self.magnetise()?),
             State::Verifying => return Ok(self.verify()?),
             State::Learning => self.learn()?,

@@ -49,6 +49,7 @@ fn codes_never_change() {
         (44, Fault::InverterOverload),
         (45, Fault::ThermistorOpen),
         (46, Fault::ThermistorShorted),
+        (47, Fault::NotCaught),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);
