@@ -8,16 +8,19 @@
 //! |---|---|---|
 //! | PA15, PB3 | encoder A, B | TIM2_CH1, CH2 |
 //! | PA2, PA3 | console: transmit, receive (the ST-LINK's serial port) | LPUART1 |
+//! | PC6 | brake chopper | TIM8_CH1 |
+//! | PC8 | precharge relay | |
 
 mod dead_time;
 mod flash;
 
-pub use flash::{SETTINGS_SLOT_BYTES, settings_address, settings_page};
+pub use flash::{SETTINGS_SLOT_BYTES, STORED_SLOTS, settings_address, settings_page};
 
 use drive_core::Settings;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{CurrentSensors, Inverter, Line, Scales, Sequence};
 
+use crate::boards::pin::{self, Pin, pc};
 use crate::boards::{Board, Currents, SELECTED};
 
 // Clock ---------------------------------------------------------------------------------------
@@ -231,6 +234,14 @@ pub const COMP_HYSTERESIS: u8 = 1;
 pub const DAC_START_US: u32 = 10;
 /// Start-up time of the comparator, us (datasheet: 5 at most).
 pub const COMP_START_US: u32 = 5;
+
+// Dc link ---------------------------------------------------------------------------------------
+
+/// Output for the brake chopper, on at a high level. To be pulled down: it floats in reset.
+pub const CHOPPER: Pin = pc(6);
+const _: () = assert!(CHOPPER.is(&pin::TIM8_CH1));
+/// Output for the precharge relay, the same.
+pub const RELAY: Pin = pc(8);
 
 // Encoder -------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 pub mod adc;
 pub mod clocks;
+pub mod dc_link;
 pub mod encoder;
 pub mod flash;
 pub mod memory;

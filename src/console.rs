@@ -63,6 +63,8 @@ pub struct Console {
     began_ms: Option<u32>,
     /// Time of the last valid line; `None` to begin anew.
     heard_ms: Option<u32>,
+    /// Time of the last valid line at the console, ms.
+    line_ms: Option<u32>,
     /// While the wiring is being checked: the periods of the status at its start.
     checking: Option<u32>,
     /// The last trace.
@@ -100,6 +102,7 @@ impl Console {
             announcer: Announcer::new(),
             began_ms: None,
             heard_ms: None,
+            line_ms: None,
             checking: None,
             traced: None,
             armed: false,
@@ -233,14 +236,25 @@ impl Console {
 
     /// Stops the drive when no valid line came for too long.
     fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
+        if !self.out.as_str().is_empty() {
+            return;
+        }
         let (set, alive) = (self.settings.in_force().command.timeout_s, self.wire.alive_s());
-        let limit = if alive > 0.0 && (set == 0.0 || alive < set) { alive } else { set };
-        let heard_ms = *self.heard_ms.get_or_insert(now_ms);
-        let silence = now_ms.wrapping_sub(heard_ms) as f32 * 1e-3;
-        if alive > 0.0 && silence > alive {
+        let since =
+            |at: &mut Option<u32>| now_ms.wrapping_sub(*at.get_or_insert(now_ms)) as f32 * 1e-3;
+        let (silence, link) = (since(&mut self.heard_ms), since(&mut self.line_ms));
+        let lost = alive > 0.0 && link > alive;
+        if lost {
             self.stop_stream(drive);
         }
-        if limit > 0.0 && silence > limit && self.out.as_str().is_empty() && !drive.is_off() {
+        let limit = if lost && self.commander() == Commander::Console {
+            alive
+        } else if set > 0.0 && silence > set {
+            set
+        } else {
+            return;
+        };
+        if !drive.is_off() {
             self.heard_ms = Some(now_ms);
             self.announcer.stopping();
             match drive.command(Command::Stop) {
@@ -271,7 +285,7 @@ impl Console {
         }
         // An empty line is a sign of life, too.
         if matches!(byte, b'\r' | b'\n') && !self.reader.begun() {
-            self.heard_ms = Some(now_ms);
+            self.heard(Commander::Console, now_ms);
         }
         let line = match self.reader.push(byte) {
             Ok(None) => return,

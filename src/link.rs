@@ -4,6 +4,7 @@ pub mod mailbox;
 pub mod stream;
 pub mod trace;
 
+use drive_core::dc_link::Limiting;
 use drive_core::{Accepted, Excited, Hardware, Refused, Sample, State, Telemetry};
 
 /// The drive's answer to a command.
@@ -31,6 +32,10 @@ pub struct Status {
     pub hardware: Hardware,
     /// While the drive learns: the point that is being measured, from 1 on, and the number of points.
     pub learning: Option<(usize, usize)>,
+    /// Why the torque is smaller than asked for.
+    pub limiting: Limiting,
+    /// Tracked stator resistance relative to the settings, less one.
+    pub stator_resistance: Option<f32>,
     /// For the commissioning.
     pub excited: Excited,
 }

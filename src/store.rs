@@ -11,6 +11,7 @@
 
 pub mod codec;
 mod flash;
+pub mod history;
 pub mod learned;
 
 use codec::{COMMIT, Rejected, SlotContent};
@@ -65,6 +66,11 @@ impl<F: Flash> Saved<F> {
         let blank = contents.map(|content| content == SlotContent::Blank);
         let free = usize::from(!blank[0] && blank[1]);
         (Self { flash, newest, free }, loaded)
+    }
+
+    /// The flash, for what else is stored in it.
+    pub fn flash(&mut self) -> &mut F {
+        &mut self.flash
     }
 
     /// Writes the settings. Takes up to two erasures; only with the outputs off.

@@ -3,4 +3,6 @@
 pub mod bring_up;
 pub mod clock;
 pub mod control;
+pub mod guard;
+pub mod hours;
 pub mod supervisor;

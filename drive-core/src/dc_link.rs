@@ -21,6 +21,8 @@
 //! sagging mains stays where it is, and `held` gives way below it, so that the torque comes back; in an outage the shaft
 //! holds the link at `held`.
 
+use core::fmt;
+
 use crate::io::PERIOD_S;
 
 /// Control periods per step: those of a carrier period.
@@ -103,6 +105,8 @@ pub enum Limiting {
     No,
     /// The dc link has no more voltage at this speed; see [`voltage_limit`](crate::current::voltage_limit).
     Voltage,
+    /// The heat sink is hot.
+    HeatSink,
     /// Generating torque: the link is high.
     DcLinkHigh,
     /// Generating torque: the link is high, and the brake resistor has taken all that it can.
@@ -111,6 +115,21 @@ pub enum Limiting {
     DcLinkLow,
     /// The shaft feeds the link, which has no supply.
     RideThrough,
+}
+
+/// What limits the torque, in words.
+impl fmt::Display for Limiting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::No => "nothing",
+            Self::Voltage => "the voltage of the dc link at this speed",
+            Self::HeatSink => "the heat sink is hot",
+            Self::DcLinkHigh => "the dc link is high",
+            Self::ResistorHot => "the dc link is high and the brake resistor hot",
+            Self::DcLinkLow => "the dc link is low",
+            Self::RideThrough => "the dc link has no supply: the shaft feeds it",
+        })
+    }
 }
 
 /// Result of a step.

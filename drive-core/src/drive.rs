@@ -47,6 +47,7 @@ use crate::protect::saliency_check::SaliencyCheckState;
 use crate::protect::thermal::ThermalLoads;
 use crate::protect::wiring_check::WiringCheckState;
 use crate::settings::AngleSource;
+use crate::supply::RelayState;
 
 use axes::Axes;
 use catching::CatchingState;
@@ -94,6 +95,7 @@ pub struct Drive {
     starts: u32,
     learned: Option<Learned>,
     thermal: ThermalLoads,
+    relay: RelayState,
 }
 
 /// References of the running mode.
@@ -154,6 +156,8 @@ struct ControlState {
     /// Present limits by the dc link.
     limits: DcLinkLimits,
     limiting: Limiting,
+    /// Torque current that the heat sink does not bear, of the largest of all, A.
+    too_hot_for: f32,
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
@@ -190,6 +194,7 @@ impl Drive {
             starts: 0,
             learned: None,
             thermal: ThermalLoads::default(),
+            relay: RelayState::default(),
         }
     }
 

@@ -80,6 +80,14 @@ const POLARITY: Shared = (
     &["sensor mounted or wired the wrong way round"],
     "turn the sensor round; a gain cannot be negative",
 );
+const THERMISTOR: Shared = (
+    &[
+        "wire or connector of the thermistor open",
+        "wires of the thermistor shorted, or its pin at the supply",
+        "scales.ntc.to_ground or scales.ntc.divider_ohm wrong",
+    ],
+    "measure the thermistor at its connector",
+);
 const NOISE: Shared = (
     &[
         "sensor lines not shielded or badly grounded, or a disturbed supply of the sensors",
@@ -137,10 +145,9 @@ faults! {
     NonFiniteState = 15, "a state of the control is not a finite number", NOT_FINITE.0, NOT_FINITE.1;
     OffsetA = 16, "offset of current sensor a out of range at start", OFFSET.0, OFFSET.1;
     OffsetB = 17, "offset of current sensor b out of range at start", OFFSET.0, OFFSET.1;
-    OverTemperature = 18, "heat sink too hot, or its thermistor open or shorted",
+    OverTemperature = 18, "heat sink too hot",
         &[
             "overload, fan or air flow",
-            "thermistor or its wire open or shorted: status shows -40 degC or less, or far too much",
             "scales.ntc.* not those of the thermistor",
         ],
         "let it cool and check the fan; compare the temperature in status with the room";
@@ -271,6 +278,8 @@ faults! {
             "limits.inverter_a or limits.inverter_s not those of the power stage",
         ],
         "let it cool; reduce the torque, or sequence.i_d";
+    ThermistorOpen = 45, "thermistor of the heat sink open: colder than -40 degC", THERMISTOR.0, THERMISTOR.1;
+    ThermistorShorted = 46, "thermistor of the heat sink shorted: hotter than 200 degC", THERMISTOR.0, THERMISTOR.1;
     NotCaught = 47, "the turning shaft was not caught",
         &[
             "the shaft turns too fast: beyond 2700 rpm of four poles",

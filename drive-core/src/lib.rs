@@ -23,6 +23,7 @@
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`motion`] | speed and position loop |
 //! | [`dc_link`] | limits of the torque current by the dc link, chopper |
+//! | [`supply`] | precharge relay |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`] | what a learning has found |
 //! | [`commission`] | from the nameplate to the parameters of the motor |
@@ -59,6 +60,7 @@ pub mod math;
 pub mod motion;
 pub mod protect;
 pub mod settings;
+pub mod supply;
 pub mod tuning;
 
 pub use drive::{

@@ -28,7 +28,7 @@ pub use injection::{InjectionSettings, PrintedChain, SynchronousTracking};
 pub use list::{SETTINGS, find};
 pub use motor::Motor;
 pub use nameplate::Nameplate;
-pub use ntc::Ntc;
+pub use ntc::{HeatSink, Ntc};
 
 /// The source of the flux angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,6 +111,8 @@ pub struct Limits {
     pub inverter_s: f32,
     /// Temperature of the heat sink that trips, °C.
     pub heat_sink_c: f32,
+    /// Temperature of the heat sink from which on the current limit falls, to nothing where it trips, °C.
+    pub derate_c: Option<f32>,
 }
 
 impl Default for Limits {
@@ -128,6 +130,7 @@ impl Default for Limits {
             inverter_a: None,
             inverter_s: 5.0,
             heat_sink_c: 85.0,
+            derate_c: None,
         }
     }
 }
@@ -218,6 +221,13 @@ pub struct BrakingSettings {
     pub power_w: f32,
 }
 
+/// The supply of the dc link.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SupplySettings {
+    /// Time that the link must be steady before the precharge relay closes, s; 0 without a relay. See [`crate::supply`].
+    pub relay_s: f32,
+}
+
 impl Default for BrakingSettings {
     /// No brake resistor. Where one is fitted, its energy and power stand on it.
     fn default() -> Self {
@@ -258,6 +268,8 @@ pub struct Settings {
     pub speed: SpeedSettings,
     /// The limits by the dc link.
     pub braking: BrakingSettings,
+    /// The supply of the dc link.
+    pub supply: SupplySettings,
 }
 
 /// The reason why settings were refused.

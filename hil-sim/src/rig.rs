@@ -180,6 +180,7 @@ impl Rig {
             self.pending = Compare::OFF;
         }
         self.plant.set_chopper(self.drive.brake_duty().into());
+        self.plant.set_relay(self.drive.after_step(sample));
         self.plant.advance(&self.pending, f64::from(PERIOD_S));
         self.pending = compare;
         self.periods += 1;

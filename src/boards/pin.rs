@@ -58,6 +58,8 @@ pub const TIM1_BKIN: [Reach; 6] =
 pub const USART3_TX: [Reach; 3] = [(pb(9), 7), (pb(10), 7), (pc(10), 7)];
 /// Input of USART3.
 pub const USART3_RX: [Reach; 3] = [(pb(8), 7), (pb(11), 7), (pc(11), 7)];
+/// Output of channel 1 of TIM8.
+pub const TIM8_CH1: [Reach; 3] = [(pa(15), 2), (pb(6), 5), (pc(6), 4)];
 /// Positive input of comparator 1.
 pub const COMP1_INPUT: Pin = pa(1);
 

@@ -1,4 +1,4 @@
-//! The flash pages of the settings: reading past torn double words, erasing, programming.
+//! The flash pages of settings and history: reading past torn double words, erasing, programming.
 //!
 //! Erasing and programming follow RM0440 (FLASH main memory erase and programming sequences). With two
 //! banks the code, in the first, continues while the second is written; with one, the core waits for

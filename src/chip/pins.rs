@@ -74,6 +74,20 @@ pub fn pulled_input(pin: Pin, pull: Level) {
     mode(pin, INPUT);
 }
 
+/// Makes a pin an output: the level first, so that it never shows another.
+pub fn output(pin: Pin, level: Level) {
+    set(pin, level);
+    mode(pin, OUTPUT);
+}
+
+/// Sets the level of an output, from any context: one write.
+#[inline(always)]
+pub fn set(pin: Pin, level: Level) {
+    let shift = u32::from(pin.number) + if level == Level::Low { 16 } else { 0 };
+    // SAFETY: the bit that sets or resets one pin.
+    registers(pin.port).bsrr().write(|w| unsafe { w.bits(1 << shift) });
+}
+
 fn mode(pin: Pin, mode: u32) {
     let shift = 2 * u32::from(pin.number);
     // SAFETY: two bits of one pin, each value a mode.

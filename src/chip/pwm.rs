@@ -11,7 +11,7 @@ use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
 use super::clocks::clock_on;
-use super::{StartError, pins};
+use super::{StartError, dc_link, pins};
 use induction_drive::board;
 use induction_drive::boards::{Level, SELECTED, pin};
 
@@ -232,10 +232,11 @@ impl Pwm {
     }
 }
 
-/// Switches all six switches off, from any context: for handlers that do not return.
+/// Switches all six switches, chopper and relay off, from any context: for handlers that do not return.
 pub fn outputs_off() {
     // SAFETY: TIM1 always exists. This may interrupt the owner of the timer anywhere; it only clears MOE, and nothing
     // else runs after it.
     let timer = unsafe { &*pac::TIM1::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
+    dc_link::outputs_off();
 }

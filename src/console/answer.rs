@@ -111,6 +111,7 @@ impl Console {
                 }
             }
             Request::Faults(fault) => self.faults(fault, drive),
+            Request::History => self.begin(ListKind::History),
             Request::Trace(plan) => self.trace(plan, drive),
             Request::ShowTrace if drive.tracing() => {
                 self.error(&"a trace is being recorded; `trace off` ends it");
@@ -167,6 +168,9 @@ impl Console {
             if staged > 0 {
                 write!(f, "; {staged} staged")?;
             }
+            let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
+            let settings = &self.settings.in_force().drive;
+            reply::temperatures(f, status.stator_resistance, rotor, settings)?;
             tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
         });
         self.out.line(format_args!("{line}"));
@@ -275,7 +279,7 @@ impl Console {
         }
         self.task = None;
         // The time that it takes is not silence of the user.
-        self.heard_ms = None;
+        (self.heard_ms, self.line_ms) = (None, None);
         let Some(applied) = self.apply(drive) else { return };
         if matches!(task, Task::Apply) {
             return self.out.line(format_args!("ok{applied}"));

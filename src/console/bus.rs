@@ -131,7 +131,7 @@ impl Bus {
 
 impl Console {
     /// Who commands: by the staged settings, which a start puts in force.
-    fn commander(&self) -> Commander {
+    pub(super) fn commander(&self) -> Commander {
         self.settings.latest().bus.commander
     }
 
@@ -139,6 +139,9 @@ impl Console {
     pub(super) fn heard(&mut self, from: Commander, now_ms: u32) {
         if self.commander() == from {
             self.heard_ms = Some(now_ms);
+        }
+        if from == Commander::Console {
+            self.line_ms = Some(now_ms);
         }
     }
 

@@ -85,6 +85,8 @@ pub enum Request {
     Restored(u32),
     /// Show the latched fault and the last reset, or the text of a fault.
     Faults(Option<Fault>),
+    /// Show operating hours, starts and the last faults.
+    History,
     /// Clear the latched fault.
     Clear,
     /// Record a trace.
@@ -144,7 +146,7 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 34] = [
+pub const COMMANDS: [&str; 35] = [
     "help",
     "status",
     "start",
@@ -167,6 +169,7 @@ pub const COMMANDS: [&str; 34] = [
     "backup",
     "learned",
     "faults",
+    "history",
     "clear",
     "trace",
     "stream",
@@ -220,6 +223,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
     let request = match words.next("a command")? {
         "help" | "h" | "?" => Request::Help,
         "status" => Request::Status,
+        "history" => Request::History,
         "start" => match words.optional() {
             None | Some("torque") => Request::Start(Mode::Torque),
             Some("speed") => Request::Start(Mode::Speed),

@@ -16,6 +16,7 @@ use crate::link::trace::{self, Plan};
 use crate::rotor_tracking::Report;
 use crate::settings::FirmwareSettings;
 use crate::store::FlashError;
+use crate::store::history::History;
 
 /// Reason why a command was not carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
@@ -64,6 +65,8 @@ pub trait DriveHandle {
     /// # Errors
     /// The flash failed.
     fn save(&mut self, settings: &FirmwareSettings) -> Result<(), FlashError>;
+    /// Operating hours, starts and faults since the beginning.
+    fn history(&self) -> &History;
     /// Starts a trace; `false`, and nothing changed, while one is being recorded.
     fn begin_trace(&mut self, plan: &Plan) -> bool;
     /// Ends a recording without a result.

@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 37] = [
+pub const HELP: [&str; 38] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
@@ -24,6 +24,7 @@ pub const HELP: [&str; 37] = [
     "backup                    print the lines that restore settings and learned values",
     "learned                   what was learned on the motor with these settings",
     "faults [NUMBER]           the latched fault with causes and cure, and what ended the last run",
+    "history                   hours with power and with current, starts, and the last faults",
     "clear                     forget the latched fault",
     "trace N [DIVIDER] [NAME]  record N periods, every DIVIDER-th, of the signals named; print as CSV",
     "trace N ... on fault      record until a fault; then `trace` prints it",

@@ -36,6 +36,7 @@ pub(super) enum ListKind {
     Board,
     Learned,
     Fault(Fault),
+    History,
     Trace,
     /// The signals and the layout of a frame.
     Signals,
@@ -76,6 +77,9 @@ impl Console {
                 reply::board(settings.board, confirmed, line).map(|text| say(&text, next + 1))
             }
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
+            ListKind::History => {
+                reply::history(drive.history(), line).map(|text| say(&text, next + 1))
+            }
             ListKind::Learned => learned
                 .and_then(|result| reply::learned(result, believable, next))
                 .map(|text| say(&text, next + 1)),

@@ -3,6 +3,7 @@
 use core::f32::consts::TAU;
 use core::fmt;
 
+use drive_core::dc_link::Limiting;
 use drive_core::identify::learning::{Fitted, Learned};
 use drive_core::io::PERIOD_S;
 use drive_core::settings::entry::Change;
@@ -15,6 +16,7 @@ use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
 use crate::settings::staging::Staging;
+use crate::store::history::History;
 
 /// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with
 /// psi = L_m i_d; power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the carrier.
@@ -29,6 +31,9 @@ pub fn status(
 ) -> fmt::Result {
     let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
     write!(f, "{}; ", s.state)?;
+    if s.limiting != Limiting::No {
+        write!(f, "limiting now, because: {}; ", s.limiting)?;
+    }
     // While the drive is off, its signals are those of the last run.
     if s.state != State::Off {
         let (i, reference) = (t.current, t.reference);
@@ -47,6 +52,33 @@ pub fn status(
     write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
     write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
     write!(f, "stack {used} of {size}")
+}
+
+/// Temperature of the settings' resistances, °C.
+const COLD_C: f32 = 25.0;
+/// Temperatures below 0 °C at which the resistance of copper, and of the aluminium of a cage, would be none.
+const COPPER_C: f32 = 235.0;
+const ALUMINIUM_C: f32 = 225.0;
+
+/// Writes the temperatures of stator and rotor that their tracked resistances mean, if those of the settings are of 25 °C:
+/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one.
+///
+/// # Errors
+/// Those of the formatter.
+pub fn temperatures(
+    f: &mut fmt::Formatter<'_>,
+    stator: Option<f32>,
+    tau_r: Option<f32>,
+    settings: &Settings,
+) -> fmt::Result {
+    let celsius = |more: f32, metal: f32| COLD_C + more * (metal + COLD_C);
+    if let Some(more) = stator {
+        write!(f, "; stator {:.0} degC", celsius(more, COPPER_C))?;
+    }
+    tau_r.map_or(Ok(()), |tau_r| {
+        let more = settings.motor.tau_r() / tau_r - 1.0;
+        write!(f, "; rotor {:.0} degC", celsius(more, ALUMINIUM_C))
+    })
 }
 
 /// A setting with its unit and the allowed values. They are computed before anything is printed, because printing
@@ -174,6 +206,27 @@ pub fn fault(fault: Fault, i: usize) -> Option<impl fmt::Display> {
     (i <= causes.len()).then_some(fmt::from_fn(move |f| match causes.get(i) {
         Some(cause) => write!(f, "cause {}: {cause}", i + 1),
         None => write!(f, "cure: {}", fault.cure()),
+    }))
+}
+
+/// Line number `i` of the history: the totals, then the faults, the latest first.
+pub fn history(history: &History, i: usize) -> Option<impl fmt::Display> {
+    let fault = i.checked_sub(1).map(|i| history.faults().nth(i));
+    // None behind the last fault.
+    (fault != Some(None)).then_some(fmt::from_fn(move |f| {
+        let hours = |s: u32| s as f32 / 3600.0;
+        let Some(fault) = fault.flatten() else {
+            let (powered, running) = (hours(history.powered_s), hours(history.running_s));
+            let starts = history.starts;
+            return write!(
+                f,
+                "powered {powered:.1} h, with current {running:.1} h, starts {starts}"
+            );
+        };
+        let (code, at) = (fault.code, hours(60 * fault.powered_min));
+        write!(f, "at {at:.1} h, with current {:.1} h: fault {code}", hours(fault.running_s))?;
+        let known = Fault::ALL.iter().find(|known| known.code() == code);
+        known.map_or(Ok(()), |known| write!(f, ", {known}"))
     }))
 }
 

@@ -149,14 +149,14 @@ impl Console {
             let wanted = self.wire.wanted;
             if self.flushed(port) && port.change_rate(wanted) {
                 self.wire.baud = wanted;
-                self.heard_ms = Some(now_ms);
+                self.line_ms = Some(now_ms);
                 if wanted == usual {
                     self.out.line(format_args!("link: {usual} baud"));
                 }
             }
         } else if self.wire.baud != usual
             && self
-                .heard_ms
+                .line_ms
                 .is_some_and(|heard| now_ms.wrapping_sub(heard) > board::SERIAL_FALL_BACK_MS)
         {
             self.stop_stream(drive);

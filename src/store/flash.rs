@@ -1,4 +1,4 @@
-//! The flash behind the settings, and its errors.
+//! The flash behind settings and history, and its errors.
 
 use thiserror::Error;
 
@@ -6,10 +6,13 @@ use crate::board;
 
 /// Number of slots, each of which holds one set of settings.
 pub const SLOTS: usize = 2;
+/// The slots of the history.
+pub const HISTORY: [usize; 2] = [SLOTS, SLOTS + 1];
+const _: () = assert!(HISTORY[1] < board::STORED_SLOTS);
 /// Double words in a slot.
 pub const SLOT_WORDS: usize = board::SETTINGS_SLOT_BYTES as usize / 8;
 
-/// A flash of [`SLOTS`] slots of [`SLOT_WORDS`] double words.
+/// A flash of [`board::STORED_SLOTS`] slots of [`SLOT_WORDS`] double words.
 pub trait Flash {
     /// Reads a double word; `None` if the flash cannot correct it.
     fn read(&mut self, slot: usize, word: usize) -> Option<u64>;

@@ -10,6 +10,7 @@ use crate::monitor::record::Reason;
 use crate::settings::keys;
 
 mod fake;
+mod history;
 mod older;
 
 use fake::Fake;

@@ -14,7 +14,7 @@ use crate::chip::StartError;
 use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{adc, clocks, encoder, memory, over_voltage, pwm, rs485, stop, time};
+use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
@@ -87,6 +87,7 @@ pub fn bring_up() -> Result<Board, StartError> {
     let _ = chip.GPIOC.split(&mut rcc);
     // First, because the drivers are switched off from here on.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
+    let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
     let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc).ok_or(TWICE)?;
     let bus = SELECTED
         .bus
@@ -107,7 +108,7 @@ pub fn bring_up() -> Result<Board, StartError> {
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
         let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
-        start_control(coefficients, pwm, adc?, encoder, resets)
+        start_control(coefficients, pwm, dc_link?, adc?, encoder, resets)
     }();
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
@@ -216,6 +217,7 @@ fn comes_at_its_rate() -> bool {
 fn start_control(
     coefficients: Result<Coefficients, SettingsError>,
     mut pwm: pwm::Pwm,
+    dc_link: dc_link::DcLink,
     adc: adc::Adc,
     encoder: encoder::Encoder,
     resets: u32,
@@ -250,6 +252,7 @@ fn start_control(
     control::Control {
         drive,
         pwm,
+        dc_link,
         adc,
         encoder,
         status: send_status,

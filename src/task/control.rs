@@ -19,6 +19,7 @@ use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
 
 use crate::chip::adc::Adc;
+use crate::chip::dc_link::DcLink;
 use crate::chip::encoder::Encoder;
 use crate::chip::pwm::Pwm;
 use crate::chip::time;
@@ -36,6 +37,8 @@ pub struct Control {
     pub drive: Drive,
     /// The power stage.
     pub pwm: Pwm,
+    /// Chopper and precharge relay.
+    pub dc_link: DcLink,
     /// The converters.
     pub adc: Adc,
     /// The encoder.
@@ -160,6 +163,7 @@ impl Running {
         let Control {
             drive,
             pwm,
+            dc_link,
             adc,
             encoder,
             commands,
@@ -233,6 +237,9 @@ impl Running {
             MISSED.store(true, Ordering::Relaxed);
         }
 
+        let relay = drive.after_step(&sample);
+        dc_link.set(drive.brake_duty(), relay);
+
         // Between two steps: a command acts from the next step on.
         let answer = commands.take_with(|command| drive.command(command));
         let commanded = answer.is_some();
@@ -286,6 +293,8 @@ impl Running {
             report.worst_latency = self.worst_latency;
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
+            report.limiting = drive.limiting();
+            report.stator_resistance = drive.stator_resistance();
             report.excited = drive.excited();
         });
         if sent {

@@ -16,6 +16,8 @@ use crate::chip::watchdog::Watchdog;
 use crate::chip::{memory, pwm, stop, time};
 use crate::task::clock::Clock;
 use crate::task::control;
+use crate::task::guard::{Guard, extended};
+use crate::task::hours::Hours;
 use induction_drive::board;
 use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
@@ -30,6 +32,7 @@ use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Observation, Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
+use induction_drive::store::history::History;
 use induction_drive::store::{FlashError, Saved};
 
 /// Version and commit of the firmware.
@@ -60,7 +63,7 @@ pub struct Supervisor {
     status: Option<Status>,
     level: Level,
     clock: Clock,
-    guard: Option<(Watchdog, FeedRule)>,
+    guard: Guard,
     /// `None` if the control does not run.
     check: Option<MemoryCheck<5>>,
     /// Whether it has run long enough to forget earlier resets.
@@ -70,6 +73,8 @@ pub struct Supervisor {
     tracking: &'static mut Option<Tracking>,
     /// The commissioning. (Large, too.)
     commissioning: &'static mut Session,
+    /// Operating hours, starts and faults.
+    hours: Hours,
     /// Scales and pole pairs of the settings in force, for the log.
     scales: (Scales, u8),
 }
@@ -99,12 +104,13 @@ impl Supervisor {
     pub fn new(
         link: Option<ControlLink>,
         watchdog: Option<Watchdog>,
-        chip: Chip,
+        mut chip: Chip,
         tracking: &'static mut Option<Tracking>,
         commissioning: &'static mut Session,
         settings: &Settings,
     ) -> Self {
         let clock = Clock::new();
+        let hours = Hours::load(chip.saved.flash(), chip.dual_bank);
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
         let check = link.is_some().then(|| {
@@ -125,6 +131,7 @@ impl Supervisor {
             chip,
             tracking,
             commissioning,
+            hours,
             scales,
         }
     }
@@ -153,6 +160,8 @@ impl Supervisor {
         self.commission();
         // It designs for seconds: the console needs the time behind it.
         self.clock.update();
+        let (now, off, pages) = (self.clock.ms(), self.is_off(), self.chip.saved.flash());
+        self.hours.count(now, off, &mut self.guard, pages);
         self.clock.ms()
     }
 
@@ -215,6 +224,7 @@ impl Supervisor {
     fn log(&mut self, s: Status) {
         let before = self.status.replace(s);
         if before.map(|status| status.state) != Some(s.state) {
+            self.hours.entered(s.state, &mut self.guard, self.chip.saved.flash());
             if let State::Fault(fault) = s.state {
                 stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
                 if self.level >= Level::Error {
@@ -318,6 +328,10 @@ impl DriveHandle for Supervisor {
         Ok(())
     }
 
+    fn history(&self) -> &History {
+        self.hours.history()
+    }
+
     fn begin_trace(&mut self, plan: &Plan) -> bool {
         self.link.as_mut().is_some_and(|link| link.trace.begin(plan))
     }
@@ -383,18 +397,5 @@ impl DriveHandle for Supervisor {
             Some(why) => write!(to, "; {why}"),
             None => Ok(()),
         }
-    }
-}
-
-/// Does long work with the time of the watchdog extended, and restarts the feed rule after it: with one bank of flash the
-/// core, and the control with it, waits while the flash is written.
-fn extended<R>(guard: &mut Option<(Watchdog, FeedRule)>, work: impl FnOnce() -> R) -> R {
-    match guard {
-        Some((watchdog, rule)) => {
-            let result = watchdog.extended(work);
-            rule.restart(time::now(), control::PERIODS.load(Ordering::Relaxed));
-            result
-        }
-        None => work(),
     }
 }

@@ -4,7 +4,7 @@ use super::shunts::{ShuntState, Shunts};
 use crate::fault::Fault;
 use crate::io::{Compare, Sample};
 use crate::math::frames::{Abc, AlphaBeta};
-use crate::settings::Line;
+use crate::settings::{HeatSink, Line};
 
 /// Samples of the second calibration: the time with the low sides on holds them.
 const SAMPLES_AGAIN: u16 = 32;
@@ -22,9 +22,8 @@ pub struct Sensing {
     pub dc_link: Line,
     /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
     pub full_scale: u16,
-    /// Smallest and largest code of the heat sink that do not trip: hot at one end, an open or shorted thermistor at
-    /// the other.
-    pub heat_sink: (u16, u16),
+    /// Checks of the heat sink.
+    pub heat_sink: HeatSink,
     /// Number of samples averaged for the offsets.
     pub calibration_samples: u16,
     /// Largest accepted offset, A.
@@ -85,15 +84,17 @@ impl Sensing {
     ///
     /// # Errors
     /// [`Fault::SensorSaturatedA`], [`Fault::SensorSaturatedB`], [`Fault::SensorSaturatedC`], [`Fault::CurrentSum`] or
-    /// [`Fault::OverTemperature`].
+    /// that of the heat sink.
     pub fn check(&self, state: &SensingState, sample: &Sample) -> Result<(), Fault> {
         let saturated = |code: u16| code == 0 || code >= self.full_scale;
         if saturated(sample.current_a) {
             Err(Fault::SensorSaturatedA)
         } else if saturated(sample.current_b) {
             Err(Fault::SensorSaturatedB)
-        } else if sample.heat_sink < self.heat_sink.0 || sample.heat_sink > self.heat_sink.1 {
-            Err(Fault::OverTemperature)
+        } else if sample.heat_sink < self.heat_sink.window.0
+            || sample.heat_sink > self.heat_sink.window.1
+        {
+            Err(self.heat_sink.fault(sample.heat_sink))
         } else if let Some(shunts) = &self.shunts {
             if saturated(sample.current_c) {
                 Err(Fault::SensorSaturatedC)
@@ -197,6 +198,7 @@ impl Sensing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Ntc;
 
     fn sensing() -> Sensing {
         Sensing {
@@ -205,7 +207,7 @@ mod tests {
             shunts: None,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
-            heat_sink: (80, 4000),
+            heat_sink: Ntc::default().checks(70.0, 85.0),
             calibration_samples: 64,
             largest_offset: 0.2,
         }
@@ -265,14 +267,17 @@ mod tests {
             Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
         let state = SensingState::default();
         assert_eq!(sensing().check(&state, &sample), Ok(()));
+        let (cold, hot) = sensing().heat_sink.window;
         let cases = [
             (Sample { current_a: 0, ..sample }, Err(Fault::SensorSaturatedA)),
             (Sample { current_a: 1, ..sample }, Ok(())),
             (Sample { current_b: 4095, ..sample }, Err(Fault::SensorSaturatedB)),
             (Sample { current_b: 4094, ..sample }, Ok(())),
-            (Sample { heat_sink: 79, ..sample }, Err(Fault::OverTemperature)),
-            (Sample { heat_sink: 4001, ..sample }, Err(Fault::OverTemperature)),
-            (Sample { heat_sink: 4000, ..sample }, Ok(())),
+            (Sample { heat_sink: cold - 1, ..sample }, Err(Fault::ThermistorOpen)),
+            (Sample { heat_sink: cold, ..sample }, Ok(())),
+            (Sample { heat_sink: hot + 1, ..sample }, Err(Fault::OverTemperature)),
+            (Sample { heat_sink: hot, ..sample }, Ok(())),
+            (Sample { heat_sink: 4095, ..sample }, Err(Fault::ThermistorShorted)),
         ];
         for (sample, found) in cases {
             assert_eq!(sensing().check(&state, &sample), found, "{sample:?}");

@@ -32,6 +32,7 @@ use crate::protect::saliency_check::SaliencyCheck;
 use crate::protect::thermal::{Body, Thermal};
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
+use crate::supply::Relay;
 use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
@@ -111,6 +112,8 @@ pub struct Coefficients {
     pub(crate) inverter_drop: InverterDrop,
     pub(crate) learning: Learning,
     pub(crate) thermal: Thermal,
+    /// The precharge relay, if there is one.
+    pub(crate) relay: Option<Relay>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub(crate) unlearned: bool,
     /// Result of the design of the current controllers, d and q.
@@ -227,7 +230,7 @@ impl Settings {
                 shunts: self.shunts(),
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
-                heat_sink: self.scales.ntc.window(self.limits.heat_sink_c),
+                heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
                 calibration_samples: periods(self.sequence.calibrate_s) as u16,
                 largest_offset: self.share_of_range(LARGEST_OFFSET_A),
             },
@@ -287,6 +290,7 @@ impl Settings {
                 motor: Body::new(self.motor_a(), self.limits.motor_s, THERMAL_S),
                 inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
             },
+            relay: self.relay(),
             learning: self.learning(),
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {

@@ -73,6 +73,8 @@ pub enum Refused {
     FluxIsFixed,
     /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
     NotLearned,
+    /// The precharge relay is open: the dc link is not charged yet, or too low.
+    NotCharged,
     /// The settings do not want the rotor time constant tracked.
     RotorNotTracked,
     /// A fault is latched; clear it first.
@@ -106,6 +108,9 @@ impl core::fmt::Display for Refused {
                     f,
                     "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
                 )
+            }
+            Self::NotCharged => {
+                write!(f, "the precharge relay is open: the dc link is too low, or not steady yet")
             }
             Self::RotorNotTracked => write!(f, "track_rotor is off in the settings"),
             Self::Fault(fault) => write!(f, "fault {} is latched: {fault}", fault.code()),

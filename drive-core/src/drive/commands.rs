@@ -137,6 +137,7 @@ impl Drive {
     pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
+            (State::Off, _) if !self.is_charged() => return Err(Refused::NotCharged),
             (State::Off, Mode::Learning) if !self.can_learn() => {
                 return Err(Refused::NeedsInjection);
             }

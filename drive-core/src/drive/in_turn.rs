@@ -175,16 +175,22 @@ impl Coefficients {
         self.voltage_limit.step(&mut s.voltage_limit, &now);
     }
 
-    /// Limits the torque current to that which the dc link bears.
+    /// Limits the torque current to that which dc link and heat sink bear.
     fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
-        let (most, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
+        let (by_voltage, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
+        let by_heat = self.protection.i_q - s.too_hot_for;
+        let (most, reason) = if by_heat < by_voltage {
+            (by_heat, Limiting::HeatSink)
+        } else if s.voltage_limit.by_voltage {
+            (by_voltage, Limiting::Voltage)
+        } else {
+            (by_voltage, Limiting::No)
+        };
         s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
-        if s.voltage_limit.by_voltage {
-            let why = &mut s.limits.why;
-            for why in [&mut why.0, &mut why.1] {
-                if *why == Limiting::No {
-                    *why = Limiting::Voltage;
-                }
+        let why = &mut s.limits.why;
+        for why in [&mut why.0, &mut why.1] {
+            if *why == Limiting::No {
+                *why = reason;
             }
         }
     }

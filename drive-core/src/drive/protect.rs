@@ -40,6 +40,29 @@ impl Coefficients {
 }
 
 impl Drive {
+    /// What has time until the next step: once a control period, in every state, with the sample of the last step. Finds
+    /// how much current the heat sink bears, and switches the precharge relay. Returns whether the relay is closed; never
+    /// without one in the settings.
+    pub fn after_step(&mut self, sample: &Sample) -> bool {
+        let largest = self.c.protection.i_q;
+        let share = self.c.sensing.heat_sink.share(sample.heat_sink);
+        self.control.too_hot_for = if share < 1.0 {
+            let (i, i_d) = (share * largest, self.control.references.current.d);
+            let square = i * i - i_d * i_d;
+            largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }
+        } else {
+            0.0
+        };
+        let Some(relay) = &self.c.relay else { return false };
+        relay.step(&mut self.relay, sample.dc_link);
+        self.relay.closed
+    }
+
+    /// Whether the dc link is charged: a relay that there is has closed.
+    pub(super) fn is_charged(&self) -> bool {
+        self.c.relay.is_none() || self.relay.closed
+    }
+
     /// Adds the current of the last periods to the thermal loads, in every state.
     pub(super) fn watch_load(&mut self) -> Result<(), State> {
         if !self.elapsed.is_multiple_of(THERMAL_EVERY) {

@@ -53,6 +53,12 @@ impl Drive {
         if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
     }
 
+    /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
+    pub fn stator_resistance(&self) -> Option<f32> {
+        let tracks = self.c.observer.is_some() && self.state.regulates();
+        tracks.then_some(self.control.observer.resistance)
+    }
+
     /// Why the torque is smaller than asked for.
     pub fn limiting(&self) -> Limiting {
         if self.state.regulates() { self.control.limiting } else { Limiting::No }

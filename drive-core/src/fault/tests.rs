@@ -47,6 +47,8 @@ fn codes_never_change() {
         (42, Fault::SlopeTooSmall),
         (43, Fault::MotorOverload),
         (44, Fault::InverterOverload),
+        (45, Fault::ThermistorOpen),
+        (46, Fault::ThermistorShorted),
         (47, Fault::NotCaught),
     ];
     for (code, fault) in table {

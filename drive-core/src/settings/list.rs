@@ -96,6 +96,7 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     auto!("limits.inverter_a", limits.inverter_a, Settings::inverter_a, "A", "current that the inverter carries for any time, peak").beside(|s| (0.01, s.trip_a())),
     number!("limits.inverter_s", limits.inverter_s, "s", "thermal time constant of its switches to the heat sink").from_to(0.1, 1000.0),
     number!("limits.heat_sink_c", limits.heat_sink_c, "degC", "temperature of the heat sink that trips").from_to(0.0, 150.0),
+    auto!("limits.derate_c", limits.derate_c, Settings::derate_c, "degC", "temperature of the heat sink from which on the current limit falls, to nothing where it trips").beside(|s| (-40.0, s.limits.heat_sink_c)),
 
     number!("sequence.calibrate_s", sequence.calibrate_s, "s", "time of the offset calibration").from_to(0.001, 10.0),
     number!("sequence.precharge_s", sequence.precharge_s, "s", "time with the low sides on").from_to(0.0, 10.0),
@@ -117,6 +118,8 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     number!("braking.ohm", braking.ohm, "ohm", "brake resistor behind the chopper; 0 for none").from_to(0.0, 1e5),
     number!("braking.energy_j", braking.energy_j, "J", "energy that the brake resistor takes from cold").from_to(1.0, 1e7),
     number!("braking.power_w", braking.power_w, "W", "power that it takes for ever").from_to(0.1, 1e5),
+
+    number!("supply.relay_s", supply.relay_s, "s", "time that the dc link must be steady before the precharge relay closes; 0 without one").from_to(0.0, 60.0),
 ];
 
 /// The setting with this name.

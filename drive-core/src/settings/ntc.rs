@@ -2,14 +2,16 @@
 
 use micromath::F32;
 
+use crate::fault::Fault;
 use crate::io::CONVERTER_CODES;
 
 /// 25 °C, K.
 const T_25: f32 = 298.15;
 /// 0 °C, K.
 const T_0: f32 = 273.15;
-/// Coldest believable heat sink, °C: below it, the thermistor or its wire is open, or shorted.
+/// Coldest and hottest believable heat sink, °C: beyond them the thermistor is open or shorted.
 const COLDEST_C: f32 = -40.0;
+const HOTTEST_C: f32 = 200.0;
 
 /// A thermistor with negative coefficient in a divider across the reference of the converter:
 /// R = R_25 exp(B (1/T - 1/T_25)).
@@ -60,6 +62,54 @@ impl Ntc {
         let (cold, hot) = (self.code(COLDEST_C), self.code(limit_c));
         if self.to_ground { (hot, cold) } else { (cold, hot) }
     }
+
+    /// Checks of a heat sink whose limits begin at `derate_c` and end at `limit_c`, °C.
+    pub fn checks(&self, derate_c: f32, limit_c: f32) -> HeatSink {
+        let (hot, from) = (f32::from(self.code(limit_c)), f32::from(self.code(derate_c)));
+        HeatSink {
+            window: self.window(limit_c),
+            hot_is_low: self.to_ground,
+            shorted: self.code(HOTTEST_C),
+            hot,
+            // Equal codes of two settings that are too close: no band.
+            per_code: if hot == from { f32::MAX } else { 1.0 / (hot - from) },
+        }
+    }
+}
+
+/// Checks of the heat sink, in codes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeatSink {
+    /// Smallest and largest code that does not trip.
+    pub window: (u16, u16),
+    hot_is_low: bool,
+    shorted: u16,
+    hot: f32,
+    per_code: f32,
+}
+
+impl HeatSink {
+    /// The fault of a code outside the window.
+    pub fn fault(&self, code: u16) -> Fault {
+        let (cold, shorted) = if self.hot_is_low {
+            (code > self.window.1, code <= self.shorted)
+        } else {
+            (code < self.window.0, code >= self.shorted)
+        };
+        if cold {
+            Fault::ThermistorOpen
+        } else if shorted {
+            Fault::ThermistorShorted
+        } else {
+            Fault::OverTemperature
+        }
+    }
+
+    /// Share of the current that is left at a code, 0 to 1. It falls straight with the code from where it begins to the
+    /// temperature that trips, which is within 0.06 of straight with the temperature.
+    pub fn share(&self, code: u16) -> f32 {
+        ((self.hot - f32::from(code)) * self.per_code).clamp(0.0, 1.0)
+    }
 }
 
 /// Logarithm by micromath, within 1e-4. It errs by up to 0.08 below one, where it takes an approximate inverse.
@@ -106,6 +156,33 @@ mod tests {
         }
         assert!(Ntc::default().window(85.0).0 < Ntc::default().window(85.0).1);
         assert!(LOW.window(85.0).0 < LOW.window(85.0).1);
+    }
+
+    /// Straight with the temperature but for the curve of the divider; whole below, none at the limit.
+    #[test]
+    fn the_current_falls_between_the_two_temperatures() {
+        for ntc in [Ntc::default(), LOW] {
+            let checks = ntc.checks(70.0, 85.0);
+            for tenths in 600..=870 {
+                let celsius = tenths as f32 / 10.0;
+                let straight = ((85.0 - celsius) / 15.0).clamp(0.0, 1.0);
+                let share = checks.share(ntc.code(celsius));
+                assert!((share - straight).abs() < 0.06, "{ntc:?}, {celsius}: {share}");
+            }
+            assert_eq!(checks.share(ntc.code(25.0)), 1.0);
+        }
+    }
+
+    #[test]
+    fn an_open_and_a_shorted_thermistor_are_told_from_a_hot_one() {
+        for (ntc, open, shorted) in [(Ntc::default(), 0, 4095), (LOW, 4095, 0)] {
+            let checks = ntc.checks(70.0, 85.0);
+            assert_eq!(checks.fault(open), Fault::ThermistorOpen);
+            assert_eq!(checks.fault(shorted), Fault::ThermistorShorted);
+            for celsius in [90.0, 120.0, 190.0] {
+                assert_eq!(checks.fault(ntc.code(celsius)), Fault::OverTemperature, "{celsius}");
+            }
+        }
     }
 
     #[test]

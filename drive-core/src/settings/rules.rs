@@ -55,6 +55,8 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 const PEAK_OF_PHASE: f32 = 0.816_496_6;
+/// Band of the heat sink in which the current limit falls, K.
+const DERATING_C: f32 = 15.0;
 /// Frequency of the carrier, Hz.
 pub(crate) const CARRIER_HZ: f32 = 600.0;
 
@@ -142,6 +144,11 @@ impl Settings {
             }
         };
         or_rule(self.sequence.i_d, rule)
+    }
+
+    /// Temperature of the heat sink from which on the current limit falls, °C.
+    pub fn derate_c(&self) -> f32 {
+        or_rule(self.limits.derate_c, || self.limits.heat_sink_c - DERATING_C)
     }
 
     /// Current that the motor carries for any time at standstill, A peak.

@@ -28,6 +28,8 @@ pub struct DcLinkSettings {
     pub mains_hz: f64,
     /// Resistance of mains and rectifier, ohm.
     pub source: f64,
+    /// Resistance more while the precharge relay is open, ohm; 0 without a relay.
+    pub precharge: f64,
     /// Start and duration of a mains outage, s; none with a duration of 0.
     pub outage_at: f64,
     /// See `outage_at`.
@@ -57,6 +59,7 @@ impl Default for DcLinkSettings {
             pulses: 6,
             mains_hz: 50.0,
             source: 1.0,
+            precharge: 0.0,
             outage_at: 0.0,
             outage: 0.0,
             sag_at: 0.0,
@@ -84,6 +87,8 @@ pub(crate) struct DcLink {
     pub nominal: f64,
     /// Duty that the drive gives the chopper.
     pub duty: f64,
+    /// Whether the precharge relay is closed.
+    pub relay: bool,
     time: f64,
     braking: bool,
 }
@@ -100,6 +105,7 @@ impl DcLink {
         }
         check("dc_link.mains_hz", s.mains_hz, 1.0..=1000.0, "Hz")?;
         check("dc_link.source", s.source, 0.01..=1000.0, "ohm")?;
+        check("dc_link.precharge", s.precharge, 0.0..=1e5, "ohm")?;
         check("dc_link.outage_at", s.outage_at, 0.0..=1e6, "s")?;
         check("dc_link.outage", s.outage, 0.0..=1e6, "s")?;
         check("dc_link.sag_at", s.sag_at, 0.0..=1e6, "s")?;
@@ -109,7 +115,7 @@ impl DcLink {
         check("dc_link.load", s.load, 0.0..=1e6, "W")?;
         check("dc_link.chopper_v", s.chopper_v, RANGE, "V")?;
         check("dc_link.chopper", s.chopper, 0.1..=1e6, "ohm")?;
-        Ok(Self { settings: *s, nominal, duty: 0.0, time: 0.0, braking: false })
+        Ok(Self { settings: *s, nominal, duty: 0.0, relay: false, time: 0.0, braking: false })
     }
 
     /// Whether the voltage changes at all.
@@ -133,7 +139,8 @@ impl DcLink {
         // The energy of the capacitor is balanced, not its charge: exact for a constant power.
         let alone = (v * v - 2.0 * taken / s.capacitor).max(0.0).sqrt();
         let mains = self.mains();
-        let weight = h / (s.source * s.capacitor);
+        let source = s.source + if self.relay { 0.0 } else { s.precharge };
+        let weight = h / (source * s.capacitor);
         let charged = if mains > alone { (alone + weight * mains) / (1.0 + weight) } else { alone };
         charged.clamp(*RANGE.start(), *RANGE.end())
     }
@@ -178,5 +185,10 @@ impl Plant {
     /// Sets the duty of the brake chopper, 0 to 1; what is beyond counts as the nearer end.
     pub fn set_chopper(&mut self, duty: f64) {
         self.dc_link.duty = duty.clamp(0.0, 1.0);
+    }
+
+    /// Closes or opens the precharge relay.
+    pub fn set_relay(&mut self, closed: bool) {
+        self.dc_link.relay = closed;
     }
 }

@@ -228,6 +228,8 @@ keys! {
         mains_hz: f64 = 50.0, [1 .. 1000], "Hz";
         /// Resistance of mains and rectifier.
         source: f64 = 1.0, [0.01 .. 1000], "ohm";
+        /// Resistance more while the precharge relay is open; 0 without one.
+        precharge: f64 = 0.0, [0 .. 1e5], "ohm";
         /// Start of a mains outage.
         outage_at_s: f64 = 0.0, [0 .. 1e6], "s";
         /// Duration of the outage; 0 for none.

@@ -127,6 +127,7 @@ pub fn plant_settings(config: &Config) -> PlantSettings {
             pulses: config.dc_link.pulses,
             mains_hz: config.dc_link.mains_hz,
             source: config.dc_link.source,
+            precharge: config.dc_link.precharge,
             outage_at: config.dc_link.outage_at_s,
             outage: config.dc_link.outage_s,
             sag_at: config.dc_link.sag_at_s,

@@ -26,6 +26,7 @@ use crate::periph::lpuart::Lpuart;
 use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
+use crate::periph::tim8::Tim8;
 use crate::periph::time_base::TimeBase;
 use crate::periph::usart::Usart;
 use crate::periph::{NEVER, Reset, Store, plain};
@@ -128,6 +129,8 @@ pub struct Chip {
     pub exti: Store,
     /// Timer of the power stage.
     pub tim1: Tim1,
+    /// Timer of the brake chopper.
+    pub tim8: Tim8,
     /// Timer of the encoder.
     pub tim2: EncoderTimer,
     /// Time base.
@@ -191,6 +194,7 @@ impl Default for Chip {
             syscfg: Store::new(plain::SYSCFG),
             exti: Store::new(plain::EXTI),
             tim1,
+            tim8: Tim8::default(),
             tim2: EncoderTimer::default(),
             tim5: TimeBase::default(),
             adc: Adc::default(),
@@ -247,8 +251,14 @@ impl Chip {
     /// The core locks up: to the break of TIM1, if the firmware wants that.
     pub fn lock_up(&mut self) {
         if self.syscfg.get(plain::CFGR2) & plain::CLL != 0 {
-            self.tim1.system_break();
+            self.system_break();
         }
+    }
+
+    /// A fault inside the chip pulls the breaks.
+    fn system_break(&mut self) {
+        self.tim1.system_break();
+        self.tim8.system_break();
     }
 
     /// Interrupt requests that are levels.
@@ -356,7 +366,7 @@ impl Chip {
             }
         }
         if self.rcc.happen(now) {
-            self.tim1.system_break();
+            self.system_break();
             self.scs.pend(scs::NMI);
         }
         self.adc.happen(now);

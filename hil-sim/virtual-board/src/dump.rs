@@ -6,7 +6,7 @@ use crate::{Board, Image, Options, PowerStage};
 
 /// The registers that the firmware sets up, by peripheral with its address: name and offset of each, and the bits that are
 /// the same after every start where these are not all, in hexadecimal.
-const REGISTERS: [(&str, u32, &str); 19] = [
+const REGISTERS: [(&str, u32, &str); 20] = [
     // Oscillator, PLL and clock security on; the trimming bits are the chip's own.
     (
         "RCC",
@@ -20,7 +20,7 @@ const REGISTERS: [(&str, u32, &str); 19] = [
     ("SYSCFG", 0x4001_0000, "CFGR2 1c f"),
     ("GPIOA", 0x4800_0000, "MODER 00, PUPDR 0c, AFRL 20, AFRH 24"),
     ("GPIOB", 0x4800_0400, "MODER 00, PUPDR 0c, AFRL 20"),
-    ("GPIOC", 0x4800_0800, "MODER 00, PUPDR 0c"),
+    ("GPIOC", 0x4800_0800, "MODER 00, PUPDR 0c, AFRL 20"),
     // Not the direction.
     (
         "TIM1",
@@ -29,6 +29,7 @@ const REGISTERS: [(&str, u32, &str); 19] = [
          CCR1 34, CCR4 40, BDTR 44, AF1 60",
     ),
     ("TIM2", 0x4000_0000, "SMCR 08, CCMR1 18, CR1 00 1"),
+    ("TIM8", 0x4001_3400, "CR1 00 3ef, CCMR1 18, CCER 20, ARR 2c, BDTR 44, AF1 60"),
     ("TIM5", 0x4000_0c00, "CR1 00 1, PSC 28 ffff, ARR 2c"),
     ("ADC1", 0x5000_0000, "CR 08 30000009, CFGR 0c, SMPR1 14, TR1 20 fff0fff, JSQR 4c, IER 04"),
     ("ADC2", 0x5000_0100, "CR 08 30000009, CFGR 0c, SMPR1 14, TR1 20 fff0fff, JSQR 4c, IER 04"),
@@ -37,7 +38,7 @@ const REGISTERS: [(&str, u32, &str); 19] = [
     ("COMP1", 0x4001_0200, "CSR 00 8fffffff"),
     ("LPUART1", 0x4000_8000, "BRR 0c"),
     // The probe sets bits of DBGMCU_CR; these two are the firmware's.
-    ("DBGMCU", 0xe004_2000, "APB1FZR1 08 1008, APB2FZ 10 800"),
+    ("DBGMCU", 0xe004_2000, "APB1FZR1 08 1008, APB2FZ 10 2800"),
     ("MPU", 0xe000_ed90, "CTRL 04 7"),
     ("IWDG", 0x4000_3000, "PR 04 7, RLR 08 fff"),
 ];

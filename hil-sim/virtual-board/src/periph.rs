@@ -12,6 +12,7 @@ pub mod plain;
 pub mod pwr;
 pub mod rcc;
 pub mod tim1;
+pub mod tim8;
 pub mod time_base;
 pub mod usart;
 

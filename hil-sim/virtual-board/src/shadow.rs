@@ -139,6 +139,7 @@ impl Shadow {
     pub fn follow(&mut self, period: &Period) -> Result<()> {
         let learning = self.drive.state() == State::Learning;
         let compare = self.drive.step(&period.sample);
+        self.drive.after_step(&period.sample);
         if learning
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()

@@ -14,8 +14,9 @@ use virtual_board::chip::{Chip, clock_of, pins};
 use virtual_board::dump;
 
 /// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is as ADC1.
-const BLOCKS: [(&str, &str, u32); 22] = [
+const BLOCKS: [(&str, &str, u32); 23] = [
     ("tim1", "TIM1", 0x4001_2c00),
+    ("tim1", "TIM8", 0x4001_3400),
     ("tim2", "TIM2", 0x4000_0000),
     ("tim5", "TIM5", 0x4000_0c00),
     ("iwdg", "IWDG", 0x4000_3000),
@@ -44,6 +45,7 @@ const RESETS: &[(&str, u32, &str)] = &[
     ("RCC_CR", 0x63, "MSI bits of another family; RM0440: HSION and HSIRDY"),
     ("FLASH_ACR", 0x600, "DBG_SWEN is set after reset (RM0440, FLASH_ACR: 0x0004_0600)"),
     ("TIM1_AF1", 0, "BKINE is set after reset (RM0440)"),
+    ("TIM8_AF1", 0, "as TIM1_AF1"),
     ("TIM1_AF2", 0, "BK2INE is set after reset (RM0440)"),
     ("USART3_ISR", 0, "TXE and TC are set after reset (RM0440)"),
     ("DBGMCU_IDCODE", 0, "the identity of this chip, not a value of reset"),

@@ -1,4 +1,6 @@
-//! The power goes while the settings are saved.
+//! What the flash keeps while the power comes and goes.
+
+mod common;
 
 use anyhow::Result;
 use induction_drive::settings::keys;
@@ -12,5 +14,38 @@ fn no_operation_of_a_save_loses_both_sets() -> Result<()> {
     // An erasure, the two words of the head, and one a key: nothing was learned.
     assert_eq!(operations, [3 + keys::COUNT as u64; 2]);
     println!("{operations:?} operations");
+    Ok(())
+}
+
+/// A start and a fault are in the history at once. After power-on the fault is there, and the next one before it; a start
+/// after the last write is counted again.
+#[test]
+fn the_history_survives_power_off() -> Result<()> {
+    let mut pair = common::regulating(8)?;
+    pair.board.set_fault_pin(false);
+    pair.run(1200, |_, _| {})?;
+    let totals = pair.say("history")?;
+    assert_eq!(totals.lines().next(), Some("powered 0.0 h, with current 0.0 h, starts 1"));
+    pair.board.set_fault_pin(true);
+    let list = |board: &mut virtual_board::Board| -> Result<Vec<String>> {
+        board.run_periods(30_000)?;
+        board.take_console();
+        board.type_line("history");
+        board.run_periods(3000)?;
+        Ok(board.take_console().lines().map(str::to_owned).collect())
+    };
+    let fault = "at 0.0 h, with current 0.0 h: fault 20, the power stage pulled the break input";
+    pair.board.unplug();
+    let after = list(&mut pair.board)?;
+    assert_eq!(after.len(), 3, "{after:#?}");
+    assert!(after[0].ends_with("starts 1") && after[1] == fault && after[2] == "ok", "{after:#?}");
+    // The first page was begun: an erasure, two totals, the fault, its head.
+    assert_eq!(pair.board.chip().flash.operations, 5);
+    // Many resets write nothing.
+    for _ in 0..2 {
+        pair.board.reset(virtual_board::periph::Reset::Pin);
+        assert_eq!(list(&mut pair.board)?, after);
+    }
+    assert_eq!(pair.board.chip().flash.operations, 5);
     Ok(())
 }

@@ -67,6 +67,12 @@ fn a_rotor_that_is_warmer_than_believed_is_found() -> Result<()> {
     assert!(found && (used / truth - 1.0).abs() < 0.06, "{used} ms for {truth} ms");
     assert!(before.abs() > 5.0 && after.abs() < 1.4, "{before} and {after} degrees");
 
+    // A cage with 30 % more resistance is 75 K above 25 degC; 6 % of the time constant are 15 K.
+    let warm = pair.say("status")?;
+    let celsius = warm.split_once("; rotor ").and_then(|(_, rest)| rest.split(' ').next());
+    let celsius: f64 = celsius.and_then(|number| number.parse().ok()).unwrap_or_default();
+    assert!((celsius - 100.0).abs() < 20.0, "{warm}");
+
     // Without torque the rotor does not show: the status says so, and the time constant in use stays.
     pair.order("torque 0")?;
     pair.run(18_000, |_, _| {})?;

@@ -19,6 +19,7 @@ use induction_drive::link::{Status, stream};
 use induction_drive::rotor_tracking::{Report, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::FlashError;
+use induction_drive::store::history::History;
 
 /// A drive without hardware.
 pub struct FakeDrive {
@@ -48,6 +49,8 @@ pub struct FakeDrive {
     pub streamed: (u16, VecDeque<stream::Sample>),
     /// The commissioning.
     pub session: Session,
+    /// Operating hours, starts and faults.
+    pub history: History,
 }
 
 impl FakeDrive {
@@ -67,6 +70,7 @@ impl FakeDrive {
             tracking: None,
             streamed: (0, VecDeque::new()),
             session: Session::new(&Settings::default()),
+            history: History::default(),
         }
     }
 }
@@ -93,6 +97,8 @@ impl DriveHandle for FakeDrive {
             worst_latency: u32::MAX,
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
+            limiting: self.drive.limiting(),
+            stator_resistance: self.drive.stator_resistance(),
             excited: self.drive.excited(),
         })
     }
@@ -124,6 +130,9 @@ impl DriveHandle for FakeDrive {
         }
         self.saved = Some(*settings);
         Ok(())
+    }
+    fn history(&self) -> &History {
+        &self.history
     }
     fn begin_trace(&mut self, plan: &Plan) -> bool {
         assert!(usize::from(plan.records) <= board::TRACE_RECORDS);

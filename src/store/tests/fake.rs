@@ -1,12 +1,13 @@
 //! A flash that loses power.
 
+use crate::board::STORED_SLOTS;
 use crate::store::*;
 
 /// Flash that loses power, with what a power failure leaves drawn from random bits.
 #[derive(Clone, Debug)]
 pub struct Fake {
     /// `None` is torn.
-    pub words: [[Option<u64>; SLOT_WORDS]; SLOTS],
+    pub words: [[Option<u64>; SLOT_WORDS]; STORED_SLOTS],
     /// Operations until the power fails.
     pub left: Option<usize>,
     pub random: u64,
@@ -14,7 +15,7 @@ pub struct Fake {
 
 impl Fake {
     pub fn new() -> Self {
-        Self { words: [[Some(u64::MAX); SLOT_WORDS]; SLOTS], left: None, random: 1 }
+        Self { words: [[Some(u64::MAX); SLOT_WORDS]; STORED_SLOTS], left: None, random: 1 }
     }
 
     /// A record is in this slot.

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn every_protection_switches_off_in_the_same_step() {
     type Change = fn(&mut Sample);
-    let cases: [(Change, Fault); 13] = [
+    let cases: [(Change, Fault); 15] = [
         (|s| s.current_a = 4050, Fault::OverCurrentA),
         (|s| s.current_b = 4050, Fault::OverCurrentB),
         (|s| (s.current_a, s.current_b) = (3200, 3300), Fault::OverCurrentC),
@@ -13,7 +13,9 @@ fn every_protection_switches_off_in_the_same_step() {
         (|s| s.current_b = 0, Fault::SensorSaturatedB),
         (|s| s.dc_link = 3700, Fault::DcLinkOverVoltage),
         (|s| s.dc_link = 1000, Fault::DcLinkUnderVoltage),
-        (|s| s.heat_sink = 4095, Fault::OverTemperature),
+        (|s| s.heat_sink = 3400, Fault::OverTemperature),
+        (|s| s.heat_sink = 0, Fault::ThermistorOpen),
+        (|s| s.heat_sink = 4095, Fault::ThermistorShorted),
         (|s| s.encoder = 1_000_000, Fault::Encoder),
         (|s| s.hardware = Hardware::BREAK, Fault::Break),
         (|s| s.hardware = Hardware::ANALOG_WATCHDOG, Fault::AnalogWatchdog),
@@ -169,4 +171,32 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
     drive.command(&Command::Start(Mode::Torque)).unwrap();
     assert!(!run_to(&mut drive, &mut load, State::Torque));
     assert_eq!(drive.state(), State::Fault(Fault::CarrierNoRoom));
+}
+
+/// Half of 3.5 A is left half-way between the limits of the heat sink: 1.6 A beside 0.7 A of direct current. It comes back
+/// as the heat sink cools.
+#[test]
+fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
+    let (mut drive, mut load) = running();
+    drive.command(&Command::Torque(3.0)).unwrap();
+    let mut at = |drive: &mut Drive, celsius: f32| {
+        for _ in 0..1200 {
+            let heat_sink = Settings::default().scales.ntc.code(celsius);
+            let sample = Sample { heat_sink, ..load.sample() };
+            let compare = drive.step(&sample);
+            drive.after_step(&sample);
+            load.advance(compare);
+        }
+        (drive.telemetry().current.q, drive.limiting())
+    };
+    let (whole, why) = at(&mut drive, 60.0);
+    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::No, "{whole} {why}");
+    let (half, why) = at(&mut drive, 77.5);
+    // 4 % of 3.5 A for the curve of the thermistor, which moves i_q by i/i_q of that.
+    assert!((half - libm::sqrtf(1.75 * 1.75 - 0.7 * 0.7)).abs() < 0.16, "{half}");
+    assert_eq!(why, Limiting::HeatSink);
+    let (nothing, why) = at(&mut drive, 84.9);
+    assert!(nothing.abs() < 0.02 && why == Limiting::HeatSink, "{nothing} {why}");
+    let (whole, why) = at(&mut drive, 60.0);
+    assert!((whole - 3.0).abs() < 0.02 && why == Limiting::No, "{whole} {why}");
 }

@@ -2,7 +2,12 @@
 
 use super::or_rule;
 use crate::dc_link::{ChopperSettings, DcLinkSettings};
+use crate::io::periods;
 use crate::settings::Settings;
+use crate::supply::Relay;
+
+/// Largest change of a dc link that counts as steady, with 311 V.
+const STEADY_V: f32 = 5.0;
 
 impl Settings {
     /// Dc link above which the drive trips, V.
@@ -31,6 +36,13 @@ impl Settings {
     /// Direct current that is added while generating torque is limited, A.
     pub fn braking_flux_a(&self) -> f32 {
         or_rule(self.braking.flux_a, || self.share_of_rated(1.0))
+    }
+
+    /// The precharge relay, which opens where the drive trips.
+    pub(crate) fn relay(&self) -> Option<Relay> {
+        let (least_v, band_v) = (self.dc_under_v(), self.share_of_dc_link(STEADY_V));
+        let time = periods(self.supply.relay_s);
+        (time > 0).then(|| Relay::new(self.scales.dc_link, least_v, band_v, time))
     }
 
     /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and

@@ -24,6 +24,8 @@ pub(super) struct Connection {
     applied: Compare,
     /// Dead time that it sees, ticks; none before the outputs were on.
     dead_time: Option<u32>,
+    /// Duty of the chopper and relay that it sees.
+    dc_link: (f64, bool),
     /// The last sample.
     pub sample: Sample,
     shunts: Option<ShuntReader>,
@@ -70,7 +72,14 @@ impl Connection {
                 })
             }
         };
-        Self { at: 0, applied: Compare::OFF, dead_time: None, sample: Sample::default(), shunts }
+        Self {
+            at: 0,
+            applied: Compare::OFF,
+            dead_time: None,
+            dc_link: (0.0, false),
+            sample: Sample::default(),
+            shunts,
+        }
     }
 }
 
@@ -140,6 +149,13 @@ impl Board {
             chip.look_at_gates();
         }
         let (now, compare) = (chip.now, chip.gates.bridge().compare());
+        let seen = (chip.chopper_duty(), chip.relay_pin());
+        if seen != self.connection.dc_link {
+            self.advance_plant(now);
+            self.connection.dc_link = seen;
+            self.plant.set_chopper(seen.0);
+            self.plant.set_relay(seen.1);
+        }
         if compare.enabled != self.connection.applied.enabled {
             self.advance_plant(now);
             self.connection.applied = compare;

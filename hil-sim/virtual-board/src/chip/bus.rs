@@ -15,6 +15,7 @@ pub(super) const PWR: u32 = 0x4000_7000;
 pub(super) const USART3: u32 = 0x4000_4800;
 pub(super) const LPUART1: u32 = 0x4000_8000;
 pub(super) const SYSCFG: u32 = 0x4001_0000;
+pub(super) const TIM8: u32 = 0x4001_3400;
 const BDTR: u32 = 0x4001_2c44;
 const EXTI: u32 = 0x4001_0400;
 pub(super) const TIM1: u32 = 0x4001_2c00;
@@ -130,7 +131,7 @@ impl Chip {
             let (value, torn) = self.flash.load(address);
             if torn {
                 if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
-                    self.tim1.system_break();
+                    self.system_break();
                 }
                 self.scs.pend(scs::NMI);
                 self.attention = true;
@@ -150,6 +151,7 @@ impl Chip {
             TIM1 => self.tim1.read(offset, now),
             ADC1 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
+            TIM8 => self.tim8.read(offset),
             TIM5 => self.tim5.read(offset, now),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
@@ -199,6 +201,7 @@ impl Chip {
             TIM1 => self.tim1.write(offset, value, rules)?,
             ADC1 => self.adc.write(offset, value, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
+            TIM8 => self.tim8.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
             PWR => {

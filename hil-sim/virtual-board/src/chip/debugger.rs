@@ -13,6 +13,9 @@ const IWDG_STOP: u32 = 1 << 12;
 /// DBGMCU: TIM1 stops while the core is halted.
 const TIM1_STOP: u32 = 1 << 11;
 
+/// DBGMCU: TIM8 stops while the core is halted.
+const TIM8_STOP: u32 = 1 << 13;
+
 /// The program may take this long to switch off outputs that come back as the core goes on, ticks: two periods.
 const NOTICED: u64 = 2 * TICKS_PER_PERIOD;
 
@@ -37,6 +40,11 @@ impl Chip {
             self.look_at_gates();
         }
         self.attention = true;
+    }
+
+    /// Whether a halt has stopped the timer of the brake chopper, which takes its output off.
+    pub(super) fn stops_chopper(&self) -> bool {
+        self.halt.is_some() && self.debug.get(DBG_APB2_FZ) & TIM8_STOP != 0
     }
 
     /// Lets the core go on.

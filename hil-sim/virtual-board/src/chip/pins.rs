@@ -20,6 +20,11 @@ pub const OUTPUTS: [Signal; 6] = [
 ];
 /// The break input.
 pub const BREAK: Signal = ("TIM1_BKIN", "A6:6 A14:6 A15:9 B8:12 B10:12 B12:6 C13:2");
+/// The brake chopper.
+pub const CHOPPER: Signal = ("TIM8_CH1", "A15:2 B6:5 C6:4");
+/// Where the firmware has it, and the output for the precharge relay.
+const CHOPPER_PIN: Pin = (2, 6);
+const RELAY_PIN: Pin = (2, 8);
 /// The encoder.
 pub const ENCODER: [Signal; 2] = [("TIM2_CH1", "A0:1 A5:1 A15:1"), ("TIM2_CH2", "A1:1 B3:1")];
 /// The console.
@@ -77,6 +82,21 @@ impl Chip {
         if pin {
             self.require_pin(BREAK, "TIM1_AF1.BKINE is set");
         }
+    }
+
+    /// Duty at the pin of the brake chopper. Released, the pin is pulled down.
+    pub fn chopper_duty(&self) -> f64 {
+        let (port, pin) = CHOPPER_PIN;
+        let connected = pins_of(CHOPPER).any(|(place, function)| {
+            place == CHOPPER_PIN && self.gpio[port].pad(pin) == Pad::Alternate(function)
+        });
+        if connected && !self.stops_chopper() { self.tim8.duty() } else { 0.0 }
+    }
+
+    /// Whether the pin of the precharge relay is high. Released, it is pulled down.
+    pub fn relay_pin(&self) -> bool {
+        let (port, pin) = RELAY_PIN;
+        self.gpio[port].pad(pin) == Pad::Output(true)
     }
 
     /// The encoder counts.

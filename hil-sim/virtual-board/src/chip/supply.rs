@@ -36,7 +36,7 @@ impl Chip {
             "SYSCFG_CFGR2.PVDL is set while PWR_CR2.PVDE is off".into()
         });
         if self.pwr.too_low() {
-            self.tim1.system_break();
+            self.system_break();
             self.look_at_gates();
         }
     }

@@ -1,0 +1,107 @@
+//! Precharge relay: it bridges the resistor through which the rectifier charges the dc link.
+//!
+//! It closes when the link has been steady for a time, at or above the voltage at which the drive trips, and opens below
+//! that voltage. Steady is a voltage within [`Relay`]'s band of the one with which the time began: behind a resistor R
+//! and a capacitor C the link approaches its end E as `E - v = (E - v_0) exp(-t/RC)`, so that at most
+//! `band / (exp(t/RC) - 1)` is missing where it closes.
+//!
+//! Converter codes are compared, so that a step takes no conversion.
+
+use crate::io::CONVERTER_CODES;
+use crate::settings::Line;
+
+/// Coefficients of the relay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relay {
+    /// Code at which it opens.
+    least: u16,
+    /// Largest distance of a steady link, codes.
+    band: u16,
+    /// Control periods of a steady link until it closes.
+    settle: u32,
+}
+
+/// State of the relay. It is kept over stops and starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RelayState {
+    /// Code with which the steady time began, and its control periods so far.
+    from: u16,
+    steady: u32,
+    /// Whether it is closed.
+    pub closed: bool,
+}
+
+impl Relay {
+    /// A relay that closes `periods` control periods after the link has become steady within `band_v`, and opens below
+    /// `least_v`, V.
+    pub fn new(dc_link: Line, least_v: f32, band_v: f32, periods: u32) -> Self {
+        // The casts saturate.
+        let least = (((least_v - dc_link.offset) / dc_link.gain) as u16).min(CONVERTER_CODES);
+        Self { least, band: (band_v / dc_link.gain) as u16, settle: periods }
+    }
+
+    /// One control period with the code of the dc link.
+    pub fn step(&self, state: &mut RelayState, code: u16) {
+        if code < self.least {
+            *state = RelayState::default();
+        } else if state.closed {
+        } else if code.abs_diff(state.from) > self.band {
+            (state.from, state.steady) = (code, 0);
+        } else {
+            state.steady += 1;
+            state.closed = state.steady >= self.settle;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::disallowed_methods)] // std functions are the reference here
+    use super::*;
+    use crate::io::PERIOD_S;
+
+    const LINE: Line = Line { gain: 0.11, offset: 0.0 };
+    const END_V: f32 = 311.0;
+
+    fn code(v: f32) -> u16 {
+        (v / LINE.gain) as u16
+    }
+
+    /// Link through R C from 0: closed when it is steady, within what the head of this file states, and not at once.
+    #[test]
+    fn it_closes_near_the_end_of_charging_whatever_the_resistor() {
+        for tau_s in [0.05_f32, 0.5, 2.0] {
+            let relay = Relay::new(LINE, 200.0, 5.0, 3000);
+            let mut state = RelayState::default();
+            let (mut v, mut n) = (0.0_f32, 0);
+            while !state.closed {
+                v += (END_V - v) * PERIOD_S / tau_s;
+                relay.step(&mut state, code(v));
+                n += 1;
+                assert!(n < 1_000_000, "never closed with {tau_s} s");
+            }
+            // Two codes for the rounding of both voltages.
+            let missing = 5.0 / ((0.5 / tau_s).exp() - 1.0) + 2.0 * LINE.gain;
+            assert!(END_V - v <= missing, "{tau_s} s: {v} V, {missing} V may be missing");
+            assert!(n > 3000, "{tau_s} s: after {n} periods");
+        }
+    }
+
+    #[test]
+    fn it_opens_at_once_below_the_least_and_closes_anew() {
+        let relay = Relay::new(LINE, 200.0, 5.0, 10);
+        let mut state = RelayState::default();
+        let steps = |state: &mut RelayState, v: f32, n: u32| {
+            (0..n).for_each(|_| relay.step(state, code(v)));
+            state.closed
+        };
+        assert!(!steps(&mut state, 311.0, 10) && steps(&mut state, 311.0, 1));
+        // A sag above it, however fast, opens nothing.
+        assert!(steps(&mut state, 205.0, 1) && steps(&mut state, 390.0, 1));
+        assert!(!steps(&mut state, 199.0, 1));
+        assert!(!steps(&mut state, 311.0, 10) && steps(&mut state, 311.0, 1));
+        // Steady, but too low.
+        state = RelayState::default();
+        assert!(!steps(&mut state, 199.0, 1000));
+    }
+}

@@ -1,0 +1,62 @@
+//! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, upwards. Other modes are off here.
+
+use super::{Effect, Store, registers};
+
+registers! {
+    CR1 = 0x00, 0, 0x1bff;
+    _ = 0x14, 0, 0;
+    CCMR1 = 0x18, 0, 0x0101_ffff;
+    CCER = 0x20, 0, 0x0033_ffff;
+    ARR = 0x2c, 0xffff, 0x000f_ffff;
+    CCR1 = 0x34, 0, 0x000f_ffff;
+    BDTR = 0x44, 0, 0x3fff_ffff;
+    _ = 0x60, 1, 0x0003_ffff;
+}
+
+const CEN: u32 = 1;
+const CC1E: u32 = 1;
+/// OC1M and CC1S.
+const MODE: u32 = 0x1_0073;
+const PWM_1: u32 = 0x60;
+const BKE: u32 = 1 << 12;
+const MOE: u32 = 1 << 15;
+
+/// The timer.
+#[derive(Clone, Debug)]
+pub struct Tim8(Store);
+
+impl Default for Tim8 {
+    fn default() -> Self {
+        Self(Store::new(KNOWN))
+    }
+}
+
+impl Tim8 {
+    /// Share of a period in which its first output is high. A new compare value counts at once, not from the next period on.
+    pub fn duty(&self) -> f64 {
+        let get = |offset| self.0.get(offset);
+        let runs = get(CR1) & CEN != 0 && get(CCER) & CC1E != 0 && get(BDTR) & MOE != 0;
+        if !runs || get(CCMR1) & MODE != PWM_1 {
+            return 0.0;
+        }
+        f64::from(get(CCR1)) / (f64::from(get(ARR)) + 1.0)
+    }
+
+    /// A fault inside the chip pulls the break.
+    pub fn system_break(&mut self) {
+        let bdtr = self.0.get(BDTR);
+        if bdtr & BKE != 0 {
+            self.0.write(BDTR, bdtr & !MOE);
+        }
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32) -> Option<u32> {
+        self.0.read(offset)
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
+        self.0.write(offset, value)
+    }
+}

@@ -1,0 +1,65 @@
+//! Outputs for the dc link: brake chopper and precharge relay.
+//!
+//! TIM8 makes the chopper's pulses, one in each control period; the relay is a plain output. High switches either on. A
+//! reset releases both pins, so external resistors pull them down ([`board::CHOPPER`], [`board::RELAY`]). The break of
+//! TIM8 takes the chopper off without software where the core locks up, the supply or the flash fails.
+
+use stm32g4xx_hal::pac;
+use stm32g4xx_hal::rcc::Rcc;
+
+use super::clocks::clock_on;
+use super::{StartError, pins};
+use induction_drive::board;
+use induction_drive::boards::{Level, pin};
+
+/// Ticks of a control period.
+const PERIOD: u16 = 2 * board::PWM_TOP;
+
+/// Chopper and relay.
+pub struct DcLink {
+    timer: pac::TIM8,
+}
+
+impl DcLink {
+    /// Both off, then connected with their pins.
+    ///
+    /// # Errors
+    /// The timer has no clock.
+    pub fn new(timer: pac::TIM8, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Result<Self, StartError> {
+        if !clock_on!(rcc.apb2enr(), tim8en) {
+            return Err("TIM8 has no clock");
+        }
+        // Halted by a debugger, the counter stops and the chopper goes off.
+        debug.apb2_fz().modify(|_, w| w.dbg_tim8_stop().set_bit());
+        timer.arr().write(|w| w.arr().set(u32::from(PERIOD - 1)));
+        // High below the compare value (PWM mode 1), which is preloaded.
+        timer.ccmr1_output().write(|w| w.oc1m().pwm_mode1().oc1pe().enabled());
+        timer.ccr1().write(|w| w.ccr().set(0));
+        timer.ccer().write(|w| w.cce(0).set_bit());
+        // No pin breaks it, only faults inside the chip, which `Pwm::new` connects for all timers.
+        timer.af1().write(|w| w.bkine().clear_bit());
+        timer.bdtr().write(|w| {
+            w.ossi().idle_level().bke().enabled().bkp().active_high().aoe().manual().moe().enabled()
+        });
+        timer.egr().write(|w| w.ug().update());
+        timer.cr1().write(|w| w.arpe().enabled().cen().enabled());
+        pins::alternate(board::CHOPPER, board::CHOPPER.function(&pin::TIM8_CH1), Some(Level::Low));
+        pins::output(board::RELAY, Level::Low);
+        Ok(Self { timer })
+    }
+
+    /// Sets the duty of the chopper, 0 to 1, from the next period on, and the relay.
+    pub fn set(&mut self, duty: f32, relay: bool) {
+        // The cast saturates.
+        self.timer.ccr1().write(|w| w.ccr().set((duty * f32::from(PERIOD)) as u32));
+        pins::set(board::RELAY, if relay { Level::High } else { Level::Low });
+    }
+}
+
+/// Switches both off, from any context: for handlers that do not return.
+pub fn outputs_off() {
+    // SAFETY: TIM8 always exists. This may interrupt its owner anywhere; it only clears MOE, which is set once.
+    let timer = unsafe { &*pac::TIM8::ptr() };
+    timer.bdtr().modify(|_, w| w.moe().disabled_idle());
+    pins::set(board::RELAY, Level::Low);
+}

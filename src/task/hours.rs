@@ -1,0 +1,73 @@
+//! Operating hours, starts and faults, counted by the main loop.
+
+use defmt::Display2Format;
+use drive_core::State;
+
+use crate::chip::flash::Pages;
+use crate::task::guard::{Guard, extended};
+use induction_drive::store::FlashError;
+use induction_drive::store::history::History;
+
+/// The history, and what is counted next.
+pub struct Hours {
+    history: History,
+    /// Time up to which it is counted, ms.
+    counted_ms: u32,
+    /// Whether the drive was off in the last report.
+    was_off: bool,
+    /// Whether the control goes on while the history is written; it is not written otherwise.
+    dual_bank: bool,
+}
+
+impl Hours {
+    /// The hours in the flash.
+    pub fn load(pages: &mut Pages, dual_bank: bool) -> Self {
+        Self { history: History::load(pages), counted_ms: 0, was_off: true, dual_bank }
+    }
+
+    /// All of them.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Counts up to this time, ms, and writes where that is due.
+    pub fn count(&mut self, now_ms: u32, off: bool, guard: &mut Guard, pages: &mut Pages) {
+        self.history.pass(now_ms.wrapping_sub(self.counted_ms), !off);
+        self.counted_ms = now_ms;
+        if self.history.is_due(off) {
+            self.write(guard, pages, History::write);
+        }
+    }
+
+    /// Notes a new state of the drive: starts and faults.
+    pub fn entered(&mut self, state: State, guard: &mut Guard, pages: &mut Pages) {
+        let off = matches!(state, State::Off | State::Fault(_));
+        if self.was_off && !off {
+            self.history.started();
+        }
+        self.was_off = off;
+        if let State::Fault(fault) = state {
+            self.write(guard, pages, |history, pages| history.fault(pages, fault.code()));
+        }
+    }
+
+    fn write(
+        &mut self,
+        guard: &mut Guard,
+        pages: &mut Pages,
+        write: impl FnOnce(&mut History, &mut Pages) -> Result<(), FlashError>,
+    ) {
+        if !self.dual_bank {
+            return;
+        }
+        let history = &mut self.history;
+        let result = if history.is_full() {
+            extended(guard, || write(history, pages))
+        } else {
+            write(history, pages)
+        };
+        if let Err(why) = result {
+            defmt::warn!("the history is not written: {}", Display2Format(&why));
+        }
+    }
+}
