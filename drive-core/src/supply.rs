@@ -7,9 +7,6 @@
 //!
 //! Converter codes are compared, so that a step takes no conversion.
 
-use crate::io::CONVERTER_CODES;
-use crate::settings::Line;
-
 /// Coefficients of the relay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relay {
@@ -32,12 +29,10 @@ pub struct RelayState {
 }
 
 impl Relay {
-    /// A relay that closes `periods` control periods after the link has become steady within `band_v`, and opens below
-    /// `least_v`, V.
-    pub fn new(dc_link: Line, least_v: f32, band_v: f32, periods: u32) -> Self {
-        // The casts saturate.
-        let least = (((least_v - dc_link.offset) / dc_link.gain) as u16).min(CONVERTER_CODES);
-        Self { least, band: (band_v / dc_link.gain) as u16, settle: periods }
+    /// A relay that closes `settle` control periods after the link has become steady within `band`, and opens below
+    /// `least`, both converter codes.
+    pub fn new(least: u16, band: u16, settle: u32) -> Self {
+        Self { least, band, settle }
     }
 
     /// One control period with the code of the dc link.
@@ -60,18 +55,19 @@ mod tests {
     use super::*;
     use crate::io::PERIOD_S;
 
-    const LINE: Line = Line { gain: 0.11, offset: 0.0 };
+    /// Volts of a code.
+    const GAIN: f32 = 0.11;
     const END_V: f32 = 311.0;
 
     fn code(v: f32) -> u16 {
-        (v / LINE.gain) as u16
+        (v / GAIN) as u16
     }
 
     /// Link through R C from 0: closed when it is steady, within what the head of this file states, and not at once.
     #[test]
     fn it_closes_near_the_end_of_charging_whatever_the_resistor() {
         for tau_s in [0.05_f32, 0.5, 2.0] {
-            let relay = Relay::new(LINE, 200.0, 5.0, 3000);
+            let relay = Relay::new(code(200.0), code(5.0) - code(0.0), 3000);
             let mut state = RelayState::default();
             let (mut v, mut n) = (0.0_f32, 0);
             while !state.closed {
@@ -81,7 +77,7 @@ mod tests {
                 assert!(n < 1_000_000, "never closed with {tau_s} s");
             }
             // Two codes for the rounding of both voltages.
-            let missing = 5.0 / ((0.5 / tau_s).exp() - 1.0) + 2.0 * LINE.gain;
+            let missing = 5.0 / ((0.5 / tau_s).exp() - 1.0) + 2.0 * GAIN;
             assert!(END_V - v <= missing, "{tau_s} s: {v} V, {missing} V may be missing");
             assert!(n > 3000, "{tau_s} s: after {n} periods");
         }
@@ -89,7 +85,7 @@ mod tests {
 
     #[test]
     fn it_opens_at_once_below_the_least_and_closes_anew() {
-        let relay = Relay::new(LINE, 200.0, 5.0, 10);
+        let relay = Relay::new(code(200.0), code(5.0) - code(0.0), 10);
         let mut state = RelayState::default();
         let steps = |state: &mut RelayState, v: f32, n: u32| {
             (0..n).for_each(|_| relay.step(state, code(v)));

@@ -1,5 +1,6 @@
 //! The grammar: a line in, a [`Request`] or a [`ParseError`] out.
 
+mod backup;
 mod error;
 mod recording;
 #[cfg(test)]
@@ -19,6 +20,7 @@ use crate::link::trace::Plan;
 use crate::settings::keys::{self, Key};
 use crate::settings::staging::{Assignments, MOST};
 
+use backup::{hexadecimal, restore};
 pub use error::ParseError;
 pub use recording::Stream;
 
@@ -362,22 +364,6 @@ fn assignments<'a>(words: &mut Words<'a>) -> Result<Assignments, ParseError<'a>>
     }
 }
 
-/// The words of a learned result in a line of `backup`.
-fn restore<'a>(index: &'a str, words: &mut Words<'a>) -> Result<Request, ParseError<'a>> {
-    let largest = crate::store::learned::WORDS as u16 - 1;
-    let index = whole("the index", index, 0, largest)?;
-    let mut all = Vec::new();
-    while let Some(word) = words.optional() {
-        let most = WORDS_IN_LINE;
-        all.push(hexadecimal(word)?)
-            .map_err(|_| ParseError::TooMany { what: "words in a line", most })?;
-    }
-    if all.is_empty() {
-        return Err(ParseError::Missing("a word"));
-    }
-    Ok(Request::Restore(index.into(), all))
-}
-
 /// The fault with this number.
 fn fault(word: &str) -> Result<Fault, ParseError<'_>> {
     let last = Fault::ALL.last().map_or(0, |fault| fault.code());
@@ -395,10 +381,4 @@ where
     let (min_u32, max_u32) = (min.into(), max.into());
     let value = word.parse().ok().filter(|value| (min..=max).contains(value));
     value.ok_or(ParseError::Whole { what, word, min: min_u32, max: max_u32 })
-}
-
-fn hexadecimal(word: &str) -> Result<u32, ParseError<'_>> {
-    let digits = word.len() == 8 && word.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let value = u32::from_str_radix(word, 16).ok().filter(|_| digits);
-    value.ok_or(ParseError::Hexadecimal(word))
 }

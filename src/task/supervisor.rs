@@ -73,7 +73,6 @@ pub struct Supervisor {
     tracking: &'static mut Option<Tracking>,
     /// The commissioning. (Large, too.)
     commissioning: &'static mut Session,
-    /// Operating hours, starts and faults.
     hours: Hours,
     /// Scales and pole pairs of the settings in force, for the log.
     scales: (Scales, u8),
