@@ -82,7 +82,7 @@ fn hash(compares: &[Compare]) -> u64 {
 #[test]
 fn torque_steps_without_a_sensor() {
     let (hashes, interrupts) = replay("sensorless");
-    assert_eq!(interrupts, 65_291);
+    assert_eq!(interrupts, 66_856);
     assert_eq!(
         hashes,
         [
@@ -105,7 +105,7 @@ fn torque_steps_without_a_sensor() {
 #[test]
 fn position_steps_with_the_encoder() {
     let (hashes, interrupts) = replay("encoder");
-    assert_eq!(interrupts, 27_201);
+    assert_eq!(interrupts, 27_257);
     assert_eq!(
         hashes,
         [

@@ -159,7 +159,7 @@ fn random_and_mutated_frames() {
                 framed(&[&[17, 16, 0x20, at, 0, count, 2 * count][..], &values].concat())
             }
         };
-        let mutate = rng.next_u32() % 2 == 0 && !frame.is_empty();
+        let mutate = rng.next_u32().is_multiple_of(2) && !frame.is_empty();
         if mutate {
             let place = rng.next_u32() as usize % frame.len();
             frame[place] ^= 1 << (rng.next_u32() % 8);

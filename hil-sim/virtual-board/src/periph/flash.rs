@@ -156,7 +156,7 @@ impl Flash {
             self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let torn = self.torn.get(at / 8) == Some(&true);
         if torn {
-            self.eccr = ECCD | 1 << 21 | (address - BANK_2) / 8 & 0x7_ffff;
+            self.eccr = ECCD | 1 << 21 | ((address - BANK_2) / 8) & 0x7_ffff;
         }
         (word, torn)
     }
