@@ -86,17 +86,18 @@ fn torque_steps_without_a_sensor() {
     assert_eq!(
         hashes,
         [
-            0x654e_02a0_b262_0240,
-            0x3da0_7c12_ffdc_7e87,
-            0x13d3_422b_ea20_3c5c,
-            0x4c30_175b_94f3_f2d5,
-            0x1986_26cd_9359_6675,
-            0x86e2_8187_bb61_3028,
-            0x8183_73fe_63bc_d735,
-            0x2271_de59_ddf3_b5d9,
-            0x7de5_ae42_c79d_143e,
-            0xee56_a61b_b42d_e7dc,
-            0x4320_3407_fd73_11f6
+            0xb800_0f23_8011_1af7,
+            0x2dcc_1bc7_1087_bb30,
+            0xc8f8_76bf_c075_a2e9,
+            0xbfe4_e1b7_26a5_c2f3,
+            0x5eb7_26d8_6c14_711c,
+            0xea37_9efc_5b17_3254,
+            0xc909_28ae_e6b3_8078,
+            0x627e_03e5_200d_17c1,
+            0x5f65_7021_83f5_98f5,
+            0x4b34_ca51_9b7c_eb34,
+            0xef61_d7d5_0dc7_d276,
+            0x6358_a681_30b8_cb14
         ],
         "{hashes:#018x?}"
     );
@@ -110,10 +111,10 @@ fn position_steps_with_the_encoder() {
         hashes,
         [
             0xbca7_8fe8_cd36_3465,
-            0x0626_9b70_7233_32d8,
-            0x93ee_8c04_d1af_05ee,
-            0x8b34_52e3_44a2_d29c,
-            0x0062_9980_c6f0_f990
+            0x8b5b_0808_b8b5_754c,
+            0xa893_85b6_bd03_b067,
+            0xf1ee_1706_51ac_db57,
+            0x2fe6_fe2d_99c9_2d99
         ],
         "{hashes:#018x?}"
     );
