@@ -70,8 +70,9 @@ fn a_break_switches_off_and_is_reported() -> Result<()> {
     assert!(!pair.board.chip().tim1.outputs_on());
     pair.run(2, |_, _| {})?;
     assert_eq!(pair.shadow.drive.state(), State::Fault(drive_core::Fault::Break));
-    // The console hears of it with the next report.
-    pair.run(REPORT, |_, _| {})?;
+    // The console hears of it with the next report, and says so: 0.2 s at most.
+    pair.run(REPORT + 1200, |_, _| {})?;
+    assert!(pair.board.take_console().contains("fault 20"));
     let faults = pair.say("faults")?;
     assert!(faults.contains("20"), "{faults}");
     Ok(())
