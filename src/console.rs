@@ -239,7 +239,7 @@ impl Console {
         if !self.out.as_str().is_empty() {
             return;
         }
-        let (set, alive) = (self.settings.in_force().command.timeout_s, self.wire.alive_s());
+        let (set, alive) = (self.command_timeout_s(), self.wire.alive_s());
         let since =
             |at: &mut Option<u32>| now_ms.wrapping_sub(*at.get_or_insert(now_ms)) as f32 * 1e-3;
         let (silence, link) = (since(&mut self.heard_ms), since(&mut self.line_ms));

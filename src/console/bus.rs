@@ -23,6 +23,9 @@ use crate::settings::bus::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST};
 
+/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
+const BUS_SILENT_S: f32 = 1.0;
+
 /// Fields of the command word: what to do, and the direction. Other bits are refused.
 const ACTION: u16 = 0b11;
 const STOP: u16 = 1;
@@ -133,6 +136,13 @@ impl Console {
     /// Who commands: by the staged settings, which a start puts in force.
     pub(super) fn commander(&self) -> Commander {
         self.settings.latest().bus.commander
+    }
+
+    /// Silence of the one that commands after which the drive stops, s; 0: never. A line of the bus that breaks is not
+    /// seen by anybody, so the bus always has a limit.
+    pub(super) fn command_timeout_s(&self) -> f32 {
+        let set = self.settings.in_force().command.timeout_s;
+        if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
     }
 
     /// Notes a valid line or frame: silence of the one that commands stops the drive.

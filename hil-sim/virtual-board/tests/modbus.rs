@@ -118,7 +118,7 @@ impl Master {
     }
 }
 
-const BUS: [&str; 2] = ["set bus.commands bus command.timeout_s 1", "save"];
+const BUS: [&str; 2] = ["set bus.commands bus", "save"];
 
 /// Start, run to speed, read, reverse, stop: 5 Hz of two pole pairs are 150 rpm. The speed of the simulated rotor within 3 % is
 /// what the drive reaches without a sensor; the registers agree with it within 3 % and a count.
