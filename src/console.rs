@@ -7,6 +7,7 @@
 pub mod announce;
 mod answer;
 mod bus;
+mod commander;
 mod commissioning;
 mod design;
 pub mod grammar;
@@ -24,8 +25,8 @@ mod tests;
 
 use core::fmt;
 
+use drive_core::State;
 use drive_core::identify::learning::Learned;
-use drive_core::{Command, State};
 
 use crate::commissioning::News;
 use crate::link::trace::Plan;
@@ -231,36 +232,6 @@ impl Console {
             self.out.clear();
         } else if typed {
             self.out.raw(self.reader.text());
-        }
-    }
-
-    /// Stops the drive when no valid line came for too long.
-    fn watch_silence(&mut self, drive: &mut impl DriveHandle, now_ms: u32) {
-        if !self.out.as_str().is_empty() {
-            return;
-        }
-        let (set, alive) = (self.command_timeout_s(), self.wire.alive_s());
-        let since =
-            |at: &mut Option<u32>| now_ms.wrapping_sub(*at.get_or_insert(now_ms)) as f32 * 1e-3;
-        let (silence, link) = (since(&mut self.heard_ms), since(&mut self.line_ms));
-        let lost = alive > 0.0 && link > alive;
-        if lost {
-            self.stop_stream(drive);
-        }
-        let limit = if lost && self.commander() == Commander::Console {
-            alive
-        } else if set > 0.0 && silence > set {
-            set
-        } else {
-            return;
-        };
-        if !drive.is_off() {
-            self.heard_ms = Some(now_ms);
-            self.announcer.stopping();
-            match drive.command(Command::Stop) {
-                Ok(_) => self.out.line(format_args!("stopped: no command for {limit} s")),
-                Err(why) => self.error(&format_args!("not stopped: {why}")),
-            }
         }
     }
 

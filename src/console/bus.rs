@@ -11,7 +11,6 @@ use modbus_core::Exception;
 
 use super::Console;
 use super::answer::{MUST_BE_OFF, Task};
-use super::grammar::Request;
 use super::handle::DriveHandle;
 use super::line::OutputLine;
 use crate::modbus::Port;
@@ -22,9 +21,6 @@ use crate::modbus::slave::{self, Registers, Words};
 use crate::settings::bus::Commander;
 use crate::settings::keys;
 use crate::settings::staging::{Assignments, MOST};
-
-/// Silence of the bus that commands after which the drive stops, s, unless `command.timeout_s` says otherwise.
-const BUS_SILENT_S: f32 = 1.0;
 
 /// Fields of the command word: what to do, and the direction. Other bits are refused.
 const ACTION: u16 = 0b11;
@@ -133,43 +129,6 @@ impl Bus {
 }
 
 impl Console {
-    /// Who commands: by the staged settings, which a start puts in force.
-    pub(super) fn commander(&self) -> Commander {
-        self.settings.latest().bus.commander
-    }
-
-    /// Silence of the one that commands after which the drive stops, s; 0: never. A line of the bus that breaks is not
-    /// seen by anybody, so the bus always has a limit.
-    pub(super) fn command_timeout_s(&self) -> f32 {
-        let set = self.settings.in_force().command.timeout_s;
-        if set == 0.0 && self.commander() == Commander::Bus { BUS_SILENT_S } else { set }
-    }
-
-    /// Notes a valid line or frame: silence of the one that commands stops the drive.
-    pub(super) fn heard(&mut self, from: Commander, now_ms: u32) {
-        if self.commander() == from {
-            self.heard_ms = Some(now_ms);
-        }
-        if from == Commander::Console {
-            self.line_ms = Some(now_ms);
-        }
-    }
-
-    /// Whether a line is refused because the bus commands. Stop, clear, and all that needs the drive off are not.
-    pub(super) fn is_for_the_bus(&self, request: &Request) -> bool {
-        self.commander() == Commander::Bus
-            && matches!(
-                request,
-                Request::Start(_)
-                    | Request::Learn { .. }
-                    | Request::Commission(..)
-                    | Request::Relock
-                    | Request::Torque(_)
-                    | Request::Speed(_)
-                    | Request::Position(_)
-            )
-    }
-
     /// Answers a frame of the bus, if there is one, and follows its orders; never waits. `now_ms` wraps.
     pub fn serve(&mut self, port: &mut impl Port, drive: &mut impl DriveHandle, now_ms: u32) {
         let settings = self.settings.in_force().bus;
