@@ -65,7 +65,6 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
     ("IWDG_PR", 7, KEY),
     ("IWDG_RLR", 0xfff, KEY),
     ("IWDG_WINR", 0xfff, KEY),
-    ("LPUART1_CR1", 0xf3ff_7fff, "FIFOEN is not modelled: the write is refused as unknown"),
     ("LPUART1_TDR", 0x1ff, "write-only"),
     ("USART3_CR1", u32::MAX, "FIFOEN is not modelled: the write is refused as unknown"),
     ("USART3_TDR", 0x1ff, "write-only"),
