@@ -118,7 +118,6 @@ impl Supervisor {
             MemoryCheck::new(CheckedMemory { code, source, constants, changes }, memory::word)
         });
         let (status, level, well) = (None, Level::Info, false);
-        let scales = (settings.scales, settings.motor.pole_pairs);
         Self {
             link,
             status,
@@ -131,7 +130,7 @@ impl Supervisor {
             tracking,
             commissioning,
             hours,
-            scales,
+            scales: (settings.scales, settings.motor.pole_pairs),
         }
     }
 
@@ -223,7 +222,6 @@ impl Supervisor {
     fn log(&mut self, s: Status) {
         let before = self.status.replace(s);
         if before.map(|status| status.state) != Some(s.state) {
-            self.hours.entered(s.state, &mut self.guard, self.chip.saved.flash());
             if let State::Fault(fault) = s.state {
                 stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
                 if self.level >= Level::Error {
@@ -232,6 +230,8 @@ impl Supervisor {
             } else if self.level >= Level::Info {
                 defmt::info!("state: {}", Display2Format(&s.state));
             }
+            // Last: it writes to the flash for milliseconds.
+            self.hours.entered(s.state, &mut self.guard, self.chip.saved.flash());
         }
         // An event that lasts is logged once.
         let known = before.map_or(Hardware::empty(), |status| status.hardware);
