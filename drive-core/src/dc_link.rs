@@ -117,7 +117,7 @@ pub enum Limiting {
     RideThrough,
 }
 
-/// What limits the torque, in words.
+/// Reason of the limit, in words.
 impl fmt::Display for Limiting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

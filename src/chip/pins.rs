@@ -81,7 +81,7 @@ pub fn output(pin: Pin, level: Level) {
 }
 
 /// Sets the level of an output, from any context: one write.
-#[inline(always)]
+#[inline(always)] // the control interrupt calls it, and nothing in the CCM may call into the flash
 pub fn set(pin: Pin, level: Level) {
     let shift = u32::from(pin.number) + if level == Level::Low { 16 } else { 0 };
     // SAFETY: the bit that sets or resets one pin.

@@ -12,7 +12,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::{run, toolchain};
 
-/// 5 Hz, which two pole pairs turn with 150 rpm, and how far the speed may be off: what the drive reaches without a sensor.
+/// Frequency asked for: 5 Hz, 150 rpm of two pole pairs; and the tolerance of the speed, rpm, as a sensorless drive reaches.
 const HUNDREDTHS: &str = "500";
 const RPM: (f64, f64) = (150.0, 8.0);
 /// Time to magnetise and to run up.

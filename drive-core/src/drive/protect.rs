@@ -40,9 +40,9 @@ impl Coefficients {
 }
 
 impl Drive {
-    /// What has time until the next step: once a control period, in every state, with the sample of the last step. Finds
-    /// how much current the heat sink bears, and switches the precharge relay. Returns whether the relay is closed; never
-    /// without one in the settings.
+    /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
+    /// finds the current that the heat sink bears, and switches the precharge relay. Returns whether the relay is closed:
+    /// always `false` where the settings have none.
     pub fn after_step(&mut self, sample: &Sample) -> bool {
         let largest = self.c.protection.i_q;
         let share = self.c.sensing.heat_sink.share(sample.heat_sink);

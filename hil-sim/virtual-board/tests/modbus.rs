@@ -10,7 +10,7 @@ use virtual_board::{Board, Image, Options};
 
 /// Periods from a frame to the end of its answer: 8 bytes, 3.5 characters of silence, and 30 bytes at 19 200 bit/s are 27 ms.
 const ANSWERED: u64 = 240;
-/// The same at 115 200 bit/s.
+/// Periods from a frame to the end of its answer at 115 200 bit/s.
 const ANSWERED_FAST: u64 = 60;
 /// Largest time from the end of a frame to the first byte of its answer, s: the silence of 2.03 ms, the interrupts, a
 /// pass of the main loop, and the byte itself, 0.57 ms.
@@ -265,8 +265,8 @@ fn settings_are_written_and_saved() -> Result<()> {
     Ok(())
 }
 
-/// Frames of noise, and valid requests with changed bits, among valid ones: no reset, no effect of what is not valid, an
-/// answer to what is.
+/// Frames of noise, and requests with changed bits, among valid requests: no reset; an invalid frame has no effect; a valid one
+/// is answered.
 #[test]
 fn three_thousand_frames_of_noise() -> Result<()> {
     let mut master = Master::new(&["set bus.commands bus bus.baud 115200", "save"])?;

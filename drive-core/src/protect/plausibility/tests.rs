@@ -152,7 +152,7 @@ fn the_resistance_that_is_tracked_is_reckoned_with() {
     let current = AlphaBeta::new(2.0, 0.0);
     let judged = |resistance: Resistance| {
         let mut state = PredictionState { last: current, ..PredictionState::default() };
-        // What the model of the cold motor needs, and the voltage of the warm one.
+        // The voltage that the model of the cold motor needs, and that of the warm motor.
         let cold = current * ((1.0 - PLANT.p) / PLANT.k) as f32;
         let warm = cold + current * (0.3 * Motor::default().r_s);
         (0..600).try_for_each(|_| {
