@@ -134,6 +134,8 @@ impl Drive {
         self.changes = self.changes.wrapping_add(1);
     }
 
+    // Not inlined: it acts with the outputs off alone, and stays in the flash.
+    #[inline(never)]
     pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
