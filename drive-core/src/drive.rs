@@ -14,6 +14,7 @@ mod learn;
 mod observed;
 mod protect;
 mod reference;
+mod scalar;
 mod starting;
 mod state;
 #[cfg(test)]
@@ -35,6 +36,7 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::flux::observer::ObserverState;
+use crate::flux::volts_per_hertz::VoltsPerHertzState;
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
 use crate::math::angle::{Angle, UnitVector};
@@ -170,6 +172,7 @@ struct ControlState {
     /// Whether a learning has measured all its points.
     all_measured: bool,
     excitation: ExcitationState,
+    turning: VoltsPerHertzState,
 }
 
 impl Drive {

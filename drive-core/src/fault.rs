@@ -287,6 +287,13 @@ faults! {
             "motor.* of another motor",
         ],
         "let the shaft slow down, then clear and start again";
+    Stalled = 49, "the motor stays at its current limit and hardly turns",
+        &[
+            "shaft blocked, or a load beyond the torque that the current limit allows",
+            "nameplate.* of another motor",
+            "speed.ramp_rpm_per_s too steep for the inertia",
+        ],
+        "free the shaft, or reduce the load; raise limits.current_a if motor and inverter bear it";
 }
 
 impl Fault {

@@ -7,3 +7,4 @@ pub mod indirect;
 pub mod observer;
 pub mod schedule;
 pub mod tracker;
+pub mod volts_per_hertz;

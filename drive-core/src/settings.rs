@@ -235,6 +235,23 @@ impl Default for BrakingSettings {
     }
 }
 
+/// The mode for a motor that nobody has identified; see [`crate::flux::volts_per_hertz`]. Unset values follow [`rules`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoltsPerHertzMode {
+    /// Voltage between lines, rms, per frequency, V/Hz.
+    pub volts_per_hz: Option<f32>,
+    /// Current of the standing motor, A peak.
+    pub boost_a: Option<f32>,
+    /// Share of the slip that is compensated.
+    pub slip_share: f32,
+}
+
+impl Default for VoltsPerHertzMode {
+    fn default() -> Self {
+        Self { volts_per_hz: None, boost_a: None, slip_share: 1.0 }
+    }
+}
+
 /// All settings of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settings {
@@ -270,6 +287,8 @@ pub struct Settings {
     pub braking: BrakingSettings,
     /// The supply of the dc link.
     pub supply: SupplySettings,
+    /// The mode for a motor that nobody has identified.
+    pub vf: VoltsPerHertzMode,
 }
 
 /// The reason why settings were refused.

@@ -195,6 +195,7 @@ pub const DRIVE: &[&str] = &[
     "speed.",
     "observer.",
     "braking.",
+    "vf.",
 ];
 /// Keys of the speed loop, which a drive that regulates torque does not use.
 pub const SPEED_LOOP: &[&str] =

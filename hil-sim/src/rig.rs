@@ -293,6 +293,7 @@ fn mode_word(mode: Mode) -> &'static str {
         Mode::Torque => "torque",
         Mode::Speed => "speed",
         Mode::Position => "position",
+        Mode::VoltsPerHertz => "voltage-and-frequency",
         Mode::Learning => "learning",
         Mode::Commissioning => "commissioning",
     }

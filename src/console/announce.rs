@@ -87,7 +87,9 @@ impl Announcer {
         }
         match state {
             State::Fault(fault) => Some(News::Fault(fault)),
-            State::Torque | State::Speed | State::Position => Some(News::Running(state)),
+            State::Torque | State::Speed | State::Position | State::VoltsPerHertz => {
+                Some(News::Running(state))
+            }
             State::Off => {
                 let asked = core::mem::take(&mut self.stopped);
                 match (before?, was) {
@@ -131,6 +133,7 @@ impl fmt::Display for News {
             }
             Self::Running(State::Speed) => f.write_str("running: speed"),
             Self::Running(State::Position) => f.write_str("running: position"),
+            Self::Running(State::VoltsPerHertz) => f.write_str("running: vf"),
             Self::Running(_) => f.write_str("running: torque"),
             Self::Off(why) => write!(f, "off: {why}"),
             Self::Learning { point, points, left_s } => {

@@ -230,9 +230,10 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             None | Some("torque") => Request::Start(Mode::Torque),
             Some("speed") => Request::Start(Mode::Speed),
             Some("position") => Request::Start(Mode::Position),
+            Some("vf") => Request::Start(Mode::VoltsPerHertz),
             Some("learning") => Request::Learn { again: false },
             Some(word) => {
-                let all = "torque speed position learning";
+                let all = "torque speed position vf learning";
                 return Err(ParseError::OneOf { what: "the mode", word, all });
             }
         },

@@ -4,7 +4,7 @@
 pub const HELP: [&str; 38] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
-    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
+    "start [MODE]              calibrate, magnetise, then regulate torque, speed or position; vf: turn a motor that is not identified",
     "commission [STEP [STEP]]  measure the motor at rest, from its nameplate: all steps, one, or from one to another; plant: shaft locked; inertia: shaft free",
     "accept                    put in force what `commission` has found, and save",
     "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",

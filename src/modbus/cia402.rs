@@ -48,7 +48,12 @@ impl Power {
                 | State::Verifying,
             ) => Self::SwitchedOn,
             Some(
-                State::Torque | State::Speed | State::Position | State::Learning | State::Exciting,
+                State::Torque
+                | State::Speed
+                | State::Position
+                | State::VoltsPerHertz
+                | State::Learning
+                | State::Exciting,
             ) => Self::OperationEnabled,
             Some(State::Stopping) => Self::QuickStopActive,
             Some(State::Fault(_)) => Self::Fault,

@@ -21,6 +21,7 @@ use crate::filter::dissertation::lpf_lag_samples;
 use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
 use crate::flux::observer::{Leakage, Observer};
+use crate::flux::volts_per_hertz::VoltsPerHertz;
 use crate::identify::learning::Learning;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
@@ -114,6 +115,8 @@ pub struct Coefficients {
     pub(crate) thermal: Thermal,
     /// The precharge relay, if there is one.
     pub(crate) relay: Option<Relay>,
+    /// The mode without identification, where the pairs of poles fit the nameplate.
+    pub(crate) volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub(crate) unlearned: bool,
     /// Result of the design of the current controllers, d and q.
@@ -291,6 +294,7 @@ impl Settings {
                 inverter: Body::new(self.inverter_a(), self.limits.inverter_s, THERMAL_S),
             },
             relay: self.relay(),
+            volts_per_hertz: self.volts_per_hertz(),
             learning: self.learning(),
             unlearned: self.tracks_synchronously() && !t.allow_unlearned,
             prediction: {

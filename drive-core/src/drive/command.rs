@@ -73,6 +73,8 @@ pub enum Refused {
     FluxIsFixed,
     /// The drive has not learned its motor, and `injection.allow_unlearned` is off.
     NotLearned,
+    /// Rated frequency and speed of the nameplate are those of other pairs of poles.
+    Nameplate,
     /// The precharge relay is open: the dc link is not charged yet, or too low.
     NotCharged,
     /// The settings do not want the rotor time constant tracked.
@@ -107,6 +109,12 @@ impl core::fmt::Display for Refused {
                 write!(
                     f,
                     "nothing is learned of this motor with these settings: lock the shaft and `learn` first"
+                )
+            }
+            Self::Nameplate => {
+                write!(
+                    f,
+                    "nameplate.speed_rpm must be 0.85 to 1 times 60 nameplate.frequency_hz/motor.pole_pairs"
                 )
             }
             Self::NotCharged => {

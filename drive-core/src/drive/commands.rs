@@ -38,6 +38,7 @@ impl Drive {
                     State::Calibrating
                     | State::Precharge
                     | State::CheckingWiring
+                    | State::VoltsPerHertz
                     | State::Exciting => {
                         self.enter(State::Off);
                     }
@@ -143,7 +144,10 @@ impl Drive {
             (State::Off, Mode::Learning) if !self.can_learn() => {
                 return Err(Refused::NeedsInjection);
             }
-            (State::Off, Mode::Learning | Mode::Commissioning) => {}
+            (State::Off, Mode::VoltsPerHertz) if self.c.volts_per_hertz.is_none() => {
+                return Err(Refused::Nameplate);
+            }
+            (State::Off, Mode::Learning | Mode::Commissioning | Mode::VoltsPerHertz) => {}
             (State::Off, _) if self.c.unlearned => return Err(Refused::NotLearned),
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
@@ -162,7 +166,9 @@ impl Drive {
         let gone = self.c.catching.map_or(0, |c| c.flux_gone);
         self.control.catching.flux_left =
             self.starts > 1 && self.elapsed < gone && self.can_catch();
-        self.control.references = self.no_torque(self.c.sequence.i_d);
+        let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
+        let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
+        self.control.references = self.no_torque(i_d);
         self.c.turn(&mut self.control.axes, 0.0, self.c.injection_axis, false);
         self.c.sensing.start(&mut self.control.sensing);
         self.c.estimator.start(&mut self.control.estimator);
@@ -203,12 +209,15 @@ impl Drive {
 
     /// Whether a reference for `mode` can be taken now.
     fn takes_references(&self, mode: Mode, value: f32) -> Result<(), Refused> {
+        let takes = match self.mode {
+            Mode::VoltsPerHertz => mode == Mode::Speed,
+            Mode::Learning | Mode::Commissioning => false,
+            own => own == mode,
+        };
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
             State::Off | State::Stopping => Err(Refused::State(self.state)),
-            _ if self.mode != mode || matches!(mode, Mode::Learning | Mode::Commissioning) => {
-                Err(Refused::State(State::of_mode(self.mode)))
-            }
+            _ if !takes => Err(Refused::State(State::of_mode(self.mode))),
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),
         }

@@ -1,6 +1,7 @@
 //! The quantities of a step that the drive shows.
 
 use super::Drive;
+use crate::drive::state::Mode;
 use crate::math::angle::Angle;
 use crate::math::frames::{AlphaBeta, Dq};
 
@@ -64,7 +65,11 @@ impl Drive {
         Telemetry {
             phi: t.phi,
             flux_freq: t.flux_freq,
-            rotor_freq: if self.counts() { s.indirect.rotor_freq } else { s.estimator.rotor_freq },
+            rotor_freq: match (self.mode, &self.c.volts_per_hertz) {
+                (Mode::VoltsPerHertz, Some(turning)) => turning.rotor_freq(&s.turning),
+                _ if self.counts() => s.indirect.rotor_freq,
+                _ => s.estimator.rotor_freq,
+            },
             reference: t.reference,
             current: t.current,
             voltage: t.voltage,

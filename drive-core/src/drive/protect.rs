@@ -68,7 +68,7 @@ impl Drive {
         if !self.elapsed.is_multiple_of(THERMAL_EVERY) {
             return Ok(());
         }
-        let on = self.state.has_current() || self.state == State::Exciting;
+        let on = self.state.is_energised();
         let square = if on { self.control.seen.current.length_squared() } else { 0.0 };
         let borne = self.c.thermal.step(&mut self.thermal, square);
         // Off it cools, and is not judged.

@@ -50,7 +50,7 @@ impl Drive {
 
     /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
     pub fn brake_duty(&self) -> f32 {
-        if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
+        if self.state.is_energised() { self.control.limits.chopper } else { 0.0 }
     }
 
     /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
@@ -61,6 +61,7 @@ impl Drive {
 
     /// Why the torque is smaller than asked for.
     pub fn limiting(&self) -> Limiting {
-        if self.state.regulates() { self.control.limiting } else { Limiting::No }
+        let acts = self.state.regulates() || self.state == State::VoltsPerHertz;
+        if acts { self.control.limiting } else { Limiting::No }
     }
 }

@@ -27,6 +27,7 @@ impl Drive {
             State::Calibrating => self.calibrate(sample)?,
             State::Precharge => self.precharge(sample)?,
             State::Exciting => self.excite(&measured)?,
+            State::VoltsPerHertz => return self.turn_by_voltage(&measured),
             _ => self.check_wiring(sample, &measured)?,
         })
     }
@@ -51,6 +52,9 @@ impl Drive {
         if self.elapsed >= self.c.sequence.precharge {
             if self.mode == Mode::Commissioning {
                 self.excite_from_here();
+            } else if self.mode == Mode::VoltsPerHertz {
+                // Its boost checks the wiring.
+                self.enter(State::VoltsPerHertz);
             } else if self.wiring_unchecked {
                 self.wiring = WiringCheckState::default();
                 self.enter(State::CheckingWiring);

@@ -13,6 +13,9 @@ pub enum Mode {
     Speed,
     /// Position of the rotor. Without the encoder it drifts; see [`motion`](crate::motion).
     Position,
+    /// Speed of a motor that nobody has identified, by voltage in proportion to the frequency; see
+    /// [`volts_per_hertz`](crate::flux::volts_per_hertz).
+    VoltsPerHertz,
     /// Learning of the reference of the angle tracking with the shaft locked (see [`crate::identify::learning`]), then
     /// stops.
     Learning,
@@ -46,6 +49,8 @@ pub enum State {
     Speed,
     /// Regulating position.
     Position,
+    /// Turning by voltage and frequency.
+    VoltsPerHertz,
     /// Learning with the shaft locked.
     Learning,
     /// Taking the torque to zero, then off.
@@ -61,6 +66,7 @@ impl State {
             Mode::Torque => Self::Torque,
             Mode::Speed => Self::Speed,
             Mode::Position => Self::Position,
+            Mode::VoltsPerHertz => Self::VoltsPerHertz,
             Mode::Learning => Self::Learning,
             Mode::Commissioning => Self::Exciting,
         }
@@ -79,6 +85,11 @@ impl State {
                 | Self::Learning
                 | Self::Stopping
         )
+    }
+
+    /// Whether the outputs drive a current, for whatever purpose.
+    pub(crate) const fn is_energised(self) -> bool {
+        self.has_current() || matches!(self, Self::Exciting | Self::VoltsPerHertz)
     }
 
     /// Whether torque, speed or position is regulated as asked for.
@@ -107,6 +118,7 @@ impl fmt::Display for State {
             Self::Torque => "regulating torque",
             Self::Speed => "regulating speed",
             Self::Position => "regulating position",
+            Self::VoltsPerHertz => "turning by voltage and frequency",
             Self::Learning => "learning",
             Self::Stopping => "stopping",
             Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),

@@ -120,6 +120,10 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     number!("braking.power_w", braking.power_w, "W", "power that it takes for ever").from_to(0.1, 1e5),
 
     number!("supply.relay_s", supply.relay_s, "s", "time that the dc link must be steady before the precharge relay closes; 0 without one").from_to(0.0, 60.0),
+
+    auto!("vf.volts_per_hz", vf.volts_per_hz, Settings::volts_per_hz, "V/Hz", "voltage between lines, rms, per frequency, of a motor that nobody has identified").from_to(0.01, 200.0),
+    auto!("vf.boost_a", vf.boost_a, Settings::boost_a, "A", "current of this motor at standstill, peak").beside(|s| (0.01, s.current_limit_a())),
+    number!("vf.slip_share", vf.slip_share, "", "share of its slip that is compensated").from_to(0.0, 1.5),
 ];
 
 /// The setting with this name.

@@ -27,8 +27,11 @@
 //! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the voltages that trip |
 //! | `braking.flux_a` | 1 A | rated current |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
+//! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
+//! | `vf.boost_a` | 1.991 A | rated current; at most 0.6 of `limits.current_a` |
 
 mod dc_link;
+mod volts_per_hertz;
 
 use core::f32::consts::{SQRT_2, TAU};
 

@@ -40,6 +40,7 @@ fn commands_are_understood() {
         ("  status\t", Request::Status),
         ("start", Request::Start(Mode::Torque)),
         ("start position", Request::Start(Mode::Position)),
+        ("start vf", Request::Start(Mode::VoltsPerHertz)),
         ("start learning", Request::Learn { again: false }),
         ("learn", Request::Learn { again: false }),
         ("learn again", Request::Learn { again: true }),

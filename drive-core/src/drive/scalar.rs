@@ -1,0 +1,54 @@
+//! Running by voltage and frequency, without a model of the motor: see [`volts_per_hertz`](crate::flux::volts_per_hertz).
+
+use super::Drive;
+use crate::current::sensing::Measured;
+use crate::dc_link::{DIVIDER, Limiting};
+use crate::drive::state::State;
+use crate::fault::Fault;
+use crate::flux::volts_per_hertz::Demand;
+use crate::io::Compare;
+
+impl Drive {
+    /// One period. All protections of a sample act, over-speed by the frequency, and the thermal loads.
+    ///
+    /// # Errors
+    /// The state to go to with the outputs off.
+    // Not inlined: it is no part of the path that `cargo xtask cycles` counts.
+    #[inline(never)]
+    pub(super) fn turn_by_voltage(&mut self, measured: &Measured) -> Result<Compare, State> {
+        let (c, s) = (&self.c, &mut self.control);
+        let Some(turning) = &c.volts_per_hertz else { return Err(State::Off) };
+        let freq = c.freq_per_speed * s.references.speed;
+        let rotor_freq = turning.rotor_freq(&s.turning);
+        if self.elapsed.is_multiple_of(u32::from(DIVIDER)) {
+            let most = c.protection.i_q - s.too_hot_for;
+            s.limits = c.dc_link.step(&mut s.dc_link, measured.dc_link, rotor_freq, most);
+            if rotor_freq.abs() > c.protection.rotor_freq {
+                return Err(Fault::OverSpeed.into());
+            }
+        }
+        let largest_v = c.modulator.circle(measured.dc_link);
+        let demand = Demand { freq, i_q: s.limits.i_q, largest_v };
+        let turned = turning.step(&mut s.turning, measured.current, &demand)?;
+        if !(turned.voltage.d + turned.voltage.q + s.turning.freq).is_finite() {
+            return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
+        }
+        let voltage = turned.voltage.to_alpha_beta(turned.applied);
+        let flowing = turned.current.to_alpha_beta(turned.applied);
+        let signs = c.dead_time.signs(flowing.to_abc());
+        let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
+        let modulated = c.modulator.step(voltage, compensation, measured.dc_link);
+
+        let (_, why) = s.limits.hold(turned.current.q);
+        s.limiting = match why {
+            Limiting::No if s.turning.by_voltage => Limiting::Voltage,
+            why => why,
+        };
+        let seen = &mut s.seen;
+        (seen.phi, seen.flux_freq) = (turned.angle, s.turning.freq);
+        (seen.current, seen.voltage) = (turned.current, turned.voltage);
+        (seen.measured, seen.realised) = (measured.current, modulated.realised);
+        seen.dc_link = measured.dc_link;
+        Ok(Compare::on(modulated.compare))
+    }
+}

@@ -1,0 +1,163 @@
+//! Procedure: turn a motor of which only the nameplate is known, by voltage and frequency. The parameters in `motor.*` are
+//! those of another motor throughout.
+
+mod common;
+
+use common::{config, plant_settings};
+use drive_core::settings::Motor;
+use drive_core::{Command, Fault, Mode, Refused, Settings, State};
+use hil_sim::Config;
+use hil_sim::plant::{Channel, CurrentFault, Load};
+use hil_sim::rig::Rig;
+
+/// Time until the boost stands and the flux has built up, s.
+const BUILT_S: f64 = 1.5;
+
+/// Settings that know the nameplate and the pairs of poles alone.
+fn unidentified(config: &Config) -> Settings {
+    let own = &config.drive;
+    let motor = Motor { pole_pairs: own.motor.pole_pairs, ..Motor::default() };
+    let mut settings = Settings { motor, ..*own };
+    settings.sequence.i_d = None;
+    settings
+}
+
+/// A free shaft that is turned at `rpm`, settled.
+fn turning(config: &Config, rpm: f64, seed: u64) -> Rig {
+    let settings = unidentified(config);
+    let mut rig = Rig::new(&plant_settings(config), &settings, seed).unwrap();
+    rig.set_load(Load::Free { torque: 0.0 }).unwrap();
+    rig.start(Mode::VoltsPerHertz).unwrap();
+    rig.run(BUILT_S, |_| {});
+    rig.command(&Command::Speed(rpm as f32)).unwrap();
+    rig.run(rpm.abs() / f64::from(settings.ramp_rpm_per_s()) + 1.0, |_| {});
+    rig
+}
+
+/// Mean speed, rpm, and largest current, A, of a second.
+fn seen(rig: &mut Rig) -> (f64, f64) {
+    let (mut sum, mut n, mut peak) = (0.0, 0.0, 0.0_f64);
+    rig.run(1.0, |p| {
+        (sum, n, peak) = (sum + p.speed_rpm, n + 1.0, peak.max(p.current));
+    });
+    (sum / n, peak)
+}
+
+/// Half the rated speed, with and without a third of the rated torque, both ways. Without load the slip is that of the
+/// friction; under load the nameplate's slip is off by up to 1.5 % of the rated speed (the temperature of the rotor).
+#[test]
+fn motors_turn_by_their_nameplates() {
+    for (seed, motor) in [
+        (1, None),
+        (2, Some("motulator-2kw2")),
+        (3, Some("krause-3hp")),
+        (4, Some("buildings-4kw")),
+        (5, Some("modelica-18kw5")),
+        (6, Some("marathon-0kw2")),
+        (7, Some("rewound-48v")),
+        (8, Some("kart-5kw3")),
+    ] {
+        let config = Config::load(motor, None, &[]).unwrap();
+        let plate = &config.drive.nameplate;
+        let rated_rpm = f64::from(plate.speed_rpm);
+        let rated_nm = f64::from(plate.power_w) / (rated_rpm * std::f64::consts::TAU / 60.0);
+        // The current limit of the reference bears less than its rated flux.
+        let torque = if motor.is_some() { 0.3 * rated_nm } else { 0.08 * rated_nm };
+        let limit = f64::from(config.drive.current_limit_a());
+        for sign in [1.0, -1.0] {
+            let rpm = sign * 0.5 * rated_rpm;
+            let mut rig = turning(&config, rpm, seed);
+            let (free, peak) = seen(&mut rig);
+            rig.set_load(Load::Free { torque: sign * torque }).unwrap();
+            rig.run(1.0, |_| {});
+            let (loaded, loaded_peak) = seen(&mut rig);
+            println!(
+                "{motor:?} {rpm:.0} rpm: {free:.1}, loaded {loaded:.1}; {peak:.2} A of {limit:.2}"
+            );
+            assert_eq!(rig.drive.state(), State::VoltsPerHertz, "{motor:?}");
+            assert!((free - rpm).abs() < 0.01 * rated_rpm, "{motor:?}: {free} of {rpm}");
+            assert!((loaded - rpm).abs() < 0.03 * rated_rpm, "{motor:?}: {loaded} of {rpm}");
+            assert!(peak.max(loaded_peak) < limit, "{motor:?}: {peak} {loaded_peak} A");
+            // What the drive shows is what the shaft does.
+            let pairs = f64::from(config.drive.motor.pole_pairs);
+            let shown = f64::from(rig.drive.telemetry().rotor_freq) * 6000.0 * 60.0 / pairs;
+            assert!((shown - loaded).abs() < 0.03 * rated_rpm, "{motor:?}: {shown} {loaded}");
+        }
+    }
+}
+
+/// Two and a half times the rated torque: the shaft is dragged away, and the drive does not turn on as if nothing were.
+#[test]
+fn a_load_beyond_the_limit_switches_off() {
+    for seed in 1..4 {
+        let config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
+        let mut rig = turning(&config, 700.0, seed);
+        rig.set_load(Load::Locked).unwrap();
+        let mut peak = 0.0_f64;
+        rig.run(4.0, |p| peak = peak.max(p.current));
+        println!("{:?}, {peak:.2} A", rig.drive.state());
+        assert!(matches!(rig.drive.state(), State::Fault(_)), "{}", rig.drive.state());
+        // The trip, and a period in which the current rises on.
+        assert!(peak < 1.3 * f64::from(config.drive.trip_a()), "{peak}");
+    }
+}
+
+#[test]
+fn a_sensor_or_a_phase_that_opens_is_seen() {
+    let config = config(&[]);
+    for (seed, channel) in [(1, Channel::A), (2, Channel::B)] {
+        let mut rig = turning(&config, 600.0, seed);
+        rig.plant.set_current_fault(channel, CurrentFault::Open);
+        rig.run(1.0, |_| {});
+        let state = rig.drive.state();
+        assert!(matches!(state, State::Fault(_)), "{channel:?}: {state}");
+    }
+    for phase in 0..3 {
+        let mut rig = turning(&config, 600.0, phase as u64);
+        rig.plant.set_open_phase(Some(phase)).unwrap();
+        rig.run(1.0, |_| {});
+        let state = rig.drive.state();
+        assert!(matches!(state, State::Fault(_)), "phase {phase}: {state}");
+    }
+    let mut rig = Rig::new(&plant_settings(&config), &unidentified(&config), 1).unwrap();
+    rig.plant.set_open_phase(Some(0)).unwrap();
+    rig.drive.command(&Command::Start(Mode::VoltsPerHertz)).unwrap();
+    rig.run(5.0, |_| {});
+    assert_eq!(rig.drive.state(), State::Fault(Fault::WiringNoCurrent));
+}
+
+/// A shaft of five times the inertia is braked from speed: the frequency follows the link.
+#[test]
+fn braking_keeps_the_link_below_its_limit() {
+    let config = config(&["motor.inertia=0.06", "load.mode=free"]);
+    let mut rig = turning(&config, 1500.0, 3);
+    rig.run(6.0, |_| {});
+    rig.command(&Command::Speed(0.0)).unwrap();
+    let mut most = 0.0_f64;
+    for _ in 0..2500 {
+        rig.run(0.01, |_| {});
+        most = most.max(f64::from(rig.drive.telemetry().dc_link));
+    }
+    let rpm = seen(&mut rig).0;
+    println!("{rpm:.1} rpm, at most {most:.0} V, {}", rig.drive.state());
+    assert!(most < f64::from(config.drive.dc_over_v()) && rpm.abs() < 20.0, "{most} {rpm}");
+    assert_eq!(rig.drive.state(), State::VoltsPerHertz);
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let mut settings = unidentified(&config(&[]));
+    let plant = plant_settings(&config(&[]));
+    let mut rig = Rig::new(&plant, &settings, 1).unwrap();
+    rig.drive.command(&Command::Start(Mode::VoltsPerHertz)).unwrap();
+    for refused in [Command::Torque(1.0), Command::Position(1.0), Command::Magnetising(1.0)] {
+        let answer = rig.drive.command(&refused);
+        assert_eq!(answer, Err(Refused::State(State::VoltsPerHertz)), "{refused:?}");
+    }
+    assert!(rig.drive.command(&Command::Speed(f32::NAN)).is_err());
+    settings.motor.pole_pairs = 3;
+    let mut rig = Rig::new(&plant, &settings, 1).unwrap();
+    let answer = rig.drive.command(&Command::Start(Mode::VoltsPerHertz));
+    assert_eq!(answer, Err(Refused::Nameplate));
+    assert_eq!(rig.drive.state(), State::Off);
+}
