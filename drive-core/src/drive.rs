@@ -16,6 +16,7 @@ mod protect;
 mod reference;
 mod starting;
 mod state;
+mod stopping;
 #[cfg(test)]
 mod tests;
 
@@ -52,7 +53,7 @@ use crate::supply::RelayState;
 use axes::Axes;
 use catching::CatchingState;
 pub use coefficients::Coefficients;
-pub use command::{Accepted, Command, Refused};
+pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::ExcitationState;
 use in_turn::StepResults;
@@ -151,6 +152,8 @@ struct ControlState {
     rotor: RotorCount,
     prediction: PredictionState,
     motion: MotionState,
+    /// Whether it brakes by the ramp of a quick stop.
+    quick_stop: bool,
     voltage_limit: VoltageLimitState,
     dc_link: DcLinkState,
     /// Present limits by the dc link.

@@ -50,9 +50,9 @@ impl Console {
                 self.design_for(Task::Commission(first, last), drive);
             }
             Request::Accept => self.accept(drive),
-            Request::Stop => {
+            Request::Stop(stop) => {
                 self.announcer.stopping();
-                self.give(Command::Stop, "", drive);
+                self.give(Command::Stop(stop), "", drive);
             }
             Request::Relock => self.give(Command::Relock, "", drive),
             Request::Torque(i_q) => self.give(Command::Torque(i_q), "A", drive),

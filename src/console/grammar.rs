@@ -10,7 +10,7 @@ use core::str::SplitAsciiWhitespace;
 
 use drive_core::commission::Step;
 use drive_core::settings::value::{self, Words as _};
-use drive_core::{Fault, Mode};
+use drive_core::{Fault, Mode, Stop};
 use heapless::Vec;
 
 use super::suggest::nearest;
@@ -51,8 +51,8 @@ pub enum Request {
     Commission(Step, Step),
     /// Put in force what the commissioning has found, and save.
     Accept,
-    /// Torque to zero, then off.
-    Stop,
+    /// Stop in this way.
+    Stop(Stop),
     /// Magnetise again and check that the flux is tracked.
     Relock,
     /// Set the current on the quadrature axis, A.
@@ -249,7 +249,14 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             Some("again") => Request::Learn { again: true },
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
-        "stop" => Request::Stop,
+        "stop" => match words.optional() {
+            None => Request::Stop(Stop::Coast),
+            Some("ramp") => Request::Stop(Stop::Ramp),
+            Some("quick") => Request::Stop(Stop::Quick),
+            Some(word) => {
+                return Err(ParseError::OneOf { what: "the way to stop", word, all: "ramp quick" });
+            }
+        },
         "relock" => Request::Relock,
         "torque" => Request::Torque(words.number("the current, A")?),
         "speed" => Request::Speed(words.number("the speed, rpm")?),

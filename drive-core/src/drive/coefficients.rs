@@ -368,8 +368,9 @@ impl Settings {
             AngleSource::Encoder => self.scales.encoder_counts,
             AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
         };
-        let (limit, ramp) = (self.speed_limit_rpm() / 60.0, self.ramp_rpm_per_s() / 60.0);
-        Motion::new(design, counts, limit, ramp, self.i_q_limit_a())
+        let limit = self.speed_limit_rpm() / 60.0;
+        let ramps = [self.ramp_rpm_per_s(), self.quick_rpm_per_s()].map(|rpm| rpm / 60.0);
+        Motion::new(design, counts, limit, ramps, self.i_q_limit_a())
     }
 
     /// Only a sensorless start with the synchronous demodulation is checked.

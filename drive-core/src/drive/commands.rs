@@ -32,17 +32,8 @@ impl Drive {
                 state => Err(Refused::State(state)),
             },
             Command::Excite(excitation) => self.take_excitation(excitation),
-            Command::Stop => {
-                match self.state {
-                    State::Off | State::Fault(_) | State::Stopping => {}
-                    State::Calibrating
-                    | State::Precharge
-                    | State::CheckingWiring
-                    | State::Exciting => {
-                        self.enter(State::Off);
-                    }
-                    _ => self.enter(State::Stopping),
-                }
+            Command::Stop(stop) => {
+                self.stop(stop);
                 Ok(Accepted::AsGiven)
             }
             Command::Clear => {
@@ -205,7 +196,7 @@ impl Drive {
     fn takes_references(&self, mode: Mode, value: f32) -> Result<(), Refused> {
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
-            State::Off | State::Stopping => Err(Refused::State(self.state)),
+            State::Off | State::Stopping | State::Braking => Err(Refused::State(self.state)),
             _ if self.mode != mode || matches!(mode, Mode::Learning | Mode::Commissioning) => {
                 Err(Refused::State(State::of_mode(self.mode)))
             }

@@ -58,13 +58,19 @@ pub(super) struct Observed {
 }
 
 impl Drive {
+    /// Electrical speed of the rotor, turns per period.
+    pub(super) fn rotor_freq(&self) -> f32 {
+        let s = &self.control;
+        if self.counts() { s.indirect.rotor_freq } else { s.estimator.rotor_freq }
+    }
+
     /// The telemetry of the last step.
     pub fn telemetry(&self) -> Telemetry {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {
             phi: t.phi,
             flux_freq: t.flux_freq,
-            rotor_freq: if self.counts() { s.indirect.rotor_freq } else { s.estimator.rotor_freq },
+            rotor_freq: self.rotor_freq(),
             reference: t.reference,
             current: t.current,
             voltage: t.voltage,

@@ -23,11 +23,9 @@ impl Drive {
                     Mode::Speed => Goal::Speed(r.speed),
                     _ => Goal::Position(r.turns),
                 };
-                let count = self.control.seen.rotor_count;
-                let range = self.control.limits.i_q;
-                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
-                r.current.q
+                self.follow(goal)
             }
+            State::Braking => self.brake(),
             State::Stopping => {
                 let ramp = self.c.sequence.stop_ramp;
                 r.current.q = if r.current.q > ramp {
@@ -48,6 +46,14 @@ impl Drive {
         Ok(Dq { d: if i_d < most { i_d } else { most } + s.limits.flux_a, q: i_q })
     }
 
+    /// The torque current of the speed or the position loop, A.
+    pub(super) fn follow(&mut self, goal: Goal) -> f32 {
+        let s = &mut self.control;
+        let i_q = self.c.motion.step(&mut s.motion, goal, s.seen.rotor_count, s.limits.i_q);
+        s.references.current.q = i_q;
+        i_q
+    }
+
     /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
     pub fn brake_duty(&self) -> f32 {
         if self.state.has_current() { self.control.limits.chopper } else { 0.0 }
@@ -55,12 +61,12 @@ impl Drive {
 
     /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
     pub fn stator_resistance(&self) -> Option<f32> {
-        let tracks = self.c.observer.is_some() && self.state.regulates();
+        let tracks = self.c.observer.is_some() && self.state.has_torque();
         tracks.then_some(self.control.observer.resistance)
     }
 
     /// Why the torque is smaller than asked for.
     pub fn limiting(&self) -> Limiting {
-        if self.state.regulates() { self.control.limiting } else { Limiting::No }
+        if self.state.has_torque() { self.control.limiting } else { Limiting::No }
     }
 }

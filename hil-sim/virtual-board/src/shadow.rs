@@ -70,7 +70,7 @@ impl Shadow {
                 })?;
                 self.start(Mode::Learning)
             }
-            Ok(Request::Stop) => Command::Stop,
+            Ok(Request::Stop(stop)) => Command::Stop(stop),
             Ok(Request::Relock) => Command::Relock,
             Ok(Request::Clear) => Command::Clear,
             Ok(Request::Torque(i_q)) => Command::Torque(i_q),
