@@ -68,3 +68,32 @@ fn the_dc_link_holds_a_quick_stop_back() {
     // The torque of 3 A alone would take 4.8 s with this inertia.
     assert!(takes > 4.0 && rpm.abs() < 12.0, "{takes} s, {rpm} rpm");
 }
+
+/// With an S-ramp the acceleration comes and goes in half a second: 300 rpm at 300 rpm/s take 1.5 s instead of 1 s, up as by
+/// `stop ramp`, without the speed passing its goal by more than the noise; and nothing jerks.
+#[test]
+fn an_s_ramp_rounds_speed_and_stop() {
+    let changes = ["load.mode=free", "angle.source=encoder", "speed.s_ramp_s=0.5"];
+    let mut rig = Rig::from_config(&config(&changes), 1).unwrap();
+    rig.start(Mode::Speed).unwrap();
+    let mut speeds = Vec::new();
+    rig.command(&Command::Speed(300.0)).unwrap();
+    rig.run(2.5, |p| speeds.push(p.speed_rpm));
+    rig.command(&Command::Stop(Stop::Ramp)).unwrap();
+    rig.run(2.0, |p| speeds.push(p.speed_rpm));
+    assert_eq!(rig.drive.state(), State::Off);
+    let at = |t: f64| speeds[(t * 6000.0) as usize];
+    println!("{:.1} {:.1} {:.1} {:.1}", at(0.5), at(1.0), at(1.6), at(3.0));
+    // a t^2/(2 s) while the acceleration rises, and the same from the other end; 8 rpm are 30 ms of lag at 300 rpm/s.
+    for (t, expected) in
+        [(0.5, 75.0), (0.75, 150.0), (1.0, 225.0), (2.4, 300.0), (3.0, 225.0), (3.5, 75.0)]
+    {
+        assert!((at(t) - expected).abs() < 10.0, "{t} s: {}", at(t));
+    }
+    let most = speeds.iter().fold(0.0_f64, |m, s| m.max(*s));
+    assert!(most < 305.0, "{most}");
+    // Acceleration over 0.05 s, rpm/s: it changes by 600 rpm/s in a second, 90 with the noise in 0.1 s.
+    let a: Vec<_> = speeds.windows(300).step_by(300).map(|w| (w[299] - w[0]) / 0.05).collect();
+    let jerk = a.windows(3).fold(0.0_f64, |m, w| m.max((w[2] - w[0]).abs()));
+    assert!(jerk < 100.0, "{jerk}");
+}

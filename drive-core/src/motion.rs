@@ -47,6 +47,17 @@ pub const LARGEST_POSITION: f32 = 1000.0;
 const REST: f32 = 0.2;
 const REST_STEPS: u8 = 10;
 
+/// Limits of the speed reference's change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramps {
+    /// Acceleration, mechanical turns/s^2.
+    pub usual: f32,
+    /// Deceleration of a quick stop, at least as large.
+    pub quick: f32,
+    /// Time in which the usual acceleration comes and goes, s, but in position mode, where the braking curve shapes it.
+    pub rise_s: f32,
+}
+
 /// Coefficients of the loops. Speeds in mechanical turns/s, positions in mechanical turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
@@ -65,9 +76,10 @@ pub struct Motion {
     pub position_limit: f32,
     /// Change of the current with that of the speed reference in the same step, turns/s per A.
     per_change: f32,
-    /// Ramp of the speed reference, a step of the loops each, turns/s.
+    /// Ramp of the speed reference, turns/s in steps of the loops, with its acceleration rising, and without.
     ramp: Ramp,
-    /// The same of a quick stop.
+    straight_ramp: Ramp,
+    /// That of a quick stop.
     quick_ramp: Ramp,
     /// Twice the deceleration of the braking curve, turns/s^2.
     twice_braking: f32,
@@ -115,13 +127,12 @@ pub struct MotionState {
 impl Motion {
     /// Loops with the controllers of `design` and `counts` of the position per mechanical turn.
     ///
-    /// Limits of the references: `speed_limit`, mechanical turns/s; acceleration `ramps`, mechanical
-    /// turns/s^2, by itself and in a quick stop; `i_q_limit`, A.
+    /// Limits of the references: `speed_limit`, mechanical turns/s; `ramps`; `i_q_limit`, A.
     pub fn new(
         design: &MotionDesign,
         counts: u32,
         speed_limit: f32,
-        [ramp, quick_ramp]: [f32; 2],
+        ramps: &Ramps,
         i_q_limit: f32,
     ) -> Self {
         let rate = (1.0 / design.period_s) as f32;
@@ -135,10 +146,11 @@ impl Motion {
             smoothing: design.smoothing as f32,
             speed_limit,
             position_limit: limited(0.5 * i32::MAX as f32 / counts as f32, LARGEST_POSITION),
-            ramp: Ramp::new(ramp / rate, 0.0),
-            quick_ramp: Ramp::new(quick_ramp / rate, 0.0),
-            twice_braking: 2.0 * ramp,
-            bend: ramp / design.k_x as f32,
+            ramp: Ramp::new(ramps.usual / rate, ramps.rise_s * rate),
+            straight_ramp: Ramp::new(ramps.usual / rate, 0.0),
+            quick_ramp: Ramp::new(ramps.quick / rate, 0.0),
+            twice_braking: 2.0 * ramps.usual,
+            bend: ramps.usual / design.k_x as f32,
             i_q_limit,
         }
     }
@@ -206,10 +218,10 @@ impl Motion {
             }
             2 => {
                 let (ramp, waits) = match goal {
-                    Goal::Speed(_) | Goal::Position(_) => (&self.ramp, false),
-                    Goal::Rest { quick } => {
-                        (if quick { &self.quick_ramp } else { &self.ramp }, true)
-                    }
+                    Goal::Speed(_) => (&self.ramp, false),
+                    Goal::Position(_) => (&self.straight_ramp, false),
+                    Goal::Rest { quick: false } => (&self.ramp, true),
+                    Goal::Rest { quick: true } => (&self.quick_ramp, true),
                 };
                 let mut step = ramp.step(&mut state.ramp, limited(state.wanted, self.speed_limit));
                 let error = state.ramp.reference - state.speed;

@@ -179,6 +179,8 @@ pub struct SpeedSettings {
     pub ramp_rpm_per_s: Option<f32>,
     /// Deceleration of a quick stop, rpm/s.
     pub quick_rpm_per_s: Option<f32>,
+    /// Time in which the acceleration comes to its full value in speed mode and in a stop by the ramp, s; 0 for at once.
+    pub s_ramp_s: f32,
     /// Phase margin that the speed loop is designed for, degrees: more is calmer and slower.
     pub phase_margin_deg: f32,
 }
@@ -190,6 +192,7 @@ impl Default for SpeedSettings {
             limit_rpm: None,
             ramp_rpm_per_s: None,
             quick_rpm_per_s: None,
+            s_ramp_s: 0.0,
             phase_margin_deg: 60.0,
         }
     }

@@ -201,6 +201,7 @@ pub const SPEED_LOOP: &[&str] = &[
     "speed.limit_rpm",
     "speed.ramp_rpm_per_s",
     "speed.quick_rpm_per_s",
+    "speed.s_ramp_s",
     "speed.phase_margin_deg",
     "drive.motor.inertia",
 ];

@@ -11,7 +11,7 @@ const COUNTS: u32 = 10_000;
 
 fn motion(limit: f32, ramp: f32) -> Motion {
     let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
-    Motion::new(&design, COUNTS, limit, [ramp, 3.0 * ramp], 3.0)
+    Motion::new(&design, COUNTS, limit, &Ramps { usual: ramp, quick: 3.0 * ramp, rise_s: 0.0 }, 3.0)
 }
 
 /// What a rigid rotor, in f64, did in some seconds.
