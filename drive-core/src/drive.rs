@@ -105,6 +105,8 @@ struct References {
     current: Dq,
     /// Mechanical turns/s.
     speed: f32,
+    /// Periods for which the speed holds where it is a jog; 0 where it is none.
+    jog: u32,
     /// Mechanical turns.
     turns: f32,
     /// Added to the voltage of the current loop, V.
@@ -121,6 +123,7 @@ impl Default for References {
         Self {
             current: Dq::ZERO,
             speed: 0.0,
+            jog: 0,
             turns: 0.0,
             test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },

@@ -281,6 +281,7 @@ fn words(command: &Command) -> String {
         Command::Clear => "to clear the fault".into(),
         Command::Torque(a) => format!("a torque current of {a} A"),
         Command::Speed(rpm) => format!("a speed of {rpm} rpm"),
+        Command::Jog(rpm) => format!("to jog at {rpm} rpm"),
         Command::Position(turns) => format!("a position of {turns} turns"),
         Command::Magnetising(a) => format!("a magnetising current of {a} A"),
         Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),

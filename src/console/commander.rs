@@ -44,6 +44,7 @@ impl Console {
                     | Request::Relock
                     | Request::Torque(_)
                     | Request::Speed(_)
+                    | Request::Jog(_)
                     | Request::Position(_)
             )
     }

@@ -59,6 +59,8 @@ pub enum Request {
     Torque(f32),
     /// Set the speed, mechanical rpm.
     Speed(f32),
+    /// Turn at this speed, mechanical rpm, while it is repeated.
+    Jog(f32),
     /// Set the position, mechanical turns from the start.
     Position(f32),
     /// Show one setting.
@@ -148,7 +150,7 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 35] = [
+pub const COMMANDS: [&str; 36] = [
     "help",
     "status",
     "start",
@@ -159,6 +161,7 @@ pub const COMMANDS: [&str; 35] = [
     "relock",
     "torque",
     "speed",
+    "jog",
     "position",
     "angle",
     "get",
@@ -260,6 +263,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
         "relock" => Request::Relock,
         "torque" => Request::Torque(words.number("the current, A")?),
         "speed" => Request::Speed(words.number("the speed, rpm")?),
+        "jog" => Request::Jog(words.number("the speed, rpm")?),
         "position" => Request::Position(words.number("the position, turns")?),
         // An alias of `set angle_source`.
         "angle" => {

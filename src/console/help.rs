@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 38] = [
+pub const HELP: [&str; 39] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position",
@@ -12,6 +12,7 @@ pub const HELP: [&str; 38] = [
     "relock                    no torque, magnetise again, verify the lock, go on",
     "torque A                  current on the quadrature axis, A peak",
     "speed RPM                 speed, mechanical rpm",
+    "jog RPM                   turn at this speed while it is repeated every 0.5 s, then to rest by the ramp",
     "position TURNS            position, mechanical turns from where it started",
     "angle encoder|injection   where the flux angle comes from; the same as set angle_source",
     "get [KEY|PREFIX]          one setting with range and meaning, or all that begin so",

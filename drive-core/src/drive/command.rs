@@ -30,6 +30,9 @@ pub enum Command {
     Torque(f32),
     /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
     Speed(f32),
+    /// A speed as [`Speed`](Self::Speed), while the drive regulates the speed, that ends by the ramp when it is not given again
+    /// within 0.5 s; a `Speed` ends it as well.
+    Jog(f32),
     /// Reference of the position, mechanical turns from where the drive was started; limited to
     /// the counted range.
     Position(f32),

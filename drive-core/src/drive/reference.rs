@@ -1,10 +1,23 @@
 //! The current that is regulated, by state, within what the dc link allows.
 
-use super::Drive;
+use super::{Drive, References};
 use crate::dc_link::Limiting;
 use crate::drive::state::{Mode, State};
 use crate::math::frames::Dq;
 use crate::motion::Goal;
+
+impl References {
+    /// The reference of the speed, turns/s, in a period: a jog that is not repeated ends.
+    fn speed_now(&mut self) -> f32 {
+        if self.jog > 0 {
+            self.jog -= 1;
+            if self.jog == 0 {
+                self.speed = 0.0;
+            }
+        }
+        self.speed
+    }
+}
 
 impl Drive {
     /// The current to regulate in this state, A; moves on to the next state where it is time.
@@ -18,14 +31,7 @@ impl Drive {
             State::Magnetising => return Ok(self.magnetise()?),
             State::Verifying => return Ok(self.verify()?),
             State::Learning => self.learn()?,
-            State::Speed | State::Position => {
-                let goal = match self.mode {
-                    Mode::Speed => Goal::Speed(r.speed),
-                    _ => Goal::Position(r.turns),
-                };
-                self.follow(goal)
-            }
-            State::Braking => self.brake(),
+            State::Speed | State::Position | State::Braking => self.follow(),
             State::Stopping => {
                 let ramp = self.c.sequence.stop_ramp;
                 r.current.q = if r.current.q > ramp {
@@ -47,10 +53,18 @@ impl Drive {
     }
 
     /// The torque current of the speed or the position loop, A.
-    pub(super) fn follow(&mut self, goal: Goal) -> f32 {
+    fn follow(&mut self) -> f32 {
         let s = &mut self.control;
+        let goal = match (self.state, self.mode) {
+            (State::Braking, _) => Goal::Rest { quick: s.quick_stop },
+            (_, Mode::Speed) => Goal::Speed(s.references.speed_now()),
+            _ => Goal::Position(s.references.turns),
+        };
         let i_q = self.c.motion.step(&mut s.motion, goal, s.seen.rotor_count, s.limits.i_q);
         s.references.current.q = i_q;
+        if self.state == State::Braking && self.c.motion.is_at_rest(&s.motion) {
+            self.enter(State::Stopping);
+        }
         i_q
     }
 

@@ -3,7 +3,6 @@
 use super::Drive;
 use crate::drive::command::Stop;
 use crate::drive::state::State;
-use crate::motion::Goal;
 
 impl Drive {
     pub(super) fn stop(&mut self, stop: Stop) {
@@ -27,14 +26,5 @@ impl Drive {
         self.c.motion.take_over(&mut s.motion, s.seen.rotor_count, speed, i_q);
         s.quick_stop = stop == Stop::Quick;
         self.enter(State::Braking);
-    }
-
-    /// The torque current that brakes, A; the outputs go off by [`State::Stopping`] once the shaft is at rest.
-    pub(super) fn brake(&mut self) -> f32 {
-        let i_q = self.follow(Goal::Rest { quick: self.control.quick_stop });
-        if self.c.motion.is_at_rest(&self.control.motion) {
-            self.enter(State::Stopping);
-        }
-        i_q
     }
 }

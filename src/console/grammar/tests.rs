@@ -50,6 +50,7 @@ fn commands_are_understood() {
         ("torque -1.5", Request::Torque(-1.5)),
         ("start speed", Request::Start(Mode::Speed)),
         ("speed -150", Request::Speed(-150.0)),
+        ("jog -60", Request::Jog(-60.0)),
         ("position 5e1", Request::Position(50.0)),
         ("angle encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("set angle_source encoder", assigned(&[("angle_source", Value::Word("encoder"))])),

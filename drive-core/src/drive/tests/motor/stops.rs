@@ -56,6 +56,35 @@ fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
     }
 }
 
+/// A jog goes on while it is repeated, and ends 0.5 s after the last one, by the ramp, or by another speed.
+#[test]
+fn a_jog_lasts_as_long_as_it_is_repeated() {
+    let mut bench = Bench::new(&motor_settings(AngleSource::Encoder));
+    bench.drive.command(&Command::Start(Mode::Speed)).unwrap();
+    let early = bench.drive.command(&Command::Jog(90.0));
+    assert_eq!(early, Err(Refused::State(State::Calibrating)));
+    assert!(bench.run_to(State::Speed));
+    for _ in 0..4 {
+        bench.drive.command(&Command::Jog(90.0)).unwrap();
+        bench.run(0.45);
+    }
+    assert!((bench.motor.rpm() - 90.0).abs() < 2.0, "{}", bench.motor.rpm());
+    bench.drive.command(&Command::Jog(90.0)).unwrap();
+    bench.run(0.49);
+    assert!((bench.motor.rpm() - 90.0).abs() < 2.0, "{}", bench.motor.rpm());
+    // 0.3 s by the ramp, and the loop settles.
+    bench.run(0.8);
+    assert!(bench.motor.rpm().abs() < 2.0, "{}", bench.motor.rpm());
+    bench.drive.command(&Command::Jog(90.0)).unwrap();
+    bench.drive.command(&Command::Speed(-60.0)).unwrap();
+    bench.run(2.0);
+    assert!((bench.motor.rpm() + 60.0).abs() < 2.0, "{}", bench.motor.rpm());
+    let far = bench.drive.command(&Command::Jog(1e6));
+    assert_eq!(far, Ok(Accepted::Limited(300.0)));
+    let mut torque = Bench::started(&motor_settings(AngleSource::Encoder), Mode::Torque);
+    assert!(torque.drive.command(&Command::Jog(90.0)).is_err());
+}
+
 /// A stop by ramp becomes quick or coasts, but not slower again; one that is not running yet ends at once.
 #[test]
 fn a_stop_can_be_made_harder() {
