@@ -162,8 +162,9 @@ struct ControlState {
     /// Present limits by the dc link.
     limits: DcLinkLimits,
     limiting: Limiting,
-    /// Torque current that the heat sink does not bear, of the largest of all, A.
+    /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
     too_hot_for: f32,
+    too_hot: Limiting,
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
