@@ -25,7 +25,7 @@ fn settles(changes: &[&str], carried: f64, tau_s: f64, seconds: f64) -> (f64, f6
         }
     });
     assert_eq!(rig.drive.state(), State::Torque, "{changes:?}");
-    (most, (sum / n as f64).sqrt(), rig.drive.limiting())
+    (most, (sum / n).sqrt(), rig.drive.limiting())
 }
 
 /// The shaft is locked, 3 A are asked for. The current settles at what is carried for ever, with its direct part: from half the
