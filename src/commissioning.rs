@@ -1,7 +1,7 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
-use drive_core::{Command, Excited, Mode, Refused, Settings};
+use drive_core::{Command, Excited, Mode, Refused, Settings, Stop};
 
 use crate::rotor_tracking::Observation;
 
@@ -87,7 +87,7 @@ impl Session {
         match self.commissioning.poll(drive, &mut self.sums) {
             Next::Wait => {}
             Next::Excite(excitation) => return Some(Action::Command(Command::Excite(excitation))),
-            Next::Stop => return Some(Action::Command(Command::Stop)),
+            Next::Stop => return Some(Action::Command(Command::Stop(Stop::Coast))),
             Next::Start => return Some(Action::Command(Command::Start(Mode::Torque))),
             Next::Torque(i_q) => return Some(Action::Command(Command::Torque(i_q))),
             Next::Design => return Some(Action::Design),

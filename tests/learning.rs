@@ -5,7 +5,7 @@ mod common;
 use common::{all, config, run};
 use drive_core::identify::learning::Learned;
 use drive_core::settings::table::ReferenceTable;
-use drive_core::{Command, Fault, Mode, State};
+use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::experiments::learning;
 use hil_sim::plant::Load;
 use hil_sim::rig::Rig;
@@ -92,7 +92,7 @@ fn learning_takes_stop_and_no_other_reference() {
     assert!(rig.command(&Command::Torque(1.0)).is_err());
     assert!(rig.command(&Command::Magnetising(1.0)).is_err());
     assert_eq!(rig.drive.state(), State::Learning);
-    rig.command(&Command::Stop).unwrap();
+    rig.command(&Command::Stop(Stop::Coast)).unwrap();
     rig.run(0.5, |_| {});
     assert_eq!(rig.drive.state(), State::Off);
     assert!(rig.drive.learned().is_none());
@@ -124,7 +124,7 @@ fn the_rectified_chain_tracks_with_a_learned_reference() {
                 count += 1.0;
                 largest = largest.max(p.angle_error_deg.abs());
             });
-            rig.command(&Command::Stop).unwrap();
+            rig.command(&Command::Stop(Stop::Coast)).unwrap();
             rig.run(1.5, |_| {}); // until the flux is gone
         }
         let rms: f64 = (squares / count).sqrt();

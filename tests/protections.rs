@@ -4,7 +4,7 @@
 mod common;
 
 use common::{config, regulating};
-use drive_core::{Command, Fault, Mode, State};
+use drive_core::{Command, Fault, Mode, State, Stop};
 use hil_sim::plant::{Channel, CurrentFault, EncoderFault, Load};
 use hil_sim::rig::Rig;
 
@@ -94,7 +94,7 @@ fn nothing_trips_without_reason() {
                 rig.run(0.25, |_| {});
                 assert_eq!(rig.drive.state(), State::Torque, "seed {seed}, i_q {i_q}");
             }
-            rig.command(&Command::Stop).unwrap();
+            rig.command(&Command::Stop(Stop::Coast)).unwrap();
             rig.run(0.5, |_| {});
             assert_eq!(rig.drive.state(), State::Off, "seed {seed}");
             // Off is off: the motor is without current before it is started again.

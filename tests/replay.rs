@@ -56,7 +56,7 @@ fn order(drive: &mut Drive, settings: &mut FirmwareSettings, line: &str) {
     let taken = match request {
         None => drive.command(&Command::CheckWiring),
         Some(Request::Start(mode)) => drive.command(&Command::Start(mode)),
-        Some(Request::Stop) => drive.command(&Command::Stop),
+        Some(Request::Stop(stop)) => drive.command(&Command::Stop(stop)),
         Some(Request::Torque(i_q)) => drive.command(&Command::Torque(i_q)),
         Some(Request::Position(turns)) => drive.command(&Command::Position(turns)),
         Some(Request::Set(values)) => {

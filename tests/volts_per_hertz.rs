@@ -5,7 +5,7 @@ mod common;
 
 use common::{config, plant_settings};
 use drive_core::settings::Motor;
-use drive_core::{Command, Fault, Mode, Refused, Settings, State};
+use drive_core::{Command, Fault, Mode, Refused, Settings, State, Stop};
 use hil_sim::Config;
 use hil_sim::plant::{Channel, CurrentFault, Load};
 use hil_sim::rig::Rig;
@@ -124,6 +124,23 @@ fn a_sensor_or_a_phase_that_opens_is_seen() {
     rig.drive.command(&Command::Start(Mode::VoltsPerHertz)).unwrap();
     rig.run(5.0, |_| {});
     assert_eq!(rig.drive.state(), State::Fault(Fault::WiringNoCurrent));
+}
+
+/// `stop` switches off at once; by the ramp the shaft comes to rest first.
+#[test]
+fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
+    let config = Config::load(Some("motulator-2kw2"), None, &[]).unwrap();
+    let mut rig = turning(&config, 600.0, 1);
+    rig.command(&Command::Stop(Stop::Ramp)).unwrap();
+    rig.run(0.5, |_| {});
+    assert_eq!(rig.drive.state(), State::Braking);
+    assert!(rig.drive.command(&Command::Speed(100.0)).is_err());
+    rig.run(3.0, |_| {});
+    let rpm = seen(&mut rig).0;
+    assert!(rig.drive.state() == State::Off && rpm.abs() < 20.0, "{rpm} {}", rig.drive.state());
+    let mut rig = turning(&config, 600.0, 1);
+    rig.command(&Command::Stop(Stop::Coast)).unwrap();
+    assert_eq!(rig.drive.state(), State::Off);
 }
 
 /// A shaft of five times the inertia is braked from speed: the frequency follows the link.

@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! use drive_core::commission::{Collector, Commissioning, Next, Step};
-//! use drive_core::{Command, Drive, Mode, Settings};
+//! use drive_core::{Command, Drive, Mode, Settings, Stop};
 //!
 //! # fn one_period(drive: &mut Drive) {}
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -23,7 +23,7 @@
 //!     match commissioning.poll(&drive.excited(), &mut collector) {
 //!         Next::Wait => {}
 //!         Next::Excite(excitation) => drop(drive.command(&Command::Excite(excitation))?),
-//!         Next::Stop => drop(drive.command(&Command::Stop)?),
+//!         Next::Stop => drop(drive.command(&Command::Stop(Stop::Coast))?),
 //!         Next::Start => drop(drive.command(&Command::Start(Mode::Torque))?),
 //!         Next::Torque(i_q) => drop(drive.command(&Command::Torque(i_q))?),
 //!         Next::Design => commissioning.design(), // takes long

@@ -107,6 +107,10 @@ pub enum Limiting {
     Voltage,
     /// The heat sink is hot.
     HeatSink,
+    /// The motor carries no more for any time.
+    Motor,
+    /// The inverter carries no more for any time.
+    Inverter,
     /// Generating torque: the link is high.
     DcLinkHigh,
     /// Generating torque: the link is high, and the brake resistor has taken all that it can.
@@ -124,6 +128,8 @@ impl fmt::Display for Limiting {
             Self::No => "nothing",
             Self::Voltage => "the voltage of the dc link at this speed",
             Self::HeatSink => "the heat sink is hot",
+            Self::Motor => "the motor is at its thermal limit",
+            Self::Inverter => "the inverter is at its thermal limit",
             Self::DcLinkHigh => "the dc link is high",
             Self::ResistorHot => "the dc link is high and the brake resistor hot",
             Self::DcLinkLow => "the dc link is low",

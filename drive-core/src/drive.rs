@@ -17,6 +17,7 @@ mod reference;
 mod scalar;
 mod starting;
 mod state;
+mod stopping;
 #[cfg(test)]
 mod tests;
 
@@ -54,7 +55,7 @@ use crate::supply::RelayState;
 use axes::Axes;
 use catching::CatchingState;
 pub use coefficients::Coefficients;
-pub use command::{Accepted, Command, Refused};
+pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::ExcitationState;
 use in_turn::StepResults;
@@ -106,6 +107,8 @@ struct References {
     current: Dq,
     /// Mechanical turns/s.
     speed: f32,
+    /// Periods for which the speed holds where it is a jog; 0 where it is none.
+    jog: u32,
     /// Mechanical turns.
     turns: f32,
     /// Added to the voltage of the current loop, V.
@@ -122,6 +125,7 @@ impl Default for References {
         Self {
             current: Dq::ZERO,
             speed: 0.0,
+            jog: 0,
             turns: 0.0,
             test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
@@ -153,13 +157,16 @@ struct ControlState {
     rotor: RotorCount,
     prediction: PredictionState,
     motion: MotionState,
+    /// Whether it brakes by the ramp of a quick stop.
+    quick_stop: bool,
     voltage_limit: VoltageLimitState,
     dc_link: DcLinkState,
     /// Present limits by the dc link.
     limits: DcLinkLimits,
     limiting: Limiting,
-    /// Torque current that the heat sink does not bear, of the largest of all, A.
+    /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
     too_hot_for: f32,
+    too_hot: Limiting,
     carrier_watch: CarrierWatch,
     saliency_check: SaliencyCheckState,
     lock: LockMonitorState,
@@ -217,8 +224,8 @@ impl Drive {
     /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
     /// with the outputs off in the same step.
     pub fn step(&mut self, sample: &Sample) -> Compare {
-        let result =
-            if self.state.has_current() { self.regulate(sample) } else { self.prepare(sample) };
+        let by_model = self.state.has_current() && self.mode != Mode::VoltsPerHertz;
+        let result = if by_model { self.regulate(sample) } else { self.prepare(sample) };
         self.elapsed = self.elapsed.wrapping_add(1);
         let result = result.and_then(|compare| self.watch_load().map(|()| compare));
         let compare = result.unwrap_or_else(|off| {

@@ -24,10 +24,16 @@
 //! The acceleration reference is also fed forward to the tracking loop, which would otherwise lag by the
 //! acceleration divided by the square of its natural frequency.
 
+pub mod ramp;
+#[cfg(test)]
+mod tests;
+
 use crate::current::pi::{Pi, PiState};
 use crate::math::angle::Angle;
 use crate::math::{limited, within};
 use crate::tuning::MotionDesign;
+
+use ramp::{Ramp, RampState};
 
 /// Control periods per step of the loops: 100 Hz.
 pub const DIVIDER: u8 = 60;
@@ -36,6 +42,21 @@ pub const COUNTS_PER_TURN: u32 = 1 << 16;
 
 /// Largest position reference, mechanical turns: f32 resolves 0.02° there.
 pub const LARGEST_POSITION: f32 = 1000.0;
+/// Speed below which the shaft counts as at rest, mechanical turns/s (12 rpm: clear of the noise without an encoder), and for
+/// how many steps of the loops: 0.1 s.
+const REST: f32 = 0.2;
+const REST_STEPS: u8 = 10;
+
+/// Limits of the speed reference's change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramps {
+    /// Acceleration, mechanical turns/s^2.
+    pub usual: f32,
+    /// Deceleration of a quick stop, at least as large.
+    pub quick: f32,
+    /// Time in which the usual acceleration comes and goes, s, but in position mode, where the braking curve shapes it.
+    pub rise_s: f32,
+}
 
 /// Coefficients of the loops. Speeds in mechanical turns/s, positions in mechanical turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,8 +74,13 @@ pub struct Motion {
     pub speed_limit: f32,
     /// Largest position reference, turns.
     pub position_limit: f32,
-    /// Largest change of the speed reference per step of the loops, turns/s.
-    ramp: f32,
+    /// Change of the current with that of the speed reference in the same step, turns/s per A.
+    per_change: f32,
+    /// Ramp of the speed reference, turns/s in steps of the loops, with its acceleration rising, and without.
+    ramp: Ramp,
+    straight_ramp: Ramp,
+    /// That of a quick stop.
+    quick_ramp: Ramp,
     /// Twice the deceleration of the braking curve, turns/s^2.
     twice_braking: f32,
     /// Speed at which the braking curve changes from linear to square root, turns/s.
@@ -70,14 +96,20 @@ pub enum Goal {
     Speed(f32),
     /// Position, mechanical turns from the start.
     Position(f32),
+    /// Rest, and whether by the ramp of a quick stop. The reference waits for a rotor that the current cannot brake as
+    /// fast.
+    Rest {
+        /// By that ramp.
+        quick: bool,
+    },
 }
 
 /// State of the loops.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MotionState {
     pi: PiState,
-    /// Ramped speed reference, turns/s.
-    reference: f32,
+    /// Speed reference, turns/s.
+    ramp: RampState,
     /// Rate of change of the speed reference, turns/s per control period.
     pub acceleration: f32,
     /// Filtered speed of the rotor, turns/s.
@@ -87,33 +119,38 @@ pub struct MotionState {
     origin: u32,
     last: Option<u32>,
     phase: u8,
+    /// Steps of the loops for which the rotor was at rest, up to [`REST_STEPS`].
+    rest: u8,
     output: f32,
 }
 
 impl Motion {
     /// Loops with the controllers of `design` and `counts` of the position per mechanical turn.
     ///
-    /// Limits of the references: `speed_limit`, mechanical turns/s; acceleration `ramp`, mechanical
-    /// turns/s^2; `i_q_limit`, A.
+    /// Limits of the references: `speed_limit`, mechanical turns/s; `ramps`; `i_q_limit`, A.
     pub fn new(
         design: &MotionDesign,
         counts: u32,
         speed_limit: f32,
-        ramp: f32,
+        ramps: &Ramps,
         i_q_limit: f32,
     ) -> Self {
         let rate = (1.0 / design.period_s) as f32;
+        let (k_c, forward) = (design.k_c as f32, rate / design.acceleration as f32);
         Self {
-            pi: Pi { k_c: design.k_c as f32, z_c: design.z_c as f32 },
-            forward: rate / design.acceleration as f32,
+            pi: Pi { k_c, z_c: design.z_c as f32 },
+            forward,
+            per_change: 1.0 / (k_c + forward),
             turns_per_count: 1.0 / counts as f32,
             rate,
             smoothing: design.smoothing as f32,
             speed_limit,
             position_limit: limited(0.5 * i32::MAX as f32 / counts as f32, LARGEST_POSITION),
-            ramp: ramp / rate,
-            twice_braking: 2.0 * ramp,
-            bend: ramp / design.k_x as f32,
+            ramp: Ramp::new(ramps.usual / rate, ramps.rise_s * rate),
+            straight_ramp: Ramp::new(ramps.usual / rate, 0.0),
+            quick_ramp: Ramp::new(ramps.quick / rate, 0.0),
+            twice_braking: 2.0 * ramps.usual,
+            bend: ramps.usual / design.k_x as f32,
             i_q_limit,
         }
     }
@@ -126,6 +163,31 @@ impl Motion {
     /// Resets `state` to zero current at the position `count`, which becomes the origin.
     pub fn start(&self, state: &mut MotionState, count: u32) {
         *state = MotionState { origin: count, ..MotionState::default() };
+    }
+
+    /// Takes over from whatever gave the torque current `i_q`, A, with the rotor at `count` and `speed`, turns/s: the speed
+    /// loop goes on from both, with the acceleration that it had.
+    pub fn take_over(&self, state: &mut MotionState, count: u32, speed: f32, i_q: f32) {
+        let MotionState { acceleration, origin, .. } = *state;
+        let step = acceleration * f32::from(DIVIDER);
+        *state = MotionState {
+            pi: PiState::at_rest(i_q - self.forward * step),
+            ramp: RampState::at(speed, step),
+            acceleration,
+            speed,
+            wanted: speed,
+            origin,
+            // The speed is known to the last period.
+            last: Some(count),
+            phase: 1,
+            rest: 0,
+            output: i_q,
+        };
+    }
+
+    /// Whether reference and rotor have been at rest for 0.1 s.
+    pub fn is_at_rest(&self, state: &MotionState) -> bool {
+        state.rest >= REST_STEPS
     }
 
     /// Position in mechanical turns from the start.
@@ -150,23 +212,43 @@ impl Motion {
             1 => {
                 state.wanted = match goal {
                     Goal::Speed(speed) => speed,
+                    Goal::Rest { .. } => 0.0,
                     Goal::Position(turns) => self.braking_curve(turns - self.turns(state, count)),
                 };
             }
             2 => {
-                let change = limited(state.wanted, self.speed_limit) - state.reference;
-                let step = limited(change, self.ramp);
-                state.reference += step;
-                state.acceleration = step * (1.0 / DIVIDER as f32);
-
-                let error = state.reference - state.speed;
-                let wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
+                let (ramp, waits) = match goal {
+                    Goal::Speed(_) => (&self.ramp, false),
+                    Goal::Position(_) => (&self.straight_ramp, false),
+                    Goal::Rest { quick: false } => (&self.ramp, true),
+                    Goal::Rest { quick: true } => (&self.quick_ramp, true),
+                };
+                let mut step = ramp.step(&mut state.ramp, limited(state.wanted, self.speed_limit));
+                let error = state.ramp.reference - state.speed;
+                let mut wanted = self.pi.step(&mut state.pi, error) + self.forward * step;
                 state.output = within(limited(wanted, self.i_q_limit), range);
-                state.pi.back_calculate(state.output - wanted);
                 if state.output != wanted {
                     // The rotor does not accelerate as wanted.
-                    state.acceleration = 0.0;
+                    if waits {
+                        // Back to where it was at most.
+                        let room = if step < 0.0 { (0.0, -step) } else { (-step, 0.0) };
+                        let more = within(self.per_change * (state.output - wanted), room);
+                        state.ramp.shift(more);
+                        wanted += self.pi.revise(&mut state.pi, more) + self.forward * more;
+                        step += more;
+                    } else {
+                        step = 0.0;
+                    }
                 }
+                state.pi.back_calculate(state.output - wanted);
+                state.acceleration = step * (1.0 / DIVIDER as f32);
+                state.rest = if state.ramp.reference != 0.0 || state.speed.abs() >= REST {
+                    0
+                } else if state.rest < REST_STEPS {
+                    state.rest + 1
+                } else {
+                    REST_STEPS
+                };
             }
             _ => {}
         }
@@ -206,144 +288,5 @@ impl RotorCount {
         let moved = now.wrapping_sub(self.count as u16) as i16;
         self.count = self.count.wrapping_add_signed(i32::from(moved));
         self.count
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// No limit but the own.
-    const ANY: (f32, f32) = (f32::MIN, f32::MAX);
-    use crate::tuning::design_motion_loops;
-    use core::f64::consts::TAU;
-
-    /// 1 A accelerates the motor of Table 5 with 0.012 kg m^2 by 26.8 rad/s^2.
-    const ACCELERATION: f64 = 26.8 / TAU;
-    const COUNTS: u32 = 10_000;
-
-    fn motion(limit: f32, ramp: f32) -> Motion {
-        let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
-        Motion::new(&design, COUNTS, limit, ramp, 3.0)
-    }
-
-    /// What a rigid rotor, in f64, did in some seconds.
-    #[derive(Debug, Default)]
-    struct Done {
-        /// Position, speed.
-        end: (f64, f64),
-        furthest: f64,
-        fastest: f64,
-        /// When it was more than a degree from the end for the last time, s.
-        settled: f64,
-    }
-
-    /// With a load in A of torque current from `load.0` s on, and a motor whose inertia is `heavier`
-    /// than the design's.
-    fn run(motion: &Motion, goal: Goal, load: (f64, f64), heavier: f64, seconds: f64) -> Done {
-        const DT: f64 = 1.0 / 6000.0;
-        let mut state = MotionState::default();
-        motion.start(&mut state, 77);
-        let (mut x, mut v, mut done) = (0.0_f64, 0.0_f64, Done::default());
-        for k in 0..(seconds / DT) as u32 {
-            let t = f64::from(k) * DT;
-            let count = 77_u32.wrapping_add((x * f64::from(COUNTS)) as i64 as u32);
-            let i = f64::from(motion.step(&mut state, goal, count, ANY));
-            let i_load = if t >= load.0 { load.1 } else { 0.0 };
-            v += (ACCELERATION * (i - i_load) - 0.08 * v) / heavier * DT;
-            x += v * DT;
-            done.furthest = done.furthest.max(x);
-            done.fastest = done.fastest.max(v);
-            if let Goal::Position(turns) = goal
-                && (x - f64::from(turns)).abs() > 1.0 / 360.0
-            {
-                done.settled = t;
-            }
-        }
-        Done { end: (x, v), ..done }
-    }
-
-    #[test]
-    fn five_turns_without_overshoot_whatever_the_limits() {
-        for (limit, ramp, heavier) in
-            [(24.0, 12.0, 1.0), (24.0, 5.0, 1.0), (5.0, 5.0, 1.0), (5.0, 5.0, 1.5), (5.0, 5.0, 0.7)]
-        {
-            let done = run(&motion(limit, ramp), Goal::Position(5.0), (9e9, 0.0), heavier, 8.0);
-            println!("{limit} turns/s, {ramp} turns/s^2, inertia x{heavier}: {done:?}");
-            assert!(done.furthest < 5.0 * 1.01, "{done:?}");
-            assert!(done.settled < 3.5, "{done:?}");
-        }
-    }
-
-    #[test]
-    fn speed_is_reached_held_under_load_and_limited() {
-        for (goal, limit, end) in [(5.0, 24.0, 5.0), (30.0, 24.0, 24.0)] {
-            let motion = motion(limit, 10.0);
-            let done = run(&motion, Goal::Speed(goal), (4.0, 1.5), 1.0, 6.0);
-            assert!((done.end.1 - end).abs() < 0.01, "{done:?}");
-            // The friction it did not know of on the way up.
-            assert!(done.fastest < end * 1.04, "{done:?}");
-        }
-    }
-
-    /// A load that the current cannot hold, for two seconds, then none: the integrator has not wound
-    /// up, and the speed comes back without going beyond the reference by more than a tenth.
-    #[test]
-    fn limits_do_not_wind_up() {
-        let (motion, mut state) = (motion(24.0, 10.0), MotionState::default());
-        let (mut x, mut v, mut most) = (0.0_f64, 5.0_f64, 0.0_f64);
-        for k in 0..60_000 {
-            let t = f64::from(k) / 6000.0;
-            let count = (x * f64::from(COUNTS)) as i64 as u32;
-            let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, ANY));
-            assert!(i.abs() <= 3.0);
-            let i_load = if (2.0..4.0).contains(&t) { 3.4 } else { 0.0 };
-            v += ACCELERATION * (i - i_load) / 6000.0;
-            x += v / 6000.0;
-            if t > 4.0 {
-                most = most.max(v);
-            }
-        }
-        assert!((v - 5.0).abs() < 0.01 && most < 5.5, "{v} {most}");
-    }
-
-    #[test]
-    fn position_works_from_a_wrapped_count() {
-        let (motion, mut state) = (motion(5.0, 5.0), MotionState::default());
-        motion.start(&mut state, u32::MAX - 10);
-        assert!((motion.turns(&state, 9) - 0.002).abs() < 1e-6);
-    }
-
-    #[test]
-    fn the_rotor_is_counted_over_turns_both_ways() {
-        let mut rotor = RotorCount::default();
-        for k in 0..=10_000 {
-            // 0.47 turns a step, the most there is: 4700 turns.
-            rotor.follow(Angle::from_turns((f64::from(k) * 0.47 % 1.0) as f32));
-        }
-        assert!(rotor.count.abs_diff(4700 * COUNTS_PER_TURN) <= 1, "{rotor:?}");
-        for k in (0..=20_000).rev() {
-            rotor.follow(Angle::from_turns(((f64::from(k) - 10_000.0) * 0.47 % 1.0) as f32));
-        }
-        assert!((rotor.count as i32 + 4700 * COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
-    }
-
-    /// v^2 / 2 a turns are needed from v on with the deceleration a; near the goal k_x e is slower.
-    #[test]
-    fn the_braking_curve_ends_at_the_goal() {
-        let motion = motion(24.0, 12.0);
-        let (a, bend) = (0.5 * f64::from(motion.twice_braking), f64::from(motion.bend));
-        assert!((a - 12.0).abs() < 1e-5);
-        for error in [1e-4, 0.01, 0.3, 2.0, 50.0] {
-            let v = f64::from(motion.braking_curve(error));
-            assert!(
-                ((v * v / 2.0 + v * bend) / a / f64::from(error) - 1.0).abs() < 1e-5,
-                "{error}"
-            );
-            assert_eq!(f64::from(motion.braking_curve(-error)), -v);
-        }
-        let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
-        let slope = f64::from(motion.braking_curve(1e-4)) / 1e-4;
-        assert!((slope / design.k_x - 1.0).abs() < 1e-3, "{slope}");
     }
 }

@@ -177,13 +177,24 @@ pub struct SpeedSettings {
     pub limit_rpm: Option<f32>,
     /// Largest acceleration that is asked for, rpm/s.
     pub ramp_rpm_per_s: Option<f32>,
+    /// Deceleration of a quick stop, rpm/s.
+    pub quick_rpm_per_s: Option<f32>,
+    /// Time in which the acceleration comes to its full value in speed mode and in a stop by the ramp, s; 0 for at once.
+    pub s_ramp_s: f32,
     /// Phase margin that the speed loop is designed for, degrees: more is calmer and slower.
     pub phase_margin_deg: f32,
 }
 
 impl Default for SpeedSettings {
     fn default() -> Self {
-        Self { i_q_limit_a: None, limit_rpm: None, ramp_rpm_per_s: None, phase_margin_deg: 60.0 }
+        Self {
+            i_q_limit_a: None,
+            limit_rpm: None,
+            ramp_rpm_per_s: None,
+            quick_rpm_per_s: None,
+            s_ramp_s: 0.0,
+            phase_margin_deg: 60.0,
+        }
     }
 }
 

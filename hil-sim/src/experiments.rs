@@ -198,8 +198,14 @@ pub const DRIVE: &[&str] = &[
     "vf.",
 ];
 /// Keys of the speed loop, which a drive that regulates torque does not use.
-pub const SPEED_LOOP: &[&str] =
-    &["speed.limit_rpm", "speed.ramp_rpm_per_s", "speed.phase_margin_deg", "drive.motor.inertia"];
+pub const SPEED_LOOP: &[&str] = &[
+    "speed.limit_rpm",
+    "speed.ramp_rpm_per_s",
+    "speed.quick_rpm_per_s",
+    "speed.s_ramp_s",
+    "speed.phase_margin_deg",
+    "drive.motor.inertia",
+];
 /// Keys that do nothing while the shaft is locked or a dynamometer holds its speed.
 pub const FREE_SHAFT: &[&str] = &["motor.inertia", "motor.friction", "shaft."];
 /// Keys of the tracking of the saliency, which a drive with an encoder does not use.

@@ -6,7 +6,7 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::AngleSource;
-use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State};
+use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State, Stop};
 
 use crate::config::{self, Config, plant_settings};
 use crate::error::Error;
@@ -275,10 +275,13 @@ fn words(command: &Command) -> String {
         Command::Relock => "to magnetise and verify the angle again".into(),
         Command::CheckWiring => "to check the wiring".into(),
         Command::Excite(_) => "to excite the motor at rest".into(),
-        Command::Stop => "to stop".into(),
+        Command::Stop(Stop::Coast) => "to stop".into(),
+        Command::Stop(Stop::Ramp) => "to stop by the ramp".into(),
+        Command::Stop(Stop::Quick) => "to stop quickly".into(),
         Command::Clear => "to clear the fault".into(),
         Command::Torque(a) => format!("a torque current of {a} A"),
         Command::Speed(rpm) => format!("a speed of {rpm} rpm"),
+        Command::Jog(rpm) => format!("to jog at {rpm} rpm"),
         Command::Position(turns) => format!("a position of {turns} turns"),
         Command::Magnetising(a) => format!("a magnetising current of {a} A"),
         Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),

@@ -55,7 +55,7 @@ pub enum News {
 pub struct Announcer {
     /// The last state that was seen.
     state: Option<State>,
-    /// The last one but for stopping.
+    /// The last one but for those of a stop.
     active: State,
     /// Whether the console has stopped the drive.
     stopped: bool,
@@ -82,7 +82,7 @@ impl Announcer {
             return self.learning(status, settings, now_ms);
         }
         let was = self.active;
-        if state != State::Stopping {
+        if !matches!(state, State::Braking | State::Stopping) {
             self.active = state;
         }
         match state {

@@ -50,13 +50,14 @@ impl Console {
                 self.design_for(Task::Commission(first, last), drive);
             }
             Request::Accept => self.accept(drive),
-            Request::Stop => {
+            Request::Stop(stop) => {
                 self.announcer.stopping();
-                self.give(Command::Stop, "", drive);
+                self.give(Command::Stop(stop), "", drive);
             }
             Request::Relock => self.give(Command::Relock, "", drive),
             Request::Torque(i_q) => self.give(Command::Torque(i_q), "A", drive),
             Request::Speed(rpm) => self.give(Command::Speed(rpm), "rpm", drive),
+            Request::Jog(rpm) => self.give(Command::Jog(rpm), "rpm", drive),
             Request::Position(turns) => self.give(Command::Position(turns), "turns", drive),
             Request::Clear => self.give(Command::Clear, "", drive),
             Request::Set(values) => self.set(&values, drive),

@@ -6,7 +6,7 @@
 
 use core::fmt::{self, Write as _};
 
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode, State, Stop};
 use modbus_core::Exception;
 
 use super::Console;
@@ -14,9 +14,12 @@ use super::answer::{MUST_BE_OFF, Task};
 use super::handle::DriveHandle;
 use super::line::OutputLine;
 use crate::modbus::Port;
+use crate::modbus::cia402;
 use crate::modbus::faults::FaultLog;
 use crate::modbus::float::from_float;
-use crate::modbus::registers::{COMMAND, FREQUENCY, RESET, SETTINGS, SETTINGS_END, STAGED, View};
+use crate::modbus::registers::{
+    COMMAND, CONTROL, FREQUENCY, RESET, RUN, SETTINGS, SETTINGS_END, STAGED, View,
+};
 use crate::modbus::slave::{self, Registers, Words};
 use crate::settings::bus::Commander;
 use crate::settings::keys;
@@ -25,7 +28,6 @@ use crate::settings::staging::{Assignments, MOST};
 /// Fields of the command word: what to do, and the direction. Other bits are refused.
 const ACTION: u16 = 0b11;
 const STOP: u16 = 1;
-const RUN: u16 = 2;
 const FORWARD: u16 = 1 << 4;
 const REVERSE: u16 = 1 << 5;
 /// Bit of the reset register.
@@ -163,7 +165,8 @@ impl Console {
 
     /// Gives the drive the speed of a run command, and ends the command if the drive has stopped.
     fn follow_order(&mut self, drive: &mut impl DriveHandle) {
-        let stopping = drive.status().is_some_and(|status| status.state == State::Stopping);
+        let stopping =
+            drive.status().is_some_and(|s| matches!(s.state, State::Braking | State::Stopping));
         match self.bus.order {
             Order::Starting | Order::Run if drive.is_off() || stopping => {
                 self.bus.order = Order::Ended;
@@ -244,16 +247,13 @@ struct Access<'a, D> {
 
 impl<D: DriveHandle> Access<'_, D> {
     fn command(&mut self, word: u16) -> Result<(), Exception> {
-        let bus = &mut self.console.bus;
         if word & !(ACTION | FORWARD | REVERSE) != 0 || word & ACTION == ACTION {
             return Err(Exception::IllegalDataValue);
         }
         let commands = self.console.settings.latest().bus.commander == Commander::Bus;
         // Anybody may stop the drive. A release by a master that does not command changes nothing.
         if word & ACTION == STOP || (word == 0 && commands) {
-            bus.order = Order::Stop;
-            let stopped = self.drive.command(Command::Stop);
-            return stopped.map(|_| ()).or(Err(Exception::ServerDeviceFailure));
+            return self.stop(Stop::Coast);
         }
         if word == 0 {
             return Ok(());
@@ -271,6 +271,28 @@ impl<D: DriveHandle> Access<'_, D> {
             _ if bus.order == Order::Run => self.console.refer(self.drive),
             _ => Ok(()),
         }
+    }
+
+    /// A control word of CiA 402. A run keeps the direction.
+    fn control(&mut self, word: u16) -> Result<(), Exception> {
+        if word & cia402::FAULT_RESET != 0 {
+            self.clear()?;
+        }
+        match cia402::stop(word) {
+            Some(stop) => self.stop(stop),
+            None => self.command(RUN),
+        }
+    }
+
+    fn stop(&mut self, stop: Stop) -> Result<(), Exception> {
+        self.console.bus.order = Order::Stop;
+        let stopped = self.drive.command(Command::Stop(stop));
+        stopped.map(|_| ()).or(Err(Exception::ServerDeviceFailure))
+    }
+
+    fn clear(&mut self) -> Result<(), Exception> {
+        self.may_command()?;
+        self.console.quietly(|console| console.give(Command::Clear, "", self.drive))
     }
 
     fn frequency(&mut self, word: u16) -> Result<(), Exception> {
@@ -353,12 +375,10 @@ impl<D: DriveHandle> Registers for Access<'_, D> {
             (FREQUENCY, None) => self.frequency(word),
             (RESET, None) => match word {
                 0 => Ok(()),
-                CLEAR => {
-                    self.may_command()?;
-                    self.console.quietly(|console| console.give(Command::Clear, "", self.drive))
-                }
+                CLEAR => self.clear(),
                 _ => Err(Exception::IllegalDataValue),
             },
+            (CONTROL, None) => self.control(word),
             (STAGED, None) => self.staged(word),
             _ => Err(Exception::IllegalDataAddress),
         }

@@ -1,6 +1,6 @@
 //! Who commands, console or bus, and what its silence does.
 
-use drive_core::Command;
+use drive_core::{Command, Stop};
 
 use super::Console;
 use super::grammar::Request;
@@ -44,6 +44,7 @@ impl Console {
                     | Request::Relock
                     | Request::Torque(_)
                     | Request::Speed(_)
+                    | Request::Jog(_)
                     | Request::Position(_)
             )
     }
@@ -71,7 +72,7 @@ impl Console {
         if !drive.is_off() {
             self.heard_ms = Some(now_ms);
             self.announcer.stopping();
-            match drive.command(Command::Stop) {
+            match drive.command(Command::Stop(Stop::Coast)) {
                 Ok(_) => self.out.line(format_args!("stopped: no command for {limit} s")),
                 Err(why) => self.error(&format_args!("not stopped: {why}")),
             }

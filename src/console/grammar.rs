@@ -10,7 +10,7 @@ use core::str::SplitAsciiWhitespace;
 
 use drive_core::commission::Step;
 use drive_core::settings::value::{self, Words as _};
-use drive_core::{Fault, Mode};
+use drive_core::{Fault, Mode, Stop};
 use heapless::Vec;
 
 use super::suggest::nearest;
@@ -51,14 +51,16 @@ pub enum Request {
     Commission(Step, Step),
     /// Put in force what the commissioning has found, and save.
     Accept,
-    /// Torque to zero, then off.
-    Stop,
+    /// Stop in this way.
+    Stop(Stop),
     /// Magnetise again and check that the flux is tracked.
     Relock,
     /// Set the current on the quadrature axis, A.
     Torque(f32),
     /// Set the speed, mechanical rpm.
     Speed(f32),
+    /// Turn at this speed, mechanical rpm, while it is repeated.
+    Jog(f32),
     /// Set the position, mechanical turns from the start.
     Position(f32),
     /// Show one setting.
@@ -148,7 +150,7 @@ pub const LEVELS: [(&str, Level); 5] = [
 ];
 
 /// The commands.
-pub const COMMANDS: [&str; 35] = [
+pub const COMMANDS: [&str; 36] = [
     "help",
     "status",
     "start",
@@ -159,6 +161,7 @@ pub const COMMANDS: [&str; 35] = [
     "relock",
     "torque",
     "speed",
+    "jog",
     "position",
     "angle",
     "get",
@@ -250,10 +253,18 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
             Some("again") => Request::Learn { again: true },
             Some(word) => return Err(ParseError::TooMuch(word)),
         },
-        "stop" => Request::Stop,
+        "stop" => match words.optional() {
+            None => Request::Stop(Stop::Coast),
+            Some("ramp") => Request::Stop(Stop::Ramp),
+            Some("quick") => Request::Stop(Stop::Quick),
+            Some(word) => {
+                return Err(ParseError::OneOf { what: "the way to stop", word, all: "ramp quick" });
+            }
+        },
         "relock" => Request::Relock,
         "torque" => Request::Torque(words.number("the current, A")?),
         "speed" => Request::Speed(words.number("the speed, rpm")?),
+        "jog" => Request::Jog(words.number("the speed, rpm")?),
         "position" => Request::Position(words.number("the position, turns")?),
         // An alias of `set angle_source`.
         "angle" => {

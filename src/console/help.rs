@@ -1,17 +1,18 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 38] = [
+pub const HELP: [&str; 39] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position; vf: turn a motor that is not identified",
     "commission [STEP [STEP]]  measure the motor at rest, from its nameplate: all steps, one, or from one to another; plant: shaft locked; inertia: shaft free",
     "accept                    put in force what `commission` has found, and save",
     "learn [again]             learn the motor, shaft locked; again: at another rotor position, on top of what is learned",
-    "stop                      torque to zero, then off",
+    "stop [ramp|quick]         torque to zero, then off; ramp, quick: speed to zero first, by speed.ramp_rpm_per_s or speed.quick_rpm_per_s",
     "relock                    no torque, magnetise again, verify the lock, go on",
     "torque A                  current on the quadrature axis, A peak",
     "speed RPM                 speed, mechanical rpm",
+    "jog RPM                   turn at this speed while it is repeated every 0.5 s, then to rest by the ramp",
     "position TURNS            position, mechanical turns from where it started",
     "angle encoder|injection   where the flux angle comes from; the same as set angle_source",
     "get [KEY|PREFIX]          one setting with range and meaning, or all that begin so",

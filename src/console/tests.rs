@@ -13,7 +13,7 @@ use crate::boards;
 use drive_core::identify::learning::Verdict;
 use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
-use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State};
+use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State, Stop};
 use proptest::prelude::*;
 
 use super::announce::ANNOUNCEMENTS;
@@ -321,7 +321,12 @@ fn commands_reach_the_drive_as_they_were_given() {
     talk.say("start\ntorque 1.5\nstop\nclear\n");
     assert_eq!(
         talk.drive.commands,
-        [Command::Start(Mode::Torque), Command::Torque(1.5), Command::Stop, Command::Clear]
+        [
+            Command::Start(Mode::Torque),
+            Command::Torque(1.5),
+            Command::Stop(Stop::Coast),
+            Command::Clear
+        ]
     );
 }
 

@@ -1,6 +1,6 @@
 //! The state of the drive under the names of CiA 402 (IEC 61800-7-201), and its status word.
 
-use drive_core::State;
+use drive_core::{State, Stop};
 
 /// A state of the CiA 402 state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Power {
                 | State::Learning
                 | State::Exciting,
             ) => Self::OperationEnabled,
-            Some(State::Stopping) => Self::QuickStopActive,
+            Some(State::Braking | State::Stopping) => Self::QuickStopActive,
             Some(State::Fault(_)) => Self::Fault,
         }
     }
@@ -84,6 +84,34 @@ impl Power {
             Self::QuickStopActive => 0x07,
             Self::Fault => 0x08,
         }
+    }
+}
+
+/// Bits of the control word that order, and what they order.
+const SWITCH_ON: u16 = 1 << 0;
+const ENABLE_VOLTAGE: u16 = 1 << 1;
+/// Stops quickly where it is 0.
+const QUICK_STOP: u16 = 1 << 2;
+const ENABLE_OPERATION: u16 = 1 << 3;
+/// Bit of the control word: clear the latched fault.
+pub const FAULT_RESET: u16 = 1 << 7;
+
+/// The control word that orders the drive to run.
+pub const RUN: u16 = SWITCH_ON | ENABLE_VOLTAGE | QUICK_STOP | ENABLE_OPERATION;
+/// The control word of a drive that is stopped: shutdown.
+pub const SHUTDOWN: u16 = ENABLE_VOLTAGE | QUICK_STOP;
+
+/// The stop that a control word orders; `None` for a run. Disable voltage coasts, a quick stop brakes by its own ramp, and
+/// shutdown, switch on and disable operation brake by the ramp of the speed.
+pub const fn stop(control_word: u16) -> Option<Stop> {
+    if control_word & ENABLE_VOLTAGE == 0 {
+        Some(Stop::Coast)
+    } else if control_word & QUICK_STOP == 0 {
+        Some(Stop::Quick)
+    } else if control_word & RUN == RUN {
+        None
+    } else {
+        Some(Stop::Ramp)
     }
 }
 

@@ -18,10 +18,14 @@ use crate::settings::keys;
 
 /// The command; see the manual.
 pub const COMMAND: u16 = 0x2000;
+/// Its bit for a run.
+pub const RUN: u16 = 2;
 /// The frequency that is asked for, 0.01 Hz.
 pub const FREQUENCY: u16 = 0x2001;
 /// Bit 1 clears the latched fault.
 pub const RESET: u16 = 0x2002;
+/// The control word of CiA 402.
+pub const CONTROL: u16 = 0x6040;
 /// The first setting; two registers each.
 pub const SETTINGS: u16 = 0x4000;
 /// Order about the staged settings: 1 puts them in force, 2 also saves, 3 drops them.
@@ -127,7 +131,7 @@ const fn written(row: Row) -> Row {
 }
 
 /// The registers but for settings and faults, by number.
-pub static ROWS: [Row; 28] = [
+pub static ROWS: [Row; 29] = [
     number(0x0100, 100, "Hz", |v| v.largest_hz(), "largest frequency that is asked for, as 0x211B"),
     written(word(
         COMMAND,
@@ -192,6 +196,7 @@ pub static ROWS: [Row; 28] = [
     word(0x5009, |v| v.settings.bus.commander.place() as u16, "who commands: 0 console, 1 bus"),
     word(0x500a, |v| v.settings.learned.is_some().into(), "1 if learned values are in force"),
     word(0x603f, |v| v.error_code(), "fault as in CiA 402: 0xFF00 plus its number, 0 for none"),
+    written(word(CONTROL, |v| v.control_word(), "control word of CiA 402, see below")),
     word(0x6041, |v| v.status_word(), "status word of CiA 402, see below"),
 ];
 
@@ -305,6 +310,10 @@ impl View<'_> {
         let reverse = if self.rpm() < -0.5 { TURNS_REVERSE } else { 0 };
         let by_bus = if self.settings.bus.commander == Commander::Bus { BY_BUS } else { 0 };
         state | reverse | by_bus
+    }
+
+    fn control_word(&self) -> u16 {
+        if self.command & RUN == RUN { cia402::RUN } else { cia402::SHUTDOWN }
     }
 
     fn status_word(&self) -> u16 {

@@ -5,7 +5,7 @@ use core::sync::atomic::Ordering;
 use cortex_m::singleton;
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
-use drive_core::{Accepted, Coefficients, Command, Drive};
+use drive_core::{Accepted, Coefficients, Command, Drive, Stop};
 use heapless::spsc::Queue;
 use stm32g4xx_hal::gpio::GpioExt;
 use stm32g4xx_hal::pac;
@@ -230,7 +230,8 @@ fn start_control(
         "the design rules refuse the settings"
     })?;
     let status = singleton!(: Mailbox<Status> = Mailbox::new(Status::default())).ok_or(TWICE)?;
-    let commands = singleton!(: Mailbox<Command> = Mailbox::new(Command::Stop)).ok_or(TWICE)?;
+    let commands =
+        singleton!(: Mailbox<Command> = Mailbox::new(Command::Stop(Stop::Coast))).ok_or(TWICE)?;
     let answers =
         singleton!(: Mailbox<Answer> = Mailbox::new(Ok(Accepted::AsGiven))).ok_or(TWICE)?;
     let learned = singleton!(: Mailbox<Option<Learned>> = Mailbox::new(None)).ok_or(TWICE)?;

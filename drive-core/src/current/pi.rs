@@ -52,9 +52,21 @@ impl Pi {
         *state = PiState { output, error };
         output
     }
+
+    /// Makes the last step one of an error that was larger by `more`; returns by how much the wanted output is larger then.
+    pub fn revise(&self, state: &mut PiState, more: f32) -> f32 {
+        state.error += more;
+        state.output += self.k_c * more;
+        self.k_c * more
+    }
 }
 
 impl PiState {
+    /// A controller that has settled at this output.
+    pub fn at_rest(output: f32) -> Self {
+        Self { output, error: 0.0 }
+    }
+
     /// Anti-windup: adds `correction` = realised - wanted output, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: f32) {
         self.output += correction;

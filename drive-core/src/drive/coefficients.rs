@@ -25,7 +25,7 @@ use crate::flux::volts_per_hertz::VoltsPerHertz;
 use crate::identify::learning::Learning;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
-use crate::motion::{self, Motion};
+use crate::motion::{self, Motion, Ramps};
 use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
 use crate::protect::plausibility::Prediction;
@@ -372,8 +372,13 @@ impl Settings {
             AngleSource::Encoder => self.scales.encoder_counts,
             AngleSource::Injection => motion::COUNTS_PER_TURN * u32::from(self.motor.pole_pairs),
         };
-        let (limit, ramp) = (self.speed_limit_rpm() / 60.0, self.ramp_rpm_per_s() / 60.0);
-        Motion::new(design, counts, limit, ramp, self.i_q_limit_a())
+        let limit = self.speed_limit_rpm() / 60.0;
+        let ramps = Ramps {
+            usual: self.ramp_rpm_per_s() / 60.0,
+            quick: self.quick_rpm_per_s() / 60.0,
+            rise_s: self.speed.s_ramp_s,
+        };
+        Motion::new(design, counts, limit, &ramps, self.i_q_limit_a())
     }
 
     /// Only a sensorless start with the synchronous demodulation is checked.

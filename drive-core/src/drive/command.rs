@@ -22,14 +22,17 @@ pub enum Command {
     /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
     /// offsets and charges the bootstraps first. See [`crate::commission`].
     Excite(Excitation),
-    /// Take the torque to zero, then switch off; while the motor at rest is excited, switch off.
-    Stop,
+    /// Stop in this way. A drive that does not regulate torque, speed or position yet does it by [`Stop::Coast`].
+    Stop(Stop),
     /// Forget the latched fault and be off.
     Clear,
     /// Reference of the quadrature-axis current, A peak; limited to the machine's limits.
     Torque(f32),
     /// Reference of the speed, mechanical rpm; limited to `speed.limit_rpm`.
     Speed(f32),
+    /// A speed as [`Speed`](Self::Speed), while the drive regulates the speed, that ends by the ramp when it is not given again
+    /// within 0.5 s; a `Speed` ends it as well.
+    Jog(f32),
     /// Reference of the position, mechanical turns from where the drive was started; limited to
     /// the counted range.
     Position(f32),
@@ -47,6 +50,18 @@ pub enum Command {
     RotorTimeConstant(f32),
     /// Replace all settings. Only while off or in fault.
     Configure(Coefficients),
+}
+
+/// A way to stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stop {
+    /// Take the torque to zero, then switch off: the shaft coasts. While the motor at rest is excited, switch off.
+    #[default]
+    Coast,
+    /// Take the speed to zero by `speed.ramp_rpm_per_s`, then as [`Coast`](Self::Coast).
+    Ramp,
+    /// The same by `speed.quick_rpm_per_s`, also during a stop by ramp.
+    Quick,
 }
 
 /// An accepted command.

@@ -11,6 +11,9 @@ use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::settings::AngleSource;
 
+/// Periods for which a jog goes on: 0.5 s.
+const JOG: u32 = 3000;
+
 impl Drive {
     /// Takes a command; not from within [`step`](Self::step), but between two steps.
     ///
@@ -32,18 +35,8 @@ impl Drive {
                 state => Err(Refused::State(state)),
             },
             Command::Excite(excitation) => self.take_excitation(excitation),
-            Command::Stop => {
-                match self.state {
-                    State::Off | State::Fault(_) | State::Stopping => {}
-                    State::Calibrating
-                    | State::Precharge
-                    | State::CheckingWiring
-                    | State::VoltsPerHertz
-                    | State::Exciting => {
-                        self.enter(State::Off);
-                    }
-                    _ => self.enter(State::Stopping),
-                }
+            Command::Stop(stop) => {
+                self.stop(stop);
                 Ok(Accepted::AsGiven)
             }
             Command::Clear => {
@@ -60,11 +53,14 @@ impl Drive {
                 self.control.references.current.q = taken;
                 Ok(accepted(i_q, taken))
             }
-            Command::Speed(rpm) => {
+            Command::Speed(rpm) => self.turn_at(rpm, 0),
+            Command::Jog(rpm) => {
                 self.takes_references(Mode::Speed, rpm)?;
-                let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
-                self.control.references.speed = taken / 60.0;
-                Ok(accepted(rpm, taken))
+                // It would wait for the end of the start, however long ago it was given.
+                if self.state != State::Speed {
+                    return Err(Refused::State(self.state));
+                }
+                self.turn_at(rpm, JOG)
             }
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
@@ -128,6 +124,15 @@ impl Drive {
                 state => Err(Refused::State(state)),
             },
         }
+    }
+
+    /// Takes the speed, for so many periods where it is a jog.
+    fn turn_at(&mut self, rpm: f32, jog: u32) -> Result<Accepted, Refused> {
+        self.takes_references(Mode::Speed, rpm)?;
+        let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
+        let r = &mut self.control.references;
+        (r.speed, r.jog) = (taken / 60.0, jog);
+        Ok(accepted(rpm, taken))
     }
 
     fn configure(&mut self, coefficients: &Coefficients) {
@@ -216,7 +221,7 @@ impl Drive {
         };
         match self.state {
             State::Fault(fault) => Err(Refused::Fault(fault)),
-            State::Off | State::Stopping => Err(Refused::State(self.state)),
+            State::Off | State::Stopping | State::Braking => Err(Refused::State(self.state)),
             _ if !takes => Err(Refused::State(State::of_mode(self.mode))),
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),

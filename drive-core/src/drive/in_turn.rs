@@ -175,12 +175,12 @@ impl Coefficients {
         self.voltage_limit.step(&mut s.voltage_limit, &now);
     }
 
-    /// Limits the torque current to that which dc link and heat sink bear.
+    /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
     fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
         let (by_voltage, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
         let by_heat = self.protection.i_q - s.too_hot_for;
         let (most, reason) = if by_heat < by_voltage {
-            (by_heat, Limiting::HeatSink)
+            (by_heat, s.too_hot)
         } else if s.voltage_limit.by_voltage {
             (by_voltage, Limiting::Voltage)
         } else {

@@ -59,17 +59,23 @@ pub(super) struct Observed {
 }
 
 impl Drive {
+    /// Electrical speed of the rotor, turns per period.
+    pub(super) fn rotor_freq(&self) -> f32 {
+        let s = &self.control;
+        match (self.mode, &self.c.volts_per_hertz) {
+            (Mode::VoltsPerHertz, Some(turning)) => turning.rotor_freq(&s.turning),
+            _ if self.counts() => s.indirect.rotor_freq,
+            _ => s.estimator.rotor_freq,
+        }
+    }
+
     /// The telemetry of the last step.
     pub fn telemetry(&self) -> Telemetry {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {
             phi: t.phi,
             flux_freq: t.flux_freq,
-            rotor_freq: match (self.mode, &self.c.volts_per_hertz) {
-                (Mode::VoltsPerHertz, Some(turning)) => turning.rotor_freq(&s.turning),
-                _ if self.counts() => s.indirect.rotor_freq,
-                _ => s.estimator.rotor_freq,
-            },
+            rotor_freq: self.rotor_freq(),
             reference: t.reference,
             current: t.current,
             voltage: t.voltage,

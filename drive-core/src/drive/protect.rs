@@ -2,6 +2,7 @@
 
 use super::Drive;
 use crate::current::sensing::{Measured, SensingState};
+use crate::dc_link::Limiting;
 use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
 use crate::drive::state::State;
 use crate::fault::Fault;
@@ -41,14 +42,17 @@ impl Coefficients {
 
 impl Drive {
     /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
-    /// finds the current that the heat sink bears, and switches the precharge relay. Returns whether the relay is closed:
+    /// finds the current that heat sink, motor and inverter bear, and switches the precharge relay. Returns whether the relay is closed:
     /// always `false` where the settings have none.
     pub fn after_step(&mut self, sample: &Sample) -> bool {
-        let largest = self.c.protection.i_q;
         let share = self.c.sensing.heat_sink.share(sample.heat_sink);
-        self.control.too_hot_for = if share < 1.0 {
-            let (i, i_d) = (share * largest, self.control.references.current.d);
-            let square = i * i - i_d * i_d;
+        let (heat_sink, loads) = ((share * share, Limiting::HeatSink), self.thermal.share());
+        let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
+        let s = &mut self.control;
+        s.too_hot = why;
+        s.too_hot_for = if share < 1.0 {
+            let (largest, i_d) = (self.c.protection.i_q, s.references.current.d);
+            let square = share * largest * largest - i_d * i_d;
             largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }
         } else {
             0.0

@@ -1,10 +1,23 @@
 //! The current that is regulated, by state, within what the dc link allows.
 
-use super::Drive;
+use super::{Drive, References};
 use crate::dc_link::Limiting;
 use crate::drive::state::{Mode, State};
 use crate::math::frames::Dq;
 use crate::motion::Goal;
+
+impl References {
+    /// The reference of the speed, turns/s, in a period: a jog that is not repeated ends.
+    fn speed_now(&mut self) -> f32 {
+        if self.jog > 0 {
+            self.jog -= 1;
+            if self.jog == 0 {
+                self.speed = 0.0;
+            }
+        }
+        self.speed
+    }
+}
 
 impl Drive {
     /// The current to regulate in this state, A; moves on to the next state where it is time.
@@ -18,16 +31,7 @@ impl Drive {
             State::Magnetising => return Ok(self.magnetise()?),
             State::Verifying => return Ok(self.verify()?),
             State::Learning => self.learn()?,
-            State::Speed | State::Position => {
-                let goal = match self.mode {
-                    Mode::Speed => Goal::Speed(r.speed),
-                    _ => Goal::Position(r.turns),
-                };
-                let count = self.control.seen.rotor_count;
-                let range = self.control.limits.i_q;
-                r.current.q = self.c.motion.step(&mut self.control.motion, goal, count, range);
-                r.current.q
-            }
+            State::Speed | State::Position | State::Braking => self.follow(),
             State::Stopping => {
                 let ramp = self.c.sequence.stop_ramp;
                 r.current.q = if r.current.q > ramp {
@@ -48,6 +52,22 @@ impl Drive {
         Ok(Dq { d: if i_d < most { i_d } else { most } + s.limits.flux_a, q: i_q })
     }
 
+    /// The torque current of the speed or the position loop, A.
+    fn follow(&mut self) -> f32 {
+        let s = &mut self.control;
+        let goal = match (self.state, self.mode) {
+            (State::Braking, _) => Goal::Rest { quick: s.quick_stop },
+            (_, Mode::Speed) => Goal::Speed(s.references.speed_now()),
+            _ => Goal::Position(s.references.turns),
+        };
+        let i_q = self.c.motion.step(&mut s.motion, goal, s.seen.rotor_count, s.limits.i_q);
+        s.references.current.q = i_q;
+        if self.state == State::Braking && self.c.motion.is_at_rest(&s.motion) {
+            self.enter(State::Stopping);
+        }
+        i_q
+    }
+
     /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
     pub fn brake_duty(&self) -> f32 {
         if self.state.is_energised() { self.control.limits.chopper } else { 0.0 }
@@ -55,13 +75,13 @@ impl Drive {
 
     /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
     pub fn stator_resistance(&self) -> Option<f32> {
-        let tracks = self.c.observer.is_some() && self.state.regulates();
+        let tracks = self.c.observer.is_some() && self.state.has_torque();
         tracks.then_some(self.control.observer.resistance)
     }
 
     /// Why the torque is smaller than asked for.
     pub fn limiting(&self) -> Limiting {
-        let acts = self.state.regulates() || self.state == State::VoltsPerHertz;
+        let acts = self.state.has_torque() || self.state == State::VoltsPerHertz;
         if acts { self.control.limiting } else { Limiting::No }
     }
 }

@@ -6,7 +6,10 @@ use crate::dc_link::{DIVIDER, Limiting};
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::volts_per_hertz::Demand;
-use crate::io::Compare;
+use crate::io::{Compare, PERIOD_S};
+
+/// Frequency below which a motor that stops is switched off, turns per period.
+const STANDS: f32 = 0.2 * PERIOD_S;
 
 impl Drive {
     /// One period. All protections of a sample act, over-speed by the frequency, and the thermal loads.
@@ -18,8 +21,12 @@ impl Drive {
     pub(super) fn turn_by_voltage(&mut self, measured: &Measured) -> Result<Compare, State> {
         let (c, s) = (&self.c, &mut self.control);
         let Some(turning) = &c.volts_per_hertz else { return Err(State::Off) };
-        let freq = c.freq_per_speed * s.references.speed;
         let rotor_freq = turning.rotor_freq(&s.turning);
+        let stops = self.state == State::Braking;
+        if stops && rotor_freq.abs() < STANDS {
+            return Err(State::Off);
+        }
+        let freq = if stops { 0.0 } else { c.freq_per_speed * s.references.speed };
         if self.elapsed.is_multiple_of(u32::from(DIVIDER)) {
             let most = c.protection.i_q - s.too_hot_for;
             s.limits = c.dc_link.step(&mut s.dc_link, measured.dc_link, rotor_freq, most);

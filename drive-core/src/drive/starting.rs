@@ -27,7 +27,7 @@ impl Drive {
             State::Calibrating => self.calibrate(sample)?,
             State::Precharge => self.precharge(sample)?,
             State::Exciting => self.excite(&measured)?,
-            State::VoltsPerHertz => return self.turn_by_voltage(&measured),
+            State::VoltsPerHertz | State::Braking => return self.turn_by_voltage(&measured),
             _ => self.check_wiring(sample, &measured)?,
         })
     }

@@ -53,6 +53,8 @@ pub enum State {
     VoltsPerHertz,
     /// Learning with the shaft locked.
     Learning,
+    /// Taking the speed to zero, then [`Stopping`](Self::Stopping).
+    Braking,
     /// Taking the torque to zero, then off.
     Stopping,
     /// Outputs off until the fault is cleared.
@@ -83,6 +85,7 @@ impl State {
                 | Self::Speed
                 | Self::Position
                 | Self::Learning
+                | Self::Braking
                 | Self::Stopping
         )
     }
@@ -95,6 +98,11 @@ impl State {
     /// Whether torque, speed or position is regulated as asked for.
     pub const fn regulates(self) -> bool {
         matches!(self, Self::Torque | Self::Speed | Self::Position)
+    }
+
+    /// Whether there is torque for a purpose: as asked for, or to come to rest.
+    pub(crate) const fn has_torque(self) -> bool {
+        self.regulates() || matches!(self, Self::Braking)
     }
 }
 
@@ -120,6 +128,7 @@ impl fmt::Display for State {
             Self::Position => "regulating position",
             Self::VoltsPerHertz => "turning by voltage and frequency",
             Self::Learning => "learning",
+            Self::Braking => "braking to rest",
             Self::Stopping => "stopping",
             Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),
         })

@@ -129,7 +129,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
         assert!((t.current.q - expected).abs() < 0.01 && (t.current.d - 0.7).abs() < 0.01);
     }
 
-    drive.command(&Command::Stop).unwrap();
+    drive.command(&Command::Stop(Stop::Coast)).unwrap();
     let before = drive.telemetry().reference.q;
     assert!(run_to(&mut drive, &mut load, State::Off));
     assert_eq!(drive.step(&load.sample()), Compare::OFF);
@@ -229,7 +229,7 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(&Command::Torque(1.0)), Err(Refused::State(State::Speed)));
     assert_eq!(d.control.references.speed, -2.0, "refused commands change nothing");
     assert_eq!(d.command(&Command::Speed(1e6)), Ok(Accepted::Limited(300.0)));
-    d.command(&Command::Stop).unwrap();
+    d.command(&Command::Stop(Stop::Coast)).unwrap();
     d.command(&Command::Start(Mode::Position)).unwrap();
     assert_eq!(d.control.references.speed, 0.0, "a start takes the references back");
     assert_eq!(d.command(&Command::Speed(1.0)), Err(Refused::State(State::Position)));
@@ -247,7 +247,7 @@ fn a_test_voltage_is_put_out_bounded_and_taken_back() {
     let refused = d.command(&Command::TestVoltage(Dq::new(f32::NAN, 0.0)));
     assert_eq!(refused, Err(Refused::NotFinite));
     assert_eq!(d.control.references.test_voltage, volts, "refused commands change nothing");
-    d.command(&Command::Stop).unwrap();
+    d.command(&Command::Stop(Stop::Coast)).unwrap();
     assert!(matches!(d.command(&Command::TestVoltage(volts)), Err(Refused::State(_))));
 }
 

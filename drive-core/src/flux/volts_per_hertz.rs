@@ -19,7 +19,7 @@
 //!
 //! A phase that opens shows as a current that turns backwards. Nothing here knows the rotor. A current beyond the limit for
 //! 20 ms is taken for a motor that has pulled out: the frequency goes down until the current does. A motor that stays at its
-//! limits below 4 Hz for a second is taken for one that stands.
+//! limits below 4 Hz for two seconds is taken for one that stands.
 //!
 //! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate alone: half the rated speed within 1 % of
 //! the rated one without load, within 3 % with 0.3 of the rated torque.
@@ -54,7 +54,7 @@ const PULLED_OUT_S: f32 = 0.02;
 const RECOVERY_S: f32 = 0.5;
 const RECOVERED: f32 = 0.75;
 /// Time for which the motor may be at its limit below this frequency, s.
-const STALLED_S: f32 = 1.0;
+const STALLED_S: f32 = 2.0;
 const STALLED_BELOW: f32 = 4.0 * PERIOD_S;
 /// Time in which an excess of the whole current limit would take the rated frequency off, s.
 const EXCESS_S: f32 = 0.34;
@@ -331,7 +331,7 @@ impl VoltsPerHertz {
             state.ramp += share * step - self.per_excess * excess;
         }
 
-        let at_limit = state.recovers || excess != 0.0 || share < 0.5;
+        let at_limit = state.recovers || excess != 0.0 || share < 0.25;
         if at_limit && state.ramp.abs() < STALLED_BELOW {
             state.stalled += 4;
         } else {

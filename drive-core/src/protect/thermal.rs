@@ -9,11 +9,17 @@
 //!
 //! The vector counts, not the phase: at standstill a phase may carry its peak for ever, with the copper losses of the motor
 //! those of the vector. The load is remembered over stops and starts, but not over a reset.
+//!
+//! From a load of 1 on the torque current falls back, and with it the load: the drive settles at the current that the body
+//! carries for ever, at most 2.5 % above it. The trip is for what that cannot hold, a direct current that is too large.
 
+use crate::dc_link::Limiting;
 use crate::fault::Fault;
 
 /// Load that trips: 5 % more current than allowed for ever, with margin for ripple.
 const TRIP: f32 = 1.1;
+/// Load at which no torque current is left. It falls from a load of 1 on, by its square.
+const NOTHING_LEFT: f32 = 1.05;
 
 /// Coefficients of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +58,19 @@ pub struct ThermalLoads {
     pub motor: f32,
     /// The inverter.
     pub inverter: f32,
+}
+
+impl ThermalLoads {
+    /// Share of the square of the largest current that both still bear, 1 or more for all of it, and which bears less.
+    #[inline]
+    pub fn share(&self) -> (f32, Limiting) {
+        let (load, why) = if self.motor > self.inverter {
+            (self.motor, Limiting::Motor)
+        } else {
+            (self.inverter, Limiting::Inverter)
+        };
+        ((NOTHING_LEFT - load) * (1.0 / (NOTHING_LEFT - 1.0)), why)
+    }
 }
 
 impl Thermal {

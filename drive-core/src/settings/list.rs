@@ -109,6 +109,8 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     auto!("speed.i_q_limit_a", speed.i_q_limit_a, Settings::i_q_limit_a, "A", "largest torque current of speed and position mode").beside(|s| (0.01, s.current_limit_a())),
     auto!("speed.limit_rpm", speed.limit_rpm, Settings::speed_limit_rpm, "rpm", "largest speed that is asked for").beside(|s| (1.0, s.speed_trip_rpm())),
     auto!("speed.ramp_rpm_per_s", speed.ramp_rpm_per_s, Settings::ramp_rpm_per_s, "rpm/s", "largest acceleration that is asked for").from_to(1.0, 1e5),
+    auto!("speed.quick_rpm_per_s", speed.quick_rpm_per_s, Settings::quick_rpm_per_s, "rpm/s", "deceleration of a quick stop").beside(|s| (s.ramp_rpm_per_s(), 3e5)),
+    number!("speed.s_ramp_s", speed.s_ramp_s, "s", "time in which the acceleration comes to its full value, in speed mode and in a stop by the ramp; 0 for at once").from_to(0.0, 10.0),
     // Below 45 degrees the position loop, with some 12 less, rings; the zero allows 76 at most.
     number!("speed.phase_margin_deg", speed.phase_margin_deg, "deg", "phase margin of the speed loop: more is calmer and slower").from_to(45.0, 70.0),
 

@@ -21,6 +21,7 @@
 //! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
 //! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed |
 //! | `speed.limit_rpm` without it, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
+//! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
 //! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range |
@@ -31,6 +32,7 @@
 //! | `vf.boost_a` | 1.991 A | rated current; at most 0.6 of `limits.current_a` |
 
 mod dc_link;
+mod motion;
 mod volts_per_hertz;
 
 use core::f32::consts::{SQRT_2, TAU};
@@ -125,11 +127,6 @@ impl Settings {
     pub fn current_limit_a(&self) -> f32 {
         let rule = || f32::min(self.share_of_rated(3.5), 0.814 * self.trip_a());
         or_rule(self.limits.current_a, rule)
-    }
-
-    /// Largest torque current of speed and position mode, A peak.
-    pub fn i_q_limit_a(&self) -> f32 {
-        or_rule(self.speed.i_q_limit_a, || 3.0 / 3.5 * self.current_limit_a())
     }
 
     /// Direct (magnetising) current, A peak. 0.7 A is that of section 3.10.
@@ -261,20 +258,6 @@ impl Settings {
         or_rule(self.injection.synchronous.tracked_rpm, || self.share_of_poles(700.0))
     }
 
-    /// Largest speed that is asked for, rpm: the rated speed with the observer. The injection alone is good to 300 rpm on
-    /// four poles; with an encoder it may be larger.
-    pub fn speed_limit_rpm(&self) -> f32 {
-        or_rule(self.speed.limit_rpm, || {
-            if self.uses_observer() { self.nameplate.speed_rpm } else { self.share_of_poles(300.0) }
-        })
-    }
-
-    /// Largest acceleration that is asked for, rpm/s. Without a sensor the angle lags by 5.7 degrees while the speed
-    /// changes by 300 rpm/s (four poles, tracking loop of 4 Hz).
-    pub fn ramp_rpm_per_s(&self) -> f32 {
-        or_rule(self.speed.ramp_rpm_per_s, || self.share_of_poles(300.0))
-    }
-
     /// Speed of the shaft that trips, rpm.
     pub fn speed_trip_rpm(&self) -> f32 {
         let rule = || 2000.0 / RATED_RPM * self.nameplate.speed_rpm;
@@ -348,6 +331,7 @@ mod tests {
             (s.tracked_rpm(), 700.0),
             (s.speed_limit_rpm(), 1720.0),
             (s.ramp_rpm_per_s(), 300.0),
+            (s.quick_rpm_per_s(), 900.0),
             (s.speed_trip_rpm(), 2000.0),
             (s.dc_over_v(), 400.0),
             (s.dc_under_v(), 200.0),

@@ -70,11 +70,12 @@ impl Shadow {
                 })?;
                 self.start(Mode::Learning)
             }
-            Ok(Request::Stop) => Command::Stop,
+            Ok(Request::Stop(stop)) => Command::Stop(stop),
             Ok(Request::Relock) => Command::Relock,
             Ok(Request::Clear) => Command::Clear,
             Ok(Request::Torque(i_q)) => Command::Torque(i_q),
             Ok(Request::Speed(rpm)) => Command::Speed(rpm),
+            Ok(Request::Jog(rpm)) => Command::Jog(rpm),
             Ok(Request::Position(turns)) => Command::Position(turns),
             Ok(Request::Set(values)) => {
                 self.settings.set(&values).map_err(|why| anyhow::anyhow!("{line}: {why}"))?;

@@ -33,7 +33,7 @@ fn in_state(state: State) -> Rig {
         }
         rig.drive.command(&Command::Torque(2.0)).unwrap();
         rig.run(0.1, |_| {});
-        rig.drive.command(&Command::Stop).unwrap();
+        rig.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     }
     for _ in 0..60_000 {
         if rig.drive.state() == state {

@@ -101,7 +101,7 @@ fn the_console_commands_by_default_and_the_bus_may_read_and_stop() {
     // The release that LinuxCNC writes all the time does not stop the console's run; a stop does.
     both.talk.say("start speed\n");
     assert_eq!((both.write(0x2000, 0), both.write(0x2000, 1)), (0, 0));
-    assert_eq!(both.talk.drive.commands, [Command::Start(Mode::Speed), Command::Stop]);
+    assert_eq!(both.talk.drive.commands, [Command::Start(Mode::Speed), Command::Stop(Stop::Coast)]);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn the_bus_commands_with_frequencies() {
     let commands = &both.talk.drive.commands;
     assert_eq!(commands[0], Command::Start(Mode::Speed));
     assert_eq!(commands[1..6], given);
-    assert_eq!(commands[6..], [Command::Stop]);
+    assert_eq!(commands[6..], [Command::Stop(Stop::Coast)]);
     // A jog, bits of no meaning, an external fault.
     for (at, word) in [(0x2000, 3), (0x2000, 0x80), (0x2002, 1)] {
         assert_eq!(both.write(at, word), 3, "{at:#x} {word}");
@@ -150,6 +150,32 @@ fn a_stop_from_elsewhere_holds_until_the_bus_writes_a_stop() {
     assert_eq!(both.talk.drive.drive.state(), State::Calibrating);
 }
 
+/// The control word of CiA 402: run, then each way to stop.
+#[test]
+fn the_control_word_runs_and_stops_in_three_ways() {
+    let mut both = Both::by_bus();
+    both.write(0x2001, 250);
+    for (word, stop) in [(0x0d, Stop::Coast), (0x0b, Stop::Quick), (7, Stop::Ramp), (6, Stop::Ramp)]
+    {
+        both.talk.drive.commands.clear();
+        assert_eq!((both.write(0x6040, 15), both.read(0x6040)), (0, 15));
+        assert_eq!((both.write(0x6040, word), both.read(0x6040)), (0, 6));
+        let speed = Command::Speed(75.0);
+        let wanted = [Command::Start(Mode::Speed), speed, Command::Stop(stop)];
+        assert_eq!(both.talk.drive.commands, wanted);
+    }
+    both.talk.drive.commands.clear();
+    assert_eq!(both.write(0x6040, 0x80), 0);
+    assert_eq!(both.talk.drive.commands, [Command::Clear, Command::Stop(Stop::Coast)]);
+    // The console's drive is stopped by anybody, but cleared and run by nobody else.
+    let mut both = Both::new("");
+    assert_eq!(
+        (both.write(0x6040, 15), both.write(0x6040, 0x86), both.write(0x6040, 2)),
+        (4, 4, 0)
+    );
+    assert_eq!(both.talk.drive.commands, [Command::Stop(Stop::Quick)]);
+}
+
 #[test]
 fn silence_of_the_one_that_commands_stops_the_drive() {
     let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
@@ -160,7 +186,7 @@ fn silence_of_the_one_that_commands_stops_the_drive() {
         both.talk.ask("status");
         both.serve();
     }
-    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop));
+    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
     // Reads do.
     let mut both = Both::new("set bus.commands bus command.timeout_s 1\napply\n");
     both.write(0x2000, 18);
@@ -169,7 +195,7 @@ fn silence_of_the_one_that_commands_stops_the_drive() {
         both.read(0x2101);
         both.talk.poll();
     }
-    assert!(!both.talk.drive.commands.contains(&Command::Stop));
+    assert!(!both.talk.drive.commands.contains(&Command::Stop(Stop::Coast)));
     // Frames of others do not.
     for _ in 0..15 {
         both.talk.now_ms += 100;
@@ -179,7 +205,7 @@ fn silence_of_the_one_that_commands_stops_the_drive() {
         both.serve();
         both.talk.poll();
     }
-    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop));
+    assert_eq!(both.talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn result(gain: f32, asymmetry: Asymmetry, misfit: f32) -> Learned {
 
 /// Ends the learning with this result.
 fn ends_with(talk: &mut Talk, found: Learned) -> String {
-    talk.drive.drive.command(&Command::Stop).unwrap();
+    talk.drive.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     talk.drive.found = Some(found);
     let lines = talk.say("");
     lines.into_iter().find(|line| line.contains("learned: ") || line.contains("refused: ")).unwrap()

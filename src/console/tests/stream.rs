@@ -123,11 +123,11 @@ fn a_link_that_is_lost_stops_the_drive_if_the_stream_asks_for_it() {
         // An empty line is a sign of life.
         assert!(talk.say("\n").is_empty());
     }
-    assert!(!talk.drive.commands.contains(&Command::Stop));
+    assert!(!talk.drive.commands.contains(&Command::Stop(Stop::Coast)));
     talk.pass(399);
-    assert!(!talk.drive.commands.contains(&Command::Stop));
+    assert!(!talk.drive.commands.contains(&Command::Stop(Stop::Coast)));
     talk.pass(3);
-    assert_eq!(talk.drive.commands.last(), Some(&Command::Stop));
+    assert_eq!(talk.drive.commands.last(), Some(&Command::Stop(Stop::Coast)));
     assert!(talk.port.received.contains("stopped: no command for 0.4 s"), "{}", talk.port.received);
     assert_eq!(talk.drive.streamed.0, 0);
 }

@@ -64,7 +64,7 @@ fn a_stop_is_at_once_and_references_are_refused() {
     }
     let started = drive.command(&Command::Start(Mode::Torque));
     assert_eq!(started, Err(Refused::State(State::Exciting)));
-    drive.command(&Command::Stop).unwrap();
+    drive.command(&Command::Stop(Stop::Coast)).unwrap();
     assert_eq!(drive.state(), State::Off);
     assert!(!drive.step(&load.sample()).enabled);
 }

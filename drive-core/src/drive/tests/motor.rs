@@ -3,6 +3,8 @@
 
 use num_complex::Complex64;
 
+mod stops;
+
 use super::*;
 use crate::identify::learning::Verdict;
 use crate::io::PERIOD_S;
@@ -186,7 +188,7 @@ fn without_a_sensor_speed_and_position_are_those_of_the_rotor() {
         assert!((seen - bench.motor.rpm()).abs() < 20.0, "{seen}");
         assert!((f64::from(t.turns) - bench.motor.turns()).abs() < 0.7, "{}", t.turns);
     }
-    bench.drive.command(&Command::Stop).unwrap();
+    bench.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     bench.motor.load = Some(0.0);
     assert!(bench.run_to(State::Off));
     let mut bench = Bench::started(&motor_settings(AngleSource::Injection), Mode::Position);
@@ -225,7 +227,7 @@ fn a_stop_takes_the_torque_away_by_its_ramp() {
         let mut bench = Bench::started(&motor_settings(AngleSource::Encoder), Mode::Torque);
         bench.drive.command(&Command::Torque(i_q)).unwrap();
         bench.run(0.1);
-        bench.drive.command(&Command::Stop).unwrap();
+        bench.drive.command(&Command::Stop(Stop::Coast)).unwrap();
         bench.run(0.025);
         assert_eq!(bench.drive.state(), State::Stopping);
         let reference = bench.drive.telemetry().reference.q;
@@ -296,7 +298,7 @@ fn learning_finds_the_saliencies_and_the_mismatch() {
     // It holds until the next learning, which the free shaft ends.
     bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
     assert_eq!(bench.drive.learned(), Some(&learned));
-    bench.drive.command(&Command::Stop).unwrap();
+    bench.drive.command(&Command::Stop(Stop::Coast)).unwrap();
     bench.motor.load = Some(0.0);
     bench.drive.command(&Command::Start(Mode::Learning)).unwrap();
     assert_eq!(bench.drive.learned(), None);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, State};
+use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, State, Stop};
 
 /// What the drive is started for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ impl DriveUnderTest for Drive {
 
     fn stop(&mut self) {
         // Refused by a drive that is not on.
-        let _ = command(self, &Command::Stop);
+        let _ = command(self, &Command::Stop(Stop::Coast));
     }
 
     fn chopper(&self) -> f64 {

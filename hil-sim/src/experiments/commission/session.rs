@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
 use drive_core::settings::{Motor, Settings};
-use drive_core::{AlphaBeta, Command, Excitation, Mode, Sample, State};
+use drive_core::{AlphaBeta, Command, Excitation, Mode, Sample, State, Stop};
 
 use crate::config::Config;
 use crate::error::Error;
@@ -94,7 +94,7 @@ impl Session {
             if abort.step == Some(commissioning.step()) && rig.drive.state() != State::Off {
                 in_step += 1;
                 if in_step == abort.after {
-                    rig.command(&Command::Stop)?;
+                    rig.command(&Command::Stop(Stop::Coast))?;
                 }
             }
             if commissioning.step() == Step::Leakage && carrier_on != AlphaBeta::ZERO {
@@ -115,7 +115,7 @@ impl Session {
                     rig.command(&Command::Excite(excitation))?;
                 }
                 Next::Stop => {
-                    rig.command(&Command::Stop)?;
+                    rig.command(&Command::Stop(Stop::Coast))?;
                 }
                 Next::Start => {
                     rig.command(&Command::Start(Mode::Torque))?;

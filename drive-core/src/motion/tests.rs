@@ -1,0 +1,132 @@
+use super::*;
+
+/// No limit but the own.
+const ANY: (f32, f32) = (f32::MIN, f32::MAX);
+use crate::tuning::design_motion_loops;
+use core::f64::consts::TAU;
+
+/// 1 A accelerates the motor of Table 5 with 0.012 kg m^2 by 26.8 rad/s^2.
+const ACCELERATION: f64 = 26.8 / TAU;
+const COUNTS: u32 = 10_000;
+
+fn motion(limit: f32, ramp: f32) -> Motion {
+    let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
+    Motion::new(&design, COUNTS, limit, &Ramps { usual: ramp, quick: 3.0 * ramp, rise_s: 0.0 }, 3.0)
+}
+
+/// What a rigid rotor, in f64, did in some seconds.
+#[derive(Debug, Default)]
+struct Done {
+    /// Position, speed.
+    end: (f64, f64),
+    furthest: f64,
+    fastest: f64,
+    /// When it was more than a degree from the end for the last time, s.
+    settled: f64,
+}
+
+/// With a load in A of torque current from `load.0` s on, and a motor whose inertia is `heavier`
+/// than the design's.
+fn run(motion: &Motion, goal: Goal, load: (f64, f64), heavier: f64, seconds: f64) -> Done {
+    const DT: f64 = 1.0 / 6000.0;
+    let mut state = MotionState::default();
+    motion.start(&mut state, 77);
+    let (mut x, mut v, mut done) = (0.0_f64, 0.0_f64, Done::default());
+    for k in 0..(seconds / DT) as u32 {
+        let t = f64::from(k) * DT;
+        let count = 77_u32.wrapping_add((x * f64::from(COUNTS)) as i64 as u32);
+        let i = f64::from(motion.step(&mut state, goal, count, ANY));
+        let i_load = if t >= load.0 { load.1 } else { 0.0 };
+        v += (ACCELERATION * (i - i_load) - 0.08 * v) / heavier * DT;
+        x += v * DT;
+        done.furthest = done.furthest.max(x);
+        done.fastest = done.fastest.max(v);
+        if let Goal::Position(turns) = goal
+            && (x - f64::from(turns)).abs() > 1.0 / 360.0
+        {
+            done.settled = t;
+        }
+    }
+    Done { end: (x, v), ..done }
+}
+
+#[test]
+fn five_turns_without_overshoot_whatever_the_limits() {
+    for (limit, ramp, heavier) in
+        [(24.0, 12.0, 1.0), (24.0, 5.0, 1.0), (5.0, 5.0, 1.0), (5.0, 5.0, 1.5), (5.0, 5.0, 0.7)]
+    {
+        let done = run(&motion(limit, ramp), Goal::Position(5.0), (9e9, 0.0), heavier, 8.0);
+        println!("{limit} turns/s, {ramp} turns/s^2, inertia x{heavier}: {done:?}");
+        assert!(done.furthest < 5.0 * 1.01, "{done:?}");
+        assert!(done.settled < 3.5, "{done:?}");
+    }
+}
+
+#[test]
+fn speed_is_reached_held_under_load_and_limited() {
+    for (goal, limit, end) in [(5.0, 24.0, 5.0), (30.0, 24.0, 24.0)] {
+        let motion = motion(limit, 10.0);
+        let done = run(&motion, Goal::Speed(goal), (4.0, 1.5), 1.0, 6.0);
+        assert!((done.end.1 - end).abs() < 0.01, "{done:?}");
+        // The friction it did not know of on the way up.
+        assert!(done.fastest < end * 1.04, "{done:?}");
+    }
+}
+
+/// A load that the current cannot hold, for two seconds, then none: the integrator has not wound
+/// up, and the speed comes back without going beyond the reference by more than a tenth.
+#[test]
+fn limits_do_not_wind_up() {
+    let (motion, mut state) = (motion(24.0, 10.0), MotionState::default());
+    let (mut x, mut v, mut most) = (0.0_f64, 5.0_f64, 0.0_f64);
+    for k in 0..60_000 {
+        let t = f64::from(k) / 6000.0;
+        let count = (x * f64::from(COUNTS)) as i64 as u32;
+        let i = f64::from(motion.step(&mut state, Goal::Speed(5.0), count, ANY));
+        assert!(i.abs() <= 3.0);
+        let i_load = if (2.0..4.0).contains(&t) { 3.4 } else { 0.0 };
+        v += ACCELERATION * (i - i_load) / 6000.0;
+        x += v / 6000.0;
+        if t > 4.0 {
+            most = most.max(v);
+        }
+    }
+    assert!((v - 5.0).abs() < 0.01 && most < 5.5, "{v} {most}");
+}
+
+#[test]
+fn position_works_from_a_wrapped_count() {
+    let (motion, mut state) = (motion(5.0, 5.0), MotionState::default());
+    motion.start(&mut state, u32::MAX - 10);
+    assert!((motion.turns(&state, 9) - 0.002).abs() < 1e-6);
+}
+
+#[test]
+fn the_rotor_is_counted_over_turns_both_ways() {
+    let mut rotor = RotorCount::default();
+    for k in 0..=10_000 {
+        // 0.47 turns a step, the most there is: 4700 turns.
+        rotor.follow(Angle::from_turns((f64::from(k) * 0.47 % 1.0) as f32));
+    }
+    assert!(rotor.count.abs_diff(4700 * COUNTS_PER_TURN) <= 1, "{rotor:?}");
+    for k in (0..=20_000).rev() {
+        rotor.follow(Angle::from_turns(((f64::from(k) - 10_000.0) * 0.47 % 1.0) as f32));
+    }
+    assert!((rotor.count as i32 + 4700 * COUNTS_PER_TURN as i32).abs() <= 1, "{rotor:?}");
+}
+
+/// v^2 / 2 a turns are needed from v on with the deceleration a; near the goal k_x e is slower.
+#[test]
+fn the_braking_curve_ends_at_the_goal() {
+    let motion = motion(24.0, 12.0);
+    let (a, bend) = (0.5 * f64::from(motion.twice_braking), f64::from(motion.bend));
+    assert!((a - 12.0).abs() < 1e-5);
+    for error in [1e-4, 0.01, 0.3, 2.0, 50.0] {
+        let v = f64::from(motion.braking_curve(error));
+        assert!(((v * v / 2.0 + v * bend) / a / f64::from(error) - 1.0).abs() < 1e-5, "{error}");
+        assert_eq!(f64::from(motion.braking_curve(-error)), -v);
+    }
+    let design = design_motion_loops(ACCELERATION, None, 60.0, 0.01).unwrap();
+    let slope = f64::from(motion.braking_curve(1e-4)) / 1e-4;
+    assert!((slope / design.k_x - 1.0).abs() < 1e-3, "{slope}");
+}

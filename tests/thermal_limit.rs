@@ -1,0 +1,62 @@
+//! Procedure: more torque asked for than motor or inverter carry for any time, at standstill.
+
+mod common;
+
+use common::config;
+use drive_core::dc_link::Limiting;
+use drive_core::{Command, Mode, State};
+use hil_sim::rig::Rig;
+
+/// Largest load of an i²t body of `tau_s` s that carries `carried` A for ever, with the true current; the mean current of the last
+/// second, A; what limits then.
+fn settles(changes: &[&str], carried: f64, tau_s: f64, seconds: f64) -> (f64, f64, Limiting) {
+    let mut rig = Rig::from_config(&config(changes), 1).unwrap();
+    rig.start(Mode::Torque).unwrap();
+    rig.command(&Command::Torque(3.0)).unwrap();
+    let (mut load, mut most) = (0.0_f64, 0.0_f64);
+    let (mut sum, mut n) = (0.0, 0.0);
+    let end = rig.time() + seconds;
+    rig.run(seconds, |p| {
+        let square = p.iq * p.iq + p.id * p.id;
+        load += (square / (carried * carried) - load) / (tau_s * 6000.0);
+        most = most.max(load);
+        if p.t > end - 1.0 {
+            (sum, n) = (sum + square, n + 1.0);
+        }
+    });
+    assert_eq!(rig.drive.state(), State::Torque, "{changes:?}");
+    (most, (sum / n).sqrt(), rig.drive.limiting())
+}
+
+/// The shaft is locked, 3 A are asked for. The current settles at what is carried for ever, with its direct part: from half the
+/// limit to nearly all of it, with slow bodies and with the fastest that the settings allow.
+#[test]
+fn the_torque_falls_back_to_what_is_carried_for_ever() {
+    for (who, carried, tau_s, why) in [
+        ("motor", 1.5, 5.0, Limiting::Motor),
+        ("motor", 2.5, 1.0, Limiting::Motor),
+        ("inverter", 2.0, 0.5, Limiting::Inverter),
+        ("inverter", 2.6, 0.1, Limiting::Inverter),
+    ] {
+        let (a, s) = (format!("limits.{who}_a={carried}"), format!("limits.{who}_s={tau_s}"));
+        for source in ["angle.source=injection", "angle.source=encoder"] {
+            let changes = [a.as_str(), s.as_str(), source, "load.mode=locked"];
+            let (load, current, limiting) = settles(&changes, carried, tau_s, 3.0 + 4.0 * tau_s);
+            println!("{a} {s} {source}: load {load:.3}, {current:.3} A, {limiting}");
+            assert!(load <= 1.1, "{load}");
+            assert!((current / carried - 1.0).abs() < 0.03, "{current} A");
+            assert_eq!(limiting, why);
+        }
+    }
+}
+
+/// A direct current that alone is too large is nothing that the torque can give way for: it trips.
+#[test]
+fn what_cannot_fall_back_trips() {
+    let changes =
+        ["limits.motor_a=0.5", "limits.motor_s=1", "angle.source=encoder", "load.mode=locked"];
+    let mut rig = Rig::from_config(&config(&changes), 1).unwrap();
+    rig.command(&Command::Start(Mode::Torque)).unwrap();
+    rig.run(3.0, |_| {});
+    assert_eq!(rig.drive.state(), State::Fault(drive_core::Fault::MotorOverload));
+}
