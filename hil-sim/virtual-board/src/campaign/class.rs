@@ -96,14 +96,16 @@ const CLASSES: &[Class] = &[
         let value = *current(which, &mut { now });
         board.disturb = Some(Box::new(move |s| *current(which, s) = value));
         format!("{} at {value}", name(which))
-    }),
+    })
+    .at_speed(SILENT_AT_SPEED),
     regulating("current sensor open", SILENT, |board, target, rng| {
         let which = target.any_current(rng);
         let line = target.line(which);
         let zero = (-line.offset / line.gain).round() as u16;
         board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
         name(which).into()
-    }),
+    })
+    .at_speed(SILENT_AT_SPEED),
     regulating("current sensor saturated", SAMPLE, |board, target, rng| {
         let (which, high) = (target.any_current(rng), rng.random::<bool>());
         let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
@@ -212,13 +214,15 @@ const CLASSES: &[Class] = &[
     }),
     regulating("bit flip in the drive's state", LOCK, |board, target, rng| {
         flip(board, rng, target.state)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in the control's code", CHECK, |board, target, rng| {
         flip(board, rng, target.code)
     }),
     regulating("bit flip anywhere in the control's data", LOCK, |board, target, rng| {
         flip(board, rng, target.control)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in RAM, stack included", LOCK, |board, target, rng| {
         let area = if rng.random() {
             target.data
@@ -226,7 +230,8 @@ const CLASSES: &[Class] = &[
             Region { address: target.stack.end() - 1024, size: 1024 }
         };
         flip(board, rng, area)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating(
         "timer update dropped",
         (2.0 * STEP_MS, "five updates at most, each seen in its own period"),
@@ -334,11 +339,20 @@ const SILENT: Bound = (
     70.0,
     "up to 60 ms until the axis has turned to the sensor, then three carrier periods of silence",
 );
+/// At speed there is no carrier: the voltage shows it, by more than the back-emf at once, or in the mean.
+const SILENT_AT_SPEED: Bound = (
+    150.0,
+    "without a carrier the voltage shows it, at the latest by its mean over 50 ms in the frame of the flux",
+);
 /// From any wrong angle to the right one or to the lock monitor's fault. The longest is 180 degrees, which
 /// looks right until the flux has decayed with the rotor time constant.
 const LOCK: Bound = (
     400.0,
     "a wrong angle: right again, or off by the lock monitor (measured there for 90, 120 and 180 degrees)",
+);
+const LOCK_AT_SPEED: Bound = (
+    400.0,
+    "a wrong angle: right again by the observer, or off as the voltage misses the flux where it is believed to be",
 );
 /// Compared and hashed by the main loop, 64 words of 5300 a pass, a pass a control period: 14 ms for all.
 const CHECK: Bound =
