@@ -65,7 +65,7 @@ pub mod tuning;
 
 pub use drive::{
     Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    State, Telemetry,
+    Room, State, Telemetry,
 };
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};
