@@ -58,7 +58,8 @@ fn status_tells_the_torque_that_the_motor_then_gives() {
 fn a_drive_that_is_off_has_the_torque_of_a_shaft_at_rest_and_a_fault_has_none() {
     let mut talk = Talk::new();
     let settings = drive_core::Settings::default();
-    let (i_q, per_a) = (settings.i_q_limit_a(), settings.motor.torque_per_ampere(settings.i_d()));
+    let (i_d, all) = (settings.i_d(), settings.current_limit_a());
+    let (i_q, per_a) = ((all * all - i_d * i_d).sqrt(), settings.motor.torque_per_ampere(i_d));
     let status = talk.ask("status");
     assert!(status.starts_with("off; switch on disabled; torque now -"), "{status}");
     let (nm, a) = promised(&status);
