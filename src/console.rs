@@ -18,6 +18,7 @@ mod list;
 mod number;
 mod reply;
 mod restore;
+mod status;
 mod stream;
 mod suggest;
 #[cfg(test)]

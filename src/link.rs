@@ -5,7 +5,7 @@ pub mod stream;
 pub mod trace;
 
 use drive_core::dc_link::Limiting;
-use drive_core::{Accepted, Excited, Hardware, Refused, Sample, State, Telemetry};
+use drive_core::{Accepted, Excited, Hardware, Refused, Room, Sample, State, Telemetry};
 
 /// The drive's answer to a command.
 pub type Answer = Result<Accepted, Refused>;
@@ -34,6 +34,8 @@ pub struct Status {
     pub learning: Option<(usize, usize)>,
     /// Why the torque is smaller than asked for.
     pub limiting: Limiting,
+    /// What limits the torque.
+    pub room: Room,
     /// Tracked stator resistance relative to the settings, less one.
     pub stator_resistance: Option<f32>,
     /// For the commissioning.

@@ -61,7 +61,7 @@ use excite::ExcitationState;
 use in_turn::StepResults;
 pub use layout::Layout;
 use observed::Observed;
-pub use observed::Telemetry;
+pub use observed::{Room, Telemetry};
 pub use state::{Mode, State};
 
 /// The drive: coefficients, state, and the references it was given.

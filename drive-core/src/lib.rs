@@ -65,7 +65,7 @@ pub mod tuning;
 
 pub use drive::{
     Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    State, Stop, Telemetry,
+    Room, State, Stop, Telemetry,
 };
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};

@@ -11,7 +11,7 @@ mod current_step;
 mod dead_time;
 mod demodulators;
 mod filters;
-mod full_range;
+pub mod full_range;
 mod identify_continuous;
 mod identify_discrete;
 mod identify_machine;

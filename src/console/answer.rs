@@ -160,23 +160,6 @@ impl Console {
         }
     }
 
-    fn status(&mut self, drive: &impl DriveHandle) {
-        let Some(status) = drive.status() else { return self.error(&drive.no_control()) };
-        let tracking = drive.tracking().filter(|_| status.state.regulates());
-        let staged = self.settings.count();
-        let line = fmt::from_fn(|f| {
-            reply::status(f, &status, &self.settings.in_force().drive, drive.stack())?;
-            if staged > 0 {
-                write!(f, "; {staged} staged")?;
-            }
-            let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
-            let settings = &self.settings.in_force().drive;
-            reply::temperatures(f, status.stator_resistance, rotor, settings)?;
-            tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
-        });
-        self.out.line(format_args!("{line}"));
-    }
-
     /// Gives the drive a command; `unit` is that of its reference.
     pub(super) fn give(&mut self, command: Command, unit: &str, drive: &mut impl DriveHandle) {
         match drive.command(command) {

@@ -7,8 +7,8 @@ use thiserror::Error;
 
 /// Longest line that is taken, characters without its end.
 pub const LONGEST: usize = 120;
-/// Room for text that goes out, bytes: the longest line, a line of `describe`, and what was typed so far.
-pub const OUTPUT: usize = 480;
+/// Room for text that goes out, bytes: the longest line, that of `status`, or one of `describe` and what was typed so far.
+pub const OUTPUT: usize = 504;
 
 const CTRL_C: u8 = 0x03;
 const BACKSPACE: u8 = 0x08;

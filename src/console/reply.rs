@@ -1,85 +1,17 @@
-//! Replies: the status line, settings, the text of a fault, and the result of a learning.
+//! Replies: settings, the text of a fault, and the result of a learning.
 
-use core::f32::consts::TAU;
 use core::fmt;
 
-use drive_core::dc_link::Limiting;
+use drive_core::Fault;
 use drive_core::identify::learning::{Fitted, Learned};
-use drive_core::io::PERIOD_S;
 use drive_core::settings::entry::Change;
 use drive_core::settings::value::Value;
-use drive_core::{Fault, Settings, State};
 
-use crate::board::CYCLES_PER_US;
 use crate::boards::Board;
-use crate::link::Status;
 use crate::settings::FirmwareSettings;
 use crate::settings::keys::Key;
 use crate::settings::staging::Staging;
 use crate::store::history::History;
-
-/// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with
-/// psi = L_m i_d; power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the carrier.
-///
-/// # Errors
-/// Those of the formatter.
-pub fn status(
-    f: &mut fmt::Formatter<'_>,
-    s: &Status,
-    settings: &Settings,
-    (used, size): (usize, usize),
-) -> fmt::Result {
-    let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
-    write!(f, "{}; ", s.state)?;
-    if s.limiting != Limiting::No {
-        write!(f, "limiting now, because: {}; ", s.limiting)?;
-    }
-    // While the drive is off, its signals are those of the last run.
-    if s.state != State::Off {
-        let (i, reference) = (t.current, t.reference);
-        let rpm = t.rotor_freq * (60.0 / PERIOD_S) / f32::from(motor.pole_pairs);
-        let torque = motor.torque_per_ampere(i.d) * i.q;
-        let shaft_w = torque * rpm * (TAU / 60.0);
-        let electrical_w = 1.5 * (t.voltage.d * i.d + t.voltage.q * i.q);
-        write!(f, "i_d {:.2} A, i_q {:.2} of {:.2} A, ", i.d, i.q, reference.q)?;
-        write!(f, "torque {torque:.2} Nm, speed {rpm:.1} rpm, position {:.3} turns, ", t.turns)?;
-        write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
-    }
-    // Dc link and heat sink from the sample: the drive's own values stand still while it is off.
-    let dc_link = scales.dc_link.at(s.sample.dc_link);
-    let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
-    write!(f, "dc link {dc_link:.0} V, ")?;
-    write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
-    write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
-    write!(f, "stack {used} of {size}")
-}
-
-/// Temperature of the settings' resistances, °C.
-const COLD_C: f32 = 25.0;
-/// Temperatures below 0 °C at which the resistance of copper, and of the aluminium of a cage, would be none.
-const COPPER_C: f32 = 235.0;
-const ALUMINIUM_C: f32 = 225.0;
-
-/// Writes the temperatures of stator and rotor that their tracked resistances mean, if those of the settings are of 25 °C:
-/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one.
-///
-/// # Errors
-/// Those of the formatter.
-pub fn temperatures(
-    f: &mut fmt::Formatter<'_>,
-    stator: Option<f32>,
-    tau_r: Option<f32>,
-    settings: &Settings,
-) -> fmt::Result {
-    let celsius = |more: f32, metal: f32| COLD_C + more * (metal + COLD_C);
-    if let Some(more) = stator {
-        write!(f, "; stator {:.0} degC", celsius(more, COPPER_C))?;
-    }
-    tau_r.map_or(Ok(()), |tau_r| {
-        let more = settings.motor.tau_r() / tau_r - 1.0;
-        write!(f, "; rotor {:.0} degC", celsius(more, ALUMINIUM_C))
-    })
-}
 
 /// A setting with its unit and the allowed values. They are computed before anything is printed, because printing
 /// needs much stack and so does the range.

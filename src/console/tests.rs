@@ -6,6 +6,7 @@ mod learning;
 mod lists;
 mod staging;
 mod stream;
+mod torque;
 mod typing;
 mod wrong;
 
@@ -14,7 +15,6 @@ use drive_core::identify::learning::Verdict;
 use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
 use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State, Stop};
-use proptest::prelude::*;
 
 use super::announce::ANNOUNCEMENTS;
 use super::help::HELP;
@@ -103,7 +103,7 @@ fn a_session() {
     assert!(talk.ask("save").starts_with("error: the drive must be off"));
     talk.drive.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
     let status = talk.ask("status");
-    assert!(status.starts_with("calibrating; i_d 0.00 A"), "{status}");
+    assert!(status.starts_with("calibrating; switched on; i_d 0.00 A"), "{status}");
     assert!(status.contains("dc link 311 V, heat sink 22 degC;"), "{status}");
     assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("save"), "ok");

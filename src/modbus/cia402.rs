@@ -2,6 +2,14 @@
 
 use drive_core::{State, Stop};
 
+use crate::settings::FirmwareSettings;
+use crate::settings::bus::Commander;
+
+/// Whether the bus may start a drive with these settings.
+pub fn bus_may_start(settings: &FirmwareSettings) -> bool {
+    settings.bus.commander == Commander::Bus && settings.board_is_confirmed()
+}
+
 /// A state of the CiA 402 state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Power {
@@ -33,7 +41,7 @@ impl Power {
         Self::Fault,
     ];
 
-    /// The state of a drive; `startable` tells whether the bus may start it.
+    /// The state of a drive; `startable`: see [`bus_may_start`].
     pub fn of(state: Option<State>, startable: bool) -> Self {
         match state {
             None => Self::NotReadyToSwitchOn,

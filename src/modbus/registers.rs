@@ -295,9 +295,7 @@ impl View<'_> {
     }
 
     fn power(&self) -> Power {
-        let startable =
-            self.settings.bus.commander == Commander::Bus && self.settings.board_is_confirmed();
-        Power::of(self.status.map(|status| status.state), startable)
+        Power::of(self.status.map(|status| status.state), cia402::bus_may_start(self.settings))
     }
 
     fn delta_status(&self) -> u16 {

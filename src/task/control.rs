@@ -294,6 +294,7 @@ impl Running {
             report.hardware = self.unreported;
             report.learning = drive.learning_progress();
             report.limiting = drive.limiting();
+            report.room = drive.room();
             report.stator_resistance = drive.stator_resistance();
             report.excited = drive.excited();
         });

@@ -35,16 +35,29 @@ pub fn cycles(elf: &Path) -> Result<()> {
 }
 
 /// Injects faults into this image; fails if the outputs stay on with wrong control beyond a bound.
-pub fn campaign(elf: &Path, board: &str, count: u32, seed: u32, class: &str) -> Result<()> {
+pub fn campaign(elf: &Path, board: &str, faults: &Faults, class: &str) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    run::step("campaign of faults", faults(elf, board, count, seed).args(["--class", class]))
+    run::step("campaign of faults", faults.command(elf, board).args(["--class", class]))
 }
 
-/// The command that injects `count` faults into the image of a board, the first with this seed.
-pub fn faults(elf: &Path, board: &str, count: u32, seed: u32) -> Command {
-    let mut command = program("campaign", elf);
-    command.args([count.to_string(), seed.to_string()]).args(["--board", board]);
-    command
+/// Faults of a campaign.
+pub struct Faults {
+    /// Their number.
+    pub count: u32,
+    /// Seed of the first.
+    pub seed: u32,
+    /// Speed of the shaft, rpm on four poles; none is the usual scene at low speed.
+    pub rpm: Option<u32>,
+}
+
+impl Faults {
+    /// The command that injects them into the image of a board.
+    pub fn command(&self, elf: &Path, board: &str) -> Command {
+        let mut command = program("campaign", elf);
+        command.args([self.count.to_string(), self.seed.to_string()]).args(["--board", board]);
+        command.args(self.rpm.map(|rpm| format!("--rpm={rpm}")));
+        command
+    }
 }
 
 /// A task of the virtual board as a program.

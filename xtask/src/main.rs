@@ -66,6 +66,9 @@ enum Task {
         /// Only classes of faults whose name contains this
         #[arg(default_value = "")]
         class: String,
+        /// Speed of the shaft, rpm: 850 to 3500; the usual scene is at rest and at low speed
+        #[arg(long)]
+        rpm: Option<u32>,
         /// The board
         #[command(flatten)]
         which: Which,
@@ -143,8 +146,9 @@ fn run(task: Task) -> Result<()> {
         Task::Foreign => foreign::test(),
         Task::Cycles => board::cycles(&image::build()?),
         Task::Bus => bus::test(&image::build()?),
-        Task::Campaign { count, seed, class, which } => {
-            board::campaign(&which.image()?, &which.board, count, seed, &class)
+        Task::Campaign { count, seed, class, rpm, which } => {
+            let faults = board::Faults { count, seed, rpm };
+            board::campaign(&which.image()?, &which.board, &faults, &class)
         }
         Task::Fuzz { seconds } => fuzz::fuzz(seconds),
         Task::Size => size::report(&image::build()?),
@@ -180,7 +184,8 @@ fn test() -> Result<()> {
     run::step("lints of the firmware", target.cargo("clippy")?.args(lints))?;
     let elf = image::build_with(&target)?;
     size::report(&elf)?;
-    board::campaign(&elf, image::REFERENCE, CAMPAIGN / 20, 1, "")?;
+    let faults = board::Faults { count: CAMPAIGN / 20, seed: 1, rpm: None };
+    board::campaign(&elf, image::REFERENCE, &faults, "")?;
     board::test(&target)?;
     board::cycles(&elf)?;
 

@@ -13,8 +13,10 @@ use serde_json::Value;
 
 use crate::{before, board, fuzz, image, run, toolchain};
 
-/// Faults of a shard of the campaign.
+/// Faults of a shard of the campaign, and shards of a speed, rpm.
 const FAULTS: u32 = 100;
+const CAMPAIGN: u32 = 20;
+const SPEEDS: [Option<u32>; 4] = [None, Some(900), Some(1800), Some(3000)];
 /// Seconds of a shard of fuzzing.
 const FUZZ_S: u32 = 300;
 /// Runs of a shard of the lock monitor and of the saliency check.
@@ -48,10 +50,11 @@ const PROOFS: [Proof; 7] = [
     },
     Proof {
         name: "campaign",
-        about: "2000 faults on the virtual board: outputs off in time, or control correct",
-        shards: 20,
+        about: "2000 faults at low speed, and at 900, 1800 and 3000 rpm: outputs off in time, or control correct",
+        shards: CAMPAIGN * SPEEDS.len() as u32,
         command: |shard| {
-            Ok(board::faults(&image::build()?, image::REFERENCE, FAULTS, 1 + shard * FAULTS))
+            let rpm = SPEEDS[(shard / CAMPAIGN) as usize];
+            Ok(faults(shard % CAMPAIGN, rpm).command(&image::build()?, image::REFERENCE))
         },
         bounds: &[],
         page: None,
@@ -64,7 +67,7 @@ const PROOFS: [Proof; 7] = [
             let boards = image::boards()?;
             let board = &boards[1 + shard as usize / 2];
             let elf = image::build_for(&toolchain::for_target()?, board)?;
-            Ok(board::faults(&elf, board, FAULTS, 1 + shard % 2 * FAULTS))
+            Ok(faults(shard % 2, None).command(&elf, board))
         },
         bounds: &[],
         page: None,
@@ -108,6 +111,11 @@ const PROOFS: [Proof; 7] = [
         page: Some("docs/before.md"),
     },
 ];
+
+/// The faults of a shard of a campaign.
+fn faults(shard: u32, rpm: Option<u32>) -> board::Faults {
+    board::Faults { count: FAULTS, seed: 1 + shard * FAULTS, rpm }
+}
 
 fn simulation(experiment: &str, runs: u32, seed: u32, more: &[&str]) -> Command {
     let mut command = run::cargo("run --release --package hil-sim -- run --json");

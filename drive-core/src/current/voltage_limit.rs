@@ -49,6 +49,8 @@ pub struct VoltageLimit {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VoltageLimitState {
     trim: f32,
+    /// Voltage that weakens the flux, V peak; 0 where the flux is kept.
+    pub available: f32,
     /// Most direct and torque current, A.
     pub most: Dq,
     /// Whether the latter is that of the voltage.
@@ -72,6 +74,11 @@ pub struct Operation {
     pub added: f32,
 }
 
+/// Angular frequency that is not zero, rad/s, from electrical turns per period.
+fn angular(flux_freq: f32) -> f32 {
+    flux_freq.abs() * (TAU / PERIOD_S) + 1.0
+}
+
 impl VoltageLimit {
     /// Limit for a motor at the direct current `i_d`, A, with currents up to `largest_a`, A peak.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32) -> Self {
@@ -88,7 +95,8 @@ impl VoltageLimit {
 
     /// State without a limit.
     pub fn start(&self) -> VoltageLimitState {
-        VoltageLimitState { trim: 1.0, most: Dq { d: self.i_d, q: self.i_q }, by_voltage: false }
+        let most = Dq { d: self.i_d, q: self.i_q };
+        VoltageLimitState { trim: 1.0, available: 0.0, most, by_voltage: false }
     }
 
     /// Updates the limits.
@@ -96,7 +104,6 @@ impl VoltageLimit {
         let &Operation { current, voltage, largest, flux_freq, kept, added } = now;
         let whole = USED * largest;
         let available = whole * state.trim;
-        let w = flux_freq.abs() * (TAU / PERIOD_S) + 1.0;
         // (|u| - U)/U near U, without the root.
         let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
         let trim = state.trim - TRIM * excess;
@@ -108,24 +115,38 @@ impl VoltageLimit {
             1.0
         };
 
-        let by_leakage = FOR_LEAKAGE * available / (w * self.leakage);
-        let i_q = current.q.abs();
-        let drop = self.r_s * if current.q * flux_freq < 0.0 { -i_q } else { i_q };
-        let across = w * self.leakage * if i_q < by_leakage { i_q } else { by_leakage };
-        let along = libm::sqrtf(available * available - across * across) - drop;
-        let i_d = along / (w * self.stator);
-        // NaN gives the setting; the step finds it.
-        let i_d = if kept || i_d.is_nan() || i_d >= self.i_d {
-            self.i_d
-        } else if i_d < LEAST * self.i_d {
-            LEAST * self.i_d
-        } else {
-            i_d
-        };
+        let by_leakage = self.by_leakage(available, flux_freq);
+        let i_d = if kept { self.i_d } else { self.direct(available, flux_freq, current.q) };
+        state.available = if kept { 0.0 } else { available };
         let all = i_d + added;
         let rest =
             if all == self.i_d { self.i_q } else { libm::sqrtf(self.current_squared - all * all) };
         state.by_voltage = by_leakage < rest;
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
+    }
+
+    /// Most direct current, A, with the torque current `i_q`, A, where `available` V can be used.
+    #[inline]
+    pub fn direct(&self, available: f32, flux_freq: f32, i_q: f32) -> f32 {
+        let by_leakage = self.by_leakage(available, flux_freq);
+        let (w, size) = (angular(flux_freq), i_q.abs());
+        let drop = self.r_s * if i_q * flux_freq < 0.0 { -size } else { size };
+        let across = w * self.leakage * if size < by_leakage { size } else { by_leakage };
+        let along = libm::sqrtf(available * available - across * across) - drop;
+        let i_d = along / (w * self.stator);
+        // NaN gives the setting; the step finds it.
+        if i_d.is_nan() || i_d >= self.i_d {
+            self.i_d
+        } else if i_d < LEAST * self.i_d {
+            LEAST * self.i_d
+        } else {
+            i_d
+        }
+    }
+
+    /// Torque current, A, whose leakage takes its share of the voltage.
+    #[inline]
+    fn by_leakage(&self, available: f32, flux_freq: f32) -> f32 {
+        FOR_LEAKAGE * available / (angular(flux_freq) * self.leakage)
     }
 }

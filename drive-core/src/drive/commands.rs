@@ -22,6 +22,8 @@ impl Drive {
     ///
     /// # Errors
     /// The reason of the refusal; nothing has changed then.
+    // Not inlined: it stays in the flash.
+    #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         match *command {
             Command::Start(mode) => self.start(mode),
@@ -140,8 +142,6 @@ impl Drive {
         self.changes = self.changes.wrapping_add(1);
     }
 
-    // Not inlined: it acts with the outputs off alone, and stays in the flash.
-    #[inline(never)]
     pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
         match (self.state, mode) {
             (State::Fault(fault), _) => return Err(Refused::Fault(fault)),

@@ -138,8 +138,8 @@ impl Coefficients {
     /// Takes one of the six looks at the noise of the current sensors.
     fn watch_noise(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
         match &self.noise_watch {
-            Some(watch) if s.hand_over.is_quiet() => watch.step(&mut s.noise, look, sample),
-            _ => Ok(()),
+            Some(watch) => watch.step(&mut s.noise, look, sample, s.hand_over.is_quiet()),
+            None => Ok(()),
         }
     }
 

@@ -44,6 +44,18 @@ pub struct Telemetry {
     pub turns: f32,
 }
 
+/// What limits the torque now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Room {
+    /// Least and largest torque current, A, at the present speed, dc link and heat sink; only while the drive regulates.
+    pub i_q: (f32, f32),
+    /// Torque current that the heat sink does not bear, of the largest current, A.
+    pub too_hot_for: f32,
+    /// Voltage that [the limit of the direct current](crate::current::voltage_limit) reckons with, V peak; 0 where the direct
+    /// current is that of the setting.
+    pub voltage: f32,
+}
+
 /// The telemetry of a step that is not part of another state; see [`Telemetry`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Observed {
@@ -67,6 +79,13 @@ impl Drive {
             _ if self.counts() => s.indirect.rotor_freq,
             _ => s.estimator.rotor_freq,
         }
+    }
+
+    /// What limits the torque now.
+    pub fn room(&self) -> Room {
+        let s = &self.control;
+        let voltage = s.voltage_limit.available;
+        Room { i_q: s.limits.i_q, too_hot_for: s.too_hot_for, voltage }
     }
 
     /// The telemetry of the last step.

@@ -80,7 +80,7 @@ impl HandOver {
         self.unquiet = if self.weight > 0.0 { QUIET } else { self.unquiet.saturating_sub(1) };
     }
 
-    /// Whether the noise of the sensors may be judged: some 0.2 s after the injection has the angle alone.
+    /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it has the angle alone.
     pub fn is_quiet(&self) -> bool {
         self.unquiet == 0
     }

@@ -15,6 +15,7 @@ mod scene;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::ops::RangeInclusive;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -25,7 +26,7 @@ use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
 use crate::periph::Reset;
 use crate::power_stage::{PowerStage, REFERENCE};
-use class::{CLASSES, Class, Run};
+use class::{Class, Run};
 use judge::Outcome;
 use scene::Scene;
 
@@ -37,6 +38,8 @@ const AFTER_MS: f64 = 150.0;
 const LATEST: u64 = 20 * 170_000;
 /// Longest time of `save`, periods.
 const SAVE: u64 = 1200;
+/// Speeds of a campaign at speed, rpm on four poles: the carrier is off from some 800 rpm on, and a drive turns up to 3600.
+const SPEEDS_RPM: RangeInclusive<f64> = 850.0..=3500.0;
 
 /// Results of a class.
 #[derive(Clone, Debug, Default)]
@@ -58,6 +61,9 @@ pub struct Selection {
     pub seed: u64,
     /// Only of the classes whose name contains this.
     pub class: String,
+    /// Speed of the shaft, rpm on four poles: 850 to 3500, where the observer alone gives the angle. None: the shaft is
+    /// locked without the encoder, and at 300 and 900 rpm with it.
+    pub rpm: Option<f64>,
     /// The power stage that the image was built for.
     pub stage: &'static PowerStage,
 }
@@ -67,45 +73,55 @@ pub struct Selection {
 /// # Errors
 /// The table with the failures; no class has that name.
 pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
-    let Selection { count, seed, ref class, stage } = *selection;
-    let classes = CLASSES.len() as u64;
-    let is_chosen = |seed: &u64| CLASSES[(seed % classes) as usize].name.contains(class);
+    let Selection { count, seed, ref class, rpm, stage } = *selection;
+    let all = Class::all(rpm.is_some());
+    let classes = all.len() as u64;
+    let is_chosen = |seed: &u64| all[(seed % classes) as usize].name.contains(class);
     ensure!(
-        CLASSES.iter().any(|c| c.name.contains(class)),
+        all.iter().any(|c| c.name.contains(class)),
         "no class of faults has {class:?} in its name: {}",
-        CLASSES.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
+        all.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
+    );
+    ensure!(
+        rpm.is_none_or(|rpm| SPEEDS_RPM.contains(&rpm)),
+        "--rpm {}: {} to {} rpm on four poles",
+        rpm.unwrap_or_default(),
+        SPEEDS_RPM.start(),
+        SPEEDS_RPM.end()
     );
     let seeds = Mutex::new((seed..).filter(is_chosen).take(count as usize));
     let tallies: Mutex<BTreeMap<usize, Tally>> = Mutex::default();
     let work = || -> Result<()> {
-        let mut scene = Scene::new(open()?, stage)?;
+        let mut scene = Scene::new(open()?, stage, rpm)?;
         scene.board.forgive();
         loop {
             // A seed says all: a campaign of one with the seed of a failure repeats it.
             let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
             let Some(seed) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
-            let outcome = one(&mut scene, &CLASSES[which], seed / classes, seed);
+            let outcome = one(&mut scene, &all[which], seed / classes, seed);
             let outcome = outcome.and_then(|outcome| {
                 // A damaged program may break the chip's rules; one that is whole may not.
-                let whole = !matches!(CLASSES[which].run, Run::Regulating(_));
+                let whole = !matches!(all[which].run, Run::Regulating(_));
                 let broken = scene.board.violations().first().filter(|_| whole);
                 broken.map_or(Ok(outcome), |broken| Err(anyhow!("{broken}")))
             });
             if let Err(why) = &outcome {
-                eprintln!("{}, seed {}: {why:#}", CLASSES[which].name, seed);
+                eprintln!("{}, seed {}: {why:#}", all[which].name, seed);
             }
             let mut tallies = tallies.lock().map_err(|_| anyhow!("another worker has failed"))?;
-            add(tallies.entry(which).or_default(), &CLASSES[which], seed, outcome);
+            add(tallies.entry(which).or_default(), &all[which], seed, outcome);
         }
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
     std::thread::scope(|scope| {
-        let all: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        all.into_iter().try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
+        let started: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        started
+            .into_iter()
+            .try_for_each(|one| one.join().map_err(|_| anyhow!("a worker panicked"))?)
     })?;
     let tallies = tallies.into_inner().map_err(|_| anyhow!("a worker panicked"))?;
-    let table = table(&tallies);
+    let table = table(&all, &tallies);
     let failed: usize = tallies.values().map(|f| f.failures.len()).sum();
     if failed > 0 {
         bail!("{failed} of {count} failed\n{table}");
@@ -140,7 +156,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
     match class.run {
         Run::Regulating(inject) => {
-            scene.regulating(source)?;
+            scene.regulating(source, turn)?;
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
             let what = inject(&mut scene.board, &scene.target, &mut rng);
@@ -173,7 +189,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             after_power(scene, true)
         }
         Run::Reset => {
-            scene.regulating(source)?;
+            scene.regulating(source, turn)?;
             scene.board.run_ticks(rng.random_range(0..LATEST))?;
             scene.board.went_off = None;
             scene.board.reset(Reset::Pin);
@@ -192,7 +208,7 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
 /// # Errors
 /// The slot and the operation of the first failure.
 pub fn every_operation_of_save(image: Image) -> Result<[u64; 2]> {
-    let mut scene = Scene::new(image, &REFERENCE)?;
+    let mut scene = Scene::new(image, &REFERENCE, None)?;
     scene.board.forgive();
     let mut counts = [0; 2];
     for (slot, count) in counts.iter_mut().enumerate() {
@@ -257,13 +273,13 @@ fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
     Ok(Outcome { off_ms: Some(0.0), ..Outcome::default() })
 }
 
-fn table(tallies: &BTreeMap<usize, Tally>) -> String {
+fn table(all: &[Class], tallies: &BTreeMap<usize, Tally>) -> String {
     let mut text = String::from(
         "class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed\n\
          ---|---|---|---|---|---|---|---|---\n",
     );
     for (which, f) in tallies {
-        let class = &CLASSES[*which];
+        let class = &all[*which];
         let _ = writeln!(
             text,
             "{} | {:.3} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {}",
@@ -280,16 +296,19 @@ fn table(tallies: &BTreeMap<usize, Tally>) -> String {
     }
     for (which, f) in tallies.iter().filter(|(_, f)| !f.failures.is_empty()) {
         for (seed, why) in &f.failures {
-            let _ = writeln!(text, "{}, seed {seed}: {why}", CLASSES[*which].name);
+            let _ = writeln!(text, "{}, seed {seed}: {why}", all[*which].name);
         }
     }
     text
 }
 
-/// The bounds and their reasons.
-pub fn bounds() -> String {
-    CLASSES.iter().fold(String::from("class | bound, ms | reason\n---|---|---\n"), |mut text, c| {
-        let _ = writeln!(text, "{} | {:.3} | {}", c.name, c.bound.0, c.bound.1);
-        text
-    })
+/// The bounds and their reasons, at speed or not.
+pub fn bounds(at_speed: bool) -> String {
+    Class::all(at_speed).iter().fold(
+        String::from("class | bound, ms | reason\n---|---|---\n"),
+        |mut text, c| {
+            let _ = writeln!(text, "{} | {:.3} | {}", c.name, c.bound.0, c.bound.1);
+            text
+        },
+    )
 }

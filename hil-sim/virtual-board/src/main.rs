@@ -30,6 +30,9 @@ enum Task {
         /// Only the classes whose name contains this.
         #[arg(long, default_value = "")]
         class: String,
+        /// Speed of the shaft, rpm on four poles: 850 to 3500.
+        #[arg(long)]
+        rpm: Option<f64>,
         /// The board that the ELF was built for; it has a motor that suits it.
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
@@ -64,10 +67,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
-        Task::Campaign { elf, count, seed, class, board } => {
+        Task::Campaign { elf, count, seed, class, rpm, board } => {
             let stage = PowerStage::named(&board)?;
-            let selection = campaign::Selection { count, seed, class, stage };
-            println!("{}", campaign::bounds());
+            let selection = campaign::Selection { count, seed, class, rpm, stage };
+            println!("{}", campaign::bounds(rpm.is_some()));
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }
         Task::Dump { elf, board } => {

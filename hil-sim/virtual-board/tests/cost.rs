@@ -38,7 +38,7 @@ fn an_interrupt_above_a_limit_is_refused_by_its_figure() {
         check(&[row]).err().map(|why| why.to_string())
     };
     // 15 % of the 28 333 cycles of a period, and 3000 to the compare values.
-    assert_eq!(refused(3000, 4250), None);
-    assert!(refused(3000, 4251).is_some_and(|why| why.contains("4251 cycles, 4250 allowed")));
-    assert!(refused(3001, 4250).is_some_and(|why| why.contains("3001") && why.contains("3000")));
+    assert_eq!(refused(3000, 4391), None);
+    assert!(refused(3000, 4392).is_some_and(|why| why.contains("4392 cycles, 4391 allowed")));
+    assert!(refused(3001, 4391).is_some_and(|why| why.contains("3001") && why.contains("3000")));
 }

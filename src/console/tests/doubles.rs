@@ -98,6 +98,7 @@ impl DriveHandle for FakeDrive {
             hardware: Hardware::empty(),
             learning: self.drive.learning_progress(),
             limiting: self.drive.limiting(),
+            room: self.drive.room(),
             stator_resistance: self.drive.stator_resistance(),
             excited: self.drive.excited(),
         })

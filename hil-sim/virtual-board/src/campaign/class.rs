@@ -32,11 +32,14 @@ pub enum Run {
 pub type Bound = (f64, &'static str);
 
 /// A class of faults.
+#[derive(Clone, Copy)]
 pub struct Class {
     /// Its name.
     pub name: &'static str,
     /// Its bound.
     pub bound: Bound,
+    /// Its bound in a campaign at speed; none where it is not part of one.
+    at_speed: Option<Bound>,
     /// The angle sources that it is tried with.
     pub sources: &'static [Source],
     /// The procedure of its runs.
@@ -45,7 +48,8 @@ pub struct Class {
 
 /// A class of faults that are injected while the drive regulates with either angle source.
 const fn regulating(name: &'static str, bound: Bound, inject: Inject) -> Class {
-    Class { name, bound, sources: BOTH, run: Run::Regulating(inject) }
+    let at_speed = Some(bound);
+    Class { name, bound, at_speed, sources: BOTH, run: Run::Regulating(inject) }
 }
 
 impl Class {
@@ -53,9 +57,28 @@ impl Class {
     const fn with(self, sources: &'static [Source]) -> Self {
         Self { sources, ..self }
     }
+
+    /// The same with this bound at speed.
+    const fn at_speed(self, bound: Bound) -> Self {
+        Self { at_speed: Some(bound), ..self }
+    }
+
+    /// The same, but no part of a campaign at speed.
+    const fn not_at_speed(self) -> Self {
+        Self { at_speed: None, ..self }
+    }
+
+    /// The classes of a campaign with their bounds, at speed or not.
+    pub fn all(at_speed: bool) -> Vec<Self> {
+        let fast = |class: &Self| class.at_speed.map(|bound| Self { bound, ..*class });
+        CLASSES
+            .iter()
+            .filter_map(|class| if at_speed { fast(class) } else { Some(*class) })
+            .collect()
+    }
 }
 
-const BOTH: &[Source] = &[Source::Injection, Source::Encoder];
+const BOTH: &[Source] = &[Source::Sensorless, Source::Encoder];
 const ENCODER: &[Source] = &[Source::Encoder];
 
 /// From the first lost count of 5 % of them to the fault: 210 ms measured.
@@ -66,21 +89,23 @@ const PERIOD_MS: f64 = 1.0 / 6.0;
 const STEP_MS: f64 = 2.0 * PERIOD_MS;
 
 /// All classes.
-pub const CLASSES: &[Class] = &[
+const CLASSES: &[Class] = &[
     regulating("nothing (for comparison)", THROUGHOUT, |_, _, _| String::new()),
     regulating("current sensor stuck", SILENT, |board, target, rng| {
         let (which, now) = (target.any_current(rng), board.sample());
         let value = *current(which, &mut { now });
         board.disturb = Some(Box::new(move |s| *current(which, s) = value));
         format!("{} at {value}", name(which))
-    }),
+    })
+    .at_speed(SILENT_AT_SPEED),
     regulating("current sensor open", SILENT, |board, target, rng| {
         let which = target.any_current(rng);
         let line = target.line(which);
         let zero = (-line.offset / line.gain).round() as u16;
         board.disturb = Some(Box::new(move |s| *current(which, s) = zero));
         name(which).into()
-    }),
+    })
+    .at_speed(SILENT_AT_SPEED),
     regulating("current sensor saturated", SAMPLE, |board, target, rng| {
         let (which, high) = (target.any_current(rng), rng.random::<bool>());
         let code = if high { firmware_board::ADC_FULL_SCALE } else { 0 };
@@ -146,13 +171,13 @@ pub const CLASSES: &[Class] = &[
     )
     .with(ENCODER),
     regulating(
-        "encoder loses up to 2 % of its counts",
+        "encoder loses counts of up to 6 rpm",
         (0.0, "as a slip that is wrong by as much: control is correct throughout"),
-        |board, _, rng| losing(board, rng.random_range(0.0..0.02)),
+        |board, target, rng| losing(board, rng.random_range(0.0..6.0) / target.encoder_rpm),
     )
     .with(ENCODER),
     regulating(
-        "encoder loses 5 to 90 % of its counts at 900 rpm",
+        "encoder loses 5 to 90 % of its counts at 900 rpm and more",
         (
             LOST_COUNTS_MS,
             "the back-emf of the flux that is turned away, once it is there: with the rotor \
@@ -170,7 +195,8 @@ pub const CLASSES: &[Class] = &[
         ),
         |board, _, rng| losing(board, rng.random_range(0.02..0.9)),
     )
-    .with(ENCODER),
+    .with(ENCODER)
+    .not_at_speed(),
     regulating(
         "break pin",
         (firmware_board::BREAK_REACTION_NS as f64 * 1e-6, "the timer's filter; no software"),
@@ -188,13 +214,15 @@ pub const CLASSES: &[Class] = &[
     }),
     regulating("bit flip in the drive's state", LOCK, |board, target, rng| {
         flip(board, rng, target.state)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in the control's code", CHECK, |board, target, rng| {
         flip(board, rng, target.code)
     }),
     regulating("bit flip anywhere in the control's data", LOCK, |board, target, rng| {
         flip(board, rng, target.control)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating("bit flip in RAM, stack included", LOCK, |board, target, rng| {
         let area = if rng.random() {
             target.data
@@ -202,7 +230,8 @@ pub const CLASSES: &[Class] = &[
             Region { address: target.stack.end() - 1024, size: 1024 }
         };
         flip(board, rng, area)
-    }),
+    })
+    .at_speed(LOCK_AT_SPEED),
     regulating(
         "timer update dropped",
         (2.0 * STEP_MS, "five updates at most, each seen in its own period"),
@@ -274,18 +303,21 @@ pub const CLASSES: &[Class] = &[
     Class {
         name: "damaged page of the settings",
         bound: (0.0, "outputs are off; the other page holds"),
-        sources: &[Source::Injection],
+        at_speed: None,
+        sources: &[Source::Sensorless],
         run: Run::DamagedPage,
     },
     Class {
         name: "power lost in an operation of save",
         bound: (0.0, "outputs are off; the old or the new set holds"),
-        sources: &[Source::Injection],
+        at_speed: None,
+        sources: &[Source::Sensorless],
         run: Run::Saving,
     },
     Class {
         name: "reset pin at any time",
-        bound: (0.001, "the reset of the timer; no software"),
+        bound: RESET,
+        at_speed: Some(RESET),
         sources: BOTH,
         run: Run::Reset,
     },
@@ -293,6 +325,7 @@ pub const CLASSES: &[Class] = &[
 
 /// A carrier period, ms.
 const CARRIER_MS: f64 = 10.0 * PERIOD_MS;
+const RESET: Bound = (0.001, "the reset of the timer; no software");
 const THROUGHOUT: Bound = (0.0, "control is correct throughout");
 const SAMPLE: Bound = (STEP_MS, "the sample after it, and the step that sees it");
 /// Noise that turns the angle.
@@ -306,11 +339,20 @@ const SILENT: Bound = (
     70.0,
     "up to 60 ms until the axis has turned to the sensor, then three carrier periods of silence",
 );
+/// At speed there is no carrier: the voltage shows it, by more than the back-emf at once, or in the mean.
+const SILENT_AT_SPEED: Bound = (
+    150.0,
+    "without a carrier the voltage shows it, at the latest by its mean over 50 ms in the frame of the flux",
+);
 /// From any wrong angle to the right one or to the lock monitor's fault. The longest is 180 degrees, which
 /// looks right until the flux has decayed with the rotor time constant.
 const LOCK: Bound = (
     400.0,
     "a wrong angle: right again, or off by the lock monitor (measured there for 90, 120 and 180 degrees)",
+);
+const LOCK_AT_SPEED: Bound = (
+    400.0,
+    "a wrong angle: right again by the observer, or off as the voltage misses the flux where it is believed to be",
 );
 /// Compared and hashed by the main loop, 64 words of 5300 a pass, a pass a control period: 14 ms for all.
 const CHECK: Bound =

@@ -1,8 +1,11 @@
 //! The beginning of every injection: snapshots of a board that has started.
 
+use std::f64::consts::TAU;
+
 use anyhow::{Context, Result, ensure};
 use drive_core::{Settings, State};
 use hil_sim::Config;
+use hil_sim::experiments::full_range::for_the_range;
 use hil_sim::plant::Load;
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::{Flash, FlashError, Loaded, Saved};
@@ -16,13 +19,16 @@ use crate::memory::{Region, STORED};
 use crate::pair::Pair;
 use crate::power_stage::PowerStage;
 
-/// Current on the quadrature axis before the injection, A on the dissertation's motor.
+/// Current on the quadrature axis before the injection of a fault, A on the dissertation's motor. At speed it also generates.
 const TORQUE_A: f64 = 1.5;
-/// Held speeds of the shaft with the encoder, rad/s mechanical with four poles: 300 and 900 rpm. Without it the shaft is
-/// locked, where the injection alone knows the angle.
-const SPEEDS: [f64; 2] = [31.4, 94.2];
-/// Periods until the torque stands.
+/// Held speeds of the shaft with the encoder, rpm on four poles, in a campaign without a speed.
+const SPEEDS_RPM: [f64; 2] = [300.0, 900.0];
+/// Periods until the torque stands; and at speed, where the flux may be weakened.
 const SETTLING: u64 = 1200;
+const SETTLING_AT_SPEED: u64 = 3600;
+/// Periods in which the held shaft becomes faster by [`STEP_RPM`]: 1000 rpm/s on four poles.
+const STEP: u64 = 60;
+const STEP_RPM: f64 = 10.0;
 /// Periods until the rotor flux has decayed: 1.5 s are eight time constants.
 const DECAYED: u64 = 9000;
 /// Longest that learning takes, periods: ten minutes.
@@ -30,11 +36,11 @@ const LEARNING: u64 = 3_600_000;
 /// A setting that is changed and not saved yet.
 const CHANGE: (&str, f32) = ("command.timeout_s", 3600.0);
 
-/// The source of the flux angle, and the speed of the shaft.
+/// The source of the flux angle, and the speed of the shaft unless the campaign has one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The injection, with the shaft locked.
-    Injection,
+    /// No encoder: the injection, with the shaft locked; at speed the observer.
+    Sensorless,
     /// The encoder, at 300 rpm.
     Encoder,
     /// The encoder, at 900 rpm.
@@ -62,10 +68,12 @@ pub struct Target {
     pub relative_current: f64,
     /// Voltages in proportion to its dc link.
     pub relative_voltage: f64,
+    /// Speed of [`Source::Encoder`], rpm on four poles.
+    pub encoder_rpm: f64,
 }
 
 impl Target {
-    fn new(board: &Board, config: &Config, settings: Settings) -> Result<Self> {
+    fn new(board: &Board, config: &Config, settings: Settings, encoder_rpm: f64) -> Result<Self> {
         let Addresses { coefficients, state, control, .. } = board.addresses();
         let between = |first: &str, end: &str| {
             let address = board.image().symbol(first)?.address;
@@ -84,6 +92,7 @@ impl Target {
             settings,
             relative_current: config.amperes(1.0),
             relative_voltage: config.inverter.dc_link_v / Config::default().inverter.dc_link_v,
+            encoder_rpm,
         })
     }
 }
@@ -99,17 +108,25 @@ pub struct Scene {
     /// With the first set saved twice and the second one not yet; with the second one saved over the older
     /// of these, and the first one to be saved again.
     off: [Snapshot; 2],
-    injection: Snapshot,
-    encoder: [Snapshot; 2],
+    /// One with each torque: without the encoder, and with it at each speed.
+    sensorless: Vec<Snapshot>,
+    encoder: Vec<Vec<Snapshot>>,
 }
 
 impl Scene {
-    /// Starts a board with this power stage and a motor that suits it, once with each angle source.
+    /// Starts a board with this power stage and a motor that suits it, once with each angle source; at this speed, rpm on
+    /// four poles, with settings for the whole range, or without one.
     ///
     /// # Errors
     /// The board does not start.
-    pub fn new(image: Image, stage: &'static PowerStage) -> Result<Self> {
-        let config = stage.config()?;
+    pub fn new(image: Image, stage: &'static PowerStage, rpm: Option<f64>) -> Result<Self> {
+        let mut config = stage.config()?;
+        let (mut torques, mut speeds) = (vec![config.amperes(TORQUE_A)], SPEEDS_RPM.to_vec());
+        if let Some(rpm) = rpm {
+            config = for_the_range(&config)?;
+            torques.push(-torques[0]);
+            speeds = vec![rpm];
+        }
         let mut pair = Pair::new(image, Options::on(stage, &config, 1).set_up(&config)?)?;
         pair.order("set wiring_checked yes")?;
         if config.prepare.learn {
@@ -129,37 +146,40 @@ impl Scene {
         pair.order("save")?;
         pair.order(&format!("set {} {}", CHANGE.0, old.command.timeout_s))?;
         let off = [first, pair.board.keep()?];
-        let torque = format!("torque {}", config.amperes(TORQUE_A));
-        let injection = started(&mut pair, &torque)?;
-        pair.order("stop")?;
-        pair.until_state(State::Off)?;
-        pair.order("angle encoder")?;
-        let mut with_encoder = |speed| {
+        let settling = if rpm.is_some() { SETTLING_AT_SPEED } else { SETTLING };
+        started(&mut pair)?;
+        let mut held = 0.0;
+        while held < rpm.unwrap_or(0.0) {
+            held += STEP_RPM;
+            let speed = config.rpm(held.min(speeds[0])) * TAU / 60.0;
             pair.board.plant.set_load(Load::Speed { speed })?;
-            let started = started(&mut pair, &torque)?;
-            pair.order("stop")?;
-            pair.until_state(State::Off)?;
-            // A start takes a flux that has not decayed for a current that follows no voltage.
-            pair.run(DECAYED, |_, _| {})?;
-            anyhow::Ok(started)
+            pair.run(STEP, |_, _| {})?;
+        }
+        let sensorless = with_torques(&mut pair, &torques, settling)?;
+        pair.order("angle encoder")?;
+        let mut with_encoder = |rpm: &f64| {
+            pair.board.plant.set_load(Load::Speed { speed: config.rpm(*rpm) * TAU / 60.0 })?;
+            started(&mut pair)?;
+            with_torques(&mut pair, &torques, settling)
         };
-        let encoder = [with_encoder(config.rpm(SPEEDS[0]))?, with_encoder(config.rpm(SPEEDS[1]))?];
+        let encoder = speeds.iter().map(&mut with_encoder).collect::<Result<_>>()?;
         let settings = pair.shadow.settings();
         let board = pair.board;
-        let target = Target::new(&board, &config, settings)?;
-        Ok(Self { board, target, settings: [old, new], off, injection, encoder })
+        let target = Target::new(&board, &config, settings, speeds[0])?;
+        Ok(Self { board, target, settings: [old, new], off, sensorless, encoder })
     }
 
-    /// Regulating torque.
+    /// Regulating torque, at speed every other pair of turns a generating one.
     ///
     /// # Errors
     /// An error of the emulator.
-    pub fn regulating(&mut self, source: Source) -> Result<()> {
-        match source {
-            Source::Injection => self.board.go_back(&self.injection),
-            Source::Encoder => self.board.go_back(&self.encoder[0]),
-            Source::FastEncoder => self.board.go_back(&self.encoder[1]),
-        }
+    pub fn regulating(&mut self, source: Source, turn: u64) -> Result<()> {
+        let snapshots = match source {
+            Source::Sensorless => &self.sensorless,
+            Source::Encoder => &self.encoder[0],
+            Source::FastEncoder => &self.encoder[self.encoder.len() - 1],
+        };
+        self.board.go_back(&snapshots[(turn / 2) as usize % snapshots.len()])
     }
 
     /// Off, with settings that are not saved: the second set, to go to one slot, or the first, to go to the
@@ -172,14 +192,26 @@ impl Scene {
     }
 }
 
-fn started(pair: &mut Pair, torque: &str) -> Result<Snapshot> {
+fn started(pair: &mut Pair) -> Result<()> {
     pair.order("start torque")?;
-    pair.until_state(State::Torque)?;
-    pair.order(torque)?;
-    pair.run(SETTLING, |_, _| {})?;
-    // A control interrupt has just ended; half a period later nothing happens for a while.
-    pair.board.run_ticks(u64::from(induction_drive::board::PWM_TOP) / 2)?;
-    pair.board.keep()
+    pair.until_state(State::Torque)
+}
+
+/// A snapshot with each torque; then it stops.
+fn with_torques(pair: &mut Pair, torques: &[f64], settling: u64) -> Result<Vec<Snapshot>> {
+    let mut snapshots = Vec::new();
+    for torque in torques {
+        pair.order(&format!("torque {torque}"))?;
+        pair.run(settling, |_, _| {})?;
+        // A control interrupt has just ended; half a period later nothing happens for a while.
+        pair.board.run_ticks(u64::from(induction_drive::board::PWM_TOP) / 2)?;
+        snapshots.push(pair.board.keep()?);
+    }
+    pair.order("stop")?;
+    pair.until_state(State::Off)?;
+    // A start takes a flux that has not decayed for a current that follows no voltage.
+    pair.run(DECAYED, |_, _| {})?;
+    Ok(snapshots)
 }
 
 /// The stored part of the flash, as the firmware reads it.

@@ -1,0 +1,123 @@
+//! The status line.
+
+use core::f32::consts::TAU;
+use core::fmt;
+
+use drive_core::current::voltage_limit::VoltageLimit;
+use drive_core::dc_link::Limiting;
+use drive_core::io::PERIOD_S;
+use drive_core::{Settings, State};
+
+use super::Console;
+use super::handle::DriveHandle;
+use crate::board::CYCLES_PER_US;
+use crate::link::Status;
+use crate::modbus::cia402::{self, Power};
+use crate::settings::FirmwareSettings;
+
+impl Console {
+    /// Answers with the status line.
+    pub(super) fn status(&mut self, drive: &impl DriveHandle) {
+        let Some(status) = drive.status() else { return self.error(&drive.no_control()) };
+        let tracking = drive.tracking().filter(|_| status.state.regulates());
+        let staged = self.settings.count();
+        let line = fmt::from_fn(|f| {
+            line(f, &status, self.settings.in_force(), drive.stack())?;
+            if staged > 0 {
+                write!(f, "; {staged} staged")?;
+            }
+            let rotor = tracking.and_then(|report| report.estimate.ok()).map(|found| found.tau_r);
+            let settings = &self.settings.in_force().drive;
+            temperatures(f, status.stator_resistance, rotor, settings)?;
+            tracking.map_or(Ok(()), |report| write!(f, "; {report}"))
+        });
+        self.out.line(format_args!("{line}"));
+    }
+}
+
+/// Writes the status line: `stack` is the most bytes used and the size. Torque by 3/2 P L_m/L_r psi i_q (Eq. 2.7) with
+/// psi = L_m i_d; power at the shaft is torque times speed, electrical power 3/2 (v_d i_d + v_q i_q), without the carrier.
+///
+/// # Errors
+/// Those of the formatter.
+fn line(
+    f: &mut fmt::Formatter<'_>,
+    s: &Status,
+    settings: &FirmwareSettings,
+    (used, size): (usize, usize),
+) -> fmt::Result {
+    let power = Power::of(Some(s.state), cia402::bus_may_start(settings)).name();
+    let settings = &settings.drive;
+    let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
+    write!(f, "{}; {power}; ", s.state)?;
+    if s.limiting != Limiting::No {
+        write!(f, "limiting now, because: {}; ", s.limiting)?;
+    }
+    // While the drive is off, its signals are those of the last run.
+    if s.state != State::Off {
+        let (i, reference) = (t.current, t.reference);
+        let rpm = t.rotor_freq * (60.0 / PERIOD_S) / f32::from(motor.pole_pairs);
+        let torque = motor.torque_per_ampere(i.d) * i.q;
+        let shaft_w = torque * rpm * (TAU / 60.0);
+        let electrical_w = 1.5 * (t.voltage.d * i.d + t.voltage.q * i.q);
+        write!(f, "i_d {:.2} A, i_q {:.2} of {:.2} A, ", i.d, i.q, reference.q)?;
+        write!(f, "torque {torque:.2} Nm, speed {rpm:.1} rpm, position {:.3} turns, ", t.turns)?;
+        write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
+    }
+    if s.state == State::Off || s.state.regulates() {
+        torque_range(f, s, settings)?;
+    }
+    // Dc link and heat sink from the sample: the drive's own values stand still while it is off.
+    let dc_link = scales.dc_link.at(s.sample.dc_link);
+    let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
+    write!(f, "dc link {dc_link:.0} V, ")?;
+    write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
+    write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
+    write!(f, "stack {used} of {size}")
+}
+
+/// Writes the torque that the drive can give now, least and largest, with the direct current that is left there; of a shaft at
+/// rest while it is off.
+fn torque_range(f: &mut fmt::Formatter<'_>, s: &Status, settings: &Settings) -> fmt::Result {
+    let (i_d, largest) = (settings.i_d(), settings.current_limit_a());
+    let limit = VoltageLimit::new(&settings.motor, i_d, largest);
+    let (least, most, voltage) = if s.state.regulates() {
+        (s.room.i_q.0, s.room.i_q.1, s.room.voltage)
+    } else {
+        let most = limit.start().most.q.min(largest - s.room.too_hot_for);
+        (-most, most, 0.0)
+    };
+    let torque = |i_q: f32| {
+        let weakened = limit.direct(voltage, s.telemetry.flux_freq, i_q);
+        settings.motor.torque_per_ampere(if voltage > 0.0 { weakened } else { i_d }) * i_q
+    };
+    let (from, to) = (torque(least), torque(most));
+    write!(f, "torque now {from:.2} to {to:.2} Nm ({least:.2} to {most:.2} A), ")
+}
+
+/// Temperature of the settings' resistances, °C.
+const COLD_C: f32 = 25.0;
+/// Temperatures below 0 °C at which the resistance of copper, and of the aluminium of a cage, would be none.
+const COPPER_C: f32 = 235.0;
+const ALUMINIUM_C: f32 = 225.0;
+
+/// Writes the temperatures of stator and rotor that their tracked resistances mean, if those of the settings are of 25 °C:
+/// `R/R_25 = (c + T)/(c + 25)`. `stator` is relative to the settings, less one.
+///
+/// # Errors
+/// Those of the formatter.
+fn temperatures(
+    f: &mut fmt::Formatter<'_>,
+    stator: Option<f32>,
+    tau_r: Option<f32>,
+    settings: &Settings,
+) -> fmt::Result {
+    let celsius = |more: f32, metal: f32| COLD_C + more * (metal + COLD_C);
+    if let Some(more) = stator {
+        write!(f, "; stator {:.0} degC", celsius(more, COPPER_C))?;
+    }
+    tau_r.map_or(Ok(()), |tau_r| {
+        let more = settings.motor.tau_r() / tau_r - 1.0;
+        write!(f, "; rotor {:.0} degC", celsius(more, ALUMINIUM_C))
+    })
+}
