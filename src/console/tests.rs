@@ -10,19 +10,19 @@ mod torque;
 mod typing;
 mod wrong;
 
-use crate::boards;
-use drive_core::identify::learning::Verdict;
-use drive_core::identify::online::NoEstimate;
-use drive_core::io::PERIOD_S;
-use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State, Stop};
-
 use super::announce::ANNOUNCEMENTS;
 use super::help::HELP;
 use super::*;
+use crate::boards;
 use crate::link::trace::Trigger;
 use crate::rotor_tracking::Report;
 use crate::settings::keys;
 use doubles::{FakeDrive, FakePort, found};
+use drive_core::identify::learning::Verdict;
+use drive_core::identify::online::NoEstimate;
+use drive_core::io::PERIOD_S;
+use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State, Stop};
+use proptest::prelude::*;
 
 struct Talk {
     console: Console,

@@ -272,7 +272,7 @@ impl VoltsPerHertz {
         let square = seen.length_squared();
         if square > self.limit_a * self.limit_a {
             let beyond = 1.0 - self.limit_a / libm::sqrtf(square);
-            voltage = voltage - seen * (self.limiting * beyond);
+            voltage -= seen * (self.limiting * beyond);
         }
         let angle = state.angle;
         let applied = (angle + Angle::from_turns(AHEAD * state.freq)).unit_vector();

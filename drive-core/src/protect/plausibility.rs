@@ -140,9 +140,9 @@ const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
 
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
 const SMOOTHING: f32 = 0.276;
-/// Tolerated error of the expected back-emf as a share of it. 15° of angle error at 2 A make the flux 1.7
-/// times the estimated one.
-const EMF_SHARE: f32 = 1.0;
+/// Tolerated error of the expected back-emf as a share of it. The more, the longer a broken sensor drives the current at
+/// speed; half of it never stopped a run of `full-range` that the whole had not.
+const EMF_SHARE: f32 = 0.5;
 /// Share of the newest value in the mean in the frame of the flux: 50 ms.
 const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
 /// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.

@@ -102,7 +102,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("stop now", "the way to stop = now: not one of: ramp quick"),
         ("angle", "encoder or injection is missing"),
         ("angle guess", "angle_source = guess: not one of: encoder injection"),
-        ("start backwards", "the mode = backwards: not one of: torque speed position learning"),
+        ("start backwards", "the mode = backwards: not one of: torque speed position vf learning"),
         ("torque", "the current, A is missing"),
         ("torque 1 2", "too many words, from `2` on"),
         ("torque 1,5", "not a number: 1,5 (the current, A)"),

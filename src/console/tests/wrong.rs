@@ -6,7 +6,7 @@ const WRONG: [(&str, &[&str]); 65] = [
     ("torqe 1", &["torqe", "`torque`"]),
     ("quit", &["quit", "`help`"]),
     ("stop now", &["now"]),
-    ("start backwards", &["mode", "backwards", "torque speed position learning"]),
+    ("start backwards", &["mode", "backwards", "torque speed position vf learning"]),
     ("start speed 5", &["5"]),
     ("torque", &["current, A"]),
     ("torque one", &["current, A", "one"]),

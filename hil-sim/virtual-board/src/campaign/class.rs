@@ -339,9 +339,9 @@ const SILENT: Bound = (
     70.0,
     "up to 60 ms until the axis has turned to the sensor, then three carrier periods of silence",
 );
-/// At speed there is no carrier: the voltage shows it, by more than the back-emf at once, or in the mean.
+/// At speed there is no carrier: the voltage shows it, by more than half of the back-emf at once, or in the mean.
 const SILENT_AT_SPEED: Bound = (
-    150.0,
+    70.0,
     "without a carrier the voltage shows it, at the latest by its mean over 50 ms in the frame of the flux",
 );
 /// From any wrong angle to the right one or to the lock monitor's fault. The longest is 180 degrees, which
