@@ -287,7 +287,7 @@ faults! {
             "motor.* of another motor",
         ],
         "let the shaft slow down, then clear and start again";
-    Stalled = 49, "the motor stays at its current limit and hardly turns",
+    Stalled = 48, "the motor stays at its current limit and hardly turns",
         &[
             "shaft blocked, or a load beyond the torque that the current limit allows",
             "nameplate.* of another motor",

@@ -50,7 +50,7 @@ fn codes_never_change() {
         (45, Fault::ThermistorOpen),
         (46, Fault::ThermistorShorted),
         (47, Fault::NotCaught),
-        (49, Fault::Stalled),
+        (48, Fault::Stalled),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);
