@@ -29,7 +29,7 @@
 //! | `braking.flux_a` | 1 A | rated current |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
 //! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
-//! | `vf.boost_a` | 1.991 A | rated current; at most 0.6 of `limits.current_a` |
+//! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
 
 mod dc_link;
 mod motion;
@@ -59,7 +59,7 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 /// overshoot.
 const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
-const PEAK_OF_PHASE: f32 = 0.816_496_6;
+pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Band of the heat sink in which the current limit falls, K.
 const DERATING_C: f32 = 15.0;
 /// Frequency of the carrier, Hz.
