@@ -28,7 +28,7 @@ use crate::fault::Fault;
 use crate::io::Sample;
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
-use crate::protect::plausibility::{Resistance, RotorFlux};
+use crate::protect::plausibility::{Known, RotorFlux};
 use crate::settings::AngleSource;
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
@@ -207,8 +207,9 @@ impl Coefficients {
             s.prediction.forget_mean();
         }
         let tracked = self.observer.is_some() && !step.learning;
-        let resistance = Resistance { deviation: s.observer.resistance, tracked };
-        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, resistance);
+        let building = step.building;
+        let known = Known { deviation: s.observer.resistance, tracked, building };
+        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, known);
         // Flux that was left turns beside that which builds up.
         if step.looking || step.alone {
             s.prediction.forget();

@@ -104,13 +104,15 @@ pub struct RotorFlux {
     pub flux_freq: f32,
 }
 
-/// Stator resistance of the comparison.
+/// What is known of resistance and flux in a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Resistance {
-    /// Deviation from the settings, relative.
+pub struct Known {
+    /// Deviation of the stator resistance from the settings, relative.
     pub deviation: f32,
-    /// Whether it is tracked; otherwise it is as of the start.
+    /// Whether that is tracked; otherwise it is as of the start.
     pub tracked: bool,
+    /// Whether the flux of a turning shaft builds up.
+    pub building: bool,
 }
 
 /// State of the comparison.
@@ -141,8 +143,10 @@ const JUDGED_EVERY: usize = CARRIER_SAMPLES / 2;
 /// Share of the newest value in the filtered unexplained voltage: 2.6 ms.
 const SMOOTHING: f32 = 0.276;
 /// Tolerated error of the expected back-emf as a share of it. The more, the longer a broken sensor drives the current at
-/// speed; half of it never stopped a run of `full-range` that the whole had not.
+/// speed; half of it never stopped a run of `full-range` that the whole had not, but for starts on a turning shaft, whose flux
+/// is not as large yet as it is believed to be.
 const EMF_SHARE: f32 = 0.5;
+const EMF_SHARE_BUILDING: f32 = 1.0;
 /// Share of the newest value in the mean in the frame of the flux: 50 ms.
 const MEAN_SMOOTHING: f32 = JUDGED_EVERY as f32 * PERIOD_S / 0.050;
 /// Tolerated share of the back-emf in that mean: a flux that is gone, or elsewhere, misses all of it.
@@ -190,18 +194,17 @@ impl Prediction {
         &self,
         state: &mut PredictionState,
         current: AlphaBeta,
-        resistance: Resistance,
+        known: Known,
     ) -> Result<(), Fault> {
         const MEAN: f32 = 1.0 / JUDGED_EVERY as f32;
         let changed = (current - state.last) * self.pole + state.currents * (1.0 - self.pole);
-        let explained =
-            changed * self.per_ampere + state.currents * (self.r_s * resistance.deviation);
+        let explained = changed * self.per_ampere + state.currents * (self.r_s * known.deviation);
         let unexplained = (explained - state.taken) * MEAN - state.rotor;
         state.unexplained += (unexplained - state.unexplained) * SMOOTHING;
         (state.last, state.currents) = (current, AlphaBeta::ZERO);
         // The two uncertainties are independent: their squares add.
-        let allowed =
-            self.allowed * self.allowed + EMF_SHARE * EMF_SHARE * state.rotor.length_squared();
+        let share = if known.building { EMF_SHARE_BUILDING } else { EMF_SHARE };
+        let allowed = self.allowed * self.allowed + share * share * state.rotor.length_squared();
         // NaN fails the comparison.
         let explained = state.unexplained.length_squared() <= allowed;
         if !explained {
@@ -209,8 +212,7 @@ impl Prediction {
         }
         let (axis, emf) = state.flux;
         state.mean += (unexplained.to_dq(axis) - state.mean) * MEAN_SMOOTHING;
-        let allowed =
-            self.allowed_mean[usize::from(resistance.tracked)] + MEAN_EMF_SHARE * emf.abs();
+        let allowed = self.allowed_mean[usize::from(known.tracked)] + MEAN_EMF_SHARE * emf.abs();
         let explained = state.mean.length_squared() <= allowed * allowed;
         if explained { Ok(()) } else { Err(Fault::FluxNotAsPredicted) }
     }

@@ -99,7 +99,7 @@ fn run(
                 },
             ),
             3 | 8 => {
-                if let Err(fault) = prediction.judge(&mut state, current, Resistance::default()) {
+                if let Err(fault) = prediction.judge(&mut state, current, Known::default()) {
                     return (state.unexplained, Some((n, fault)));
                 }
             }
@@ -150,7 +150,7 @@ fn a_flux_that_is_gone_is_seen_in_the_mean_of_its_voltage() {
 fn the_resistance_that_is_tracked_is_reckoned_with() {
     let prediction = Prediction::new(&Motor::default(), PLANT, 12.0, [6.0, 3.0]);
     let current = AlphaBeta::new(2.0, 0.0);
-    let judged = |resistance: Resistance| {
+    let judged = |known: Known| {
         let mut state = PredictionState { last: current, ..PredictionState::default() };
         // The voltage that the model of the cold motor needs, and that of the warm motor.
         let cold = current * ((1.0 - PLANT.p) / PLANT.k) as f32;
@@ -158,13 +158,13 @@ fn the_resistance_that_is_tracked_is_reckoned_with() {
         (0..600).try_for_each(|_| {
             (0..JUDGED_EVERY).for_each(|_| state.collect(current, warm));
             state.latch_voltage();
-            prediction.judge(&mut state, current, resistance)
+            prediction.judge(&mut state, current, known)
         })
     };
     let fault = Err(Fault::FluxNotAsPredicted);
-    assert_eq!(judged(Resistance { deviation: 0.0, tracked: false }), Ok(()));
-    assert_eq!(judged(Resistance { deviation: 0.0, tracked: true }), fault);
-    assert_eq!(judged(Resistance { deviation: 0.3, tracked: true }), Ok(()));
+    assert_eq!(judged(Known { deviation: 0.0, tracked: false, building: false }), Ok(()));
+    assert_eq!(judged(Known { deviation: 0.0, tracked: true, building: false }), fault);
+    assert_eq!(judged(Known { deviation: 0.3, tracked: true, building: false }), Ok(()));
 }
 
 #[test]
