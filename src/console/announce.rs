@@ -99,7 +99,9 @@ impl Announcer {
                     (State::Learning | State::Stopping, State::Learning) if !asked => {
                         Some(News::Off("the learning has ended"))
                     }
-                    (State::Stopping, _) => Some(News::Off("stopped")),
+                    (State::Stopping | State::Braking | State::VoltsPerHertz, _) => {
+                        Some(News::Off("stopped"))
+                    }
                     // At once, and answered.
                     _ if asked => None,
                     _ => Some(News::Off("the start has ended")),

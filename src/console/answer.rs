@@ -310,9 +310,10 @@ impl Console {
         Some(applied)
     }
 
-    /// Starts the drive; the first time since the defaults were set with a check of the wiring.
+    /// Starts the drive; the first time since the defaults were set with a check of the wiring. With voltage and frequency its
+    /// boost is a check at every start.
     pub(super) fn start(&mut self, mode: Mode, drive: &mut impl DriveHandle) {
-        if self.settings.in_force().command.wiring_checked {
+        if self.settings.in_force().command.wiring_checked || mode == Mode::VoltsPerHertz {
             return self.give(Command::Start(mode), "", drive);
         }
         let began = drive.status().map(|status| status.periods);

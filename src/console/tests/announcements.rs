@@ -20,6 +20,7 @@ fn in_state(state: State) -> Rig {
     let mode = match state {
         State::Speed => Mode::Speed,
         State::Position => Mode::Position,
+        State::VoltsPerHertz => Mode::VoltsPerHertz,
         State::Learning => Mode::Learning,
         _ => Mode::Torque,
     };
@@ -162,6 +163,21 @@ fn the_end_of_a_start_and_of_a_stop_is_told() {
     // A stop that is off at once is answered with ok.
     talk.ask("start");
     assert_eq!(talk.say("stop\n"), ["ok"]);
+    // With voltage and frequency there is no torque to take away first; by the ramp the shaft comes to rest.
+    for stop in [Stop::Coast, Stop::Ramp] {
+        let mut rig = in_state(State::VoltsPerHertz);
+        let mut talk = Talk::new();
+        talk.drive.drive = rig.drive.clone();
+        assert_eq!(talk.say(""), ["running: vf"]);
+        rig.command(&Command::Stop(stop)).unwrap();
+        if stop == Stop::Ramp {
+            talk.drive.drive = rig.drive.clone();
+            assert!(talk.say("").is_empty());
+            rig.step();
+        }
+        talk.drive.drive = rig.drive;
+        assert_eq!(talk.say(""), ["off: stopped"]);
+    }
 }
 
 #[test]
