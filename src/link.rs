@@ -34,7 +34,7 @@ pub struct Status {
     pub learning: Option<(usize, usize)>,
     /// Why the torque is smaller than asked for.
     pub limiting: Limiting,
-    /// What limits the torque.
+    /// Limits of the torque.
     pub room: Room,
     /// Tracked stator resistance relative to the settings, less one.
     pub stator_resistance: Option<f32>,

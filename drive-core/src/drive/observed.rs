@@ -44,7 +44,7 @@ pub struct Telemetry {
     pub turns: f32,
 }
 
-/// What limits the torque now.
+/// Limits of the present torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Room {
     /// Least and largest torque current, A, at the present speed, dc link and heat sink; only while the drive regulates.
@@ -81,7 +81,7 @@ impl Drive {
         }
     }
 
-    /// What limits the torque now.
+    /// Limits of the present torque.
     pub fn room(&self) -> Room {
         let s = &self.control;
         let voltage = s.voltage_limit.available;

@@ -194,7 +194,7 @@ impl Default for VoltsPerHertzState {
     }
 }
 
-/// What a period allows and asks for.
+/// Demand and limits of a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Frequency of the rotor that is asked for, electrical turns per period.

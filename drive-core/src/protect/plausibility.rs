@@ -104,7 +104,7 @@ pub struct RotorFlux {
     pub flux_freq: f32,
 }
 
-/// What is known of resistance and flux in a comparison.
+/// Knowledge of resistance and flux in a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Known {
     /// Deviation of the stator resistance from the settings, relative.
