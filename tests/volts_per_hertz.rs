@@ -78,7 +78,7 @@ fn motors_turn_by_their_nameplates() {
             assert!((free - rpm).abs() < 0.01 * rated_rpm, "{motor:?}: {free} of {rpm}");
             assert!((loaded - rpm).abs() < 0.03 * rated_rpm, "{motor:?}: {loaded} of {rpm}");
             assert!(peak.max(loaded_peak) < limit, "{motor:?}: {peak} {loaded_peak} A");
-            // What the drive shows is what the shaft does.
+            // The drive shows the speed of the shaft.
             let pairs = f64::from(config.drive.motor.pole_pairs);
             let shown = f64::from(rig.drive.telemetry().rotor_freq) * 6000.0 * 60.0 / pairs;
             assert!((shown - loaded).abs() < 0.03 * rated_rpm, "{motor:?}: {shown} {loaded}");

@@ -55,7 +55,7 @@ impl Plate {
         let most = safe / (LEAST_CURRENT * SQRT_2);
         checked("nameplate.current_a", "A", plate.current_a, 0.0, most)?;
         let rated = settings.rated_a();
-        let z_b = plate.voltage_v / (SQRT_3 * plate.current_a);
+        let z_b = plate.base_impedance();
         Ok(Self {
             amperes: rated.min(safe).min(settings.trip_a() / 1.15),
             z_b,

@@ -74,8 +74,8 @@ impl Drive {
     /// Electrical speed of the rotor, turns per period.
     pub(super) fn rotor_freq(&self) -> f32 {
         let s = &self.control;
-        match (self.mode, &self.c.volts_per_hertz) {
-            (Mode::VoltsPerHertz, Some(turning)) => turning.rotor_freq(&s.turning),
+        match self.mode {
+            Mode::VoltsPerHertz => s.turning.rotor_freq(),
             _ if self.counts() => s.indirect.rotor_freq,
             _ => s.estimator.rotor_freq,
         }

@@ -9,7 +9,6 @@ use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertz, VoltsPerHertzSettings};
 use crate::io::{Compare, PERIOD_S};
-use crate::math::frames::SQRT_3;
 use crate::settings::Settings;
 use crate::settings::rules::PEAK_OF_PHASE;
 
@@ -39,7 +38,7 @@ impl Settings {
                 rated_a: self.rated_a(),
                 limit_a: self.current_limit_a(),
                 boost_a: self.boost_a(),
-                impedance: plate.voltage_v / (SQRT_3 * plate.current_a),
+                impedance: plate.base_impedance(),
                 lost_v: self.share_of_dc_link(LOST_V),
                 ramp_hz_per_s: self.ramp_rpm_per_s() / 60.0 * pole_pairs,
                 slip_share: self.vf.slip_share,
@@ -58,7 +57,7 @@ impl Drive {
     pub(super) fn turn_by_voltage(&mut self, measured: &Measured) -> Result<Compare, State> {
         let (c, s) = (&self.c, &mut self.control);
         let Some(turning) = &c.volts_per_hertz else { return Err(State::Off) };
-        let rotor_freq = turning.rotor_freq(&s.turning);
+        let rotor_freq = s.turning.rotor_freq();
         let stops = self.state == State::Braking;
         if stops && rotor_freq.abs() < STANDS {
             return Err(State::Off);

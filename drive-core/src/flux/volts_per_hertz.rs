@@ -218,6 +218,13 @@ pub struct Turned {
     pub voltage: Dq,
 }
 
+impl VoltsPerHertzState {
+    /// Speed of the rotor, electrical turns per period.
+    pub fn rotor_freq(&self) -> f32 {
+        self.ramp
+    }
+}
+
 impl VoltsPerHertz {
     /// For a motor with these data, all greater than zero.
     pub fn new(s: &VoltsPerHertzSettings) -> Self {
@@ -283,11 +290,6 @@ impl VoltsPerHertz {
     /// Whether the boost stands, and references act.
     pub fn is_built(&self, state: &VoltsPerHertzState) -> bool {
         state.held >= self.holds
-    }
-
-    /// Speed of the rotor, electrical turns per period.
-    pub fn rotor_freq(&self, state: &VoltsPerHertzState) -> f32 {
-        state.ramp
     }
 
     /// The voltage of a motor that stands, while its current rises.

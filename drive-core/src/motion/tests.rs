@@ -14,7 +14,7 @@ fn motion(limit: f32, ramp: f32) -> Motion {
     Motion::new(&design, COUNTS, limit, &Ramps { usual: ramp, quick: 3.0 * ramp, rise_s: 0.0 }, 3.0)
 }
 
-/// What a rigid rotor, in f64, did in some seconds.
+/// Result of a run of a rigid rotor, in f64.
 #[derive(Debug, Default)]
 struct Done {
     /// Position, speed.

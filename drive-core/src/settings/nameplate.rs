@@ -1,5 +1,7 @@
 //! The nameplate of the motor.
 
+use crate::math::frames::SQRT_3;
+
 /// The data on the nameplate of the motor, for the star connection. The rules take the currents and the speed of the
 /// drive from it; see [`rules`](super::rules).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +27,11 @@ impl Nameplate {
         frequency_hz: 60.0,
         speed_rpm: 1720.0,
     };
+
+    /// Base impedance of a phase, ohm.
+    pub(crate) fn base_impedance(&self) -> f32 {
+        self.voltage_v / (SQRT_3 * self.current_a)
+    }
 }
 
 impl Default for Nameplate {

@@ -58,7 +58,7 @@ impl Class {
         Self { sources, ..self }
     }
 
-    /// The same with this bound at speed.
+    /// This class with another bound at speed.
     const fn at_speed(self, bound: Bound) -> Self {
         Self { at_speed: Some(bound), ..self }
     }
