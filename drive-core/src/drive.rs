@@ -96,6 +96,8 @@ pub struct Drive {
     wiring: WiringCheckState,
     /// Starts so far, wrapping.
     starts: u32,
+    /// Count of the encoder at position 0, where that was set.
+    home: Option<u32>,
     learned: Option<Learned>,
     thermal: ThermalLoads,
     relay: RelayState,
@@ -109,8 +111,10 @@ struct References {
     speed: f32,
     /// Periods for which the speed holds where it is a jog; 0 where it is none.
     jog: u32,
-    /// Mechanical turns.
-    turns: f32,
+    /// Mechanical turns; `None`: where the drive was started.
+    turns: Option<f32>,
+    /// Largest torque current with which position mode presses on at the speed, A; `None`: it goes to the position.
+    press: Option<f32>,
     /// Added to the voltage of the current loop, V.
     test_voltage: Dq,
     /// Injection axis seen from the frame.
@@ -126,7 +130,8 @@ impl Default for References {
             current: Dq::ZERO,
             speed: 0.0,
             jog: 0,
-            turns: 0.0,
+            turns: None,
+            press: None,
             test_voltage: Dq::ZERO,
             injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
             lead: Angle::ZERO,
@@ -202,6 +207,7 @@ impl Drive {
             wiring_unchecked: false,
             wiring: WiringCheckState::default(),
             starts: 0,
+            home: None,
             learned: None,
             thermal: ThermalLoads::default(),
             relay: RelayState::default(),

@@ -26,6 +26,7 @@
 //! | [`supply`] | precharge relay |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
 //! | [`learned`] | what a learning has found |
+//! | [`homing`] | finding a stop of the shaft |
 //! | [`commission`] | from the nameplate to the parameters of the motor |
 //! | [`identify`] | learning of the tracking reference; rotor time constant while running |
 //! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
@@ -53,6 +54,7 @@ mod drive;
 pub mod fault;
 pub mod filter;
 pub mod flux;
+pub mod homing;
 pub mod identify;
 pub mod io;
 pub mod learned;

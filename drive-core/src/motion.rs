@@ -116,7 +116,8 @@ pub struct MotionState {
     speed: f32,
     /// Speed reference before limit and ramp, turns/s.
     wanted: f32,
-    origin: u32,
+    /// Count at position 0.
+    pub(crate) origin: u32,
     last: Option<u32>,
     phase: u8,
     /// Steps of the loops for which the rotor was at rest, up to [`REST_STEPS`].
@@ -183,6 +184,13 @@ impl Motion {
             rest: 0,
             output: i_q,
         };
+    }
+
+    /// Makes the position `turns` position 0; returns its count.
+    pub fn shift_origin(&self, state: &mut MotionState, turns: f32) -> u32 {
+        let counts = (turns / self.turns_per_count) as i32;
+        state.origin = state.origin.wrapping_add_signed(counts);
+        state.origin
     }
 
     /// Whether reference and rotor have been at rest for 0.1 s.

@@ -283,6 +283,8 @@ fn words(command: &Command) -> String {
         Command::Speed(rpm) => format!("a speed of {rpm} rpm"),
         Command::Jog(rpm) => format!("to jog at {rpm} rpm"),
         Command::Position(turns) => format!("a position of {turns} turns"),
+        Command::Press(rpm, a) => format!("to press on at {rpm} rpm with {a} A"),
+        Command::Home(turns) => format!("to take the position {turns} for 0"),
         Command::Magnetising(a) => format!("a magnetising current of {a} A"),
         Command::TurnInjection(deg) => format!("to turn the injection axis by {deg}°"),
         Command::TestVoltage(v) => format!("a test voltage of {} V and {} V (d, q)", v.d, v.q),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{self, Target};
-use crate::{control, paths, run, sections, sources};
+use crate::{control, paths, run, sections, sources, stack};
 
 /// The name that probe-rs has for the controller of the board.
 pub const CHIP: &str = "STM32G474RETx";
@@ -71,6 +71,7 @@ pub fn folder() -> Result<PathBuf> {
 fn check(elf: &Path) -> Result<()> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
     control::check(&bytes).context("the control interrupt")?;
+    stack::check_interrupts(&bytes).context("the bank of the settings")?;
     paths::check(&bytes)?;
     sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)
 }

@@ -28,15 +28,15 @@ pub fn report(elf: &Path) -> Result<()> {
         println!("{:<8} {used:>9} {of:>9} {percent:>5.1}%   {}", region.name, list.join(", "));
     }
     let named = |names: &[&str]| sum(&sections, |s| names.contains(&s.name));
-    let (code, constants) = (named(&[".vector_table", ".text", ".ccm"]), named(&[".rodata"]));
+    let code = named(&[".vector_table", ".design", ".text", ".ccm", ".background"]);
+    let constants = named(&[".rodata"]);
     let ram = named(&[".data", ".bss", ".uninit", ".control_data"]);
     let trace = sum(&map::entries(&map, Level::Symbol), |symbol| symbol.name.contains(TRACE));
     println!("code {code}, constants {constants}, static RAM {ram} with {trace} for the trace");
 
     let region = |name| regions.iter().find(|r| r.name == name).context("memory.x lacks a memory");
     let (flash, stack) = (region("FLASH")?, region("STACK")?);
-    // 99/100 of the first bank (253.4 of 256 KiB); the other has the control code's copy and the settings. The
-    // code in CCM has memories of its own, CONTROL and CCM, which the linker checks.
+    // 99/100 of the first bank (253.4 of 256 KiB). The linker checks the memories of the second, and CCM.
     let flash_used = sum(&sections, |section| flash.takes(section));
     run::limit("code and constants", flash_used, flash.length / 100 * 99, "bytes")?;
     run::limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT, "bytes")?;
@@ -94,6 +94,7 @@ mod tests {
             [
                 ("FLASH", 0x0800_0000, 256),
                 ("CONTROL", 0x0804_0000, 32),
+                ("DESIGN", 0x0804_8000, 192),
                 // Overflows where there is no memory.
                 ("STACK", 0x2000_0000, 34),
                 // To 96, not 128: CCM is mapped again behind it.

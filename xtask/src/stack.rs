@@ -10,9 +10,9 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use object::read::elf::ElfFile32;
-use object::{Object, ObjectSymbol, SymbolKind};
+use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use crate::elf::{self, Instruction};
 
@@ -38,7 +38,9 @@ const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write
 /// Part of the name of a veneer, which ends with the name of its target.
 const VENEER: &str = "LongThunk_";
 /// Sections with code.
-const SECTIONS: [&str; 2] = [".text", ".ccm"];
+const SECTIONS: [&str; 4] = [".text", ".ccm", ".design", ".background"];
+/// The section with code in the bank that is written: no interrupt may need it.
+const WRITTEN_BANK: &str = ".background";
 
 /// One function.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -63,6 +65,28 @@ pub fn worst_case(image: &[u8]) -> Result<u32> {
         let depths = names.iter().map(|name| depth_of(&functions, name));
         Ok(sum + EXCEPTION + depths.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
     })
+}
+
+/// Fails if an interrupt can come, by calls that name their target, to code in the bank of the flash that is written.
+pub fn check_interrupts(image: &[u8]) -> Result<()> {
+    let elf: ElfFile32 = ElfFile32::parse(image)?;
+    let section = elf.section_by_name(WRITTEN_BANK).context(WRITTEN_BANK)?;
+    let bank = section.address()..section.address() + section.size();
+    let functions = functions(image)?;
+    let named = |name: &str| functions.iter().find(|(_, f)| f.name == name).map(|(at, _)| *at);
+    let mut left: Vec<u32> =
+        INTERRUPTS.iter().flat_map(|names| names.iter()).filter_map(|n| named(n)).collect();
+    let mut seen = left.clone();
+    while let Some(at) = left.pop() {
+        let Some(function) = functions.get(&at) else { continue };
+        ensure!(!bank.contains(&at.into()), "an interrupt can come to {}", function.name);
+        let target = function.name.split_once(VENEER).and_then(|(_, name)| named(name));
+        let next = function.calls.iter().copied().chain(target).filter(|at| !seen.contains(at));
+        let next: Vec<u32> = next.collect();
+        seen.extend(&next);
+        left.extend(next);
+    }
+    Ok(())
 }
 
 fn functions(image: &[u8]) -> Result<Functions> {

@@ -33,9 +33,15 @@ pub enum Command {
     /// A speed as [`Speed`](Self::Speed), while the drive regulates the speed, that ends by the ramp when it is not given again
     /// within 0.5 s; a `Speed` ends it as well.
     Jog(f32),
-    /// Reference of the position, mechanical turns from where the drive was started; limited to
-    /// the counted range.
+    /// Reference of the position, mechanical turns from where the drive was started, or from [`Home`](Self::Home); limited
+    /// to the counted range. It ends [`Press`](Self::Press).
     Position(f32),
+    /// While the drive regulates the position: turn at this speed, mechanical rpm, with at most this torque current, A peak,
+    /// instead, to find a stop; see [`homing`](crate::homing). The speed is limited to `speed.limit_rpm`.
+    Press(f32, f32),
+    /// While the drive regulates the position: this position, mechanical turns, is 0 from now on, and the shaft goes there.
+    /// With the encoder as angle source this holds until new settings; without, until the next start.
+    Home(f32),
     /// Reference of the direct-axis (magnetising) current, A peak.
     Magnetising(f32),
     /// Turn the injection axis by this many electrical degrees away from phi + 90°, to map delta_i

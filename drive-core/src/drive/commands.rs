@@ -67,8 +67,42 @@ impl Drive {
             Command::Position(turns) => {
                 self.takes_references(Mode::Position, turns)?;
                 let taken = limited(turns, self.c.motion.position_limit);
-                self.control.references.turns = taken;
+                if self.control.references.press.is_some() {
+                    self.rest_here();
+                }
+                self.control.references.turns = Some(taken);
                 Ok(accepted(turns, taken))
+            }
+            Command::Press(rpm, i_q) => {
+                self.takes_references(Mode::Position, rpm)?;
+                let max = self.c.protection.i_q;
+                if self.state != State::Position {
+                    return Err(Refused::State(self.state));
+                }
+                if !(0.0..=max).contains(&i_q) {
+                    return Err(Refused::OutOfRange { min: 0.0, max });
+                }
+                self.rest_here();
+                let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
+                let r = &mut self.control.references;
+                (r.speed, r.press) = (taken / 60.0, Some(i_q));
+                Ok(accepted(rpm, taken))
+            }
+            Command::Home(turns) => {
+                self.takes_references(Mode::Position, turns)?;
+                if self.state != State::Position {
+                    return Err(Refused::State(self.state));
+                }
+                let max = self.c.motion.position_limit;
+                if turns.abs() > max {
+                    return Err(Refused::OutOfRange { min: -max, max });
+                }
+                self.rest_here();
+                let s = &mut self.control;
+                let origin = self.c.motion.shift_origin(&mut s.motion, turns);
+                s.references.turns = Some(0.0);
+                self.home = (self.c.source == AngleSource::Encoder).then_some(origin);
+                Ok(Accepted::AsGiven)
             }
             Command::Magnetising(i_d) => {
                 self.takes_references(self.mode, i_d)?;
@@ -137,8 +171,16 @@ impl Drive {
         Ok(accepted(rpm, taken))
     }
 
+    /// Lets the position loop begin anew where the shaft is, without torque.
+    fn rest_here(&mut self) {
+        let s = &mut self.control;
+        self.c.motion.take_over(&mut s.motion, s.seen.rotor_count, 0.0, 0.0);
+        s.references.press = None;
+    }
+
     fn configure(&mut self, coefficients: &Coefficients) {
         self.c = *coefficients;
+        self.home = None;
         self.changes = self.changes.wrapping_add(1);
     }
 

@@ -89,7 +89,7 @@ impl Drive {
         let r = &self.control.references;
         if !self.c.is_finite() {
             Some(Fault::NonFiniteSettings)
-        } else if !(r.current.is_finite() && (r.speed + r.turns).is_finite()) {
+        } else if !(r.current.is_finite() && (r.speed + r.turns.unwrap_or(0.0)).is_finite()) {
             Some(Fault::NonFiniteCommand)
         } else if !self.control.estimator.is_finite() {
             Some(Fault::NonFiniteState)

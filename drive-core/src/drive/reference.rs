@@ -4,6 +4,7 @@ use super::{Drive, References};
 use crate::dc_link::Limiting;
 use crate::drive::state::{Mode, State};
 use crate::math::frames::Dq;
+use crate::math::limited;
 use crate::motion::Goal;
 
 impl References {
@@ -55,12 +56,17 @@ impl Drive {
     /// The torque current of the speed or the position loop, A.
     fn follow(&mut self) -> f32 {
         let s = &mut self.control;
-        let goal = match (self.state, self.mode) {
-            (State::Braking, _) => Goal::Rest { quick: s.quick_stop },
-            (_, Mode::Speed) => Goal::Speed(s.references.speed_now()),
-            _ => Goal::Position(s.references.turns),
+        let (r, mut range) = (&mut s.references, s.limits.i_q);
+        let goal = match (self.state, self.mode, r.press) {
+            (State::Braking, ..) => Goal::Rest { quick: s.quick_stop },
+            (_, Mode::Speed, _) => Goal::Speed(r.speed_now()),
+            (_, _, Some(most)) => {
+                range = (limited(range.0, most), limited(range.1, most));
+                Goal::Speed(r.speed)
+            }
+            _ => Goal::Position(r.turns.unwrap_or(0.0)),
         };
-        let i_q = self.c.motion.step(&mut s.motion, goal, s.seen.rotor_count, s.limits.i_q);
+        let i_q = self.c.motion.step(&mut s.motion, goal, s.seen.rotor_count, range);
         s.references.current.q = i_q;
         if self.state == State::Braking && self.c.motion.is_at_rest(&s.motion) {
             self.enter(State::Stopping);

@@ -110,6 +110,11 @@ impl Drive {
             AngleSource::Injection => s.count_by_flux(),
         };
         self.c.motion.start(&mut s.motion, s.seen.rotor_count);
+        if let Some(home) = self.home {
+            s.motion.origin = home;
+            let here = self.c.motion.turns(&s.motion, s.seen.rotor_count);
+            s.references.turns.get_or_insert(here);
+        }
         self.enter(State::Magnetising);
     }
 

@@ -37,6 +37,12 @@ pub struct MechanicsSettings {
     pub static_torque: f64,
     /// Amplitude of a load torque that varies once a turn with the cosine of the rotor angle, N m.
     pub once_torque: f64,
+    /// Stops on both sides, this far from angle 0, mechanical rad; 0 is none.
+    pub stops: f64,
+    /// Stiffness of a stop, N m/rad.
+    pub stop_stiffness: f64,
+    /// Damping of a stop, N m s/rad: with the other defaults, 0.65 of the speed comes back.
+    pub stop_damping: f64,
     /// Inertia behind an elastic coupling, where the load acts, kg m^2; 0 is none.
     pub load_inertia: f64,
     /// Stiffness of the coupling, N m/rad.
@@ -54,6 +60,9 @@ impl Default for MechanicsSettings {
             friction: 0.001,
             static_torque: 0.0,
             once_torque: 0.0,
+            stops: 0.0,
+            stop_stiffness: 100.0,
+            stop_damping: 0.3,
             load_inertia: 0.0,
             stiffness: 100.0,
             damping: 0.0,
@@ -79,11 +88,26 @@ pub struct Mechanics {
 struct Extras {
     static_torque: f64,
     once_torque: f64,
+    stops: f64,
+    stop_stiffness: f64,
+    stop_damping: f64,
     coupling: Option<Coupling>,
-    /// Torque once a turn in this period.
-    once: f64,
+    /// Torque by the angle in this period.
+    by_angle: f64,
     /// Speed at the start of the step; 0 also while friction holds the shaft.
     speed: f64,
+}
+
+impl Extras {
+    /// Torque of the stop that the shaft has reached: it pushes, and does not pull.
+    fn stop_torque(&self, angle: f64) -> f64 {
+        let beyond = angle.abs() - self.stops;
+        if self.stops == 0.0 || beyond <= 0.0 {
+            return 0.0;
+        }
+        let outwards = self.speed * angle.signum();
+        (self.stop_stiffness * beyond + self.stop_damping * outwards).max(0.0) * angle.signum()
+    }
 }
 
 /// The elastic coupling and the inertia behind it.
@@ -109,6 +133,11 @@ impl Mechanics {
         let s = settings;
         check("mechanics.static_torque", s.static_torque, 0.0..=1000.0, "N m")?;
         check("mechanics.once_torque", s.once_torque, 0.0..=1000.0, "N m")?;
+        check("mechanics.stops", s.stops, 0.0..=1e4, "rad")?;
+        // With the inertia a resonance of 100 Hz at most: the torque is constant within a PWM period.
+        let most = s.inertia * 628.0 * 628.0;
+        check("mechanics.stop_stiffness", s.stop_stiffness, 0.0..=most.max(100.0), "N m/rad")?;
+        check("mechanics.stop_damping", s.stop_damping, 0.0..=1000.0, "N m s/rad")?;
         if s.load_inertia != 0.0 {
             check("mechanics.load_inertia", s.load_inertia, 1e-6..=1000.0, "kg m^2")?;
         }
@@ -125,12 +154,16 @@ impl Mechanics {
             speed: 0.0,
             torque: 0.0,
         });
-        let plain = coupling.is_none() && s.static_torque == 0.0 && s.once_torque == 0.0;
+        let plain =
+            coupling.is_none() && (s.static_torque, s.once_torque, s.stops) == (0.0, 0.0, 0.0);
         let extras = Extras {
             static_torque: s.static_torque,
             once_torque: s.once_torque,
+            stops: s.stops,
+            stop_stiffness: s.stop_stiffness,
+            stop_damping: s.stop_damping,
             coupling,
-            once: 0.0,
+            by_angle: 0.0,
             speed: 0.0,
         };
         let mut mechanics = Self {
@@ -197,11 +230,11 @@ impl Mechanics {
         self.extras.is_some()
     }
 
-    /// Fixes the torque once a turn for a period that begins at this rotor angle.
+    /// Fixes the torques by the angle for a period that begins at this one of the rotor.
     #[inline]
     pub(crate) fn begin_period(&mut self, angle: f64) {
         if let Some(extras) = &mut self.extras {
-            extras.once = extras.once_torque * angle.cos();
+            extras.by_angle = extras.once_torque * angle.cos() + extras.stop_torque(angle);
         }
     }
 
@@ -212,7 +245,7 @@ impl Mechanics {
         let (Load::Free { torque: load }, Some(extras)) = (self.load, &mut self.extras) else {
             return speed;
         };
-        let at_load = load + extras.once;
+        let at_load = load + extras.by_angle;
         let against = extras.coupling.as_mut().map_or(at_load, |coupling| {
             coupling.torque =
                 coupling.stiffness * coupling.twist + coupling.damping * (speed - coupling.speed);
@@ -242,7 +275,7 @@ impl Mechanics {
             return;
         };
         if let Some(coupling) = &mut extras.coupling {
-            coupling.speed += h * (coupling.torque - load - extras.once) / coupling.inertia;
+            coupling.speed += h * (coupling.torque - load - extras.by_angle) / coupling.inertia;
             coupling.twist += h * (speed - coupling.speed);
         }
     }

@@ -127,6 +127,23 @@ fn a_load_once_a_turn_is_a_pendulum() {
 }
 
 #[test]
+fn a_stop_throws_the_shaft_back_with_its_restitution() {
+    for side in [1.0, -1.0] {
+        let mut motor = shaft(|m| (m.stops, m.stop_stiffness, m.stop_damping) = (0.5, 100.0, 0.3));
+        motor.state.speed = side * 4.0;
+        coast(&mut motor, 0.4);
+        // A damped swing leaves a stop that does not pull when the stop's torque is 0: at the angle whose tangent is
+        // -2 damping sqrt(1 - damping^2)/(1 - 2 damping^2) of it.
+        let damping = 0.5 * 0.3 / (100.0_f64 * 0.012).sqrt();
+        let root = (1.0 - damping * damping).sqrt();
+        let leaves = (2.0 * damping * root).atan2(2.0 * damping * damping - 1.0);
+        let back = (-damping / root * leaves).exp();
+        near(motor.state.speed, -side * 4.0 * back, 0.03);
+        assert!(motor.state.angle.abs() < 0.5, "{}", motor.state.angle);
+    }
+}
+
+#[test]
 fn an_elastic_coupling_resonates() {
     let mut motor = shaft(|m| {
         (m.inertia, m.load_inertia, m.stiffness) = (0.003, 0.009, 15.0);

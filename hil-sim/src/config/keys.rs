@@ -307,6 +307,10 @@ keys! {
         static_nm: f64 = 0.0, [0 .. 1000], "Nm";
         /// Amplitude of a load torque that varies once a turn.
         once_nm: f64 = 0.0, [0 .. 1000], "Nm";
+        /// Stops on both sides, this far from where the shaft begins; 0: it turns freely.
+        stops_turns: f64 = 0.0, [0 .. 1000], "turns";
+        /// Stiffness of a stop.
+        stop_stiffness: f64 = 100.0, [0 .. 1e9], "Nm/rad";
         /// Inertia behind an elastic coupling, where the load acts; 0 for a rigid shaft. motor.inertia is then that before
         /// it.
         load_inertia: f64 = 0.0, [0 .. 1000], "kg m2";

@@ -1,0 +1,131 @@
+//! Procedure: homing against an elastic stop of the simulated shaft, with the noise of its sensors.
+
+mod common;
+
+use common::config;
+use core::f64::consts::TAU;
+use drive_core::homing::{Failure, Homing, Next, Plan, Seen};
+use drive_core::{Command, Mode, State, Stop};
+use hil_sim::rig::Rig;
+
+/// Stiffness of the stop, N m/rad.
+const STIFFNESS: f64 = 100.0;
+/// Where the stops are, turns.
+const STOPS: f64 = 1.3;
+
+fn rig(changes: &[&str], seed: u64) -> Rig {
+    let mut all = vec!["load.mode=free", "shaft.stops_turns=1.3"];
+    all.extend(changes);
+    let mut rig = Rig::from_config(&config(&all), seed).unwrap();
+    rig.start(Mode::Position).unwrap();
+    rig
+}
+
+/// What the firmware's main loop sees, ten times a second.
+fn seen(rig: &Rig) -> Seen {
+    let (t, room) = (rig.drive.telemetry(), rig.drive.room().i_q);
+    let periods = (rig.time() * 6000.0).round() as u32;
+    Seen { periods, state: rig.drive.state(), turns: t.turns, i_q: t.reference.q, room }
+}
+
+/// Lets the drive home; the outcome, and the mean torque in the last second of pressing, N m.
+fn home(rig: &mut Rig, plan: Plan) -> (Result<(), Failure>, f64) {
+    let mut homing = Homing::new(plan, 3.0).unwrap();
+    rig.command(&homing.begin()).unwrap();
+    let (mut torques, mut pressed) = ([0.0; 10], 0.0);
+    for n in 0..600 {
+        let mut sum = 0.0;
+        rig.run(0.1, |p| sum += p.torque / 600.0);
+        torques[n % 10] = sum;
+        match homing.poll(&seen(rig)) {
+            Next::Wait => {}
+            Next::Command(command) => {
+                rig.command(&command).unwrap();
+                pressed = torques.iter().sum::<f64>() / 10.0;
+            }
+            Next::Ended(outcome) => return (outcome, pressed),
+        }
+    }
+    panic!("no end in a minute")
+}
+
+fn turns(rig: &mut Rig) -> f64 {
+    let mut turns = 0.0;
+    rig.run(0.01, |p| turns = p.turns);
+    turns
+}
+
+/// Position 0 is where the stop yields to the torque, and positions count from there. A heavy shaft swings at its elastic stop for
+/// longer than is waited; without an encoder the position drifts under torque.
+#[test]
+fn the_stop_becomes_position_0() {
+    let heavier = ["motor.inertia=0.06", "drive.motor.inertia=0.06"];
+    for (source, heavier, accuracy) in [
+        ("angle.source=encoder", &[][..], 0.002),
+        ("angle.source=encoder", &heavier[..], 0.01),
+        ("angle.source=injection", &[][..], 0.01),
+    ] {
+        let plans =
+            [(30.0, 0.6), (-30.0, 0.6), (60.0, 1.0), (-60.0, 0.4), (60.0, 1.5), (10.0, 0.5)];
+        for (n, (rpm, i_q)) in plans.into_iter().enumerate() {
+            let mut rig = rig(&[&[source], heavier].concat(), 40 + n as u64);
+            let (outcome, torque) = home(&mut rig, Plan { rpm, i_q, turns: 3.0 });
+            outcome.unwrap();
+            let stop = f64::from(rpm.signum()) * STOPS + torque / STIFFNESS / TAU;
+            let wrong = turns(&mut rig) - stop - f64::from(rig.drive.telemetry().turns);
+            // Away from it by a turn, and there.
+            rig.command(&Command::Position(-rpm.signum())).unwrap();
+            rig.run(4.0, |_| {});
+            let there = turns(&mut rig) - stop + f64::from(rpm.signum());
+            println!(
+                "{source} {heavier:?} {rpm} rpm {i_q} A: {wrong:.4} turns, a turn away {there:.4}"
+            );
+            assert!(wrong.abs() < accuracy, "{wrong}");
+            // The position without an encoder drifts by some 3 degrees on the way.
+            assert!(there.abs() < accuracy + 0.008, "{there}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_a_stop_is_told() {
+    // Friction holds the shaft.
+    let plan = Plan { rpm: 30.0, i_q: 0.5, turns: 1.0 };
+    let mut held = rig(&["angle.source=encoder", "shaft.static_nm=1.2"], 1);
+    assert_eq!(home(&mut held, plan).0, Err(Failure::Held));
+    // The stop is further away; the shaft stays where it is.
+    let mut far = rig(&["angle.source=encoder"], 1);
+    assert_eq!(home(&mut far, plan).0, Err(Failure::NoStop(1.0)));
+    far.run(1.0, |_| {});
+    let before = turns(&mut far);
+    far.run(1.0, |_| {});
+    assert!((turns(&mut far) - before).abs() < 0.002);
+    // A stop by the user.
+    let mut stopped = rig(&["angle.source=encoder"], 1);
+    let mut homing = Homing::new(plan, 3.0).unwrap();
+    stopped.command(&homing.begin()).unwrap();
+    stopped.run(0.2, |_| {});
+    stopped.command(&Command::Stop(Stop::Coast)).unwrap();
+    stopped.run(0.2, |_| {});
+    assert_eq!(homing.poll(&seen(&stopped)), Next::Ended(Err(Failure::Left(State::Off))));
+}
+
+/// With the encoder a start finds position 0 again, and does not move the shaft.
+#[test]
+fn position_0_outlives_a_stop_with_the_encoder() {
+    for (source, keeps) in [("encoder", true), ("injection", false)] {
+        let mut rig = rig(&[&format!("angle.source={source}")], 3);
+        home(&mut rig, Plan { rpm: 60.0, i_q: 0.6, turns: 3.0 }).0.unwrap();
+        rig.command(&Command::Position(-1.0)).unwrap();
+        rig.run(4.0, |_| {});
+        rig.command(&Command::Stop(Stop::Coast)).unwrap();
+        rig.run(2.0, |_| {});
+        let before = turns(&mut rig);
+        rig.start(Mode::Position).unwrap();
+        rig.run(1.0, |_| {});
+        let (after, says) = (turns(&mut rig), f64::from(rig.drive.telemetry().turns));
+        println!("{source}: {before:.4} {after:.4}, {says:.4}");
+        assert!((after - before).abs() < 0.01, "{before} {after}");
+        assert!((says - if keeps { -1.0 } else { 0.0 }).abs() < 0.01, "{says}");
+    }
+}
