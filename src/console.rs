@@ -13,6 +13,7 @@ mod design;
 pub mod grammar;
 pub mod handle;
 pub mod help;
+mod homing;
 pub mod line;
 mod list;
 mod number;
@@ -27,6 +28,7 @@ mod tests;
 use core::fmt;
 
 use drive_core::State;
+use drive_core::homing::{Failure, Homing};
 use drive_core::identify::learning::Learned;
 
 use crate::commissioning::News;
@@ -79,6 +81,9 @@ pub struct Console {
     ended: bool,
     /// News of the commissioning, and the number of the next line about it.
     commissioned: Option<(News, usize)>,
+    /// A homing, and how the last one has ended, until that is announced.
+    homing: Option<Homing>,
+    homed: Option<Result<(), Failure>>,
     restore: Restore,
     /// The stream, and the rate of the port.
     wire: Wire,
@@ -111,6 +116,8 @@ impl Console {
             unbelievable: None,
             ended: false,
             commissioned: None,
+            homing: None,
+            homed: None,
             restore: Restore::new(),
             wire: Wire::new(),
             foreign: None,
@@ -136,6 +143,9 @@ impl Console {
         });
         if self.commissioned.is_none() {
             self.commissioned = drive.commissioned().map(|news| (news, 0));
+        }
+        if self.homed.is_none() {
+            self.homed = self.go_on_homing(drive);
         }
         if port.take_damage() {
             self.reader.spoil(LineError::Lost);
@@ -223,6 +233,11 @@ impl Console {
             let (text, next) = commissioning::told(&news, line);
             self.out.line(format_args!("commissioning: {text}"));
             self.commissioned = next.map(|line| (news, line));
+        } else if let Some(homed) = self.homed.take() {
+            match homed {
+                Ok(()) => self.out.line(format_args!("homing: position 0 is at the stop")),
+                Err(why) => self.out.line(format_args!("homing: {why}")),
+            }
         } else if self.armed && !drive.tracing() {
             self.armed = false;
             self.out.line(format_args!("trace: recorded; `trace` prints it"));

@@ -70,7 +70,7 @@ function lost(why) { gone = why; state('not connected'); alarm('gone', [why]); }
 function announced(line) {
   listeners.forEach(listener => listener(line));
   if (line.startsWith('fault ')) showFault();
-  if (/^(off|stopped|running): /.test(line)) say(line);
+  if (/^(off|stopped|running|homing): /.test(line)) say(line);
   if (line.startsWith('trace: ')) showTrace();
   if (line.startsWith('link: ') || line.startsWith('induction-drive ')) request({ ask: [++number, 'version'] }).then(restream);
 }
@@ -249,11 +249,24 @@ function drawFlux(angle, motor, psi) {
 }
 
 // --- controls ------------------------------------------------------------------------------------
-const WHAT = { torque: 'current, A peak', speed: 'speed, rpm', position: 'position, turns' };
-$('mode').onchange = () => { $('what').textContent = WHAT[$('mode').value]; };
+const WHAT = { torque: 'current, A peak', speed: 'speed, rpm', position: 'position, turns', vf: 'speed, rpm' };
+($('mode').onchange = () => {
+  const mode = $('mode').value;
+  $('what').textContent = WHAT[mode];
+  document.querySelectorAll('[data-mode]').forEach(part => { part.hidden = part.dataset.mode !== mode; });
+})();
 $('stop').onclick = stopDrive;
 $('start').onclick = () => tell(`start ${$('mode').value}`).catch(quiet);
-$('run').onsubmit = event => { event.preventDefault(); tell(`${$('mode').value} ${$('reference').value}`).catch(quiet); };
+$('run').onsubmit = event => { event.preventDefault(); tell(`${$('mode').value.replace('vf', 'speed')} ${$('reference').value}`).catch(quiet); };
+$('home').onclick = () => tell(`home ${$('h-rpm').value} ${$('h-a').value} ${$('h-turns').value}`).catch(quiet);
+/** The drive ends a jog that is not repeated within half a second. */
+document.querySelectorAll('[data-jog]').forEach(button => {
+  let repeat;
+  const end = () => { if (repeat) tell('speed 0').catch(quiet); repeat = clearInterval(repeat); };
+  const jog = () => ask(`jog ${button.dataset.jog * Math.abs($('reference').value)}`).catch(error => { say(error.message, true); repeat = clearInterval(repeat); });
+  button.onpointerdown = () => { clearInterval(repeat); repeat = setInterval(jog, 200); jog(); };
+  button.onpointerup = button.onpointerleave = button.onpointercancel = end;
+});
 $('pause').onclick = pause;
 $('rate').onchange = restream;
 $('record').onclick = () => {

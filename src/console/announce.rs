@@ -9,7 +9,7 @@ use crate::link::Status;
 
 /// First words of all lines that come unasked, and of `designing...`, which comes before an answer: a program that waits
 /// for an answer passes over them.
-pub const ANNOUNCEMENTS: [&str; 13] = [
+pub const ANNOUNCEMENTS: [&str; 14] = [
     "fault ",
     "running: ",
     "off: ",
@@ -17,6 +17,7 @@ pub const ANNOUNCEMENTS: [&str; 13] = [
     "learning: ",
     "learned: ",
     "commissioning: ",
+    "homing: ",
     "refused: ",
     "trace: ",
     "link: ",

@@ -58,7 +58,11 @@ impl Console {
             Request::Torque(i_q) => self.give(Command::Torque(i_q), "A", drive),
             Request::Speed(rpm) => self.give(Command::Speed(rpm), "rpm", drive),
             Request::Jog(rpm) => self.give(Command::Jog(rpm), "rpm", drive),
-            Request::Position(turns) => self.give(Command::Position(turns), "turns", drive),
+            Request::Position(turns) => {
+                self.homing = None;
+                self.give(Command::Position(turns), "turns", drive);
+            }
+            Request::Home(plan) => self.home(plan, drive),
             Request::Clear => self.give(Command::Clear, "", drive),
             Request::Set(values) => self.set(&values, drive),
             Request::Defaults => {

@@ -46,6 +46,7 @@ impl Console {
                     | Request::Speed(_)
                     | Request::Jog(_)
                     | Request::Position(_)
+                    | Request::Home(_)
             )
     }
 

@@ -1,7 +1,7 @@
 //! The lines of `help`.
 
 /// One line per command; the last line is none.
-pub const HELP: [&str; 39] = [
+pub const HELP: [&str; 40] = [
     "help                      this list; also h and ?",
     "status                    what the drive is doing",
     "start [MODE]              calibrate, magnetise, then regulate torque, speed or position; vf: turn a motor that is not identified",
@@ -14,6 +14,7 @@ pub const HELP: [&str; 39] = [
     "speed RPM                 speed, mechanical rpm",
     "jog RPM                   turn at this speed while it is repeated every 0.5 s, then to rest by the ramp",
     "position TURNS            position, mechanical turns from where it started",
+    "home RPM A TURNS          in position mode: turn towards a stop, slowly, with at most this current and this far; the stop becomes position 0",
     "angle encoder|injection   where the flux angle comes from; the same as set angle_source",
     "get [KEY|PREFIX]          one setting with range and meaning, or all that begin so",
     "describe [PREFIX]         the settings as JSON, one a line",

@@ -3,7 +3,7 @@
 
 /// Beginnings of lines that the drive says unasked, those of the firmware's announcements and of its greeting, and of
 /// the one that comes before an answer that takes a while.
-const UNASKED: [&str; 14] = [
+const UNASKED: [&str; 15] = [
     "induction-drive ",
     "fault ",
     "running: ",
@@ -12,6 +12,7 @@ const UNASKED: [&str; 14] = [
     "learning: ",
     "learned: ",
     "commissioning: ",
+    "homing: ",
     "refused: ",
     "trace: ",
     "link: ",

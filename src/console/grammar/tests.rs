@@ -1,7 +1,9 @@
+use drive_core::homing;
 use drive_core::settings::value::{Value, ValueError};
 use proptest::prelude::*;
 
 use super::*;
+use crate::link::trace::Plan;
 use crate::console::help::HELP;
 use crate::link::trace::{self, SignalChoice, Trigger};
 
@@ -53,6 +55,7 @@ fn commands_are_understood() {
         ("speed -150", Request::Speed(-150.0)),
         ("jog -60", Request::Jog(-60.0)),
         ("position 5e1", Request::Position(50.0)),
+        ("home -30 0.5 4", Request::Home(homing::Plan { rpm: -30.0, i_q: 0.5, turns: 4.0 })),
         ("angle encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("set angle_source encoder", assigned(&[("angle_source", Value::Word("encoder"))])),
         ("get", Request::List("")),
@@ -109,6 +112,7 @@ fn what_is_half_wrong_is_refused_whole() {
         ("torque 1A", "not a number: 1A (the current, A)"),
         ("torque nan", "not a number: nan (the current, A)"),
         ("speed inf", "not a number: inf (the speed, rpm)"),
+        ("home -30 0.5", "the longest way, turns is missing"),
         ("position 1e99", "not a number: 1e99 (the position, turns)"),
         ("set", "the setting is missing"),
         ("set motor.r_s", "the value is missing"),
