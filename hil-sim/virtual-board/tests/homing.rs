@@ -1,0 +1,45 @@
+//! Homing by the image, against a stop of the simulated shaft.
+
+mod common;
+
+use anyhow::Result;
+use drive_core::State;
+use hil_sim::Config;
+use hil_sim::config::LoadMode;
+
+#[test]
+fn the_image_finds_the_stop_and_counts_from_it() -> Result<()> {
+    let mut config = Config::default();
+    (config.load.mode, config.shaft.stops_turns) = (LoadMode::Free, 0.4);
+    let mut pair = common::pair(&config, 43)?;
+    for line in ["angle encoder", "start position"] {
+        pair.order(line)?;
+    }
+    pair.until_state(State::Position)?;
+    // From here the image gives itself commands, of which its shadow on the host does not know.
+    let mut board = pair.board;
+    let mut say = |line: &str, until: &str| {
+        board.take_console();
+        board.type_line(line);
+        let mut said = String::new();
+        for _ in 0..200 {
+            board.run_periods(600)?;
+            while board.next_period().is_some() {}
+            said += &board.take_console();
+            if said.contains(until) {
+                return anyhow::Ok((said, board.plant.mechanical_angle()));
+            }
+        }
+        anyhow::bail!("{until}: {said}")
+    };
+    let (said, stop) = say("home 60 0.6 2", "homing: ")?;
+    assert!(said.contains("homing: position 0 is at the stop"), "{said}");
+    say("position -0.25", "ok")?;
+    // A stop by ramp waits until the shaft rests.
+    std::iter::repeat_n("status", 20).try_for_each(|line| say(line, "turns").map(|_| ()))?;
+    let (said, end) = say("stop ramp", "off: ")?;
+    let moved = (end - stop) / std::f64::consts::TAU;
+    println!("the stop at {stop:.3} rad, then {moved:.4} turns: {said}");
+    assert!((moved + 0.25).abs() < 0.003, "{moved} turns");
+    Ok(())
+}
