@@ -4,6 +4,7 @@
 mod common;
 
 use common::{config, plant_settings};
+use drive_core::dc_link::Limiting;
 use drive_core::settings::Motor;
 use drive_core::{Command, Fault, Mode, Refused, Settings, State, Stop};
 use hil_sim::Config;
@@ -159,6 +160,24 @@ fn braking_keeps_the_link_below_its_limit() {
     println!("{rpm:.1} rpm, at most {most:.0} V, {}", rig.drive.state());
     assert!(most < f64::from(config.drive.dc_over_v()) && rpm.abs() < 20.0, "{most} {rpm}");
     assert_eq!(rig.drive.state(), State::VoltsPerHertz);
+}
+
+/// With a hot heat sink the shaft gives way under a load that it carries when cold, and the drive says why.
+#[test]
+fn a_hot_heat_sink_takes_torque_and_is_named() {
+    for (celsius, why) in [(25.0, Limiting::No), (77.0, Limiting::HeatSink)] {
+        let hot = format!("measurement.heat_sink_c={celsius}");
+        let config = Config::load(Some("motulator-2kw2"), None, &[hot]).unwrap();
+        let mut rig = turning(&config, 600.0, 1);
+        rig.set_load(Load::Free { torque: 4.0 }).unwrap();
+        let mut limiting = 0;
+        for _ in 0..200 {
+            rig.run(0.01, |_| {});
+            limiting += u32::from(rig.drive.limiting() == why);
+        }
+        println!("{celsius} degC: {limiting} of 200, {}", rig.drive.state());
+        assert!(limiting > 100, "{limiting}");
+    }
 }
 
 #[test]

@@ -227,13 +227,13 @@ impl DcLink {
     }
 
     /// One step with the measured dc link `dc_link`, V, at the speed `freq` of the rotor, electrical turns per control
-    /// period, for torque currents within `i_q_limit`, A.
+    /// period, for torque currents within `i_q_limit`, A, which is less than the usual for this reason.
     pub fn step(
         &self,
         state: &mut DcLinkState,
         dc_link: f32,
         freq: f32,
-        i_q_limit: f32,
+        (i_q_limit, reason): (f32, Limiting),
     ) -> DcLinkLimits {
         let before = state.v.unwrap_or(dc_link);
         let v = before + 0.5 * (dc_link - before);
@@ -262,14 +262,14 @@ impl DcLink {
         let limit = |share: f32| (1.0 - weight + weight * share) * i_q_limit;
         let (motoring, generating) = (limit(motoring), limit(generating));
         let high = if generating >= i_q_limit {
-            Limiting::No
+            reason
         } else if self.chopper.is_some() && cold < 1.0 {
             Limiting::ResistorHot
         } else {
             Limiting::DcLinkHigh
         };
         let low = if motoring >= i_q_limit {
-            Limiting::No
+            reason
         } else if motoring < 0.0 {
             Limiting::RideThrough
         } else {

@@ -40,7 +40,6 @@ use crate::flux::observer::ObserverState;
 use crate::flux::volts_per_hertz::VoltsPerHertzState;
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
-use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::motion::{MotionState, RotorCount};
 use crate::protect::lock_monitor::LockMonitorState;
@@ -62,6 +61,7 @@ use in_turn::StepResults;
 pub use layout::Layout;
 use observed::Observed;
 pub use observed::{Room, Telemetry};
+use reference::References;
 pub use state::{Mode, State};
 
 /// The drive: coefficients, state, and the references it was given.
@@ -101,43 +101,6 @@ pub struct Drive {
     learned: Option<Learned>,
     thermal: ThermalLoads,
     relay: RelayState,
-}
-
-/// References of the running mode.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct References {
-    current: Dq,
-    /// Mechanical turns/s.
-    speed: f32,
-    /// Periods for which the speed holds where it is a jog; 0 where it is none.
-    jog: u32,
-    /// Mechanical turns; `None`: where the drive was started.
-    turns: Option<f32>,
-    /// Largest torque current with which position mode presses on at the speed, A; `None`: it goes to the position.
-    press: Option<f32>,
-    /// Added to the voltage of the current loop, V.
-    test_voltage: Dq,
-    /// Injection axis seen from the frame.
-    injection_axis: UnitVector,
-    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
-    lead: Angle,
-    lead_axis: UnitVector,
-}
-
-impl Default for References {
-    fn default() -> Self {
-        Self {
-            current: Dq::ZERO,
-            speed: 0.0,
-            jog: 0,
-            turns: None,
-            press: None,
-            test_voltage: Dq::ZERO,
-            injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
-            lead: Angle::ZERO,
-            lead_axis: UnitVector::default(),
-        }
-    }
 }
 
 /// State of the control, fresh at every start.

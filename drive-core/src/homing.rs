@@ -70,6 +70,7 @@ pub struct Seen {
 }
 
 /// What is to be done.
+#[allow(clippy::large_enum_variant)] // taken at once
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
     /// Nothing yet.

@@ -59,7 +59,8 @@ impl Bench {
         let steps = (seconds * 600.0) as usize;
         for _ in 0..steps {
             let freq = self.rpm as f32 * FREQ_PER_RPM;
-            let limits = self.limits.step(&mut self.state, self.v as f32, freq, I_Q);
+            let limits =
+                self.limits.step(&mut self.state, self.v as f32, freq, (I_Q, Limiting::No));
             assert!(limits.i_q.0 <= limits.i_q.1 && (0.0..=1.0).contains(&limits.chopper));
             let asked = (0.1 * (reference(self.t) - self.rpm)) as f32;
             let (taken, why) = limits.hold(asked.clamp(-I_Q, I_Q));
@@ -229,8 +230,9 @@ fn a_resistor_takes_what_it_may() {
 #[test]
 fn nothing_is_limited_where_nothing_has_to_be() {
     let limits = DcLink::new(&DcLinkSettings::default());
-    let step =
-        |v: f32, rpm: f32| limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, I_Q);
+    let step = |v: f32, rpm: f32| {
+        limits.step(&mut DcLinkState::default(), v, rpm * FREQ_PER_RPM, (I_Q, Limiting::No))
+    };
     for (v, rpm) in
         [(311.0, 1800.0), (311.0, -3600.0), (395.0, 250.0), (210.0, -250.0), (395.0, 0.0)]
     {

@@ -1,6 +1,7 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use super::{ControlState, Drive, References};
+use super::reference::References;
+use super::{ControlState, Drive};
 
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Command, Refused};

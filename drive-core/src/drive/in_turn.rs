@@ -179,7 +179,7 @@ impl Coefficients {
     fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
         let (by_voltage, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
         let by_heat = self.protection.i_q - s.too_hot_for;
-        let (most, reason) = if by_heat < by_voltage {
+        let most = if by_heat < by_voltage {
             (by_heat, s.too_hot)
         } else if s.voltage_limit.by_voltage {
             (by_voltage, Limiting::Voltage)
@@ -187,12 +187,6 @@ impl Coefficients {
             (by_voltage, Limiting::No)
         };
         s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
-        let why = &mut s.limits.why;
-        for why in [&mut why.0, &mut why.1] {
-            if *why == Limiting::No {
-                *why = reason;
-            }
-        }
     }
 
     /// Whether the demodulation has a carrier.

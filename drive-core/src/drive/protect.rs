@@ -49,13 +49,12 @@ impl Drive {
         let (heat_sink, loads) = ((share * share, Limiting::HeatSink), self.thermal.share());
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         let s = &mut self.control;
-        s.too_hot = why;
-        s.too_hot_for = if share < 1.0 {
+        (s.too_hot_for, s.too_hot) = if share < 1.0 {
             let (largest, i_d) = (self.c.protection.i_q, s.references.current.d);
             let square = share * largest * largest - i_d * i_d;
-            largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }
+            (largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }, why)
         } else {
-            0.0
+            (0.0, Limiting::No)
         };
         let Some(relay) = &self.c.relay else { return false };
         relay.step(&mut self.relay, sample.dc_link);

@@ -1,11 +1,49 @@
 //! The current that is regulated, by state, within what the dc link allows.
 
-use super::{Drive, References};
+use super::Drive;
 use crate::dc_link::Limiting;
 use crate::drive::state::{Mode, State};
+use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::Dq;
 use crate::math::limited;
 use crate::motion::Goal;
+
+/// References of the running mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct References {
+    pub(super) current: Dq,
+    /// Mechanical turns/s.
+    pub(super) speed: f32,
+    /// Periods for which the speed holds where it is a jog; 0 where it is none.
+    pub(super) jog: u32,
+    /// Mechanical turns; `None`: where the drive was started.
+    pub(super) turns: Option<f32>,
+    /// Largest torque current with which position mode presses on at the speed, A; `None`: it goes to the position.
+    pub(super) press: Option<f32>,
+    /// Added to the voltage of the current loop, V.
+    pub(super) test_voltage: Dq,
+    /// Injection axis seen from the frame.
+    pub(super) injection_axis: UnitVector,
+    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
+    pub(super) lead: Angle,
+    pub(super) lead_axis: UnitVector,
+}
+
+impl Default for References {
+    fn default() -> Self {
+        Self {
+            current: Dq::ZERO,
+            speed: 0.0,
+            jog: 0,
+            turns: None,
+            press: None,
+            test_voltage: Dq::ZERO,
+            injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
+            lead: Angle::ZERO,
+            lead_axis: UnitVector::default(),
+        }
+    }
+}
 
 impl References {
     /// The reference of the speed, turns/s, in a period: a jog that is not repeated ends.

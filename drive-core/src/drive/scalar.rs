@@ -64,7 +64,7 @@ impl Drive {
         }
         let freq = if stops { 0.0 } else { c.freq_per_speed * s.references.speed };
         if self.elapsed.is_multiple_of(u32::from(DIVIDER)) {
-            let most = c.protection.i_q - s.too_hot_for;
+            let most = (c.protection.i_q - s.too_hot_for, s.too_hot);
             s.limits = c.dc_link.step(&mut s.dc_link, measured.dc_link, rotor_freq, most);
             if rotor_freq.abs() > c.protection.rotor_freq {
                 return Err(Fault::OverSpeed.into());

@@ -3,8 +3,8 @@ use drive_core::settings::value::{Value, ValueError};
 use proptest::prelude::*;
 
 use super::*;
-use crate::link::trace::Plan;
 use crate::console::help::HELP;
+use crate::link::trace::Plan;
 use crate::link::trace::{self, SignalChoice, Trigger};
 
 #[test]
