@@ -10,7 +10,7 @@ use crate::math::frames::Abc;
 
 use crate::carrier::DemodulatorKind;
 use crate::io::Hardware;
-use crate::math::angle::Angle;
+use crate::math::angle::{Angle, UnitVector};
 use crate::settings::Line;
 use crate::settings::{IdentifiedPlant, Settings};
 use proptest::prelude::*;
@@ -234,6 +234,10 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.control.references.speed, 0.0, "a start takes the references back");
     assert_eq!(d.command(&Command::Speed(1.0)), Err(Refused::State(State::Position)));
     assert_eq!(d.command(&Command::Position(-1e9)), Ok(Accepted::Limited(-1000.0)));
+    // While it starts there is nothing to press against, and no place to be position 0.
+    let starting = Err(Refused::State(State::Calibrating));
+    assert_eq!(d.command(&Command::Press(30.0, 0.5)), starting);
+    assert_eq!(d.command(&Command::Home(0.0)), starting);
 }
 
 #[test]

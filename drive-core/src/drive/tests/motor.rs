@@ -195,6 +195,23 @@ fn without_a_sensor_speed_and_position_are_those_of_the_rotor() {
     bench.drive.command(&Command::Position(-2.0)).unwrap();
     bench.run(3.0);
     assert!((bench.motor.turns() + 2.0).abs() < 0.02, "{}", bench.motor.turns());
+    let most = bench.drive.c.protection.i_q;
+    for a in [-0.1, most * 1.01, f32::NAN] {
+        let refused = bench.drive.command(&Command::Press(60.0, a));
+        assert_eq!(refused, Err(Refused::OutOfRange { min: 0.0, max: most }));
+    }
+    assert!(bench.drive.command(&Command::Home(1001.0)).is_err());
+    assert!(bench.drive.command(&Command::Home(f32::NAN)).is_err());
+    bench.run(0.5);
+    assert!((bench.motor.turns() + 2.0).abs() < 0.02, "refused commands change nothing");
+    // It turns on at the speed until a position is given.
+    bench.drive.command(&Command::Press(60.0, 1.0)).unwrap();
+    bench.run(2.0);
+    assert!((bench.motor.rpm() - 60.0).abs() < 12.0, "{}", bench.motor.rpm());
+    // A turn further on than where position 0 was.
+    bench.drive.command(&Command::Home(1.0)).unwrap();
+    bench.run(3.0);
+    assert!((bench.motor.turns() - 1.0).abs() < 0.03, "{}", bench.motor.turns());
 }
 
 #[test]
