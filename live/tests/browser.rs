@@ -134,6 +134,7 @@ fn the_page_shows_and_drives_the_virtual_board() {
     page.value("view('view-live'); $('reference').focus()");
     page.key("Escape", 27);
     state(&mut page, "off");
+    jogs(&mut page, &folder);
     settings(&mut page, &folder, &files);
     sets_up(&mut page, &folder);
     begins_again(&mut page);
@@ -171,6 +172,32 @@ fn runs_and_shows(page: &mut Page<'_>, folder: &Path) {
     page.key("p", 80);
     page.until("paused", PATIENCE);
     page.key("p", 80);
+}
+
+/// A jog lasts while its button is held, in speed mode; a stop by ramp ends in off. Every mode shows what it has.
+fn jogs(page: &mut Page<'_>, folder: &Path) {
+    let choose = |page: &mut Page<'_>, mode: &str| {
+        page.value(&format!("$('mode').value = '{mode}'; $('mode').onchange()"));
+        page.value("[...document.querySelectorAll('[data-mode]')].filter(part => part.offsetParent).map(part => part.dataset.mode).join()")
+    };
+    assert_eq!(choose(page, "torque"), "");
+    assert_eq!(choose(page, "position"), "position");
+    pictures(page, folder, "homing");
+    page.value("$('home').click()");
+    page.until("/not possible while the drive is off/.test($('said').textContent)", PATIENCE);
+    assert_eq!(choose(page, "speed"), "speed");
+    page.value("$('start').click()");
+    state(page, "regulating speed");
+    // The shaft is locked: the jog shows as torque.
+    page.value(
+        "$('reference').value = 60; document.querySelector('[data-jog=\"-1\"]').onpointerdown()",
+    );
+    page.until("parseFloat($('torque').textContent) < -0.3", PATIENCE);
+    page.value("document.querySelector('[data-jog=\"-1\"]').onpointerup()");
+    page.until("Math.abs(parseFloat($('torque').textContent)) < 0.2", PATIENCE);
+    page.value("document.querySelector('[data-ask=\"stop ramp\"]').click()");
+    state(page, "off");
+    choose(page, "torque");
 }
 
 /// A recording has every frame; a trace has the full rate, at once and around its trigger.
