@@ -305,7 +305,9 @@ impl Drive {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, held, seen, phi);
+            // A flux that builds up does not show the resistance.
+            let builds_up = held || self.state == State::Catching;
+            let turning = c.observe_fundamental(s, index, builds_up, seen, phi);
             if c.observer.is_some() {
                 let carrier =
                     AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
