@@ -240,8 +240,9 @@ faults! {
         &[
             "dc link too low for speed and torque",
             "injection.amplitude_v too large",
+            "at the start: phase of the motor open",
         ],
-        "lower injection.amplitude_v, the speed or the torque";
+        "check the motor cable; lower injection.amplitude_v, the speed or the torque";
     SensorNoisyA = 36, "current sensor a is too noisy for the injection", NOISE.0, NOISE.1;
     SensorNoisyB = 37, "current sensor b is too noisy for the injection", NOISE.0, NOISE.1;
     SensorSaturatedC = 38, "current sensor c at the end of its range, shorted or open", SENSOR_RANGE.0, SENSOR_RANGE.1;

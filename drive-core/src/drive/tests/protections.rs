@@ -125,6 +125,7 @@ fn an_open_phase_does_not_get_past_the_start() {
             Fault::CarrierMissingA,
             Fault::CarrierMissingB,
             Fault::CarrierWeak,
+            Fault::CarrierNoRoom,
             Fault::CurrentNotAsPredicted,
         ];
         assert!(named.contains(&fault), "{name}: {fault:?}");
