@@ -37,8 +37,11 @@ impl Console {
         };
         let outcome = match homing.poll(&seen) {
             Next::Wait => return None,
-            // Refused when the drive has just stopped: the next report says so.
-            Next::Command(command) => return drive.command(command).err().and(None),
+            Next::Command(command) => {
+                // Refused when the drive has just stopped: the next report says so.
+                let _ = drive.command(command);
+                return None;
+            }
             Next::Ended(outcome) => outcome,
         };
         self.homing = None;
