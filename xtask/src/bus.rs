@@ -85,7 +85,11 @@ pub fn test(elf: &Path) -> Result<()> {
     type Client = fn(&str, &Path) -> Result<f64>;
     let clients: [(&str, bool, Client); 3] = [
         ("mbpoll", there("mbpoll", "-V"), mbpoll),
-        ("pymodbus", python().arg("import pymodbus").status().is_ok_and(|s| s.success()), pymodbus),
+        (
+            "pymodbus",
+            python().arg("import pymodbus, serial").status().is_ok_and(|s| s.success()),
+            pymodbus,
+        ),
         ("vfdb_vfd", there("halcmd", "-V") && there("vfdb_vfd", "-h"), vfdb_vfd),
     ];
     for (name, installed, client) in clients {
