@@ -216,7 +216,11 @@ impl Coefficients {
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
         match &self.lock_monitor {
             Some(monitor)
-                if self.injects(s) && s.carrier.is_settled() && (step.held || !step.learning) =>
+                if self.injects(s)
+                    && s.carrier.is_settled()
+                    && (step.held || !step.learning)
+                    // A flux that builds up makes a poor baseline: that of the last start is better.
+                    && !(step.building && s.lock.baseline != 0.0) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
