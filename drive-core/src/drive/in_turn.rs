@@ -220,7 +220,7 @@ impl Coefficients {
                     && s.carrier.is_settled()
                     && (step.held || !step.learning)
                     // A flux that builds up makes a poor baseline: that of the last start is better.
-                    && !(step.building && s.lock.baseline != 0.0) =>
+                    && !(step.building && s.lock.is_of_last_start()) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.

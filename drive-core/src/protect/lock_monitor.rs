@@ -132,6 +132,11 @@ pub struct LockMonitorState {
 }
 
 impl LockMonitorState {
+    /// Whether there is a baseline, and not of this start.
+    pub fn is_of_last_start(&self) -> bool {
+        self.measured == 0 && self.baseline != 0.0
+    }
+
     /// Whether the baseline has been measured since the start.
     pub fn is_measured(&self) -> bool {
         self.measured >= MEASURED
