@@ -21,7 +21,7 @@ fn rig(changes: &[&str], seed: u64) -> Rig {
     rig
 }
 
-/// What the firmware's main loop sees, ten times a second.
+/// The report that the firmware gets ten times a second.
 fn seen(rig: &Rig) -> Seen {
     let (t, room) = (rig.drive.telemetry(), rig.drive.room().i_q);
     let periods = (rig.time() * 6000.0).round() as u32;

@@ -42,7 +42,7 @@ fn a_start_on_a_turning_shaft_keeps_the_resistance() {
                 100.0 * before
             );
             assert_eq!(state, State::Torque);
-            // What tracks it takes 5 s.
+            // The tracking has a time constant of 5 s.
             assert!((more - before).abs() < 0.002, "{more}");
         }
     }

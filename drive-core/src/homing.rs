@@ -54,7 +54,7 @@ pub struct OutOfRange {
     unit: &'static str,
 }
 
-/// What the drive does, as it reports it.
+/// A report of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
     /// Control periods, wrapping. A report with the same number is the same.
@@ -69,7 +69,7 @@ pub struct Seen {
     pub room: (f32, f32),
 }
 
-/// What is to be done.
+/// The next action.
 #[allow(clippy::large_enum_variant)] // taken at once
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
