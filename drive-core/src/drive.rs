@@ -62,6 +62,7 @@ pub use layout::Layout;
 use observed::Observed;
 pub use observed::{Room, Telemetry};
 use reference::References;
+use starting::FluxStage;
 pub use state::{Mode, State};
 
 /// The drive: coefficients, state, and the references it was given.
@@ -220,8 +221,7 @@ impl Drive {
             s.seen.rotor_count = sample.encoder;
         }
         let wanted = self.reference()?;
-        let held = self.state == State::Magnetising;
-        let looking = self.state == State::Catching && self.control.catching.is_looking();
+        let stage = self.flux_stage();
         let alone = self.injection_alone();
         let counts = self.counts();
         let (c, s) = (&self.c, &mut self.control);
@@ -278,7 +278,7 @@ impl Drive {
             s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
         }
 
-        if held {
+        if stage == FluxStage::Held {
             let sample = DropSample {
                 current,
                 voltage,
@@ -305,18 +305,14 @@ impl Drive {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            // A flux that builds up does not show the resistance.
-            let builds_up = held || self.state == State::Catching;
-            let turning = c.observe_fundamental(s, index, builds_up, seen, phi);
+            let turning = c.observe_fundamental(s, index, stage, seen, phi);
             if c.observer.is_some() {
                 let carrier =
                     AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
                 s.observer.put_out(modulated.realised - carrier);
             }
-            // While the flux builds up, its angle is held.
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if !held && !looking && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err()
-            {
+            if stage.turns() && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
@@ -340,9 +336,7 @@ impl Drive {
             flux_axis,
             flux_freq: flux.freq,
             rotor_freq,
-            held,
-            looking,
-            building: self.state == State::Catching && !looking,
+            stage,
             alone,
             learning: self.mode == Mode::Learning,
         };

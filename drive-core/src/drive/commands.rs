@@ -58,11 +58,7 @@ impl Drive {
             }
             Command::Speed(rpm) => self.turn_at(rpm, 0),
             Command::Jog(rpm) => {
-                self.takes_references(Mode::Speed, rpm)?;
-                // It would wait for the end of the start, however long ago it was given.
-                if self.state != State::Speed {
-                    return Err(Refused::State(self.state));
-                }
+                self.takes_now(Mode::Speed, rpm)?;
                 self.turn_at(rpm, JOG)
             }
             Command::Position(turns) => {
@@ -75,11 +71,8 @@ impl Drive {
                 Ok(accepted(turns, taken))
             }
             Command::Press(rpm, i_q) => {
-                self.takes_references(Mode::Position, rpm)?;
+                self.takes_now(Mode::Position, rpm)?;
                 let max = self.c.protection.i_q;
-                if self.state != State::Position {
-                    return Err(Refused::State(self.state));
-                }
                 if !(0.0..=max).contains(&i_q) {
                     return Err(Refused::OutOfRange { min: 0.0, max });
                 }
@@ -90,10 +83,7 @@ impl Drive {
                 Ok(accepted(rpm, taken))
             }
             Command::Home(turns) => {
-                self.takes_references(Mode::Position, turns)?;
-                if self.state != State::Position {
-                    return Err(Refused::State(self.state));
-                }
+                self.takes_now(Mode::Position, turns)?;
                 let max = self.c.motion.position_limit;
                 if turns.abs() > max {
                     return Err(Refused::OutOfRange { min: -max, max });
@@ -269,6 +259,12 @@ impl Drive {
             _ if !value.is_finite() => Err(Refused::NotFinite),
             _ => Ok(()),
         }
+    }
+
+    /// Whether a reference that must not wait for the end of a start can be taken for `mode`.
+    fn takes_now(&self, mode: Mode, value: f32) -> Result<(), Refused> {
+        self.takes_references(mode, value)?;
+        if self.state == State::of_mode(mode) { Ok(()) } else { Err(Refused::State(self.state)) }
     }
 }
 

@@ -4,6 +4,7 @@ use core::f32::consts::TAU;
 
 use super::ControlState;
 use super::in_turn::StepResults;
+use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
 use crate::math::angle::UnitVector;
@@ -16,12 +17,12 @@ const RESISTANCE_UP_TO: f32 = 6.0 * crate::io::PERIOD_S;
 
 impl Coefficients {
     /// One period of the observer; the turn of the flux that it sees. `current` is the one that is regulated, `phi` the
-    /// axis of the flux at the sample, `builds_up` whether the flux does.
+    /// axis of the flux at the sample.
     pub(super) fn observe_fundamental(
         &self,
         s: &mut ControlState,
         index: usize,
-        builds_up: bool,
+        stage: FluxStage,
         current: AlphaBeta,
         phi: UnitVector,
     ) -> Turning {
@@ -29,7 +30,9 @@ impl Coefficients {
         let filtered = !s.hand_over.silent;
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
         observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
-        if weight == 0.0 && !builds_up && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
+        // A flux that builds up does not show the resistance.
+        let ready = stage == FluxStage::Ready;
+        if weight == 0.0 && ready && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
             observer.track_resistance(state);
         }
         const PER_RADIAN: f32 = 1.0 / TAU;
@@ -42,8 +45,8 @@ impl Coefficients {
         let Some(observer) = &self.observer else { return };
         let weight = s.hand_over.weight;
         observer.update(&mut s.observer, step.rotor_freq);
-        let builds_up = step.looking || step.building;
-        if weight > COMPARED_FROM && s.hand_over.demodulates() && !builds_up {
+        let ready = step.stage == FluxStage::Ready;
+        if weight > COMPARED_FROM && s.hand_over.demodulates() && ready {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }

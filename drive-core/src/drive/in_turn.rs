@@ -19,6 +19,7 @@
 //! averages of sample 9.
 
 use super::ControlState;
+use super::starting::FluxStage;
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
 use crate::current::voltage_limit::Operation;
@@ -49,12 +50,7 @@ pub(super) struct StepResults<'a> {
     pub flux_freq: f32,
     /// Electrical speed of the rotor.
     pub rotor_freq: f32,
-    /// Whether the flux is held still.
-    pub held: bool,
-    /// Whether a turning shaft is looked for: nothing is judged.
-    pub looking: bool,
-    /// Whether the flux of a turning shaft builds up.
-    pub building: bool,
+    pub stage: FluxStage,
     /// Whether the observer keeps its hands off the angle.
     pub alone: bool,
     /// Whether the drive learns: nothing is tracked then, and there is no reference yet.
@@ -100,7 +96,7 @@ impl Coefficients {
                 s.estimator.synchronous.average_reference(step.i_q);
                 if self.observer.is_some() && !step.learning {
                     s.hand_over.update(step.flux_freq);
-                    if step.looking {
+                    if step.stage == FluxStage::Sought {
                         s.hand_over.silence();
                     } else if step.alone {
                         s.hand_over.weight = 0.0;
@@ -196,16 +192,16 @@ impl Coefficients {
 
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        if step.held || step.building {
-            // The flux is still building up, and the drop of the inverter may not be known.
+        if step.stage != FluxStage::Ready {
+            // The drop of the inverter may not be known either.
             s.prediction.forget_mean();
         }
         let tracked = self.observer.is_some() && !step.learning;
-        let building = step.building;
+        let building = step.stage == FluxStage::BuildingUp;
         let known = Known { deviation: s.observer.resistance, tracked, building };
         let judged = self.prediction.judge(&mut s.prediction, step.measured.current, known);
         // Flux that was left turns beside that which builds up.
-        if step.looking || step.alone {
+        if step.stage == FluxStage::Sought || step.alone {
             s.prediction.forget();
             return Ok(());
         }
@@ -218,17 +214,16 @@ impl Coefficients {
             Some(monitor)
                 if self.injects(s)
                     && s.carrier.is_settled()
-                    && (step.held || !step.learning)
+                    && (step.stage == FluxStage::Held || !step.learning)
                     // A flux that builds up makes a poor baseline: that of the last start is better.
-                    && !(step.building && s.lock.is_of_last_start()) =>
+                    && !(step.stage == FluxStage::BuildingUp && s.lock.is_of_last_start()) =>
             {
                 let seen = s.estimator.synchronous.saliency;
                 // A drift of the gains since the start is not in what the start measured.
                 let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
                 // The baseline of the monitor is measured while the angle does not come from the injection. Once it is
                 // there, the monitor also watches the observer.
-                let led = step.held
-                    || step.building
+                let led = step.stage != FluxStage::Ready
                     || s.hand_over.weight >= 1.0 && !s.lock.is_measured();
                 if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
                     self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
