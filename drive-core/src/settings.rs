@@ -203,15 +203,15 @@ impl Default for SpeedSettings {
 pub struct ObserverSettings {
     /// Whether it does. Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
     pub enabled: bool,
-    /// Relative change of the mean leakage inductance per ampere of stator current, 1/A.
+    /// Leakage inductance of the fundamental wave at no current, as a share of that of the motor's parameters.
+    pub leakage_share: f32,
+    /// Change of that share per ampere of stator current, peak, 1/A.
     pub leakage_slope: f32,
-    /// Stator current at which the leakage inductance is that of the motor's parameters, A peak.
-    pub leakage_at_a: f32,
 }
 
 impl Default for ObserverSettings {
     fn default() -> Self {
-        Self { enabled: true, leakage_slope: 0.0, leakage_at_a: 0.0 }
+        Self { enabled: true, leakage_share: 1.0, leakage_slope: 0.0 }
     }
 }
 

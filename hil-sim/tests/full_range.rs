@@ -135,21 +135,24 @@ fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     }
 }
 
-/// Iron, whose leakage falls with the current: with the change that `cargo sim run commission --plant r --set flux_level=high`
-/// finds, the angle is right to half a degree where the voltage gives it; without, it errs by the share of the leakage times
-/// `sigma L_s i_q/psi`, some 4 degrees.
+/// Iron: a drive that has measured its motor is right to a degree where the voltage gives the angle, also where the main flux
+/// saturates (`m4b`), which the mean leakage along and across the flux mistakes for a leakage that falls with the current:
+/// with that, 7 of 16 reversals above 2700 rpm were lost, and constant torque erred by 3 degrees.
 #[test]
-fn the_change_of_the_leakage_with_the_current_makes_the_angle_right_on_iron() {
-    let found = ["drive.motor.l_ls=0.02445", "drive.motor.l_lr=0.02445"];
-    let change = ["observer.leakage_slope=-0.0677", "observer.leakage_at_a=1.34"];
-    let with = full_range("constant", &[&["plant=r"][..], &found, &change].concat());
-    let without = full_range("constant", &[&["plant=r"][..], &found].concat());
-    for region in ["750_1200", "1200_1800", "1800_2700", "2700_3600"] {
-        let rms = |of: &Outcome| get(of, &format!("constant_{region}_angle_error_rms_deg"));
-        assert!(rms(&with) < 0.5, "{region}: {}", rms(&with));
-        assert!(rms(&without) > 2.0 * rms(&with), "{region}: {}", rms(&without));
+fn a_drive_that_measured_its_motor_is_right_on_iron() {
+    for family in ["m4b", "g7"] {
+        let plant = format!("plant={family}");
+        for kind in ["constant", "reversals"] {
+            let outcome = full_range(kind, &[&plant, "prepare.commission=yes"]);
+            for region in ["750_1200", "1200_1800", "1800_2700", "2700_3600"] {
+                let rms = get(&outcome, &format!("{kind}_{region}_angle_error_rms_deg"));
+                assert!(rms < 1.0, "{family}, {kind}, {region}: {rms}");
+            }
+            for none in ["lost_runs", "refused_runs", "silent_runs"] {
+                assert_eq!(get(&outcome, none), 0.0, "{family}, {kind}: {none}");
+            }
+        }
     }
-    assert_eq!((get(&with, "lost_runs"), get(&with, "silent_runs")), (0.0, 0.0));
 }
 
 /// Parameters that changed after the learning by 5 % of the leakage, 30 % of the stator resistance and 10 % of the main

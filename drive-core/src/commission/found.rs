@@ -50,10 +50,10 @@ pub struct Leakage {
     pub inductance: f32,
     /// Saliency at standstill, (across - along)/(across + along), with half the test current along phase a.
     pub saliency: f32,
-    /// Relative change of the mean inductance, along and across the current, per ampere, 1/A.
+    /// Leakage inductance of the fundamental wave at no current, H.
+    pub fundamental: f32,
+    /// Its change per ampere, peak, H/A.
     pub slope: f32,
-    /// Current, A peak, at which it is `inductance`.
-    pub at: f32,
 }
 
 /// Result of the staircase.
@@ -133,8 +133,9 @@ impl Found {
             None => new.current_plant.source = PlantSource::Motor,
         }
         if let Some(leakage) = self.leakage {
-            new.observer.leakage_slope = leakage.slope;
-            new.observer.leakage_at_a = leakage.at;
+            let per = 1.0 / new.motor.sigma_l_s();
+            new.observer.leakage_share = leakage.fundamental * per;
+            new.observer.leakage_slope = leakage.slope * per;
         }
         // The direct current of the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);

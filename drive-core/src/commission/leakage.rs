@@ -6,8 +6,11 @@
 //! |h| = |(1 - p) / R' / (z - p)| |(1 - b) + b/z|        p = exp(-T R' / L)        b = tau_f/T (1 - e^(-T/tau_f))
 //! ```
 //!
-//! with the analog filter `tau_f` of the sensors, whose input is straight between two samples. Two biases give the change of
-//! the inductance with the current.
+//! with the analog filter `tau_f` of the sensors, whose input is straight between two samples.
+//!
+//! The mean of along and across is `sigma L_s`. The inductance across the bias is that of the fundamental wave: from
+//! `psi = L(|i|) i` follows `dpsi/di = L(|i|)` across `i`. Along the bias it is smaller where iron saturates, the main flux
+//! included. Two biases give its change with the current.
 
 use core::f32::consts::TAU;
 
@@ -125,20 +128,21 @@ impl Commissioning {
     fn report_leakage(&mut self, plate: &Plate) -> Result<Next, Refusal> {
         let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
         let [high, low] = self.inductances;
-        let mean = |[along, across]: [f32; 2]| 0.5 * (across + along);
-        let inductance = 0.5 * (mean(high) + mean(low));
+        let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);
         let [most, least] = BIASES.map(|share| share * plate.amperes);
-        let slope = (mean(high) - mean(low)) / ((most - least) * inductance);
+        let slope = (high[1] - low[1]) / (most - least);
+        let fundamental = low[1] - slope * least;
         let values = [
             Quantity::new("sigma L_s", "H", inductance)
                 .of(plate.leakage())
                 .check(Meaning::TooLarge, Meaning::TooSmall)?,
             Quantity::new("saliency at half the current", "", saliency(high)),
             Quantity::new("saliency at a quarter", "", saliency(low)),
-            Quantity::new("change of sigma L_s per ampere", "1/A", slope),
+            Quantity::new("fundamental wave, no current", "H", fundamental),
+            Quantity::new("its change per ampere", "H/A", slope),
         ];
-        let (at, saliency) = (0.5 * (most + least), saliency(high));
-        self.found.leakage = Some(Leakage { inductance, saliency, slope, at });
+        let saliency = saliency(high);
+        self.found.leakage = Some(Leakage { inductance, saliency, fundamental, slope });
         Ok(Next::Report(Report::new(Step::Leakage, values)))
     }
 }

@@ -319,8 +319,8 @@ impl Settings {
                 let leakage = Leakage {
                     flux_saliency: 0.5 * self.slope().at_rest(),
                     current_saliency: self.current_saliency(),
+                    share: self.observer.leakage_share,
                     slope: self.observer.leakage_slope,
-                    at: self.observer.leakage_at_a,
                 };
                 let ages = [current_lag, current_lag + lpf_lag_samples(0.0)];
                 Observer::new(m, &leakage, i_d, ages)

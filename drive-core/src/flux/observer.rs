@@ -6,14 +6,14 @@
 //! currents `di` and the voltage between them,
 //!
 //! ```text
-//! e   = T (v - r_s i) - sigma L_s ((1 + m (|i| - i_m)) di - s conj(di))      s = a f(psi) + b i^2/|i|
+//! e   = T (v - r_s i) - sigma L_s ((n + m |i|) di - s conj(di))      s = a f(psi) + b i^2/|i|
 //! eps = T (R_R i_d - alpha psi) - e_d
 //! g   = 2 (s_0 alpha + c |w_r|)/(alpha^2 + w_r^2)
 //! x   = (e_q + g w_r eps)/(psi + e_d + g alpha eps)                  turned = x - x^3/3
 //! ```
 //!
-//! `s` is the saliency that the injection sees, in the fundamental wave: without it the angle errs by 7 degrees. `m` is the
-//! change of the mean leakage per ampere, and `i_m` the current at which it is sigma L_s. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
+//! `s` is the saliency that the injection sees, in the fundamental wave: without it the angle errs by 7 degrees. `n + m |i|` is
+//! the leakage of the fundamental wave relative to sigma L_s, which [`commission`](crate::commission) measures. The gain is that of Hinkkanen, Harnefors and Luomi (IEEE Trans. Power Electron.
 //! 25(5), 2010) with equal gains, for which the speed of the rotor cancels. The length follows the current model by the
 //! share that the injection has of the angle, and the voltage by the rest.
 //!
@@ -58,10 +58,10 @@ const KEPT: usize = 4;
 pub struct Observer {
     /// T r_s, V s/A.
     r_s: f32,
-    /// sigma L_s, H, its relative change per ampere, 1/A, the current at which it holds, A, and the saliency per ampere, 1/A.
+    /// sigma L_s, H, the share of it at no current, its change per ampere, 1/A, and the saliency per ampere, 1/A.
     leakage: f32,
+    leakage_share: f32,
     leakage_slope: f32,
-    leakage_at: f32,
     current_saliency: f32,
     /// Saliency fixed to the flux, at nominal flux.
     flux_saliency: f32,
@@ -105,7 +105,7 @@ pub struct ObserverState {
 struct Slow {
     /// g alpha and g w_r.
     gain: Dq,
-    /// `b/|i|`, 1/A^2, saliency fixed to the flux, and `1 + m (|i| - i_m)`.
+    /// `b/|i|`, 1/A^2, saliency fixed to the flux, and `n + m |i|`.
     per_current: f32,
     flux_saliency: f32,
     leakage: f32,
@@ -118,10 +118,10 @@ pub struct Leakage {
     pub flux_saliency: f32,
     /// Saliency per ampere of stator current, 1/A.
     pub current_saliency: f32,
-    /// Relative change of the mean leakage inductance per ampere, 1/A.
+    /// Leakage inductance of the fundamental wave at no current, as a share of that of the motor's parameters.
+    pub share: f32,
+    /// Change of that share per ampere, 1/A.
     pub slope: f32,
-    /// Stator current at which it is that of the motor's parameters, A.
-    pub at: f32,
 }
 
 impl ObserverState {
@@ -139,8 +139,8 @@ impl Observer {
         Self {
             r_s: PERIOD_S * motor.r_s,
             leakage: motor.sigma_l_s(),
+            leakage_share: leakage.share,
             leakage_slope: leakage.slope,
-            leakage_at: leakage.at,
             current_saliency: leakage.current_saliency,
             flux_saliency: leakage.flux_saliency,
             rate: PERIOD_S / motor.tau_r(),
@@ -233,7 +233,7 @@ impl Observer {
             gain: Dq { d: gain * a, q: gain * w },
             per_current: if length > 0.0 { self.current_saliency / length } else { 0.0 },
             flux_saliency: self.flux_saliency * (state.flux / self.nominal),
-            leakage: 1.0 + self.leakage_slope * (length - self.leakage_at),
+            leakage: self.leakage_share + self.leakage_slope * length,
         };
     }
 

@@ -81,8 +81,8 @@ pub static SETTINGS: &[Entry<Settings>] = &[
     word!("injection.beside_encoder", injection.beside_encoder: bool, "whether the carrier is injected beside an encoder"),
 
     word!("observer.enabled", observer.enabled: bool, "whether the voltage of the motor gives the angle at speed, where the injection ends"),
-    number!("observer.leakage_slope", observer.leakage_slope, "1/A", "relative change of the mean leakage inductance per ampere").from_to(-1.0, 1.0),
-    number!("observer.leakage_at_a", observer.leakage_at_a, "A", "stator current at which it is that of motor.*, peak").from_to(0.0, 1000.0),
+    number!("observer.leakage_share", observer.leakage_share, "", "leakage inductance of the fundamental wave at no current, as a share of that of motor.*").from_to(0.5, 2.0),
+    number!("observer.leakage_slope", observer.leakage_slope, "1/A", "change of that share per ampere of stator current, peak").from_to(-1.0, 1.0),
 
     // A trip level beyond the sensors' range would never be reached.
     auto!("limits.trip_a", limits.trip_a, Settings::trip_a, "A", "phase current that trips").beside(|s| (0.05, s.sensor_range_a())),

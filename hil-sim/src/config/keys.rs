@@ -327,6 +327,9 @@ keys! {
     }
     /// Preparation of the drive before the experiment.
     "prepare." prepare: PrepareConfig {
+        /// Whether the drive measures its motor first, as a user has it do: it knows the nameplate. Its direct current is
+        /// that of the rule.
+        commission: bool = false, [switch], "";
         /// Whether a sensorless drive learns first, with the shaft locked, as a user would have it do.
         learn: bool = false, [switch], "";
     }

@@ -43,6 +43,28 @@ const ENOUGH: f64 = 0.7;
 /// Machines in the table, the worst first.
 const LISTED: usize = 20;
 
+/// A whole commissioning of the motor of this configuration by a drive that knows its nameplate.
+fn session(config: &Config, seed: u64) -> Result<Session, Error> {
+    let settings = unaware(config);
+    let rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
+    let steps = (Step::Nameplate, Step::CurrentLoop);
+    Session::run(rig, Commissioning::new(&settings), steps, Abort::default(), |_| {})
+}
+
+/// The settings that `accept` then puts in force. The inertia, which needs a free shaft, is the one of the configuration.
+///
+/// # Errors
+/// When it is refused, or does not end.
+pub fn commissioned(config: &Config, seed: u64) -> Result<Settings, Error> {
+    let session = session(config, seed)?;
+    if let Some((step, why)) = session.refusal() {
+        return Err(Error::Refused(format!("commissioning: {}: {why}", step.word())));
+    }
+    let mut settings = session.commissioning.settings(&unaware(config));
+    settings.motor.inertia = config.drive.motor.inertia;
+    Ok(settings)
+}
+
 /// The sessions.
 pub struct Commission {
     config: Config,
@@ -174,11 +196,7 @@ impl Study for Commission {
     fn run(&self, number: usize) -> Result<Record, Error> {
         let (config, seed) = self.machine(number);
         let settings = unaware(&config);
-        let unaware = Config { drive: settings, ..config.clone() };
-        let rig = Rig::from_config(&unaware, seed)?;
-        let steps = (Step::Nameplate, Step::CurrentLoop);
-        let commissioning = Commissioning::new(&settings);
-        let session = Session::run(rig, commissioning, steps, Abort::default(), |_| {})?;
+        let session = session(&config, seed)?;
         let refused = session.refusal().map(|(step, why)| format!("{}: {why}", step.word()));
         let commissioned = session.commissioning.settings(&settings);
         let m = commissioned.motor;

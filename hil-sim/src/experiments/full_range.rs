@@ -1,8 +1,8 @@
 //! The whole range of the speed: torque, load steps, ramps, wrong parameters, turned flux, starts on a turning shaft, and the
 //! dc link, per region of the speed.
 //!
-//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless `sequence.i_d` says otherwise; the
-//! drive learns its tables at that current first.
+//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless `sequence.i_d` says otherwise, or the
+//! drive commissions itself; it learns its tables at that current first.
 
 mod case;
 mod summary;
@@ -18,6 +18,7 @@ use case::Case;
 use trial::{Run, Trial};
 
 use super::battery::{Moment, learned, seed_of};
+use super::commission::commissioned;
 use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
@@ -31,7 +32,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     stands_for: "beyond the dissertation",
     about: "Runs over the whole range of the speed, `runs` of each kind in each region: angle error, current, dc link, and what \
             the drive does not notice.",
-    uses: &[BENCH, DRIVE, &["full_range.", "runs"]],
+    uses: &[BENCH, DRIVE, &["full_range.", "prepare.commission", "runs"]],
     not: &[],
     run: whole::<FullRange>,
 };
@@ -150,7 +151,10 @@ impl Study for FullRange {
     const EXPERIMENT: &'static Experiment = &EXPERIMENT;
 
     fn new(context: &Context<'_>) -> Result<Self, Error> {
-        let config = for_the_range(context.config)?;
+        let mut config = for_the_range(context.config)?;
+        if config.prepare.commission {
+            config.drive = commissioned(&config, context.seed)?;
+        }
         let cases = Case::all(config.full_range.kind);
         let each = config.extent.runs.unwrap_or(RUNS) as usize;
         let numbers = match config.full_range.index {
