@@ -136,6 +136,13 @@ pub struct ReferenceState {
     next: f32,
 }
 
+impl ReferenceState {
+    /// At rest at this reference.
+    pub const fn at(reference: f32) -> Self {
+        Self { next: reference }
+    }
+}
+
 impl ReferenceFilter {
     /// Filter with its pole at `p_f`, in [0, 1), as printed.
     pub const fn new(p_f: f64) -> Self {

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! with T = 667 us, the mean of four periods, and L = 4, 10 and 48: the short lag tells how often the long one has turned, the
-//! long one tells slow rotors from noise, of which |C| is 0.67 P with half a turn. Simulated, 2.5 A: found within 21 rpm up to
+//! long one tells slow rotors from noise, of which |C| is 0.67 P with half a turn. Simulated, 2.5 A: found within 11 rpm up to
 //! 2700 rpm on four poles.
 
 use crate::io::PERIOD_S;
@@ -28,8 +28,10 @@ const KEPT: usize = 3 * LONG.0 + 1;
 /// Control periods until the current stands, and until the end: 20 and 250 ms.
 const FROM: u32 = 120;
 const END: u32 = 1500;
-/// Highest frequency that the short lag tells, and the lowest that counts as turning, electrical turns per period.
+/// Highest frequency that the short lag tells, from which on it is believed alone, and the lowest that counts as turning, electrical
+/// turns per period.
 const HIGHEST: f32 = 151.0 * PERIOD_S;
+const FAST: f32 = 75.0 * PERIOD_S;
 const LOWEST: f32 = 0.32 * PERIOD_S;
 
 /// Sums of one lag.
@@ -77,8 +79,9 @@ pub enum Caught {
 }
 
 impl CatchState {
-    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands.
-    pub fn step(&mut self, elapsed: u32, e: Dq) -> Caught {
+    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands. The rotor turns `per_flux` times
+    /// as fast as the flux.
+    pub fn step(&mut self, elapsed: u32, e: Dq, per_flux: f32) -> Caught {
         if elapsed < FROM {
             return Caught::Searching;
         }
@@ -89,7 +92,7 @@ impl CatchState {
             self.take();
             (self.sum, self.summed) = (Dq::ZERO, 0);
         }
-        if elapsed < END { Caught::Searching } else { self.result() }
+        if elapsed < END { Caught::Searching } else { self.result(per_flux) }
     }
 
     /// Takes an average.
@@ -104,7 +107,7 @@ impl CatchState {
         self.count += 1;
     }
 
-    fn result(&self) -> Caught {
+    fn result(&self, per_flux: f32) -> Caught {
         let [short, middle, long] = &self.correlations;
         let (by_short, by_middle) = (short.frequency(SHORT), middle.frequency(MIDDLE));
         let freq = match (by_short, by_middle, long.frequency(LONG)) {
@@ -114,10 +117,12 @@ impl CatchState {
                 let turns = (near - far) * (1.0 / TURN);
                 far + (turns + if turns < 0.0 { -0.5 } else { 0.5 }) as i32 as f32 * TURN
             }
+            // Not the remainder that the long lag sees; noise alone is half a turn.
+            (Some(near), None, _) if near.abs() > FAST && near.abs() < HIGHEST => near,
             (_, Some(freq), _) | (_, _, Some(freq)) => freq,
             _ => 0.0,
         };
-        if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq) }
+        if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq * per_flux) }
     }
 }
 
