@@ -46,7 +46,9 @@ const LISTED: usize = 20;
 /// A whole commissioning of the motor of this configuration by a drive that knows its nameplate.
 fn session(config: &Config, seed: u64) -> Result<Session, Error> {
     let settings = unaware(config);
-    let rig = Rig::from_config(&Config { drive: settings, ..config.clone() }, seed)?;
+    let mut unlearned = Config { drive: settings, ..config.clone() };
+    unlearned.prepare.learn = false;
+    let rig = Rig::from_config(&unlearned, seed)?;
     let steps = (Step::Nameplate, Step::CurrentLoop);
     Session::run(rig, Commissioning::new(&settings), steps, Abort::default(), |_| {})
 }
