@@ -170,7 +170,8 @@ fn longest(stream: bool) -> Result<(u32, f64)> {
     pair.board.longest = Default::default();
     for line in ["torque 1.5", "torque -1", "torque 1"] {
         ear.ask(&mut pair, line)?;
-        pair.board.type_line("trace 500 2");
+        // Every seventh period: some of them have a report as well, whenever the trace begins.
+        pair.board.type_line("trace 500 7");
         pair.run(SECOND, |_, _| {})?;
         ear.hear(&mut pair);
         ear.text.clear();
