@@ -137,8 +137,8 @@ pub struct ReferenceState {
 }
 
 impl ReferenceState {
-    /// At rest at this reference.
-    pub const fn at(reference: f32) -> Self {
+    /// A filter that has settled at this reference.
+    pub const fn at_rest(reference: f32) -> Self {
         Self { next: reference }
     }
 }

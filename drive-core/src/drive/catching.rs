@@ -100,16 +100,19 @@ impl Drive {
             };
             // Flux that was left is large enough.
             if n == 0 && !s.catching.flux_left {
-                s.reference[0] = ReferenceState::at(AT_ONCE * c.current);
+                s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
             }
-            match s.catching.search.step(n, s.observer.change, c.per_found) {
+            match s.catching.search.step(n, s.observer.change) {
                 Caught::Searching => {}
                 Caught::Standing => {
                     s.hand_over = HandOver::default();
                     self.magnetising_from_here(0);
                 }
-                Caught::Turning(freq) if freq.abs() > HIGHEST => return Err(Fault::NotCaught),
-                Caught::Turning(freq) => {
+                Caught::Turning(flux_freq) => {
+                    let freq = flux_freq * c.per_found;
+                    if freq.abs() > HIGHEST {
+                        return Err(Fault::NotCaught);
+                    }
                     s.catching.found = Some(elapsed);
                     s.estimator.turn_with(freq);
                     s.indirect = IndirectState::default();

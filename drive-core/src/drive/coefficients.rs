@@ -302,7 +302,7 @@ impl Settings {
                 let mean_v = UNEXPLAINED_MEAN.map(|share| share * allowed_v);
                 Prediction::new(m, motor_plant, allowed_v, mean_v)
             },
-            catching: self.catching([0, 1].map(|axis: usize| designs[axis].k_c as f32)),
+            catching: self.catching(designs.map(|design| design.k_c as f32)),
             voltage_limit: VoltageLimit::new(m, i_d, current_limit),
             dc_link: DcLink::new(&self.dc_link_limits()),
             motion: self.motion(&motion_design),

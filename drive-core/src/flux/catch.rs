@@ -74,14 +74,13 @@ pub enum Caught {
     Searching,
     /// The shaft stands, or turns so slowly that a start does not mind.
     Standing,
-    /// The rotor turns at this speed, electrical turns per period.
+    /// The flux of a turning rotor turns at this speed, electrical turns per period.
     Turning(f32),
 }
 
 impl CatchState {
-    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands. The rotor turns `per_flux` times
-    /// as fast as the flux.
-    pub fn step(&mut self, elapsed: u32, e: Dq, per_flux: f32) -> Caught {
+    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands.
+    pub fn step(&mut self, elapsed: u32, e: Dq) -> Caught {
         if elapsed < FROM {
             return Caught::Searching;
         }
@@ -92,7 +91,7 @@ impl CatchState {
             self.take();
             (self.sum, self.summed) = (Dq::ZERO, 0);
         }
-        if elapsed < END { Caught::Searching } else { self.result(per_flux) }
+        if elapsed < END { Caught::Searching } else { self.result() }
     }
 
     /// Takes an average.
@@ -107,7 +106,7 @@ impl CatchState {
         self.count += 1;
     }
 
-    fn result(&self, per_flux: f32) -> Caught {
+    fn result(&self) -> Caught {
         let [short, middle, long] = &self.correlations;
         let (by_short, by_middle) = (short.frequency(SHORT), middle.frequency(MIDDLE));
         let freq = match (by_short, by_middle, long.frequency(LONG)) {
@@ -122,7 +121,7 @@ impl CatchState {
             (_, Some(freq), _) | (_, _, Some(freq)) => freq,
             _ => 0.0,
         };
-        if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq * per_flux) }
+        if freq.abs() < LOWEST { Caught::Standing } else { Caught::Turning(freq) }
     }
 }
 
