@@ -117,8 +117,9 @@ struct ControlState {
     indirect: IndirectState,
     observer: ObserverState,
     hand_over: HandOver,
-    /// Voltage that flux and leakage induce, by the observer's share in the angle, V.
+    /// Voltage that flux and leakage induce, by the observer's share in the angle, V, and that share.
     induced: Dq,
+    induced_weight: f32,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],

@@ -101,6 +101,15 @@ impl DqPi {
     }
 }
 
+impl DqPi {
+    /// Takes back what the last error adds by integration: before each step of proportional controllers.
+    pub fn hold(&self, state: &mut DqPiState) {
+        let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;
+        let last = Dq { d: integral(&self.d, &state.d), q: integral(&self.q, &state.q) };
+        state.back_calculate(-last);
+    }
+}
+
 impl DqPiState {
     /// Anti-windup: adds `correction` = realised - wanted voltage, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: Dq) {

@@ -4,7 +4,7 @@ use super::Drive;
 use crate::current::pi::ReferenceState;
 use crate::drive::state::State;
 use crate::fault::Fault;
-use crate::flux::catch::{CatchState, Caught};
+use crate::flux::catch::{self, CatchState, Caught, Path};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::io::{PERIOD_S, periods};
@@ -34,9 +34,7 @@ pub(crate) struct Catching {
     pub alone: u32,
     pub built: u32,
     pub flux_gone: u32,
-    /// Speed of the rotor by that of the flux which is found. The flux drives a current through rotor, stator and controller, which
-    /// turns it back: `1 + R_R/(k_c + r_s + R_R)`, by 1.4 to 2 % with the dissertation's motor.
-    pub per_found: f32,
+    pub path: Path,
 }
 
 impl Settings {
@@ -45,8 +43,6 @@ impl Settings {
         let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
         let current = f32::max(SHARE * self.current_limit_a(), i_d);
         let ratio = current / i_d;
-        let r_r = self.motor.coupled_inductance() / tau_r;
-        let path = 0.5 * (k_c[0] + k_c[1]) + self.motor.r_s + r_r;
         let forced_s =
             if ratio > 1.05 { tau_r * libm::logf(ratio / (ratio - 1.0)) } else { BUILT_S };
         (self.uses_observer() && self.sequence.catch).then(|| Catching {
@@ -55,7 +51,7 @@ impl Settings {
             alone: periods(ALONE_S),
             built: periods(BUILT_S),
             flux_gone: periods(FLUX_GONE_T * tau_r),
-            per_found: 1.0 + r_r / path,
+            path: Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1])),
         })
     }
 }
@@ -102,6 +98,9 @@ impl Drive {
             if n == 0 && !s.catching.flux_left {
                 s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
             }
+            if n > catch::FROM {
+                self.c.current_loop.hold(&mut s.current_loop);
+            }
             match s.catching.search.step(n, s.observer.change) {
                 Caught::Searching => {}
                 Caught::Standing => {
@@ -109,7 +108,7 @@ impl Drive {
                     self.magnetising_from_here(0);
                 }
                 Caught::Turning(flux_freq) => {
-                    let freq = flux_freq * c.per_found;
+                    let freq = c.path.rotor(flux_freq);
                     if freq.abs() > HIGHEST {
                         return Err(Fault::NotCaught);
                     }

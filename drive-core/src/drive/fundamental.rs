@@ -8,7 +8,7 @@ use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
 use crate::math::angle::UnitVector;
-use crate::math::frames::{AlphaBeta, Dq};
+use crate::math::frames::AlphaBeta;
 
 /// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
 const COMPARED_FROM: f32 = 0.3;
@@ -50,11 +50,9 @@ impl Coefficients {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }
-        let reference = s.seen.reference;
-        s.induced = if weight > 0.0 {
-            observer.induced(&s.observer, reference, step.flux_freq) * weight
-        } else {
-            Dq::ZERO
-        };
+        // What another weight changes, the controllers have been putting out.
+        let induced = observer.induced(&s.observer, s.seen.reference, step.flux_freq);
+        s.current_loop.back_calculate(induced * (s.induced_weight - weight));
+        (s.induced, s.induced_weight) = (induced * weight, weight);
     }
 }

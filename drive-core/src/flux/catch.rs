@@ -13,9 +13,12 @@
 //! long one tells slow rotors from noise, of which |C| is 0.67 P with half a turn. Simulated, 2.5 A: found within 11 rpm up to
 //! 2700 rpm on four poles.
 
+use core::f32::consts::TAU;
+
 use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
+use crate::settings::Motor;
 
 /// Control periods that are averaged.
 const AVERAGED: u8 = 4;
@@ -26,7 +29,7 @@ const LONG: (usize, f32) = (48, 0.7);
 /// Averages that are kept: the longest lag three times.
 const KEPT: usize = 3 * LONG.0 + 1;
 /// Control periods until the current stands, and until the end: 20 and 250 ms.
-const FROM: u32 = 120;
+pub const FROM: u32 = 120;
 const END: u32 = 1500;
 /// Highest frequency that the short lag tells, from which on it is believed alone, and the lowest that counts as turning, electrical
 /// turns per period.
@@ -78,8 +81,36 @@ pub enum Caught {
     Turning(f32),
 }
 
+/// Path of the current that the turning flux drives through rotor, stator and proportional controller, `Z = k_c e^(-1.5 jwT) + r_s +
+/// jw sigma L_s`. The current turns the flux back: the rotor turns by `1 + R_R Re(1/Z)` faster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Path {
+    r_r: f32,
+    resistance: f32,
+    /// By the frequency in turns per period.
+    reactance: f32,
+}
+
+impl Path {
+    /// With a controller of the gain `k_c`, V/A.
+    pub fn new(motor: &Motor, k_c: f32) -> Self {
+        Self {
+            r_r: motor.coupled_inductance() / motor.tau_r(),
+            resistance: k_c + motor.r_s,
+            reactance: TAU * (motor.sigma_l_s() / PERIOD_S - 1.5 * k_c),
+        }
+    }
+
+    /// Speed of the rotor by that of its flux, electrical turns per period.
+    pub fn rotor(&self, freq: f32) -> f32 {
+        let (r, x) = (self.resistance, self.reactance * freq);
+        freq * (1.0 + self.r_r * r / (r * r + x * x))
+    }
+}
+
 impl CatchState {
-    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands.
+    /// Takes the rotor's voltage `e` of period `elapsed` of the search, V s in a frame that stands. From [`FROM`] on
+    /// the controller is proportional.
     pub fn step(&mut self, elapsed: u32, e: Dq) -> Caught {
         if elapsed < FROM {
             return Caught::Searching;
