@@ -117,9 +117,8 @@ struct ControlState {
     indirect: IndirectState,
     observer: ObserverState,
     hand_over: HandOver,
-    /// Voltage that flux and leakage induce, by the observer's share in the angle, V, and that share.
-    induced: Dq,
-    induced_weight: f32,
+    /// Share of the observer in the angle, by which the voltage that it sees induced is fed forward.
+    induced_share: f32,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],
@@ -260,7 +259,7 @@ impl Drive {
         let flux_axis = phi.turned_by(axes.seen);
         let current = seen.to_dq(flux_axis);
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
-            + s.induced
+            + c.induced(s, reference, flux.freq)
             + s.references.test_voltage;
         (s.seen.current, s.seen.voltage) = (current, voltage);
 

@@ -8,7 +8,7 @@ use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
 use crate::math::angle::UnitVector;
-use crate::math::frames::AlphaBeta;
+use crate::math::frames::{AlphaBeta, Dq};
 
 /// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
 const COMPARED_FROM: f32 = 0.3;
@@ -50,9 +50,18 @@ impl Coefficients {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }
-        // What another weight changes, the controllers have been putting out.
+        // What another share changes, the controllers have been putting out.
         let induced = observer.induced(&s.observer, s.seen.reference, step.flux_freq);
-        s.current_loop.back_calculate(induced * (s.induced_weight - weight));
-        (s.induced, s.induced_weight) = (induced * weight, weight);
+        s.current_loop.back_calculate(induced * (s.induced_share - weight));
+        s.induced_share = weight;
+    }
+
+    /// The voltage that flux and leakage induce at these references, V, by the observer's share in the angle; `flux_freq` in
+    /// electrical turns per period.
+    pub(super) fn induced(&self, s: &ControlState, reference: Dq, flux_freq: f32) -> Dq {
+        match &self.observer {
+            Some(observer) => observer.induced(&s.observer, reference, flux_freq) * s.induced_share,
+            None => Dq::ZERO,
+        }
     }
 }

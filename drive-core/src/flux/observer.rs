@@ -229,9 +229,11 @@ impl Observer {
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
         let length = libm::sqrtf(state.current.length_squared());
+        // A current that passes zero is large before the next update.
+        let least = self.nominal / self.coupled;
         state.slow = Slow {
             gain: Dq { d: gain * a, q: gain * w },
-            per_current: if length > 0.0 { self.current_saliency / length } else { 0.0 },
+            per_current: self.current_saliency / if length > least { length } else { least },
             flux_saliency: self.flux_saliency * (state.flux / self.nominal),
             leakage: self.leakage_share + self.leakage_slope * length,
         };
