@@ -117,8 +117,10 @@ struct ControlState {
     indirect: IndirectState,
     observer: ObserverState,
     hand_over: HandOver,
-    /// Share of the observer in the angle, by which the voltage that it sees induced is fed forward.
+    /// Share of the observer in the angle, by which the induced voltage is fed forward, and the frequency of the flux times this
+    /// share, electrical turns per period.
     induced_share: f32,
+    induced_freq: f32,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],
@@ -259,7 +261,7 @@ impl Drive {
         let flux_axis = phi.turned_by(axes.seen);
         let current = seen.to_dq(flux_axis);
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
-            + c.induced(s, reference, flux.freq)
+            + c.induced(s, reference)
             + s.references.test_voltage;
         (s.seen.current, s.seen.voltage) = (current, voltage);
 

@@ -51,16 +51,15 @@ impl Coefficients {
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }
         // What another share changes, the controllers have been putting out.
-        let induced = observer.induced(&s.observer, s.seen.reference, step.flux_freq);
-        s.current_loop.back_calculate(induced * (s.induced_share - weight));
-        s.induced_share = weight;
+        let more = (s.induced_share - weight) * step.flux_freq;
+        s.current_loop.back_calculate(observer.induced(&s.observer, s.seen.reference, more));
+        (s.induced_share, s.induced_freq) = (weight, weight * step.flux_freq);
     }
 
-    /// The voltage that flux and leakage induce at these references, V, by the observer's share in the angle; `flux_freq` in
-    /// electrical turns per period.
-    pub(super) fn induced(&self, s: &ControlState, reference: Dq, flux_freq: f32) -> Dq {
+    /// The voltage that flux and leakage induce at these references, V, by the observer's share in the angle.
+    pub(super) fn induced(&self, s: &ControlState, reference: Dq) -> Dq {
         match &self.observer {
-            Some(observer) => observer.induced(&s.observer, reference, flux_freq) * s.induced_share,
+            Some(observer) => observer.induced(&s.observer, reference, s.induced_freq),
             None => Dq::ZERO,
         }
     }
