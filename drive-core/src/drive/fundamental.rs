@@ -7,6 +7,7 @@ use super::in_turn::StepResults;
 use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
+use crate::flux::observer::Observer;
 use crate::math::angle::UnitVector;
 use crate::math::frames::{AlphaBeta, Dq};
 
@@ -29,7 +30,11 @@ impl Coefficients {
         let Some(observer) = &self.observer else { return Turning::default() };
         let filtered = !s.hand_over.silent;
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
-        observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
+        if s.hand_over.is_blind() {
+            Observer::skip(state, current);
+        } else {
+            observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
+        }
         // A flux that builds up does not show the resistance.
         let ready = stage == FluxStage::Ready;
         if weight == 0.0 && ready && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {

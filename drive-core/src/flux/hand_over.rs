@@ -21,6 +21,8 @@ const TO: f32 = 20.0 * PERIOD_S;
 /// Frequencies above which the carrier goes off, and below which it comes on, turns per period.
 const CARRIER_OFF: f32 = 26.0 * PERIOD_S;
 const CARRIER_ON: f32 = 24.0 * PERIOD_S;
+/// Periods after a change of the carrier in which voltage and current of the observer do not belong together.
+const BLIND: u8 = 3;
 /// Carrier periods until the demodulation is filled.
 const FILLED: u8 = 8;
 /// Carrier periods with the injection alone until the noise is judged.
@@ -35,6 +37,9 @@ pub struct HandOver {
     pub weight: f32,
     /// Whether the carrier is off.
     pub silent: bool,
+    /// What `silent` was in the last period, and the periods for which the observer sees nothing: those after a change.
+    was_silent: bool,
+    blind: u8,
     /// Carrier periods until the demodulation is filled.
     filling: u8,
     /// Carrier periods until the noise of the sensors is judged.
@@ -83,6 +88,13 @@ impl HandOver {
     /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it has the angle alone.
     pub fn is_quiet(&self) -> bool {
         self.unquiet == 0
+    }
+
+    /// Whether the observer sees nothing in this period; to be asked once a period.
+    pub fn is_blind(&mut self) -> bool {
+        self.blind = if self.silent == self.was_silent { self.blind.saturating_sub(1) } else { BLIND };
+        self.was_silent = self.silent;
+        self.blind > 0
     }
 
     /// Turns the carrier off, and leaves the angle to itself.

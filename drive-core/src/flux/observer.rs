@@ -223,6 +223,11 @@ impl Observer {
         state.current = mean;
     }
 
+    /// One period in which the flux turns as before: with a `current` that does not belong to the voltages.
+    pub fn skip(state: &mut ObserverState, current: AlphaBeta) {
+        state.last = current;
+    }
+
     /// Computes the gains for a rotor of `rotor_freq`, electrical turns per period, and the saliency at the present current;
     /// once a carrier period.
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
