@@ -30,7 +30,8 @@ impl Coefficients {
         let Some(observer) = &self.observer else { return Turning::default() };
         let filtered = !s.hand_over.silent;
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
-        if s.hand_over.is_blind() {
+        let blind = s.hand_over.is_blind();
+        if blind {
             Observer::skip(state, current);
         } else {
             observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
@@ -41,7 +42,8 @@ impl Coefficients {
             observer.track_resistance(state);
         }
         const PER_RADIAN: f32 = 1.0 / TAU;
-        let (turned, slip) = (state.turned * PER_RADIAN, state.slip * PER_RADIAN);
+        let turned = if blind { s.hand_over.mean_turn() } else { state.turned * PER_RADIAN };
+        let slip = state.slip * PER_RADIAN;
         s.hand_over.turning(index, turned, slip, observer.ages[usize::from(filtered)])
     }
 

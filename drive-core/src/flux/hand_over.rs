@@ -97,6 +97,11 @@ impl HandOver {
         self.blind > 0
     }
 
+    /// Mean turn of the last carrier period, electrical turns per period.
+    pub fn mean_turn(&self) -> f32 {
+        self.sum * (1.0 / CARRIER_SAMPLES as f32)
+    }
+
     /// Turns the carrier off, and leaves the angle to itself.
     pub fn silence(&mut self) {
         (self.silent, self.filling, self.weight) = (true, FILLED, 0.0);
@@ -122,7 +127,7 @@ impl HandOver {
         let (turned, age) = if self.silent {
             (turned, age + 1.0)
         } else {
-            (self.sum * (1.0 / CARRIER_SAMPLES as f32), age + 1.0 + MEAN_AGE)
+            (self.mean_turn(), age + 1.0 + MEAN_AGE)
         };
         Turning { weight: self.weight, turned, slip, age }
     }
