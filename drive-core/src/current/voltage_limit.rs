@@ -24,13 +24,14 @@ use crate::settings::Motor;
 /// Share of the voltage that is used: the rest is for the current controllers.
 const USED: f32 = 0.92;
 /// Share of the voltage that the leakage may take.
-const FOR_LEAKAGE: f32 = 0.7;
+const FOR_LEAKAGE: f32 = 0.6;
 /// Least direct current, as a share of the setting.
 const LEAST: f32 = 0.15;
 /// Change of the trim in a carrier period per relative excess of the voltage.
 const TRIM: f32 = 5.0 * CARRIER_SAMPLES as f32 * PERIOD_S;
 /// Least trim.
 const LEAST_TRIM: f32 = 0.6;
+const MOST_TRIM: f32 = 1.3;
 
 /// Coefficients of the limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,15 +108,16 @@ impl VoltageLimit {
         // (|u| - U)/U near U, without the root.
         let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
         let trim = state.trim - TRIM * excess;
+        let most_trim = if state.most.d < self.i_d { MOST_TRIM } else { 1.0 };
         state.trim = if trim < LEAST_TRIM {
             LEAST_TRIM
-        } else if trim < 1.0 {
+        } else if trim < most_trim {
             trim
         } else {
-            1.0
+            most_trim
         };
 
-        let by_leakage = self.by_leakage(available, flux_freq);
+        let by_leakage = self.by_leakage(if available < whole { available } else { whole }, flux_freq);
         let i_d = if kept { self.i_d } else { self.direct(available, flux_freq, current.q) };
         state.available = if kept { 0.0 } else { available };
         let all = i_d + added;
