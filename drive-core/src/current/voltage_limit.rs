@@ -29,6 +29,8 @@ const FOR_LEAKAGE: f32 = 0.6;
 const LEAST: f32 = 0.15;
 /// Change of the trim in a carrier period per relative excess of the voltage.
 const TRIM: f32 = 5.0 * CARRIER_SAMPLES as f32 * PERIOD_S;
+/// The same from 1 on upwards: slower than a flux that builds up.
+const TRIM_UP: f32 = 0.2 * TRIM;
 /// Least trim.
 const LEAST_TRIM: f32 = 0.6;
 const MOST_TRIM: f32 = 1.3;
@@ -107,7 +109,8 @@ impl VoltageLimit {
         let available = whole * state.trim;
         // (|u| - U)/U near U, without the root.
         let excess = 0.5 * (voltage.length_squared() / (whole * whole) - 1.0);
-        let trim = state.trim - TRIM * excess;
+        let rate = if excess < 0.0 && state.trim >= 1.0 { TRIM_UP } else { TRIM };
+        let trim = state.trim - rate * excess;
         let most_trim = if state.most.d < self.i_d { MOST_TRIM } else { 1.0 };
         state.trim = if trim < LEAST_TRIM {
             LEAST_TRIM

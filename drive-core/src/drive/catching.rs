@@ -16,6 +16,8 @@ const SHARE: f32 = 0.714;
 /// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
+/// Current per missing magnetising current.
+const FORCED: f32 = 10.0;
 /// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
 const BUILT_S: f32 = 0.35;
 const ALONE_S: f32 = 0.2;
@@ -29,8 +31,6 @@ const FLUX_GONE_T: f32 = 4.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Catching {
     pub current: f32,
-    /// Time with that current until the flux of the setting has built up.
-    pub forced: u32,
     pub alone: u32,
     pub built: u32,
     pub flux_gone: u32,
@@ -42,12 +42,8 @@ impl Settings {
     pub(crate) fn catching(&self, k_c: [f32; 2]) -> Option<Catching> {
         let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
         let current = f32::max(SHARE * self.current_limit_a(), i_d);
-        let ratio = current / i_d;
-        let forced_s =
-            if ratio > 1.05 { tau_r * libm::logf(ratio / (ratio - 1.0)) } else { BUILT_S };
         (self.uses_observer() && self.sequence.catch).then(|| Catching {
             current,
-            forced: periods(forced_s),
             alone: periods(ALONE_S),
             built: periods(BUILT_S),
             flux_gone: periods(FLUX_GONE_T * tau_r),
@@ -122,12 +118,17 @@ impl Drive {
             }
             return Ok(Dq { d: c.current, q: 0.0 });
         };
+        // As much flux as the voltage bears, and with all current until it has built up.
+        let most = s.voltage_limit.most.d;
+        let missing = most - self.c.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
+        let forced = most + FORCED * missing;
+        let d = if forced > c.current { c.current } else if forced > 0.0 { forced } else { 0.0 };
         let since = elapsed.wrapping_sub(found);
         if since >= c.built {
             self.c.motion.start(&mut s.motion, s.seen.rotor_count);
             self.enter(State::of_mode(self.mode));
         }
-        Ok(Dq { d: if since < c.forced { c.current } else { self.c.sequence.i_d }, q: 0.0 })
+        Ok(Dq { d, q: 0.0 })
     }
 
     /// The state to go to when the start on a turning shaft ends so: a wrong speed shows as a voltage or a current that it does
