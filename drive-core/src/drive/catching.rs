@@ -16,6 +16,10 @@ const SHARE: f32 = 0.714;
 /// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
+/// Share of that current that is enough where flux was left: the flux drives a current of its own.
+const WITH_FLUX: f32 = 0.4;
+/// Share of the current that trips up to which both together may come.
+const UP_TO: f32 = 0.85;
 /// Current per missing magnetising current.
 const FORCED: f32 = 10.0;
 /// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
@@ -35,6 +39,9 @@ pub(crate) struct Catching {
     pub built: u32,
     pub flux_gone: u32,
     pub path: Path,
+    /// Largest voltage of flux that was left, V, and its decay per period.
+    left_v: f32,
+    decay: f32,
 }
 
 impl Settings {
@@ -42,12 +49,15 @@ impl Settings {
     pub(crate) fn catching(&self, k_c: [f32; 2]) -> Option<Catching> {
         let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
         let current = f32::max(SHARE * self.current_limit_a(), i_d);
+        let path = Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1]));
         (self.uses_observer() && self.sequence.catch).then(|| Catching {
             current,
             alone: periods(ALONE_S),
             built: periods(BUILT_S),
             flux_gone: periods(FLUX_GONE_T * tau_r),
-            path: Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1])),
+            path,
+            left_v: path.resistance * (UP_TO * self.trip_a() - WITH_FLUX * current),
+            decay: PERIOD_S / tau_r,
         })
     }
 }
@@ -58,8 +68,17 @@ pub(super) struct CatchingState {
     search: CatchState,
     /// Period in which the speed was found.
     found: Option<u32>,
-    /// Whether there may be flux from a run before.
-    pub flux_left: bool,
+    /// Flux from a run before.
+    pub flux_left: Option<FluxLeft>,
+}
+
+/// Flux of a run before.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FluxLeft {
+    /// Voltage that it induced when that run ended, V.
+    pub volts: f32,
+    /// Control periods from then to this start.
+    pub ago: u32,
 }
 
 impl CatchingState {
@@ -70,6 +89,16 @@ impl CatchingState {
 }
 
 impl Drive {
+    /// Whether flux that was left would drive too much current yet.
+    pub(super) fn waits_for_flux(&self) -> bool {
+        let Some((c, left)) = self.c.catching.zip(self.control.catching.flux_left) else {
+            return false;
+        };
+        let x = (left.ago + self.elapsed) as f32 * c.decay;
+        // It decays by e^x, which is more than this.
+        left.volts > c.left_v * (1.0 + x * (1.0 + 0.5 * x))
+    }
+
     pub(super) fn catch_from_here(&mut self) {
         self.control.hand_over.silence();
         self.enter(State::Catching);
@@ -90,10 +119,14 @@ impl Drive {
             let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
                 return Ok(Dq::ZERO);
             };
-            // Flux that was left is large enough.
-            if n == 0 && !s.catching.flux_left {
-                s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
-            }
+            let d = if s.catching.flux_left.is_some() {
+                WITH_FLUX * c.current
+            } else {
+                if n == 0 {
+                    s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
+                }
+                c.current
+            };
             if n > catch::FROM {
                 self.c.current_loop.hold(&mut s.current_loop);
             }
@@ -116,7 +149,7 @@ impl Drive {
                     }
                 }
             }
-            return Ok(Dq { d: c.current, q: 0.0 });
+            return Ok(Dq { d, q: 0.0 });
         };
         // As much flux as the voltage bears, and with all current until it has built up.
         let most = s.voltage_limit.most.d;

@@ -1,11 +1,15 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
+use core::f32::consts::TAU;
+
+use super::catching::FluxLeft;
 use super::reference::References;
 use super::{ControlState, Drive};
 
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::{Mode, State};
+use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
 use crate::math::limited;
@@ -195,15 +199,17 @@ impl Drive {
         if mode == Mode::Learning {
             self.learned = None;
         }
+        let gone = self.c.catching.map_or(0, |c| c.flux_gone);
+        let flux_left = self.starts > 1 && self.elapsed < gone && self.can_catch();
+        let freq = self.control.estimator.rotor_freq.abs() * (TAU / PERIOD_S);
+        let left = FluxLeft { volts: freq * self.control.observer.flux, ago: self.elapsed };
         // The brake resistor stays hot; a start on a turning shaft measures neither drop nor carrier.
         let ControlState { dc_link, inverter_drop, observer, lock, .. } = self.control;
         self.control = ControlState { dc_link, ..ControlState::default() };
         self.control.inverter_drop.volts = inverter_drop.volts;
         self.control.observer.resistance = observer.resistance;
         self.control.lock.baseline = lock.baseline;
-        let gone = self.c.catching.map_or(0, |c| c.flux_gone);
-        self.control.catching.flux_left =
-            self.starts > 1 && self.elapsed < gone && self.can_catch();
+        self.control.catching.flux_left = flux_left.then_some(left);
         let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
         let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
         self.control.references = self.no_torque(i_d);

@@ -86,7 +86,8 @@ pub enum Caught {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Path {
     r_r: f32,
-    resistance: f32,
+    /// k_c + r_s, ohm.
+    pub resistance: f32,
     /// By the frequency in turns per period.
     reactance: f32,
 }
