@@ -19,7 +19,7 @@ const AT_ONCE: f32 = 0.5;
 /// Share of that current that is enough where flux was left: the flux drives a current of its own.
 const WITH_FLUX: f32 = 0.4;
 /// Share of the current that trips up to which both together may come.
-const UP_TO: f32 = 0.85;
+const UP_TO: f32 = 0.7;
 /// Current per missing magnetising current.
 const FORCED: f32 = 10.0;
 /// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
