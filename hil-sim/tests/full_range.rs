@@ -6,9 +6,13 @@ use hil_sim::{Config, experiments};
 const ENCODER: &str = "angle_source=encoder";
 
 fn outcome(name: &str, set: &[&str]) -> Outcome {
+    outcome_of(None, name, set, 1)
+}
+
+fn outcome_of(motor: Option<&str>, name: &str, set: &[&str], seed: u64) -> Outcome {
     let set: Vec<String> = set.iter().map(|&set| set.to_owned()).collect();
-    let config = Config::load(None, None, &set).expect("allowed settings");
-    experiments::run(name, &config, 1).expect("an outcome")
+    let config = Config::load(motor, None, &set).expect("allowed settings");
+    experiments::run(name, &config, seed).expect("an outcome")
 }
 
 fn full_range(kind: &str, set: &[&str]) -> Outcome {
@@ -194,5 +198,41 @@ fn wrong_parameters_are_borne() {
     for region in ["350_550", "550_750", "750_1200", "1200_1800", "1800_2700"] {
         let rms = get(&outcome, &format!("wrong_parameters_{region}_angle_error_rms_deg"));
         assert!(rms < 3.0, "{region}: {rms}");
+    }
+}
+
+/// Large motors, commissioned by their drives: reversals of the whole torque, and starts on a turning shaft, with and without flux, up to
+/// 2700 rpm (on four poles). Where flux was left the start waits until it drives no more current than is borne. (With the whole
+/// current and no limit of the flux, and a feed-forward that changes in steps, these were over-current trips.)
+#[test]
+fn large_motors_reverse_and_start_while_they_turn() {
+    for motor in ["krause-3hp", "buildings-7kw5", "modelica-18kw5"] {
+        for kind in ["reversals", "turning-start", "residual-start"] {
+            let set = [&format!("full_range.kind={kind}"), "runs=4", "prepare.commission=yes"];
+            let outcome = outcome_of(Some(motor), "full-range", &set, 183);
+            for none in ["lost_runs", "silent_runs"] {
+                assert_eq!(get(&outcome, none), 0.0, "{motor}, {kind}: {none}");
+            }
+            for region in ["350_550", "550_750", "750_1200", "1200_1800", "1800_2700"] {
+                let of =
+                    |name| get(&outcome, &format!("{}_{region}_{name}", kind.replace('-', "_")));
+                assert_eq!(of("refused_runs"), 0.0, "{motor}, {kind}, {region}");
+                assert!(of("angle_error_rms_deg") < 1.5, "{motor}, {kind}, {region}");
+            }
+        }
+    }
+}
+
+/// A leakage that is believed 5 % too small at the largest torque of the highest speed is near the point from which on more torque current
+/// gives less torque: there the flux went down to a third although a fifth of the voltage was left, and the angle was more
+/// than 45 degrees wrong without a fault (`g7`), or the drive stopped (model A). Run 1591 is the one of 21 000 in which it was.
+#[test]
+fn the_largest_torque_keeps_its_flux_with_a_leakage_that_is_off() {
+    for plant in [&[][..], &["plant=g7", "prepare.commission=yes"]] {
+        let set = [&["full_range.kind=wrong-parameters", "full_range.index=1591"], plant].concat();
+        let outcome = outcome_of(None, "full-range", &set, 183);
+        assert_eq!(get(&outcome, "lost_runs"), 0.0, "{plant:?}");
+        let largest = get(&outcome, "wrong_parameters_2700_3600_angle_error_max_deg");
+        assert!(largest < 10.0, "{plant:?}: {largest}");
     }
 }

@@ -13,9 +13,9 @@ use anyhow::Result;
 use crate::{run, sources};
 
 /// Most lines of code without tests, in the whole repository.
-const LIMIT: usize = 52_500;
+const LIMIT: usize = 52_600;
 /// Most lines of code without tests in the control code: `drive-core` with all below it.
-const CONTROL_LIMIT: usize = 12_000;
+const CONTROL_LIMIT: usize = 12_100;
 /// A longer file gives its reason in its head. A person reads the reason.
 const FILE_LINES: usize = 400;
 

@@ -99,9 +99,7 @@ impl DqPi {
     pub fn step(&self, state: &mut DqPiState, error: Dq) -> Dq {
         Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
-}
 
-impl DqPi {
     /// Takes back what the last error adds by integration: before each step of proportional controllers.
     pub fn hold(&self, state: &mut DqPiState) {
         let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;

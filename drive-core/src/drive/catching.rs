@@ -155,7 +155,13 @@ impl Drive {
         let most = s.voltage_limit.most.d;
         let missing = most - self.c.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
         let forced = most + FORCED * missing;
-        let d = if forced > c.current { c.current } else if forced > 0.0 { forced } else { 0.0 };
+        let d = if forced > c.current {
+            c.current
+        } else if forced > 0.0 {
+            forced
+        } else {
+            0.0
+        };
         let since = elapsed.wrapping_sub(found);
         if since >= c.built {
             self.c.motion.start(&mut s.motion, s.seen.rotor_count);

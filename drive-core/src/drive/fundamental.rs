@@ -7,7 +7,6 @@ use super::in_turn::StepResults;
 use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
-use crate::flux::observer::Observer;
 use crate::math::angle::UnitVector;
 use crate::math::frames::{AlphaBeta, Dq};
 
@@ -32,7 +31,7 @@ impl Coefficients {
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
         let blind = s.hand_over.is_blind();
         if blind {
-            Observer::skip(state, current);
+            state.skip(current);
         } else {
             observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
         }

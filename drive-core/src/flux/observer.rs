@@ -130,6 +130,11 @@ impl ObserverState {
         let [first, second, third, _] = self.voltages;
         self.voltages = [voltage, first, second, third];
     }
+
+    /// One period whose `current`, A, does not belong to the voltages.
+    pub fn skip(&mut self, current: AlphaBeta) {
+        self.last = current;
+    }
 }
 
 impl Observer {
@@ -223,11 +228,6 @@ impl Observer {
         state.current = mean;
     }
 
-    /// One period in which the flux turns as before: with a `current` that does not belong to the voltages.
-    pub fn skip(state: &mut ObserverState, current: AlphaBeta) {
-        state.last = current;
-    }
-
     /// Computes the gains for a rotor of `rotor_freq`, electrical turns per period, and the saliency at the present current;
     /// once a carrier period.
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
@@ -287,5 +287,41 @@ impl Observer {
         let leakage = self.leakage
             * (state.slow.leakage + state.slow.per_current * state.current.length_squared());
         Dq { d: -w * leakage * current.q, q: w * (self.leakage * current.d + state.flux) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A current that was near zero at the last update and grows to 3.5 A before the next: its saliency is wrong by no more than that of
+    /// the nominal current, and the flux is seen to stand. (With `b/|i|` of the last update half of the leakage's voltage is seen as
+    /// flux at 1 A already.)
+    #[test]
+    fn a_current_that_passes_zero_does_not_turn_the_flux() {
+        let motor = Motor::default();
+        let per_a = 0.03;
+        let leakage =
+            Leakage { flux_saliency: 0.0, current_saliency: per_a, share: 1.0, slope: 0.0 };
+        let observer = Observer::new(&motor, &leakage, 1.4, [0.0; 2]);
+        let mut state = ObserverState::default();
+        observer.start(&mut state);
+        state.current = Dq { d: 0.05, q: 0.0 };
+        observer.update(&mut state, 0.0);
+        let change = 0.35;
+        for n in 0..10 {
+            let (before, after) = (change * n as f32, change * (n + 1) as f32);
+            let mean = 0.5 * (before + after);
+            // Of a flux that stands: resistance, and leakage with its true saliency along the current.
+            let sigma = motor.sigma_l_s();
+            let leakage = sigma * (1.0 - per_a * mean) * change;
+            let alpha = motor.r_s * mean + leakage / PERIOD_S;
+            state.put_out(AlphaBeta { alpha, beta: 0.0 });
+            state.put_out(AlphaBeta::ZERO);
+            let current = AlphaBeta { alpha: after, beta: 0.0 };
+            observer.step(&mut state, current, UnitVector::default(), false, 1.0);
+            let seen = state.change.length_squared().sqrt() / (sigma * change);
+            assert!(seen < 0.2, "{after} A: {seen}");
+        }
     }
 }
