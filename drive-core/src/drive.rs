@@ -36,7 +36,7 @@ use crate::filter::dissertation::{LPF, LpfState};
 use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::flux::observer::ObserverState;
+use crate::flux::observer::{Induced, ObserverState};
 use crate::flux::volts_per_hertz::VoltsPerHertzState;
 use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
@@ -117,10 +117,9 @@ struct ControlState {
     indirect: IndirectState,
     observer: ObserverState,
     hand_over: HandOver,
-    /// Share of the observer in the angle, by which the induced voltage is fed forward, and the frequency of the flux times this
-    /// share, electrical turns per period.
+    /// What flux and leakage induce, and the observer's share in the angle, by which it is fed forward.
+    induced: Induced,
     induced_share: f32,
-    induced_freq: f32,
     carrier: Carrier,
     axes: Axes,
     reference: [ReferenceState; 2],
@@ -261,7 +260,7 @@ impl Drive {
         let flux_axis = phi.turned_by(axes.seen);
         let current = seen.to_dq(flux_axis);
         let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
-            + c.induced(s, reference)
+            + s.induced.at(reference) * s.induced_share
             + s.references.test_voltage;
         (s.seen.current, s.seen.voltage) = (current, voltage);
 

@@ -8,7 +8,7 @@ use super::starting::FluxStage;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
 use crate::math::angle::UnitVector;
-use crate::math::frames::{AlphaBeta, Dq};
+use crate::math::frames::AlphaBeta;
 
 /// Weight of the observer from which on the injection, less sensitive there, shows the stator resistance.
 const COMPARED_FROM: f32 = 0.3;
@@ -56,17 +56,10 @@ impl Coefficients {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }
+        s.induced = observer.induced(&s.observer, step.flux_freq);
         // What another share changes, the controllers have been putting out.
-        let more = (s.induced_share - weight) * step.flux_freq;
-        s.current_loop.back_calculate(observer.induced(&s.observer, s.seen.reference, more));
-        (s.induced_share, s.induced_freq) = (weight, weight * step.flux_freq);
-    }
-
-    /// The voltage that flux and leakage induce at these references, V, by the observer's share in the angle.
-    pub(super) fn induced(&self, s: &ControlState, reference: Dq) -> Dq {
-        match &self.observer {
-            Some(observer) => observer.induced(&s.observer, reference, s.induced_freq),
-            None => Dq::ZERO,
-        }
+        let induced = s.induced.at(s.seen.reference);
+        s.current_loop.back_calculate(induced * (s.induced_share - weight));
+        s.induced_share = weight;
     }
 }

@@ -63,10 +63,8 @@ impl Drive {
     }
 
     fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
-        if self.waits_for_flux() {
-            return Ok(Compare::OFF);
-        }
-        if self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
+        let waits = self.waits_for_flux();
+        if !waits && self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
             // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
             if self.control.catching.flux_left.is_some() && !self.wiring_unchecked {
                 self.catch_from_here();

@@ -124,6 +124,16 @@ pub struct Leakage {
     pub slope: f32,
 }
 
+/// Voltage that flux and leakage induce, for the feed-forward of the current loop.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Induced {
+    /// By the torque current against the direct axis, and by the direct current along the quadrature axis, V/A.
+    across: f32,
+    along: f32,
+    /// By the flux, V.
+    flux: f32,
+}
+
 impl ObserverState {
     /// Takes the voltage that a step puts out, without the carrier, V.
     pub fn put_out(&mut self, voltage: AlphaBeta) {
@@ -281,12 +291,19 @@ impl Observer {
         state.flux / self.coupled
     }
 
-    /// Voltage that the flux and the leakage induce at these references, V, `flux_freq` in electrical turns per period.
-    pub fn induced(&self, state: &ObserverState, current: Dq, flux_freq: f32) -> Dq {
+    /// What flux and leakage induce at `flux_freq`, electrical turns per period.
+    pub fn induced(&self, state: &ObserverState, flux_freq: f32) -> Induced {
         let w = flux_freq * TAU / PERIOD_S;
         let leakage = self.leakage
             * (state.slow.leakage + state.slow.per_current * state.current.length_squared());
-        Dq { d: -w * leakage * current.q, q: w * (self.leakage * current.d + state.flux) }
+        Induced { across: w * leakage, along: w * self.leakage, flux: w * state.flux }
+    }
+}
+
+impl Induced {
+    /// The voltage at this current, V.
+    pub fn at(&self, current: Dq) -> Dq {
+        Dq { d: -self.across * current.q, q: self.along * current.d + self.flux }
     }
 }
 
@@ -320,7 +337,7 @@ mod tests {
             state.put_out(AlphaBeta::ZERO);
             let current = AlphaBeta { alpha: after, beta: 0.0 };
             observer.step(&mut state, current, UnitVector::default(), false, 1.0);
-            let seen = state.change.length_squared().sqrt() / (sigma * change);
+            let seen = libm::sqrtf(state.change.length_squared()) / (sigma * change);
             assert!(seen < 0.2, "{after} A: {seen}");
         }
     }
