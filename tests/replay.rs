@@ -83,22 +83,22 @@ fn hash(compares: &[Compare]) -> u64 {
 #[test]
 fn torque_steps_without_a_sensor() {
     let (hashes, interrupts) = replay("sensorless");
-    assert_eq!(interrupts, 66_856);
+    assert_eq!(interrupts, 66_851);
     assert_eq!(
         hashes,
         [
-            0x1cef_859e_681f_ee57,
-            0xa36e_783f_d541_b4ab,
-            0xafef_8413_1371_36a4,
-            0x0a29_1ecb_54fc_4e7b,
-            0x7025_9f86_4b8f_57cf,
-            0xf810_99d9_a53f_ce7f,
-            0x144e_9dbf_0b27_2980,
-            0x7224_c0a0_90e1_48b3,
-            0xd7f5_fcc1_3f81_96da,
-            0x5848_d70d_999a_e47f,
-            0x3111_3e7c_a822_5e0d,
-            0xcae8_00ec_5525_7e75
+            0x7638_63e4_da2a_5b5f,
+            0x06ed_7ed6_d697_ea92,
+            0xcada_993a_d0a2_9a3e,
+            0x02fe_4035_c759_8491,
+            0x5ee8_9677_2d95_ccfd,
+            0x54e2_020c_0c9b_2c6e,
+            0x56b3_02fe_ae03_9e85,
+            0x10e9_dcce_d35f_e8de,
+            0xcda0_5eb6_9f06_5708,
+            0x96d9_ccc8_e4b5_cec8,
+            0xe7a2_79f6_200b_40b0,
+            0x235c_183a_3cbd_1430
         ],
         "{hashes:#018x?}"
     );
