@@ -16,7 +16,7 @@ const SHARE: f32 = 0.714;
 /// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
-/// Share of that current that is enough where flux was left: the flux drives a current of its own.
+/// Least share of that current. Flux that was left drives a current of its own.
 const WITH_FLUX: f32 = 0.4;
 /// Share of the current that trips up to which both together may come.
 const UP_TO: f32 = 0.7;
@@ -39,8 +39,8 @@ pub(crate) struct Catching {
     pub built: u32,
     pub flux_gone: u32,
     pub path: Path,
-    /// Largest voltage of flux that was left, V, and its decay per period.
-    left_v: f32,
+    /// Most that this current and that of flux which was left may be together, A, and the decay of that flux per period.
+    most: f32,
     decay: f32,
 }
 
@@ -56,7 +56,7 @@ impl Settings {
             built: periods(BUILT_S),
             flux_gone: periods(FLUX_GONE_T * tau_r),
             path,
-            left_v: path.resistance * (UP_TO * self.trip_a() - WITH_FLUX * current),
+            most: UP_TO * self.trip_a(),
             decay: PERIOD_S / tau_r,
         })
     }
@@ -70,6 +70,8 @@ pub(super) struct CatchingState {
     found: Option<u32>,
     /// Flux from a run before.
     pub flux_left: Option<FluxLeft>,
+    /// Current that the rotor is looked for with, A.
+    current: f32,
 }
 
 /// Flux of a run before.
@@ -89,17 +91,21 @@ impl CatchingState {
 }
 
 impl Drive {
-    /// Whether flux that was left would drive too much current yet.
-    pub(super) fn waits_for_flux(&self) -> bool {
-        let Some((c, left)) = self.c.catching.zip(self.control.catching.flux_left) else {
-            return false;
-        };
+    /// Current that flux which was left leaves for the search, A; none where that is too little yet.
+    pub(super) fn current_beside_flux(&self) -> Option<f32> {
+        let c = self.c.catching?;
+        let Some(left) = self.control.catching.flux_left else { return Some(c.current) };
         let x = (left.ago + self.elapsed) as f32 * c.decay;
         // It decays by e^x, which is more than this.
-        left.volts > c.left_v * (1.0 + x * (1.0 + 0.5 * x))
+        let volts = left.volts / (1.0 + x * (1.0 + 0.5 * x));
+        let free = c.most - volts / c.path.resistance;
+        let current = if free < c.current { free } else { c.current };
+        (current >= WITH_FLUX * c.current).then_some(current)
     }
 
-    pub(super) fn catch_from_here(&mut self) {
+    /// Looks for a turning shaft with this current, A.
+    pub(super) fn catch_from_here(&mut self, current: f32) {
+        self.control.catching.current = current;
         self.control.hand_over.silence();
         self.enter(State::Catching);
     }
@@ -119,14 +125,10 @@ impl Drive {
             let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
                 return Ok(Dq::ZERO);
             };
-            let d = if s.catching.flux_left.is_some() {
-                WITH_FLUX * c.current
-            } else {
-                if n == 0 {
-                    s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
-                }
-                c.current
-            };
+            let d = s.catching.current;
+            if n == 0 && s.catching.flux_left.is_none() {
+                s.reference[0] = ReferenceState::at_rest(AT_ONCE * d);
+            }
             if n > catch::FROM {
                 self.c.current_loop.hold(&mut s.current_loop);
             }
