@@ -16,7 +16,7 @@ const SHARE: f32 = 0.714;
 /// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
-/// Least share of that current. Flux that was left drives a current of its own.
+/// Share of that current where flux was left that drives a large current of its own.
 const WITH_FLUX: f32 = 0.4;
 /// Share of the current that trips up to which both together may come.
 const UP_TO: f32 = 0.7;
@@ -39,9 +39,20 @@ pub(crate) struct Catching {
     pub built: u32,
     pub flux_gone: u32,
     pub path: Path,
-    /// Most that this current and that of flux which was left may be together, A, and the decay of that flux per period.
-    most: f32,
+    /// Largest voltage of flux that was left, V, and its decay per period.
+    left_v: f32,
     decay: f32,
+}
+
+impl Catching {
+    /// Current that the rotor is looked for with, A: less where flux was left that drives too much beside it.
+    pub fn current_beside(&self, left: Option<FluxLeft>) -> f32 {
+        let limit = self.left_v - self.path.resistance * (1.0 - WITH_FLUX) * self.current;
+        match left {
+            Some(left) if left.volts > limit => WITH_FLUX * self.current,
+            _ => self.current,
+        }
+    }
 }
 
 impl Settings {
@@ -56,7 +67,7 @@ impl Settings {
             built: periods(BUILT_S),
             flux_gone: periods(FLUX_GONE_T * tau_r),
             path,
-            most: UP_TO * self.trip_a(),
+            left_v: path.resistance * (UP_TO * self.trip_a() - WITH_FLUX * current),
             decay: PERIOD_S / tau_r,
         })
     }
@@ -71,7 +82,7 @@ pub(super) struct CatchingState {
     /// Flux from a run before.
     pub flux_left: Option<FluxLeft>,
     /// Current that the rotor is looked for with, A.
-    current: f32,
+    pub current: f32,
 }
 
 /// Flux of a run before.
@@ -91,21 +102,17 @@ impl CatchingState {
 }
 
 impl Drive {
-    /// Current that flux which was left leaves for the search, A; none where that is too little yet.
-    pub(super) fn current_beside_flux(&self) -> Option<f32> {
-        let c = self.c.catching?;
-        let Some(left) = self.control.catching.flux_left else { return Some(c.current) };
+    /// Whether flux that was left would drive too much current yet.
+    pub(super) fn waits_for_flux(&self) -> bool {
+        let Some((c, left)) = self.c.catching.zip(self.control.catching.flux_left) else {
+            return false;
+        };
         let x = (left.ago + self.elapsed) as f32 * c.decay;
         // It decays by e^x, which is more than this.
-        let volts = left.volts / (1.0 + x * (1.0 + 0.5 * x));
-        let free = c.most - volts / c.path.resistance;
-        let current = if free < c.current { free } else { c.current };
-        (current >= WITH_FLUX * c.current).then_some(current)
+        left.volts > c.left_v * (1.0 + x * (1.0 + 0.5 * x))
     }
 
-    /// Looks for a turning shaft with this current, A.
-    pub(super) fn catch_from_here(&mut self, current: f32) {
-        self.control.catching.current = current;
+    pub(super) fn catch_from_here(&mut self) {
         self.control.hand_over.silence();
         self.enter(State::Catching);
     }

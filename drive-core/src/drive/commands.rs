@@ -209,7 +209,9 @@ impl Drive {
         self.control.inverter_drop.volts = inverter_drop.volts;
         self.control.observer.resistance = observer.resistance;
         self.control.lock.baseline = lock.baseline;
-        self.control.catching.flux_left = flux_left.then_some(left);
+        let catching = &mut self.control.catching;
+        catching.flux_left = flux_left.then_some(left);
+        catching.current = self.c.catching.map_or(0.0, |c| c.current_beside(catching.flux_left));
         let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
         let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
         self.control.references = self.no_torque(i_d);

@@ -63,14 +63,13 @@ impl Drive {
     }
 
     fn calibrate(&mut self, sample: &Sample) -> Result<Compare, Fault> {
-        // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
-        let flux_left = self.control.catching.flux_left.is_some() && !self.wiring_unchecked;
-        let current = self.current_beside_flux();
-        let waits = flux_left && current.is_none();
+        let waits = self.waits_for_flux();
         if !waits && self.c.sensing.calibrate(&mut self.control.sensing, sample)?.is_some() {
-            match current {
-                Some(current) if flux_left => self.catch_from_here(current),
-                _ => self.enter(State::Precharge),
+            // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
+            if self.control.catching.flux_left.is_some() && !self.wiring_unchecked {
+                self.catch_from_here();
+            } else {
+                self.enter(State::Precharge);
             }
         }
         Ok(Compare::OFF)
@@ -122,9 +121,10 @@ impl Drive {
 
     /// The first current: to find a turning shaft where there is no encoder, or to magnetise.
     fn current_from_here(&mut self, encoder: u32) {
-        match self.c.catching {
-            Some(c) if self.can_catch() => self.catch_from_here(c.current),
-            _ => self.magnetising_from_here(encoder),
+        if self.can_catch() {
+            self.catch_from_here();
+        } else {
+            self.magnetising_from_here(encoder);
         }
     }
 
