@@ -16,7 +16,7 @@ const SHARE: f32 = 0.714;
 /// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
-/// Share of that current where flux was left that drives a large current of its own.
+/// Share of that current that is enough where flux was left: the flux drives a current of its own.
 const WITH_FLUX: f32 = 0.4;
 /// Share of the current that trips up to which both together may come.
 const UP_TO: f32 = 0.7;
@@ -42,17 +42,6 @@ pub(crate) struct Catching {
     /// Largest voltage of flux that was left, V, and its decay per period.
     left_v: f32,
     decay: f32,
-}
-
-impl Catching {
-    /// Current that the rotor is looked for with, A: less where flux was left that drives too much beside it.
-    pub fn current_beside(&self, left: Option<FluxLeft>) -> f32 {
-        let limit = self.left_v - self.path.resistance * (1.0 - WITH_FLUX) * self.current;
-        match left {
-            Some(left) if left.volts > limit => WITH_FLUX * self.current,
-            _ => self.current,
-        }
-    }
 }
 
 impl Settings {
@@ -81,8 +70,6 @@ pub(super) struct CatchingState {
     found: Option<u32>,
     /// Flux from a run before.
     pub flux_left: Option<FluxLeft>,
-    /// Current that the rotor is looked for with, A.
-    pub current: f32,
 }
 
 /// Flux of a run before.
@@ -132,10 +119,14 @@ impl Drive {
             let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
                 return Ok(Dq::ZERO);
             };
-            let d = s.catching.current;
-            if n == 0 && s.catching.flux_left.is_none() {
-                s.reference[0] = ReferenceState::at_rest(AT_ONCE * d);
-            }
+            let d = if s.catching.flux_left.is_some() {
+                WITH_FLUX * c.current
+            } else {
+                if n == 0 {
+                    s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
+                }
+                c.current
+            };
             if n > catch::FROM {
                 self.c.current_loop.hold(&mut s.current_loop);
             }

@@ -16,6 +16,8 @@ use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::settings::AngleSource;
 
+/// Voltage of flux that was left which a start does not mind, V.
+const LITTLE_V: f32 = 1.0;
 /// Periods for which a jog goes on: 0.5 s.
 const JOG: u32 = 3000;
 
@@ -209,9 +211,8 @@ impl Drive {
         self.control.inverter_drop.volts = inverter_drop.volts;
         self.control.observer.resistance = observer.resistance;
         self.control.lock.baseline = lock.baseline;
-        let catching = &mut self.control.catching;
-        catching.flux_left = flux_left.then_some(left);
-        catching.current = self.c.catching.map_or(0.0, |c| c.current_beside(catching.flux_left));
+        // Little of it neither meets a short circuit nor drives much current.
+        self.control.catching.flux_left = (flux_left && left.volts > LITTLE_V).then_some(left);
         let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
         let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
         self.control.references = self.no_torque(i_d);
