@@ -1,14 +1,17 @@
 //! Start on a turning shaft.
 
+use core::f32::consts::TAU;
+
 use super::Drive;
 use crate::current::pi::ReferenceState;
-use crate::drive::state::State;
+use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
 use crate::flux::catch::{self, CatchState, Caught, Path};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::io::{PERIOD_S, periods};
 use crate::math::frames::Dq;
+use crate::math::within;
 use crate::settings::Settings;
 
 /// Current that the rotor is looked for with, as a share of the current limit.
@@ -18,6 +21,8 @@ const SHARE: f32 = 0.714;
 const AT_ONCE: f32 = 0.5;
 /// Share of that current that is enough where flux was left: the flux drives a current of its own.
 const WITH_FLUX: f32 = 0.4;
+/// Voltage of flux that was left which drives no current to speak of, V.
+const LITTLE_V: f32 = 1.0;
 /// Share of the current that trips up to which both together may come.
 const UP_TO: f32 = 0.7;
 /// Current per missing magnetising current.
@@ -68,7 +73,7 @@ pub(super) struct CatchingState {
     search: CatchState,
     /// Period in which the speed was found.
     found: Option<u32>,
-    /// Flux from a run before.
+    /// Flux from a run before, until the search has ended.
     pub flux_left: Option<FluxLeft>,
 }
 
@@ -89,6 +94,22 @@ impl CatchingState {
 }
 
 impl Drive {
+    /// The flux that a run left which has ended lately.
+    pub(super) fn flux_left(&self) -> Option<FluxLeft> {
+        let (s, ago) = (&self.control, self.elapsed);
+        let freq = s.estimator.rotor_freq.abs() * (TAU / PERIOD_S);
+        let left = match s.catching.flux_left {
+            // A start that found no speed knows no more than this.
+            Some(left) => FluxLeft { ago: left.ago + ago, ..left },
+            None if self.mode == Mode::VoltsPerHertz => {
+                FluxLeft { volts: s.seen.voltage.q.abs(), ago }
+            }
+            None => FluxLeft { volts: freq * s.observer.flux, ago },
+        };
+        let recent = self.c.catching.is_some_and(|c| left.ago < c.flux_gone);
+        (self.starts > 0 && recent).then_some(left)
+    }
+
     /// Whether flux that was left would drive too much current yet.
     pub(super) fn waits_for_flux(&self) -> bool {
         let Some((c, left)) = self.c.catching.zip(self.control.catching.flux_left) else {
@@ -119,20 +140,18 @@ impl Drive {
             let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
                 return Ok(Dq::ZERO);
             };
-            let d = if s.catching.flux_left.is_some() {
-                WITH_FLUX * c.current
-            } else {
-                if n == 0 {
-                    s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
-                }
-                c.current
-            };
+            let drives = s.catching.flux_left.is_some_and(|left| left.volts > LITTLE_V);
+            if n == 0 && !drives {
+                s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
+            }
+            let d = if drives { WITH_FLUX * c.current } else { c.current };
             if n > catch::FROM {
                 self.c.current_loop.hold(&mut s.current_loop);
             }
             match s.catching.search.step(n, s.observer.change) {
                 Caught::Searching => {}
                 Caught::Standing => {
+                    s.catching.flux_left = None;
                     s.hand_over = HandOver::default();
                     self.magnetising_from_here(0);
                 }
@@ -142,6 +161,7 @@ impl Drive {
                         return Err(Fault::NotCaught);
                     }
                     s.catching.found = Some(elapsed);
+                    s.catching.flux_left = None;
                     s.estimator.turn_with(freq);
                     s.indirect = IndirectState::default();
                     if let Some(observer) = &self.c.observer {
@@ -154,16 +174,8 @@ impl Drive {
         // As much flux as the voltage bears, and with all current until it has built up.
         let most = s.voltage_limit.most.d;
         let missing = most - self.c.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
-        let forced = most + FORCED * missing;
-        let d = if forced > c.current {
-            c.current
-        } else if forced > 0.0 {
-            forced
-        } else {
-            0.0
-        };
-        let since = elapsed.wrapping_sub(found);
-        if since >= c.built {
+        let d = within(most + FORCED * missing, (0.0, c.current));
+        if elapsed.wrapping_sub(found) >= c.built {
             self.c.motion.start(&mut s.motion, s.seen.rotor_count);
             self.enter(State::of_mode(self.mode));
         }

@@ -1,23 +1,17 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use core::f32::consts::TAU;
-
-use super::catching::FluxLeft;
 use super::reference::References;
 use super::{ControlState, Drive};
 
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::{Mode, State};
-use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::settings::AngleSource;
 
-/// Voltage of flux that was left which a start does not mind, V.
-const LITTLE_V: f32 = 1.0;
 /// Periods for which a jog goes on: 0.5 s.
 const JOG: u32 = 3000;
 
@@ -196,23 +190,19 @@ impl Drive {
             (State::Off, _) => {}
             (state, _) => return Err(Refused::State(state)),
         }
+        let flux_left = self.flux_left();
         self.mode = mode;
         self.starts = self.starts.wrapping_add(1);
         if mode == Mode::Learning {
             self.learned = None;
         }
-        let gone = self.c.catching.map_or(0, |c| c.flux_gone);
-        let flux_left = self.starts > 1 && self.elapsed < gone && self.can_catch();
-        let freq = self.control.estimator.rotor_freq.abs() * (TAU / PERIOD_S);
-        let left = FluxLeft { volts: freq * self.control.observer.flux, ago: self.elapsed };
         // The brake resistor stays hot; a start on a turning shaft measures neither drop nor carrier.
         let ControlState { dc_link, inverter_drop, observer, lock, .. } = self.control;
         self.control = ControlState { dc_link, ..ControlState::default() };
         self.control.inverter_drop.volts = inverter_drop.volts;
         self.control.observer.resistance = observer.resistance;
         self.control.lock.baseline = lock.baseline;
-        // Little of it neither meets a short circuit nor drives much current.
-        self.control.catching.flux_left = (flux_left && left.volts > LITTLE_V).then_some(left);
+        self.control.catching.flux_left = flux_left.filter(|_| self.can_catch());
         let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
         let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
         self.control.references = self.no_torque(i_d);

@@ -1,0 +1,99 @@
+//! Starts on a turning shaft after a run that ended without a known speed: flux is left, and must meet no short circuit.
+
+use std::f64::consts::TAU;
+
+use drive_core::{Command, Mode, State, Stop};
+use hil_sim::Config;
+use hil_sim::experiments::full_range::for_the_range;
+use hil_sim::plant::Load;
+use hil_sim::rig::Rig;
+
+const RPM: f64 = 2000.0;
+
+/// The dissertation's motor, and a large one.
+const MOTORS: [Option<&str>; 2] = [None, Some("modelica-18kw5")];
+
+/// A drive that has learned, on a shaft that a dynamometer will turn; current that trips, A.
+fn learned(motor: Option<&str>) -> (Rig, f64) {
+    let config = Config::load(motor, None, &["load.mode=locked".to_owned()]).expect("settings");
+    let config = for_the_range(&config).expect("settings");
+    (Rig::from_config(&config, 5).expect("a bench"), config.drive.trip_a().into())
+}
+
+fn turn(rig: &mut Rig, rpm: f64) {
+    rig.set_load(Load::Speed { speed: rpm * TAU / 60.0 }).expect("a load");
+}
+
+/// Starts in torque mode; the largest current, A, and whether the low sides have short-circuited the motor.
+fn start(rig: &mut Rig, until: State) -> (f64, bool) {
+    rig.command(&Command::Start(Mode::Torque)).expect("a start");
+    let (mut largest, mut shorted) = (0.0_f64, false);
+    for _ in 0..12_000 {
+        rig.run(1.0 / 6000.0, |point| largest = largest.max(point.current));
+        shorted |= rig.drive.state() == State::Precharge;
+        if rig.drive.state() == until {
+            return (largest, shorted);
+        }
+    }
+    panic!("the drive is {}, {largest} A, short circuit: {shorted}", rig.drive.state());
+}
+
+/// Flux was left, and met no short circuit; current of flux and search as a share of the trip: they may come to 0.7.
+fn as_expected(motor: Option<&str>, flux: f64, share: f64, shorted: bool) {
+    assert!(flux > 0.1, "{motor:?}: {flux} V s");
+    assert!(share < 0.75, "{motor:?}: {share} of the trip");
+    assert!(!shorted, "{motor:?}");
+}
+
+/// The drive regulates, with the right angle.
+fn regulates(rig: &mut Rig) {
+    rig.command(&Command::Torque(1.0)).expect("a torque");
+    let mut largest = 0.0_f64;
+    rig.run(0.3, |_| {});
+    rig.run(0.5, |point| largest = largest.max(point.angle_error_deg.abs()));
+    assert_eq!(rig.drive.state(), State::Torque);
+    assert!(largest < 3.0, "{largest} degrees");
+}
+
+/// Stopped while it looked for the speed, and started again at once: what flux the first run left is still there.
+#[test]
+fn a_start_that_was_stopped_in_its_search_is_repeated() {
+    for motor in MOTORS {
+        let (mut rig, trip) = learned(motor);
+        rig.start(Mode::Torque).expect("a start");
+        for n in 1..=100 {
+            turn(&mut rig, RPM * f64::from(n) / 100.0);
+            rig.run(0.02, |_| {});
+        }
+        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
+        rig.run(0.02, |_| {});
+        start(&mut rig, State::Catching);
+        rig.run(0.015, |_| {});
+        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
+        rig.run(0.005, |_| {});
+        let flux = rig.plant.rotor_flux().norm();
+        let (largest, shorted) = start(&mut rig, State::Torque);
+        as_expected(motor, flux, largest / trip, shorted);
+        regulates(&mut rig);
+    }
+}
+
+/// The same after a run by voltage and frequency, in which the drive knows no flux.
+#[test]
+fn a_start_follows_a_run_by_voltage_and_frequency() {
+    for motor in MOTORS {
+        let (mut rig, trip) = learned(motor);
+        rig.set_load(Load::Free { torque: 0.0 }).expect("a load");
+        rig.start(Mode::VoltsPerHertz).expect("a start");
+        rig.command(&Command::Speed(RPM as f32)).expect("a speed");
+        rig.run(8.0, |_| {});
+        let rpm = rig.plant.mechanical_speed() * 60.0 / TAU;
+        rig.command(&Command::Stop(Stop::Coast)).expect("a stop");
+        rig.run(0.02, |_| {});
+        turn(&mut rig, rpm);
+        let flux = rig.plant.rotor_flux().norm();
+        let (largest, shorted) = start(&mut rig, State::Torque);
+        as_expected(motor, flux, largest / trip, shorted);
+        regulates(&mut rig);
+    }
+}
