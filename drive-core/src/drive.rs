@@ -276,7 +276,8 @@ impl Drive {
         (s.seen.measured, s.seen.realised) = (measured.current, modulated.realised);
         s.seen.dc_link = measured.dc_link;
         if modulated.limited {
-            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
+            let correction = (modulated.realised - total).to_dq(applied);
+            c.current_loop.condition(&mut s.current_loop, correction);
         }
 
         if stage == FluxStage::Held {
