@@ -276,8 +276,7 @@ impl Drive {
         (s.seen.measured, s.seen.realised) = (measured.current, modulated.realised);
         s.seen.dc_link = measured.dc_link;
         if modulated.limited {
-            let correction = (modulated.realised - total).to_dq(applied);
-            c.current_loop.condition(&mut s.current_loop, correction);
+            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
         }
 
         if stage == FluxStage::Held {

@@ -12,7 +12,7 @@
 //!
 //! A step consists of two calls: `step` returns the wanted output, `back_calculate` takes the difference
 //! between realised and wanted output. Without the second call (or with zero) the controller is exactly the
-//! unlimited one. The current loop, whose reference has a direct share, takes it by [`DqPi::condition`].
+//! unlimited one.
 //!
 //! The state is the output itself, in `f32`: near 180 V it does not change for errors below
 //! 7.6 µV / (k_c (1 - z_c)), which is 2.5 µA with the gains of section 3.10.
@@ -100,14 +100,6 @@ impl DqPi {
         Dq { d: self.d.step(&mut state.d, error.d), q: self.q.step(&mut state.q, error.q) }
     }
 
-    /// Anti-windup where the reference has a direct share, for `correction` = realised - wanted voltage, V peak: the last error
-    /// becomes the one that would have given the realised voltage. What was limited of a step follows as soon as there is
-    /// room; [`PiState::back_calculate`] alone would lose it. (Conditioning: Hanus, Kinnaert and Henrotte, 1987.)
-    pub fn condition(&self, state: &mut DqPiState, correction: Dq) {
-        self.d.revise(&mut state.d, correction.d / self.d.k_c);
-        self.q.revise(&mut state.q, correction.q / self.q.k_c);
-    }
-
     /// Takes back what the last error adds by integration: before each step of proportional controllers.
     pub fn hold(&self, state: &mut DqPiState) {
         let integral = |pi: &Pi, state: &PiState| pi.k_c * (1.0 - pi.z_c) * state.error;
@@ -117,10 +109,15 @@ impl DqPi {
 }
 
 impl DqPiState {
-    /// Adds `correction`, V peak, to the voltage that the controllers go on from.
+    /// Anti-windup: adds `correction` = realised - wanted voltage, zero if nothing was limited.
     pub fn back_calculate(&mut self, correction: Dq) {
         self.d.back_calculate(correction.d);
         self.q.back_calculate(correction.q);
+    }
+
+    /// Realised voltage of the last step, V peak.
+    pub fn output(&self) -> Dq {
+        Dq { d: self.d.output, q: self.q.output }
     }
 }
 
