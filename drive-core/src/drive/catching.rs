@@ -71,8 +71,8 @@ impl Settings {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CatchingState {
     search: CatchState,
-    /// Period in which the speed was found.
-    found: Option<u32>,
+    /// Period in which the speed was found; until then the frame stands, and nothing is judged.
+    pub found: Option<u32>,
     /// Flux from a run before, until the search has ended.
     pub flux_left: Option<FluxLeft>,
 }
@@ -84,13 +84,6 @@ pub(super) struct FluxLeft {
     pub volts: f32,
     /// Control periods from then to this start.
     pub ago: u32,
-}
-
-impl CatchingState {
-    /// Whether the speed is still looked for: the frame stands, and nothing is judged.
-    pub fn is_looking(&self) -> bool {
-        self.found.is_none()
-    }
 }
 
 impl Drive {

@@ -40,7 +40,7 @@ impl Drive {
     pub(super) fn flux_stage(&self) -> FluxStage {
         match self.state {
             State::Magnetising => FluxStage::Held,
-            State::Catching if self.control.catching.is_looking() => FluxStage::Sought,
+            State::Catching if self.control.catching.found.is_none() => FluxStage::Sought,
             State::Catching => FluxStage::BuildingUp,
             _ => FluxStage::Ready,
         }

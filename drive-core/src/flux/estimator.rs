@@ -130,7 +130,7 @@ const FLUX_SMOOTHING: f32 = 1.0 / 300.0;
 /// Share of the newest value in the mean speed of the rotor: 5 ms.
 const ROTOR_SMOOTHING: f32 = 1.0 / 30.0;
 
-/// The tracker has reached its speed limit: the flux angle is lost.
+/// The tracker has reached its speed limit, or turned by what is no number: the flux angle is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackingLost;
 
@@ -253,8 +253,8 @@ impl Estimator {
     /// reference of the quadrature current, A, `slip_freq` the slip, electrical turns per period.
     ///
     /// # Errors
-    /// [`TrackingLost`] when the PII tracker has reached its speed limit. (The drive itself checks the
-    /// speed of the other loop.)
+    /// [`TrackingLost`] when the PII tracker has reached its speed limit, or the other loop turned by what is no number. (The
+    /// drive itself checks the speed of the other loop.)
     pub fn track(
         &self,
         state: &mut EstimatorState,
@@ -272,8 +272,8 @@ impl Estimator {
             }
             AngleLoop::Pll { .. } => {
                 let EstimatorState { tracker, rotor_freq, correction, .. } = state;
-                Pll::step(tracker, rotor_freq, *correction, slip_freq, turning);
-                Ok(())
+                let finite = Pll::step(tracker, rotor_freq, *correction, slip_freq, turning);
+                if finite { Ok(()) } else { Err(TrackingLost) }
             }
         }
     }

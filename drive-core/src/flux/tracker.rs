@@ -135,15 +135,15 @@ impl Pll {
     }
 
     /// Advances by one period with the latest correction and the slip, and with the `turning` that the observer sees by its
-    /// weight. `rotor_freq` is the speed state; frequencies in electrical turns per period. (The drive checks that it is
-    /// finite and within limits.)
+    /// weight. `rotor_freq` is the speed state; frequencies in electrical turns per period. Returns whether the turn is finite.
+    /// (The drive checks that the speed is finite and within limits.)
     pub fn step(
         state: &mut TrackerState,
         rotor_freq: &mut f32,
         correction: PllCorrection,
         slip_freq: f32,
         turning: &Turning,
-    ) {
+    ) -> bool {
         let w = turning.weight;
         let seen_rotor = turning.turned - turning.slip;
         state.acceleration =
@@ -155,7 +155,9 @@ impl Pll {
         // The turn is that of an older current: the change of the speed since then is made up for.
         let seen = turning.turned + turning.age * (freq - state.freq);
         state.freq = freq;
-        state.angle += Angle::within_turn(tracked + w * (seen - tracked));
+        let turn = tracked + w * (seen - tracked);
+        state.angle += Angle::within_turn(turn);
+        turn.is_finite()
     }
 }
 
@@ -174,6 +176,19 @@ pub struct PllCorrection {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std functions are the reference here
     use super::*;
+
+    /// A turn that is no number leaves speed and frequency finite: it would go unseen as one of nothing.
+    #[test]
+    fn a_turn_that_is_no_number_is_told() {
+        let turning = Turning { weight: 1.0, ..Turning::default() };
+        for (angle, turned) in [(f32::NAN, 0.0), (0.0, f32::NAN), (0.0, 0.0)] {
+            let (mut state, mut rotor_freq) = (TrackerState::default(), 0.01);
+            let correction = PllCorrection { angle, ..PllCorrection::default() };
+            let turning = Turning { turned, ..turning };
+            let finite = Pll::step(&mut state, &mut rotor_freq, correction, 0.0, &turning);
+            assert_eq!(finite, angle.is_finite() && turned.is_finite());
+        }
+    }
 
     #[test]
     fn follows_equation_3_44() {
