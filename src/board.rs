@@ -70,8 +70,7 @@ const _: () = {
 pub const DEAD_TIME_CLOCKS: u32 = 2;
 // The timer can make the longest.
 const _: () = assert!(
-    (dead_time::LONGEST * DEAD_TIME_CLOCKS) as f32
-        >= SELECTED.dead_time_range_s.1 * CLOCK_HZ as f32
+    (dead_time::LONGEST * DEAD_TIME_CLOCKS) as f32 >= SELECTED.dead_time_max_s * CLOCK_HZ as f32
 );
 
 /// The DTG field of TIM1_BDTR for a dead time in s within the range of the board, and the dead time, s, that the
@@ -196,7 +195,8 @@ const _: () = {
 
 // Over-voltage ----------------------------------------------------------------------------------
 
-/// The comparator of the dc link pulls the break at this multiple of the software's limit, which acts first.
+/// The comparator of the dc link pulls the break at this multiple of the software's limit, which acts first, or where the
+/// board's limits end.
 const OVER_VOLTAGE_SHARE: f32 = 1.075;
 
 /// The protection that works without the control step. It is set up at start from the settings in force then, and holds
@@ -213,12 +213,15 @@ pub struct Protection {
 }
 
 /// The protection for these settings on a board: analog watchdogs at 1.02 times `limits.trip_a`, comparator at 1.075 times
-/// `limits.dc_over_v` but not above the highest voltage of the board, both within the range of the converters.
+/// `limits.dc_over_v` but not above the limit of the board, which is a code that no setting lifts; both within the range of
+/// the converters.
 pub fn protection(board: &Board, settings: &Settings) -> Protection {
     let Scales { current_a, current_b, dc_link, .. } = settings.scales;
     let trip_a = ANALOG_TRIP_SHARE * settings.trip_a();
-    let over_v = f32::min(OVER_VOLTAGE_SHARE * settings.dc_over_v(), board.highest_dc_link_v.value);
-    let over_voltage = ((over_v - dc_link.offset) / dc_link.gain) as u16;
+    // The casts saturate.
+    let code = |volts: f32, line: Line| ((volts - line.offset) / line.gain) as u16;
+    let most = code(board.dc_link_limits.comparator_v(), board.dc_link.line.value);
+    let over_voltage = code(OVER_VOLTAGE_SHARE * settings.dc_over_v(), dc_link).min(most);
     Protection {
         window_a: window(current_a, trip_a),
         window_b: window(current_b, trip_a),
@@ -329,6 +332,18 @@ const _: () = assert!(
     2 * FLASH_TIMEOUT_US < (WATCHDOG_LONG_RELOAD as u32 + 1) * 64 * 1000 / (WATCHDOG_HZ_MAX / 1000)
 );
 
+// Option bytes --------------------------------------------------------------------------------
+
+/// Bits of FLASH_OPTR (RM0440): the level of PB8 counts at a reset; without it, this one starts the firmware.
+const N_SWBOOT0: u32 = 1 << 26;
+const N_BOOT0: u32 = 1 << 27;
+
+/// Whether these option bytes let the pin PB8 choose between the firmware and ST's boot loader at a reset, as those from the
+/// factory do.
+pub fn boot_pin_counts(option_bytes: u32) -> bool {
+    option_bytes & (N_SWBOOT0 | N_BOOT0) != N_BOOT0
+}
+
 // Log -----------------------------------------------------------------------------------------
 
 /// Control periods from one status line to the next: 10 lines a second.
@@ -360,6 +375,7 @@ pub fn settings_of(board: &Board) -> Settings {
         sensors,
         shunt_settle_s,
         dc_link: board.dc_link.line.value,
+        dc_link_highest: board.highest_dc_link(),
         full_scale: ADC_FULL_SCALE,
         ntc: board.ntc.value,
         current_delay_s: board.current_delay_s.value,

@@ -1,8 +1,8 @@
 //! The boards: one board, one file. To add one, see `docs/boards.md`.
 //!
 //! A [`Board`] is data: pins, polarities, dead time, sensors, scales and limits. Each number of the power stage is
-//! [`Stated`]: read in a source, or assumed. A board with an assumed polarity, dead time or scale refuses to start until
-//! the bench steps for them were done and confirmed at the console.
+//! [`Stated`]: read in a source, or assumed. A board refuses to start until the bench steps for what is assumed were done and
+//! confirmed at the console.
 
 mod confirm;
 pub mod converter;
@@ -15,6 +15,7 @@ mod nucleo_g474re_ihm023v3;
 mod nucleo_g474re_ihm08m1;
 mod reference;
 
+use drive_core::settings::rules::dc_link::{HIGHEST_OF_NOMINAL, OVER_OF_HIGHEST};
 use drive_core::settings::{Flux, Line, Ntc};
 
 use pin::Pin;
@@ -111,6 +112,35 @@ pub struct FaultInput {
     pub pin: Pin,
     /// The level that trips. The chip pulls an open wire there.
     pub trips_at: Stated<Level>,
+    /// Resistor of the power stage that holds the input at the other level, ohm.
+    pub pull_ohm: Stated<f32>,
+}
+
+/// Voltages of the dc link that the power stage stands, V.
+#[derive(Clone, Copy, Debug)]
+pub struct DcLinkLimits {
+    /// Highest in operation: generating torque ends there.
+    pub operation: Stated<f32>,
+    /// Absolute maximum of the switches.
+    pub switches: Stated<f32>,
+    /// Rating of the capacitors.
+    pub capacitors: Stated<f32>,
+}
+
+/// Share of the switches' absolute maximum that the comparator leaves them: ringing at a turn-off comes on top.
+const OF_SWITCHES: f32 = 0.9;
+/// Largest error of the measured dc link, relative: what the bench step for its scale allows.
+const SENSING_ERROR: f32 = 0.03;
+/// Least distance from the software's trip to the comparator's, relative: offsets of comparator and DAC, which have divider and
+/// reference in common with the software.
+const COMPARATOR_ERROR: f32 = 0.03;
+
+impl DcLinkLimits {
+    /// Highest measured dc link at which the comparator may trip, V.
+    pub const fn comparator_v(&self) -> f32 {
+        let (switches, capacitors) = (OF_SWITCHES * self.switches.value, self.capacitors.value);
+        (if switches < capacitors { switches } else { capacitors }) / (1.0 + SENSING_ERROR)
+    }
 }
 
 /// An analog signal.
@@ -155,7 +185,7 @@ impl Currents {
 }
 
 /// A board: a NUCLEO-G474RE with its power stage.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// Name at the command line and in saved settings.
     pub name: &'static str,
@@ -169,8 +199,8 @@ pub struct Board {
     pub fault: FaultInput,
     /// Dead time that the timer makes, s: the default of `inverter.dead_time_s`. Dead time of the drivers comes on top.
     pub dead_time_s: Stated<f32>,
-    /// Range of that setting, s.
-    pub dead_time_range_s: (f32, f32),
+    /// Longest that the setting takes, s; the shortest is the board's own.
+    pub dead_time_max_s: f32,
     /// Phase currents.
     pub currents: Currents,
     /// Delay of the analog filters of the currents, s.
@@ -185,8 +215,13 @@ pub struct Board {
     pub dc_link_v: f32,
     /// Flux of the motor: the default of `sequence.flux`.
     pub flux: Flux,
-    /// Highest voltage that the power stage stands, V.
-    pub highest_dc_link_v: Stated<f32>,
+    /// Voltages that the power stage stands.
+    pub dc_link_limits: DcLinkLimits,
+    /// Over-current shut-down of the power stage that needs no sample, up to 60 V none: the converters see a short circuit too
+    /// late.
+    pub over_current: Option<Stated<&'static str>>,
+    /// Pins that the power stage ties to nets of others: they stay analog.
+    pub analog_only: &'static [Pin],
     /// The port of the field bus, on pins that the power stage leaves free; `None` is a board without a bus.
     pub bus: Option<Rs485>,
     /// Advice on resistors at the driver inputs, one sentence: the pins float while the chip is in reset or flashed.
@@ -204,17 +239,44 @@ pub struct Rs485 {
     pub driver: Pin,
 }
 
-impl core::fmt::Debug for Board {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(self.name)
-    }
-}
-
 impl PartialEq for Board {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
     }
 }
+
+impl Board {
+    /// Code of the highest dc link in operation, which no setting of the scale lifts.
+    pub const fn highest_dc_link(&self) -> u16 {
+        let Line { gain, offset } = self.dc_link.line.value;
+        // Rounded up: the limit itself is allowed.
+        ((self.dc_link_limits.operation.value - offset) / gain) as u16 + 1
+    }
+
+    /// Whether the pin belongs to a signal of the board.
+    const fn uses(&self, pin: Pin) -> bool {
+        let [a, b] = self.currents.a_and_b();
+        let c = match self.currents.c() {
+            Some(c) => c,
+            None => b,
+        };
+        let bus = match self.bus {
+            Some(Rs485 { transmit, receive, driver }) => [transmit, receive, driver],
+            None => [a.pin; 3],
+        };
+        let inputs = [self.fault.pin, a.pin, b.pin, c.pin, self.dc_link.pin, self.heat_sink];
+        let gates = pin.is_among(&self.high.pins) || pin.is_among(&self.low.pins);
+        gates || pin.is_among(&inputs) || pin.is_among(&bus) || pin.is_among(&pin::FIXED)
+    }
+}
+
+/// Resistors of the chip at a pin at the least, ohm (datasheet: 25 to 55 kOhm).
+const CHIP_PULL_OHM: f32 = 25e3;
+/// Share of the supply that is left for a level that must be sure: 2.6 V of 3.3, where the input needs 0.7 of it.
+const SURE_LEVEL: f32 = 2.6 / 3.3;
+/// Dc link from which on an over-current shut-down is required, V: extra-low voltage ends there, and so do switches that stand a
+/// short circuit until the next sample.
+const WITHOUT_OVER_CURRENT_V: f32 = 60.0;
 
 /// Checks a board when compiling.
 const fn check(board: &Board) {
@@ -239,14 +301,17 @@ const fn check(board: &Board) {
     }
     assert!(board.dc_link.pin.equals(pin::COMP1_INPUT), "comparator 1 does not reach the dc link");
     assert!(board.dc_link.pin.adc1().is_some() && board.heat_sink.adc2().is_some());
-    let (shortest, longest) = board.dead_time_range_s;
+    let (own, longest) = (board.dead_time_s.value, board.dead_time_max_s);
+    assert!(own > 0.0 && own <= longest && longest <= 6e-6, "dead time");
     assert!(
-        shortest > 0.0
-            && board.dead_time_s.value >= shortest
-            && board.dead_time_s.value <= longest
-            && longest <= 6e-6,
-        "dead time"
+        CHIP_PULL_OHM / (CHIP_PULL_OHM + board.fault.pull_ohm.value) >= SURE_LEVEL,
+        "the resistor at the fault input is too large: the chip pulls against it"
     );
+    let mut i = 0;
+    while i < board.analog_only.len() {
+        assert!(!board.uses(board.analog_only[i]), "a pin that must stay analog has a signal");
+        i += 1;
+    }
     if let Some(Rs485 { transmit, receive, driver }) = board.bus {
         assert!(
             transmit.is(&pin::USART3_TX) && receive.is(&pin::USART3_RX),
@@ -257,11 +322,23 @@ const fn check(board: &Board) {
             "two wires of the bus on one pin"
         );
     }
-    let range_v = board.dc_link.line.value.gain * 4095.0 + board.dc_link.line.value.offset;
-    assert!(board.dc_link_v > 0.0 && board.dc_link_v < board.highest_dc_link_v.value);
+    // Nominal dc link < end of generating torque <= operation < trip of the software < comparator <= what switches and capacitors
+    // stand.
+    let limits = &board.dc_link_limits;
+    let (operation_v, comparator_v) = (limits.operation.value, limits.comparator_v());
     assert!(
-        board.highest_dc_link_v.value <= range_v,
-        "the converter does not reach the highest dc link"
+        board.dc_link_v > 0.0 && HIGHEST_OF_NOMINAL * board.dc_link_v <= operation_v,
+        "the nominal dc link leaves no room below the highest in operation"
+    );
+    assert!(
+        OVER_OF_HIGHEST * operation_v * (1.0 + COMPARATOR_ERROR) <= comparator_v,
+        "the highest dc link in operation leaves no room for two trips below what switches and capacitors stand"
+    );
+    let range_v = board.dc_link.line.value.gain * 4095.0 + board.dc_link.line.value.offset;
+    assert!(comparator_v <= range_v, "the converter does not reach the trips of the dc link");
+    assert!(
+        board.over_current.is_some() || operation_v <= WITHOUT_OVER_CURRENT_V,
+        "above 60 V the power stage needs an over-current shut-down of its own"
     );
 }
 const _: () = {

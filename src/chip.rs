@@ -15,6 +15,7 @@ pub mod sleep;
 pub mod stop;
 pub mod time;
 pub mod watchdog;
+pub mod window;
 
 /// Reason why the drive is not started, in words: for the log and the console.
 pub type StartError = &'static str;

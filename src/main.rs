@@ -8,8 +8,8 @@
 //!   `Drive::step`, compare values out, then one command from the console if there is one.
 //! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`chip/rs485.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console (`console.rs`), the log ten times a second, the
-//!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory
-//!   (`monitor/memory_check.rs`).
+//!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory and registers
+//!   (`task/check.rs`).
 //! * `chip/stop.rs`, when the firmware cannot go on: outputs off, the reason kept for the next boot, reset.
 //! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls.
 //!
@@ -44,7 +44,7 @@ fn main() -> ! {
         let now_ms = supervisor.listen();
         console.poll(&mut port, &mut supervisor, now_ms);
         console.serve(&mut bus, &mut supervisor, now_ms);
-        supervisor.check_memory();
+        supervisor.check();
         supervisor.feed_watchdog();
         // Until an interrupt. At the end of the loop: if the control does not run, no interrupt comes before the
         // greeting is sent.

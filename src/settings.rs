@@ -25,6 +25,8 @@ pub struct FirmwareSettings {
     pub command: CommandSettings,
     /// Settings of the field bus.
     pub bus: bus::Settings,
+    /// Whether a pin chooses at a reset what starts: see [`board::boot_pin_counts`]. A state of the chip, which is not saved.
+    pub boot_pin_counts: bool,
     /// Accepted result of a learning with these settings; it overrides them where both give a value.
     pub learned: Option<Learned>,
 }
@@ -52,18 +54,23 @@ impl FirmwareSettings {
     pub fn of(board: &'static Board) -> Self {
         let drive = board::settings_of(board);
         let (command, bus) = (CommandSettings::default(), bus::Settings::default());
-        Self { board, drive, command, bus, learned: None }
+        Self { board, drive, command, bus, boot_pin_counts: true, learned: None }
     }
 
-    /// Whether the bench steps for the board's assumptions were done, with the values that it has.
+    /// Whether the bench steps of the board were done, with its values, the [hardware settings](keys::Key::hardware) and the option
+    /// bytes as they are.
     pub fn board_is_confirmed(&self) -> bool {
-        self.board.assumptions().next().is_none()
-            || self.command.confirmed == self.board.confirmation()
+        self.command.confirmed == self.confirmation()
     }
 
     /// Notes that the bench steps of the board were done.
     pub fn confirm_board(&mut self) {
-        self.command.confirmed = self.board.confirmation();
+        self.command.confirmed = self.confirmation();
+    }
+
+    fn confirmation(&self) -> u32 {
+        let hardware = keys::all().filter(|key| key.hardware()).map(|key| key.to_bits(self));
+        self.board.confirmation(hardware.chain([u32::from(self.boot_pin_counts)]))
     }
 
     /// Takes the result of a learning, if it was accepted: instead of what was learned before, or, where it was learned `again`
@@ -112,6 +119,8 @@ impl FirmwareSettings {
     /// # Errors
     /// The first value out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
+        self.drive.check()?;
+        // Those of the board are narrower.
         keys::all().try_for_each(|key| key.check(self))
     }
 }

@@ -134,7 +134,7 @@ fn a_stop_by_the_ramp_brings_the_shaft_to_rest() {
     let mut rig = turning(&config, 600.0, 1);
     rig.command(&Command::Stop(Stop::Ramp)).unwrap();
     rig.run(0.5, |_| {});
-    assert_eq!(rig.drive.state(), State::Braking);
+    assert_eq!(rig.drive.state(), State::BrakingByFrequency);
     assert!(rig.drive.command(&Command::Speed(100.0)).is_err());
     rig.run(3.0, |_| {});
     let rpm = seen(&mut rig).0;

@@ -1,8 +1,8 @@
 //! The drive on another chip.
 //!
 //! A port brings four things: a board (what the timer, the converters and the encoder do), settings with the scales of
-//! its sensors, an interrupt that calls [`Drive::step`] 6000 times a second, and a task that gives commands. Here the
-//! board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
+//! its sensors, an interrupt that calls [`Drive::step`] and [`Drive::after_step`] 6000 times a second, and a task that gives
+//! commands. Here the board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
 //! one producer and one consumer, such as `heapless::spsc::Queue`.
 //!
 //! `cargo run -p drive-core --example port`
@@ -12,7 +12,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use drive_core::identify::learning::Learned;
 use drive_core::settings::{Line, Ntc, Scales, Settings};
-use drive_core::{Accepted, Command, Compare, Drive, Hardware, Mode, Refused, Sample, State};
+use drive_core::{Accepted, Command, Compare, Drive, Hardware, Mode, Refused, Sample};
 
 /// Hardware access of the interrupt.
 trait Board {
@@ -20,6 +20,9 @@ trait Board {
     fn sample(&mut self) -> Sample;
     /// Loads the compare registers for the next period, and switches the outputs off at once where it says so.
     fn output(&mut self, compare: &Compare);
+    /// Sets the switches of the dc link: the duty of the brake chopper, and whether the precharge relay is closed. A board
+    /// that has neither leaves it empty.
+    fn dc_link(&mut self, chopper: f32, relay: bool);
 }
 
 /// The board of this example: no current flows, 48 V, 25 °C.
@@ -27,11 +30,10 @@ struct Idle;
 
 impl Board for Idle {
     fn sample(&mut self) -> Sample {
-        let zero = 2048;
         Sample {
-            current_a: zero,
-            current_b: zero,
-            current_c: zero,
+            current_a: 2048,
+            current_b: 2048,
+            current_c: 2048,
             dc_link: 1820,
             heat_sink: 1309,
             encoder: 0,
@@ -40,6 +42,8 @@ impl Board for Idle {
     }
 
     fn output(&mut self, _: &Compare) {}
+
+    fn dc_link(&mut self, _: f32, _: bool) {}
 }
 
 /// Converter codes: 12 bits.
@@ -87,9 +91,14 @@ struct Interrupt<B> {
 impl<B: Board> Interrupt<B> {
     /// Called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
-        let compare = self.drive.step(&self.board.sample());
+        let sample = self.board.sample();
+        let compare = self.drive.step(&sample);
         self.board.output(&compare);
-        // The compare values are out; what is left of the period belongs to commands.
+        // The compare values are out. The thermal limits and the precharge relay come after them; without this call a hot drive
+        // does not lower its current.
+        let relay = self.drive.after_step(&sample);
+        self.board.dc_link(self.drive.brake_duty(), relay);
+        // The rest of the period belongs to commands.
         if let Ok(command) = self.commands.try_recv() {
             let _ = self.answers.try_send(self.drive.command(&command));
         }
@@ -132,10 +141,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for _ in 0..6000 {
         interrupt.on_period();
     }
-    match interrupt.drive.state() {
-        State::Fault(fault) => println!("fault {}: {fault}", fault.code()),
-        state => println!("{state}"),
-    }
+    println!("the drive is {}", interrupt.drive.state());
 
     // Whenever a learning has ended.
     if let Some(learned) = interrupt.drive.learned().filter(|learned| learned.verdict.is_accepted())
@@ -143,4 +149,37 @@ fn main() -> Result<(), Box<dyn Error>> {
         write_learned(learned);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The idle board, which notes its relay.
+    struct Watched(bool);
+
+    impl Board for Watched {
+        fn sample(&mut self) -> Sample {
+            Idle.sample()
+        }
+        fn output(&mut self, _: &Compare) {}
+        fn dc_link(&mut self, _: f32, relay: bool) {
+            self.0 = relay;
+        }
+    }
+
+    /// The dc link of the board is steady from the beginning: the relay closes once it has been so for its time.
+    #[test]
+    fn the_precharge_relay_closes() {
+        let mut settings = settings();
+        settings.supply.relay_s = 0.1;
+        let drive = Drive::new(settings.build().unwrap());
+        let (commands, answers) = (sync_channel(1).1, sync_channel(1).0);
+        let mut interrupt = Interrupt { board: Watched(false), drive, commands, answers };
+        let mut closed = |periods: u32| {
+            (0..periods).for_each(|_| interrupt.on_period());
+            interrupt.board.0
+        };
+        assert_eq!((closed(300), closed(3000)), (false, true));
+    }
 }

@@ -226,6 +226,11 @@ impl DcLink {
         }
     }
 
+    /// Whether there is a brake resistor.
+    pub const fn has_chopper(&self) -> bool {
+        self.chopper.is_some()
+    }
+
     /// One step with the measured dc link `dc_link`, V, at the speed `freq` of the rotor, electrical turns per control
     /// period, for torque currents within `i_q_limit`, A, which is less than the usual for this reason.
     pub fn step(

@@ -295,6 +295,12 @@ faults! {
             "speed.ramp_rpm_per_s too steep for the inertia",
         ],
         "free the shaft, or reduce the load; raise limits.current_a if motor and inverter bear it";
+    ChopperOff = 49, "the chip has switched the brake chopper off",
+        &[
+            "supply of the controller below 2.8 V for a moment",
+            "an error in the flash, or a flipped bit in the timer of the chopper",
+        ],
+        "check the supply of the controller, then clear: the chopper comes back once the cause is gone";
 }
 
 impl Fault {

@@ -58,6 +58,8 @@ bitflags! {
         const DEADLINE_MISS = 1 << 2;
         /// A conversion was overwritten before it was read, or did not take place.
         const CONVERTER_OVERRUN = 1 << 3;
+        /// The output of the brake chopper is off, whatever its duty. No fault without a brake resistor.
+        const CHOPPER_OFF = 1 << 4;
     }
 }
 

@@ -74,3 +74,12 @@ pub use io::{Compare, Hardware, Sample};
 pub use math::angle::{Angle, UnitVector};
 pub use math::frames::{Abc, AlphaBeta, DmQm, Dq};
 pub use settings::Settings;
+
+/// The examples of the documents.
+#[cfg(doctest)]
+mod documents {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../../docs/porting.md")]
+    struct Porting;
+}

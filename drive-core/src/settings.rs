@@ -327,7 +327,9 @@ impl fmt::Display for SettingsError {
         match self {
             Self::Range { name, unit, value, min, max } => {
                 let space = if unit.is_empty() { "" } else { " " };
-                write!(f, "{name} = {value}: allowed is {min} to {max}{space}{unit}")
+                // NaN counts as none.
+                let beside = if min <= max { "" } else { "nothing beside other settings: " };
+                write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
             }
             Self::Tuning(error) => write!(f, "controllers: {error}"),
         }

@@ -32,13 +32,12 @@ fuzz_target!(|bytes: &[u8]| {
     static WORDS: LazyLock<Vec<&str>> = LazyLock::new(words);
     let mut bytes = bytes.iter().copied();
     while let Some(byte) = bytes.next() {
-        if byte == 0xf7 {
-            let word = bytes.next().and_then(|n| WORDS.get(usize::from(n))).unwrap_or(&"");
-            port.sent.extend(word.bytes().chain([b' ']));
-            continue;
-        }
         match byte {
             0xf6 => drive.triggered = true,
+            0xf7 => {
+                let word = bytes.next().and_then(|n| WORDS.get(usize::from(n))).unwrap_or(&"");
+                port.sent.extend(word.bytes().chain([b' ']));
+            }
             0xf8 => drive.found = Some(doubtful()),
             0xf9 => drive.found = Some(found()),
             0xfa => port.damaged = true,

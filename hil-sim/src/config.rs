@@ -17,7 +17,8 @@ mod words;
 
 use std::path::Path;
 
-use drive_core::settings::{Line, Settings};
+use drive_core::Coefficients;
+use drive_core::settings::{Line, Settings, SettingsError, find, value as drive};
 
 pub use after::After;
 use file::FileAssignment;
@@ -126,6 +127,12 @@ impl Config {
         on_reference * torque.min(inertia)
     }
 
+    /// Rated torque, Nm: power over speed of the nameplate.
+    pub fn rated_nm(&self) -> f64 {
+        let plate = &self.drive.nameplate;
+        f64::from(plate.power_w) / (f64::from(plate.speed_rpm) * std::f64::consts::TAU / 60.0)
+    }
+
     /// A quantity of the drive's settings relative to that of the dissertation's drive.
     fn relative(&self, of: fn(&Settings) -> f32) -> f64 {
         f64::from(of(&self.drive)) / f64::from(of(&Settings::default()))
@@ -172,6 +179,23 @@ impl Config {
         }
         changes
     }
+}
+
+/// The coefficients of a drive with these settings.
+///
+/// # Errors
+/// [`Error::Refused`] with the setting; where it is one that nobody set, with what its rule depends on.
+pub fn built(settings: &Settings) -> Result<Coefficients, Error> {
+    settings.build().map_err(|error| {
+        let by_rule = match error {
+            SettingsError::Range { name, .. } => {
+                find(name).is_some_and(|entry| entry.get(settings) == drive::Value::Auto)
+            }
+            SettingsError::Tuning(_) => false,
+        };
+        let rule = "; it was not set: its rule follows from nameplate, motor, measurement.range_a and inverter.dc_link_v";
+        Error::Refused(format!("{error}{}", if by_rule { rule } else { "" }))
+    })
 }
 
 /// Name and value of an assignment `KEY=VALUE`.

@@ -44,11 +44,9 @@ mod smallest_slope;
 mod speed_profile;
 pub mod statistics;
 mod steady;
-mod sweep;
 mod torque;
-mod torque_drift;
 mod torque_envelope;
-mod tracking;
+pub mod torque_limit;
 pub mod warming_rotor;
 
 pub use torque::assumptions;
@@ -240,7 +238,6 @@ pub const EXPERIMENTS: &[Experiment] = &[
     reversal::EXPERIMENT,
     perturbation::EXPERIMENT,
     speed_profile::EXPERIMENT,
-    sweep::EXPERIMENT,
     monte_carlo::EXPERIMENT,
     machines::EXPERIMENT,
     commission::EXPERIMENT,
@@ -249,10 +246,8 @@ pub const EXPERIMENTS: &[Experiment] = &[
     full_range::EXPERIMENT,
     torque_envelope::EXPERIMENT,
     lock_monitor::EXPERIMENT,
-    torque_drift::EXPERIMENT,
     record::EXPERIMENT,
     smallest_slope::EXPERIMENT,
-    tracking::EXPERIMENT,
     identify_discrete::EXPERIMENT,
     identify_continuous::EXPERIMENT,
     identify_recursive::EXPERIMENT,
@@ -268,7 +263,6 @@ pub const WITH_INPUT: &[Experiment] = &[profile::EXPERIMENT];
 
 /// The experiments of many independent runs, which can be shared between machines and continued.
 pub const STATISTICAL: &[Statistical] = &[
-    Statistical::of::<sweep::Sweep>(),
     Statistical::of::<monte_carlo::MonteCarlo>(),
     Statistical::of::<machines::Machines>(),
     Statistical::of::<commission::Commission>(),
@@ -331,6 +325,30 @@ pub fn run(name: &str, config: &Config, seed: u64) -> Result<Outcome, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The example of the page "Adding an experiment".
+    mod amplitude;
+
+    #[test]
+    fn the_example_of_the_book_runs_as_it_is_printed() {
+        let page = include_str!("../../docs/add-an-experiment.md");
+        let example = include_str!("experiments/tests/amplitude.rs");
+        assert!(
+            page.contains(&format!("```rust\n{example}```")),
+            "amplitude.rs differs from the page"
+        );
+        let config = Config::default();
+        let context = Context {
+            config: &config,
+            seed: 1,
+            seconds: None,
+            progress: Progress::hidden(),
+            file: None,
+        };
+        let outcome = (amplitude::EXPERIMENT.run)(&context).unwrap();
+        let rms = |volts: u32| outcome.metrics.get(&format!("rms_at_{volts}_v_deg")).unwrap();
+        assert!((0.1..5.0).contains(&rms(80)) && rms(80) < rms(40), "more carrier, less noise");
+    }
 
     #[test]
     fn a_group_is_all_that_begin_alike() {

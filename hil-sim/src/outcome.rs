@@ -36,6 +36,9 @@ pub struct Outcome {
     pub refusal: Option<String>,
 }
 
+/// Faults that are named where one reads of a lost run; the JSON has all.
+const MOST_FAULTS: usize = 10;
+
 /// Numbers by name, in the order in which they were added.
 #[derive(Clone, Debug, Default)]
 pub struct Metrics(Vec<(String, f64)>);
@@ -67,6 +70,23 @@ impl Metrics {
             1.0 if is_flag(name) => Cell::from("yes"),
             whole if whole.fract() == 0.0 && whole.abs() < 1e6 => Cell::fixed(whole, 0),
             other => Cell::significant(other, 4),
+        }
+    }
+
+    /// The number that stands for all: the angle error, or the first that counts no runs.
+    pub fn main(&self) -> Option<(&str, f64)> {
+        let is = |wanted: &str| self.iter().find(|(name, _)| *name == wanted);
+        let counts = |name: &str| is_flag(name) || name.ends_with("runs") || name == "machines";
+        let numbers = |entry: &(&str, f64)| !counts(entry.0) && entry.1.is_finite();
+        is("angle_error_rms_deg").or_else(|| self.iter().find(numbers))
+    }
+
+    /// Whether anything was lost: of how many runs, if they are counted. Empty where nothing could be.
+    pub fn lost(&self) -> String {
+        match (self.get("lost_runs").or(self.get("lost")), self.get("runs")) {
+            (None, _) => String::new(),
+            (Some(lost), Some(runs)) => format!("{lost} of {runs}"),
+            (Some(lost), None) => (if lost == 0.0 { "no" } else { "yes" }).to_owned(),
         }
     }
 
@@ -149,6 +169,11 @@ impl Origin {
 }
 
 impl Outcome {
+    /// Adds a remark.
+    pub fn remark(&mut self, text: impl Into<String>) {
+        self.remarks.push(text.into());
+    }
+
     /// The outcome of an experiment that was refused.
     pub fn refused(reason: &impl std::fmt::Display) -> Self {
         Self { refusal: Some(reason.to_string()), ..Self::default() }
@@ -166,7 +191,14 @@ impl Outcome {
             [] => (lost == Some(1.0)).then(|| {
                 format!("{whether}: the drive stopped itself, or its flux angle was wrong beyond recovery.")
             }),
-            faults => Some(format!("{whether}: {}.", faults.join("; "))),
+            faults => {
+                let shown = &faults[..faults.len().min(MOST_FAULTS)];
+                let more = match faults.len() - shown.len() {
+                    0 => String::new(),
+                    more => format!("; and {more} more"),
+                };
+                Some(format!("{whether}: {}{more}.", shown.join("; ")))
+            }
         }
     }
 }
@@ -212,5 +244,7 @@ mod tests {
         assert!(outcome.lost().unwrap().starts_with("Lost: the drive stopped"));
         outcome.faults.push("fault 26: the angle is not tracked".into());
         assert_eq!(outcome.lost().unwrap(), "Lost: fault 26: the angle is not tracked.");
+        outcome.faults = vec!["run: fault 11".to_owned(); 19];
+        assert!(outcome.lost().unwrap().ends_with("run: fault 11; and 9 more."));
     }
 }

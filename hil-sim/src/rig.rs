@@ -8,7 +8,7 @@ use drive_core::io::PERIOD_S;
 use drive_core::settings::AngleSource;
 use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State, Stop};
 
-use crate::config::{self, Config, plant_settings};
+use crate::config::{self, Config, built, plant_settings};
 use crate::error::Error;
 use crate::plant::{Load, Plant, PlantSettings};
 
@@ -87,13 +87,13 @@ impl Rig {
     /// # Errors
     /// [`Error::Refused`] with the setting that the plant or the drive refuses.
     pub fn new(plant: &PlantSettings, drive: &Settings, seed: u64) -> Result<Self, Error> {
-        Ok(Self {
-            plant: Plant::new(plant, seed).map_err(Error::refused)?,
-            drive: Drive::new(drive.build().map_err(Error::refused)?),
-            pending: Compare::OFF,
-            periods: 0,
-            learning_s: 0.0,
-        })
+        let plant = Plant::new(plant, seed).map_err(Error::refused)?;
+        Ok(Self::of(plant, Drive::new(built(drive)?)))
+    }
+
+    /// A drive that is off, connected to a motor at rest, both made already.
+    pub fn of(plant: Plant, drive: Drive) -> Self {
+        Self { plant, drive, pending: Compare::OFF, periods: 0, learning_s: 0.0 }
     }
 
     /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
@@ -159,6 +159,11 @@ impl Rig {
         Ok(rig)
     }
 
+    /// Periods since the beginning.
+    pub fn periods(&self) -> u64 {
+        self.periods
+    }
+
     /// Seconds since the beginning.
     pub fn time(&self) -> f64 {
         self.periods as f64 / RATE_HZ
@@ -171,7 +176,8 @@ impl Rig {
         self.step_with(&sample);
     }
 
-    /// One PWM period in which the drive is given `sample` instead of the sample of the plant.
+    /// One PWM period in which the drive is given `sample` instead of the sample of the plant. This is all that the control
+    /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
     #[inline]
     pub fn step_with(&mut self, sample: &Sample) {
         let compare = self.drive.step(sample);

@@ -9,8 +9,7 @@ use std::process::Command;
 use cli_common::{files, folder, hil_sim, object, text};
 
 /// Every statistical experiment, with options that make it small.
-const SMALL: [(&str, &[&str]); 10] = [
-    ("speed-torque-sweep", &["--seconds", "0.2"]),
+const SMALL: [(&str, &[&str]); 9] = [
     (
         "monte-carlo",
         &[
@@ -175,7 +174,7 @@ fn options_of_a_part_are_refused_where_they_mean_nothing() {
         ),
         (
             &["run", "speed-profile", "--resume", "x"],
-            "speed-torque-sweep, monte-carlo, machines, commission, commission-refusals, battery",
+            "those that do: monte-carlo, machines, commission, commission-refusals, battery",
         ),
         (&["run", "identify", "--shard", "1/2"], "does not consist of independent runs"),
         (

@@ -78,7 +78,7 @@ const CASES: [(&str, &[&str]); 54] = [
     ("run torque-steps --config key.toml", &["key.toml, line 3: there is no key `motor.rs_`"]),
     ("run torque-steps --config word.toml", &["word.toml, line 2: load.mode = free-wheeling", "locked, free, speed"]),
     ("run torque-steps --config array.toml", &["array.toml, line 2: motor.r_s = [1, 2]", "not a number"]),
-    ("run torque-steps --motor motor.toml", &["motor.toml", "about"]),
+    ("run torque-steps --motor motor.toml", &["motor.toml", "nameplate.power_w", "motor.l_m", "inverter.dc_link_v"]),
     // Profiles and traces.
     ("run profile", &["profile needs --input FILE"]),
     ("run torque-steps --input unit.csv", &["--input unit.csv", "allowed with: profile"]),

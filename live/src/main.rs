@@ -68,10 +68,8 @@ async fn run(arguments: Arguments) -> Result<()> {
         Some(_) => None,
         None => Some(VirtualBoard::start(&arguments.board, &shared)?),
     };
-    let port = match (&arguments.port, &board) {
-        (Some(port), _) => port.clone(),
-        (None, board) => board.as_ref().map(|board| board.port.clone()).unwrap_or_default(),
-    };
+    let port = arguments.port.or_else(|| board.as_ref().map(|board| board.port.clone()));
+    let port = port.context("no port")?;
     let (baud, real) = (arguments.baud, board.is_none());
     let used = port.clone();
     let worker = shared.clone();

@@ -334,11 +334,11 @@ fn begins_again(page: &mut Page<'_>) {
 
 /// A fault is shown in words with what to do; it is cleared. What does not fit is told.
 fn fails(page: &mut Page<'_>, folder: &Path) {
-    page.value("tell('set limits.heat_sink_c 10').then(() => tell('start torque'))");
+    page.value("tell('set limits.heat_sink_c 10').then(() => tell('apply')).then(() => tell('confirm board')).then(() => tell('start torque'))");
     page.until("/Fault 18.*heat sink/.test($('alarm').textContent) && $('alarm').querySelectorAll('li').length > 1", PATIENCE);
     state(page, "in fault");
     pictures(page, folder, "fault");
-    page.value("tell('set limits.heat_sink_c 85').then(() => tell('apply')).then(() => document.querySelector('[data-ask=clear]').click())");
+    page.value("tell('set limits.heat_sink_c 85').then(() => tell('apply')).then(() => tell('confirm board')).then(() => document.querySelector('[data-ask=clear]').click())");
     state(page, "off");
     page.until("$('alarm').hidden", PATIENCE);
     page.value("heard({ status: 'READY 3 4' })");

@@ -5,7 +5,7 @@ use drive_core::settings::{Line, Ntc};
 
 use super::converter::{CODES, REFERENCE_V};
 use super::pin::{Pin, pa, pb, pc};
-use super::{Analog, Currents, FaultInput, Gates, Level, Rs485, Stated, assumed};
+use super::{Analog, Currents, FaultInput, Level, Rs485, Stated, assumed};
 
 /// High sides.
 pub const HIGH: [Pin; 3] = [pa(8), pa(9), pa(10)];
@@ -17,46 +17,46 @@ pub const CURRENTS: [Pin; 3] = [pa(0), pc(1), pc(0)];
 pub const HEAT_SINK: Pin = pc(2);
 /// The port of the field bus: three pins beside each other on CN7, which the boards here do not use.
 pub const BUS: Rs485 = Rs485 { transmit: pc(10), receive: pc(11), driver: pc(12) };
-/// The thermistor of the dissertation.
-pub const NTC: Stated<Ntc> =
-    assumed(Ntc::DEFAULT, "room temperature: `status` must show it within 5 degC");
 
-/// A fault output that pulls PA6 low.
+/// A thermistor with this resistor in series. Another topology shows another temperature, or one that falls.
+pub const fn ntc(divider_ohm: f32) -> Stated<Ntc> {
+    assumed(
+        Ntc { divider_ohm, ..Ntc::DEFAULT },
+        "room temperature: `status` must show it within 5 degC, and more with a finger on the heat sink",
+    )
+}
+
+/// A fault output that pulls PA6 low, and its pull-up.
 pub const fn fault(bench_step: &'static str) -> FaultInput {
-    FaultInput { pin: pa(6), trips_at: assumed(Level::Low, bench_step) }
+    FaultInput {
+        pin: pa(6),
+        trips_at: assumed(Level::Low, bench_step),
+        pull_ohm: assumed(
+            4.7e3,
+            "firmware running, no fault: at least 2.6 V at PA6; otherwise 4.7 kOhm from PA6 to 3.3 V",
+        ),
+    }
 }
 
 /// The dc link, with this many volts a code.
-pub const fn dc_link(gain: f32, bench_step: &'static str) -> Analog {
-    Analog { pin: pa(1), line: assumed(Line { gain, offset: 0.0 }, bench_step) }
+pub const fn dc_link(gain: Stated<f32>) -> Analog {
+    let line = Line { gain: gain.value, offset: 0.0 };
+    Analog { pin: pa(1), line: Stated { value: line, source: gain.source } }
 }
 
-/// The low sides of a driver L639x.
-// The data sheet of the driver says so; whether a board inverts between Nucleo and driver is not known.
-pub const LOW_SIDES: Gates = Gates {
-    pins: LOW,
-    on_at: assumed(
-        Level::Low,
-        "motor supply off: ground each low-side pin; the gate of that low side must go on",
-    ),
-};
 /// The fault output of a power board of ST.
 pub const FAULT: FaultInput = fault("ground PA6: `status` must show the break");
 /// Delay of the amplifiers, s.
 pub const CURRENT_DELAY_S: Stated<f32> =
     assumed(0.4e-6, "rise time of the amplifier's output after a low side goes on");
-/// Bench step for the scale of the dc link.
-pub const DC_LINK_STEP: &str = "10 V at the dc link: `status` must show them within 3 %";
 /// Advice on resistors.
-pub const PULLS: &str = "none: the drivers hold their inputs off; a pull-down at a low-side input switches that low side on";
+pub const PULLS: &str = "10 kOhm to 3.3 V at each low-side input, 10 kOhm to ground at each high-side input: those of the drivers are weak";
 
 /// Shunts below the low sides, with amplifiers that give `zero_v` without current and `v_per_a` more for each ampere into
 /// the motor, V.
-pub const fn shunts(v_per_a: f32, zero_v: f32) -> Currents {
-    let line = assumed(
-        Line::of_sensor(v_per_a, zero_v, REFERENCE_V, CODES),
-        "1 A of a laboratory supply through each shunt: `status` must show it, with its sign",
-    );
+pub const fn shunts(v_per_a: Stated<f32>, zero_v: f32) -> Currents {
+    let value = Line::of_sensor(v_per_a.value, zero_v, REFERENCE_V, CODES);
+    let line = Stated { value, source: v_per_a.source };
     let [a, b, c] = CURRENTS;
     Currents::LowSide {
         shunts: [Analog { pin: a, line }, Analog { pin: b, line }, Analog { pin: c, line }],

@@ -6,30 +6,53 @@
 use drive_core::settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, Gates, Level, assumed, morpho, read};
+use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};
+
+const SHUNTS: &str =
+    "1 A of a laboratory supply through each shunt: `status` must show it, with its sign";
 
 /// The board.
 pub const BOARD: Board = Board {
     name: "nucleo-g474re-ihm023v3",
     title: "NUCLEO-G474RE with X-NUCLEO-IHM09M1 and STEVAL-IHM023V3, 1 kW at 230 V (template)",
     high: Gates { pins: morpho::HIGH, on_at: read(Level::High, "L6390 data sheet, HIN") },
-    low: morpho::LOW_SIDES,
+    // The data sheet of the driver says so; whether the adapter inverts is not known.
+    low: Gates {
+        pins: morpho::LOW,
+        on_at: assumed(
+            Level::Low,
+            "motor supply off: ground each low-side pin; the gate of that low side must go on",
+        ),
+    },
     fault: morpho::FAULT,
     dead_time_s: assumed(
         2.0e-6,
         "oscilloscope at both gates of a leg, motor supply off: at least 1.5 us between off and on",
     ),
-    dead_time_range_s: (1.5e-6, 6e-6),
+    dead_time_max_s: 6e-6,
     // Shunt, ohm, and gain of its amplifier: 0.255 V/A. A current into the motor lowers the output.
-    currents: morpho::shunts(-0.15 * 1.7, 1.7),
+    currents: morpho::shunts(assumed(-0.15 * 1.7, SHUNTS), 1.7),
     current_delay_s: morpho::CURRENT_DELAY_S,
     // 0.0075 V/V.
-    dc_link: morpho::dc_link(REFERENCE_V / CODES as f32 / 0.0075, morpho::DC_LINK_STEP),
+    dc_link: morpho::dc_link(assumed(
+        REFERENCE_V / CODES as f32 / 0.0075,
+        "130 V at the dc link: `status` must show them within 3 %",
+    )),
     heat_sink: morpho::HEAT_SINK,
-    ntc: morpho::NTC,
+    // R44.
+    ntc: morpho::ntc(3600.0),
     dc_link_v: 311.0,
     flux: Flux::High,
-    highest_dc_link_v: read(400.0, "STEVAL-IHM023V3, supply range"),
+    dc_link_limits: DcLinkLimits {
+        operation: read(392.0, "STEVAL-IHM023V3, supply range up to 400 V, less 2 %"),
+        switches: read(600.0, "STGP10H60DF data sheet, collector to emitter"),
+        capacitors: assumed(450.0, "the voltage that is printed on the capacitors"),
+    },
+    over_current: Some(assumed(
+        "comparators of the drivers L6390, at their shut-down and at the fault input",
+        "ground SD/OD of a driver: `status` must show the break",
+    )),
+    analog_only: &[],
     // Whether the adapter leaves pins of USART3 free is not known.
     bus: None,
     pulls: morpho::PULLS,

@@ -1,4 +1,4 @@
-//! NUCLEO-G474RE with X-NUCLEO-IHM08M1: 10 to 48 V, three shunts below the low sides. The board to start with: no
+//! NUCLEO-G474RE with X-NUCLEO-IHM08M1: up to 48 V while it brakes, so 42 V nominal; three shunts below the low sides. The board to start with: no
 //! voltage on it is dangerous to touch.
 //!
 //! Not tried with a motor yet. Set-up of the jumpers: JP1 and JP2 closed, J5 and J6 at three shunts, JP3 closed, J9 open
@@ -7,31 +7,47 @@
 use drive_core::settings::Flux;
 
 use super::converter::{CODES, REFERENCE_V};
-use super::{Board, Gates, Level, assumed, morpho, read};
+use super::pin::{pa, pb};
+use super::{Board, DcLinkLimits, Gates, Level, assumed, morpho, read};
+
+/// The port of NuttX to this board, which has turned motors: polarity, gain, sign and divider.
+const NUTTX: &str = "apache/nuttx, boards/arm/stm32/common/src/stm32_ihm08m1.c";
 
 /// The board.
 pub const BOARD: Board = Board {
     name: "nucleo-g474re-ihm08m1",
-    title: "NUCLEO-G474RE with X-NUCLEO-IHM08M1, 10 to 48 V",
+    title: "NUCLEO-G474RE with X-NUCLEO-IHM08M1, supply 42 V",
     high: Gates { pins: morpho::HIGH, on_at: read(Level::High, "L6398 data sheet, HIN") },
-    low: morpho::LOW_SIDES,
+    low: Gates { pins: morpho::LOW, on_at: read(Level::Low, NUTTX) },
     fault: morpho::FAULT,
     // The driver adds 320 ns of its own.
     dead_time_s: assumed(
         1.0e-6,
         "oscilloscope at both gates of a leg, motor supply off: at least 0.5 us between off and on",
     ),
-    dead_time_range_s: (0.5e-6, 3e-6),
+    dead_time_max_s: 3e-6,
     // Shunt, ohm, and gain of its amplifier: 51.8 mV/A. A current into the motor lowers the output.
-    currents: morpho::shunts(-0.010 * 5.18, 1.71),
+    currents: morpho::shunts(read(-0.010 * 5.18, NUTTX), 1.71),
     current_delay_s: morpho::CURRENT_DELAY_S,
     // A divider of 169 and 9.31 kOhm.
-    dc_link: morpho::dc_link(19.15 * REFERENCE_V / CODES as f32, morpho::DC_LINK_STEP),
+    dc_link: morpho::dc_link(read(19.15 * REFERENCE_V / CODES as f32, NUTTX)),
     heat_sink: morpho::HEAT_SINK,
-    ntc: morpho::NTC,
-    dc_link_v: 48.0,
+    ntc: morpho::ntc(4700.0),
+    // Braking lifts the link by 14 %, to the highest in operation.
+    dc_link_v: 42.0,
     flux: Flux::High,
-    highest_dc_link_v: read(60.0, "STL220N6F7 data sheet, drain to source"),
+    dc_link_limits: DcLinkLimits {
+        operation: read(48.0, "UM1996, supply range"),
+        switches: read(60.0, "STL220N6F7 data sheet, drain to source"),
+        capacitors: assumed(63.0, "the voltage that is printed on the capacitors at the supply"),
+    },
+    // The sources do not agree on what sets its threshold: a divider, or a voltage at PB4.
+    over_current: Some(assumed(
+        "comparator on the shunts, about 30 A, at the fault input",
+        "CURRENT REF (CN10-27) must have a voltage; below it the comparator does not trip",
+    )),
+    // Tied to the fault input (PA11, PB14) and to the low side of leg a (PB15).
+    analog_only: &[pa(11), pb(14), pb(15)],
     bus: Some(morpho::BUS),
     pulls: morpho::PULLS,
 };

@@ -60,6 +60,8 @@ pub const USART3_TX: [Reach; 3] = [(pb(9), 7), (pb(10), 7), (pc(10), 7)];
 pub const USART3_RX: [Reach; 3] = [(pb(8), 7), (pb(11), 7), (pc(11), 7)];
 /// Output of channel 1 of TIM8.
 pub const TIM8_CH1: [Reach; 3] = [(pa(15), 2), (pb(6), 5), (pc(6), 4)];
+/// Pins of every board: encoder, console, brake chopper, precharge relay, debug port.
+pub const FIXED: [Pin; 8] = [pa(15), pb(3), pa(2), pa(3), pc(6), pc(8), pa(13), pa(14)];
 /// Positive input of comparator 1.
 pub const COMP1_INPUT: Pin = pa(1);
 
@@ -86,6 +88,14 @@ impl Pin {
     /// Equality, when compiling.
     pub const fn equals(self, other: Self) -> bool {
         self.port as u8 == other.port as u8 && self.number == other.number
+    }
+
+    /// Whether it is one of these.
+    pub const fn is_among(self, pins: &[Self]) -> bool {
+        match pins {
+            [] => false,
+            [first, others @ ..] => first.equals(self) || self.is_among(others),
+        }
     }
 
     /// Whether the peripheral signal reaches this pin.

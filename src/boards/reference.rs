@@ -3,7 +3,7 @@
 use drive_core::settings::{Flux, Line};
 
 use super::converter::calibrated;
-use super::{Analog, Board, Currents, Gates, Level, assumed, morpho, read};
+use super::{Analog, Board, Currents, DcLinkLimits, Gates, Level, assumed, morpho, read};
 
 /// The board.
 pub const BOARD: Board = Board {
@@ -26,8 +26,8 @@ pub const BOARD: Board = Board {
     fault: morpho::fault("ground the fault input: `status` must show the break"),
     // Both switches of a leg are off for this long at every change.
     dead_time_s: read(2.2e-6, "dissertation, section 3.9"),
-    // The needs of fast and slow power modules.
-    dead_time_range_s: (0.5e-6, 6e-6),
+    // The need of slow power modules.
+    dead_time_max_s: 6e-6,
     currents: Currents::InLine([
         Analog {
             pin: morpho::CURRENTS[0],
@@ -40,15 +40,25 @@ pub const BOARD: Board = Board {
     ]),
     current_delay_s: read(30e-6, "dissertation, Figure 16: a filter of 5305 Hz"),
     // A divider by 136.5, so that 450 V are full scale. The dissertation does not describe its own.
-    dc_link: morpho::dc_link(
+    dc_link: morpho::dc_link(assumed(
         0.11,
         "10 V at the dc link: `status` must show them within 3 %; otherwise set scales.dc_link.gain",
-    ),
+    )),
     heat_sink: morpho::HEAT_SINK,
-    ntc: morpho::NTC,
+    ntc: morpho::ntc(4700.0),
     dc_link_v: 311.0,
     flux: Flux::Low,
-    highest_dc_link_v: assumed(450.0, "the voltage of the capacitors and of the switches"),
+    // With another divider all three are as many times more as the divider.
+    dc_link_limits: DcLinkLimits {
+        operation: assumed(392.0, "the voltage that all parts at the dc link stand for any time"),
+        switches: assumed(600.0, "data sheet of the switches: highest voltage when off"),
+        capacitors: assumed(450.0, "the voltage that is printed on the capacitors"),
+    },
+    over_current: Some(assumed(
+        "required of the power stage, at the fault input",
+        "inject a current above limits.trip_a into its detector: `status` must show the break",
+    )),
+    analog_only: &[],
     bus: Some(morpho::BUS),
     pulls: "pull-down resistors of 10 kOhm at all six driver inputs",
 };

@@ -1,21 +1,27 @@
-//! The page of the boards lists what the board files state.
+//! The boards against the limits of their power stages, and against the page that lists what their files state.
 
 use std::fmt::Write;
 
-use super::{ALL, Board, Level, Source};
+use super::{
+    ALL, Board, COMPARATOR_ERROR, Level, OF_SWITCHES, SENSING_ERROR, Source, check, morpho, pin,
+};
+use crate::board::{protection, settings_of};
 
 const SCALES: [&str; 3] = ["scale of current a", "scale of current b", "scale of current c"];
 
 /// The sections of the boards as `docs/boards.md` has to contain them.
 fn section(board: &Board) -> String {
     let level = |level: Level| if level == Level::High { "high" } else { "low" };
-    let pins = |pins: [super::pin::Pin; 3]| pins.map(|pin| pin.to_string()).join(" ");
+    let volts = |volts: f32| format!("{volts:.0} V");
+    let list =
+        |pins: &[pin::Pin]| pins.iter().map(|pin| pin.to_string()).collect::<Vec<_>>().join(" ");
     let currents: Vec<_> = board.currents.a_and_b().into_iter().chain(board.currents.c()).collect();
     let lines: Vec<_> = currents.iter().map(|sensor| sensor.line.value).collect();
     let values = [
         ("high sides: level that switches on", level(board.high.on_at.value).to_owned()),
         ("low sides: level that switches on", level(board.low.on_at.value).to_owned()),
         ("fault input: level that trips", level(board.fault.trips_at.value).to_owned()),
+        ("fault input: resistor", format!("{:.1} kΩ", board.fault.pull_ohm.value * 1e-3)),
         ("dead time", format!("{:.1} µs", board.dead_time_s.value * 1e6)),
     ]
     .into_iter()
@@ -30,22 +36,28 @@ fn section(board: &Board) -> String {
     })
     .chain([
         ("scale of the dc link", format!("{:.3} V a code", board.dc_link.line.value.gain)),
-        ("highest dc link", format!("{:.0} V", board.highest_dc_link_v.value)),
-        ("thermistor", format!("{:.0} Ω at 25 °C", board.ntc.value.ohm_25)),
-    ]);
+        ("highest dc link in operation", volts(board.dc_link_limits.operation.value)),
+        ("switches stand", volts(board.dc_link_limits.switches.value)),
+        ("capacitors stand", volts(board.dc_link_limits.capacitors.value)),
+    ])
+    .chain(
+        board.over_current.map(|shut_down| ("over-current shut-down", shut_down.value.to_owned())),
+    )
+    .chain([("thermistor", format!("{:.0} Ω at 25 °C", board.ntc.value.ohm_25))]);
     let sources = board.sources();
     let mut text = format!(
-        "## {}\n\n{}. High sides {}, low sides {}, fault input {}, currents {}, dc link {}, heat sink {}.\nNominal dc link {:.0} V. Resistors at the driver inputs: {}.\n\n| item | value | source |\n|---|---|---|\n",
+        "## {}\n\n{}. High sides {}, low sides {}, fault input {}, currents {}, dc link {}, heat sink {}.\nNominal dc link {:.0} V. Resistors at the driver inputs: {}.\nPins that stay analog: {}.\n\n| item | value | source |\n|---|---|---|\n",
         board.name,
         board.title,
-        pins(board.high.pins),
-        pins(board.low.pins),
+        list(&board.high.pins),
+        list(&board.low.pins),
         board.fault.pin,
-        currents.iter().map(|sensor| sensor.pin.to_string()).collect::<Vec<_>>().join(" "),
+        list(&currents.iter().map(|sensor| sensor.pin).collect::<Vec<_>>()),
         board.dc_link.pin,
         board.heat_sink,
         board.dc_link_v,
         board.pulls,
+        if board.analog_only.is_empty() { "none".to_owned() } else { list(board.analog_only) },
     );
     for (item, value) in values {
         let source = sources.iter().find(|(name, _)| *name == item).and_then(|(_, source)| *source);
@@ -66,4 +78,88 @@ fn the_manual_lists_the_boards() {
     let sections = ALL.map(section);
     let all = sections.iter().all(|section| manual.contains(section));
     assert!(all, "docs/boards.md has to contain:\n{}", sections.join("\n"));
+}
+
+/// Nominal dc link, end of generating torque, highest in operation, trip of the software, of the comparator, with the margins
+/// for the errors, and what switches and capacitors stand.
+#[test]
+fn the_voltages_of_every_board_are_in_order() {
+    for board in ALL {
+        let mut settings = settings_of(board);
+        settings.check().unwrap();
+        let limits = &board.dc_link_limits;
+        let mut highest = [settings.dc_over_v(); 2];
+        // By rule, and the highest that may be typed.
+        for typed in [false, true] {
+            if typed {
+                let entry = drive_core::settings::find("limits.dc_over_v").unwrap();
+                highest[1] = entry.range(&settings).unwrap().1;
+                settings.limits.dc_over_v = Some(highest[1]);
+                settings.check().unwrap();
+            }
+            let comparator = settings.scales.dc_link.at(protection(board, &settings).over_voltage);
+            let [nominal, end, trip] =
+                [settings.inverter.dc_link_v, settings.dc_high_v(), settings.dc_over_v()];
+            println!("{}: {nominal} {end} {trip} {comparator}", board.name);
+            let operation = 1.0005 * limits.operation.value;
+            assert!(nominal < end && end <= operation && limits.operation.value < trip);
+            // A code less.
+            assert!(comparator > (1.0 + COMPARATOR_ERROR - 0.002) * trip, "{}", board.name);
+            let at_most = comparator * (1.0 + SENSING_ERROR);
+            assert!(at_most <= OF_SWITCHES * limits.switches.value, "{}", board.name);
+            assert!(at_most <= limits.capacitors.value, "{}", board.name);
+        }
+        assert!(highest[1] >= highest[0]);
+        // A scale that is typed moves neither: they are codes.
+        let before = protection(board, &settings).over_voltage;
+        settings.scales.dc_link.gain *= 0.5;
+        settings.limits.dc_over_v = None;
+        settings.inverter.dc_link_v *= 0.5;
+        settings.limits.dc_over_v = Some(
+            drive_core::settings::find("limits.dc_over_v").unwrap().range(&settings).unwrap().1,
+        );
+        assert!(protection(board, &settings).over_voltage.abs_diff(before) <= 1, "{}", board.name);
+    }
+}
+
+/// Whether a board is refused when compiling, and with which words.
+fn refused(board: Board) -> String {
+    let panic = std::panic::catch_unwind(|| check(&board)).expect_err("it is taken");
+    panic.downcast_ref::<&str>().copied().unwrap_or_default().to_owned()
+}
+
+/// One board after the other with a number or a pin that must not be.
+#[test]
+fn a_board_that_cannot_be_protected_does_not_compile() {
+    for board in ALL {
+        check(board);
+        let mut other = *board;
+        other.dc_link_v = board.dc_link_limits.operation.value;
+        assert!(refused(other).contains("nominal dc link leaves no room"));
+        let mut other = *board;
+        other.dc_link_limits.switches.value = 1.1 * board.dc_link_limits.operation.value;
+        assert!(refused(other).contains("below what switches and capacitors stand"));
+        let mut other = *board;
+        other.dc_link_limits.capacitors.value = 1.02 * board.dc_link_limits.operation.value;
+        assert!(refused(other).contains("below what switches and capacitors stand"));
+        let mut other = *board;
+        other.fault.pull_ohm.value = 10e3;
+        assert!(refused(other).contains("the chip pulls against it"));
+        for pin in [morpho::LOW[1], board.fault.pin, board.heat_sink, pin::FIXED[4]] {
+            let mut other = *board;
+            other.analog_only = Box::leak(Box::new([pin]));
+            assert!(refused(other).contains("must stay analog"), "{pin}");
+        }
+        let mut other = *board;
+        other.over_current = None;
+        if board.dc_link_limits.operation.value > 60.0 {
+            assert!(refused(other).contains("over-current shut-down"));
+        } else {
+            check(&other);
+        }
+    }
+    // As this board was: its link up to the absolute maximum of its transistors.
+    let mut old = *ALL[1];
+    (old.dc_link_v, old.dc_link_limits.operation.value) = (48.0, 58.5);
+    assert!(refused(old).contains("below what switches and capacitors stand"));
 }

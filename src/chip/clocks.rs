@@ -27,6 +27,9 @@ const INTERNAL_DIVIDER: PllMDiv = PllMDiv::DIV_4;
 const MULTIPLIER: PllNMul = PllNMul::MUL_85;
 const OUTPUT_DIVIDER: PllRDiv = PllRDiv::DIV_2;
 
+/// Longest until the PLL has locked, ms: many times the 40 us of the datasheet.
+const PLL_START_MS: u32 = 2;
+
 const fn pll_hz(oscillator_hz: u32, divider: PllMDiv) -> u32 {
     oscillator_hz / divider.divisor() * MULTIPLIER.multiplier() / OUTPUT_DIVIDER.divisor()
 }
@@ -69,6 +72,10 @@ pub fn start(
 
     let pll =
         PllConfig { mux, m: divider, n: MULTIPLIER, r: Some(OUTPUT_DIVIDER), q: None, p: None };
+    // The HAL waits for the PLL without a limit, and no watchdog runs yet.
+    if !pll_locks(&rcc, source == Source::Crystal) {
+        return (rcc, source, Err("the PLL does not lock"));
+    }
     // Above 150 MHz the core needs its boosted voltage range.
     let power = pwr.constrain().vos(VoltageScale::Range1 { enable_boost: true }).freeze();
     // The HAL sets the flash wait states (4) that belong to voltage range and clock.
@@ -103,15 +110,31 @@ fn read_back(flash: &pac::FLASH) -> Result<(), StartError> {
     Ok(())
 }
 
+/// Whether the PLL locks on its source, within a limit; leaves it off.
+fn pll_locks(rcc: &Rcc, crystal: bool) -> bool {
+    let (source, divider) = if crystal { (3, CRYSTAL_DIVIDER) } else { (2, INTERNAL_DIVIDER) };
+    let setting = MULTIPLIER.multiplier() << 8 | (divider.divisor() - 1) << 4 | source;
+    // SAFETY: PLLN, PLLM and PLLSRC as RM0440 codes them; no output is on.
+    rcc.pllcfgr().write(|w| unsafe { w.bits(setting) });
+    rcc.cr().modify(|_, w| w.pllon().on());
+    let locks = becomes(|| rcc.cr().read().pllrdy().is_ready(), PLL_START_MS);
+    rcc.cr().modify(|_, w| w.pllon().off());
+    locks && becomes(|| !rcc.cr().read().pllrdy().is_ready(), PLL_START_MS)
+}
+
+/// Waits until something is so, for some ms at most.
+fn becomes(so: impl Fn() -> bool, ms: u32) -> bool {
+    // A tenth of a millisecond: the core still runs from the internal oscillator.
+    (0..10 * ms).any(|_| {
+        so() || {
+            asm::delay(board::HSI_HZ / 10_000);
+            false
+        }
+    })
+}
+
 /// Switches the crystal on and waits for it, with a limit.
 fn crystal_starts(rcc: &Rcc) -> bool {
     rcc.cr().modify(|_, w| w.hseon().on());
-    for _ in 0..board::HSE_START_MS * 10 {
-        if rcc.cr().read().hserdy().is_ready() {
-            return true;
-        }
-        // A tenth of a millisecond: the core still runs from the internal oscillator.
-        asm::delay(board::HSI_HZ / 10_000);
-    }
-    false
+    becomes(|| rcc.cr().read().hserdy().is_ready(), board::HSE_START_MS)
 }

@@ -48,6 +48,16 @@ impl DcLink {
         Ok(Self { timer })
     }
 
+    /// Whether a break has taken the chopper off, whatever its duty.
+    pub fn is_off(&self) -> bool {
+        self.timer.bdtr().read().moe().bit_is_clear()
+    }
+
+    /// Lets the chopper switch again; without effect while the cause of the break lasts.
+    pub fn restore(&mut self) {
+        self.timer.bdtr().modify(|_, w| w.moe().enabled());
+    }
+
     /// Sets the duty of the chopper, 0 to 1, from the next period on, and the relay.
     pub fn set(&mut self, duty: f32, relay: bool) {
         // The cast saturates.
@@ -58,7 +68,8 @@ impl DcLink {
 
 /// Switches both off, from any context: for handlers that do not return.
 pub fn outputs_off() {
-    // SAFETY: TIM8 always exists. This may interrupt its owner anywhere; it only clears MOE, which is set once.
+    // SAFETY: TIM8 always exists. This may interrupt its owner anywhere; it only clears MOE. An owner that still runs sets
+    // it again only with the drive off, at the duty zero.
     let timer = unsafe { &*pac::TIM8::ptr() };
     timer.bdtr().modify(|_, w| w.moe().disabled_idle());
     pins::set(board::RELAY, Level::Low);

@@ -49,10 +49,10 @@ pub fn control_code() -> (MemoryRange, u32) {
     (MemoryRange { address: begin, words: (end - begin) / size_of::<u32>() as u32 }, source)
 }
 
-/// The word at an address that is a multiple of 4, in the flash or in RAM.
+/// The word at an address that is a multiple of 4, in the flash, in RAM, or of a register whose read has no effect.
 pub fn word(address: u32) -> u32 {
     let word;
-    // SAFETY: all callers pass addresses of statics, and reading memory changes nothing. In assembler, because the
+    // SAFETY: all callers pass addresses of statics or of configuration registers, and reading these changes nothing. In assembler, because the
     // word may be padding or the interrupt's own, which no read in Rust may touch. A word is read whole, before or
     // after a write of the interrupt.
     unsafe {

@@ -94,7 +94,8 @@ impl Pwm {
         });
 
         // To the break as well, until the next reset: lock-up of the core, supply voltage, and errors of the flash that
-        // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.)
+        // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.) The stored pages,
+        // which a power failure may have torn, have been read before.
         if !clock_on!(rcc.apb2enr(), syscfgen) {
             return Err("TIM1 has no clock");
         }

@@ -87,12 +87,15 @@ pub fn end(reason: Reason, details: [u32; 4]) -> ! {
 fn panic(info: &PanicInfo) -> ! {
     pwm::outputs_off();
     cortex_m::interrupt::disable();
+    let line = info.location().map_or(0, |place| place.line());
+    // Before the log, which the window watchdog may cut short.
+    keep(Reason::Panic, [line, 0, 0, 0]);
     // Once: a panic while logging would come back here for ever.
     static PANICKED: AtomicBool = AtomicBool::new(false);
     if !PANICKED.swap(true, Ordering::Relaxed) {
         defmt::error!("{}", Display2Format(info));
     }
-    end(Reason::Panic, [info.location().map_or(0, |place| place.line()), 0, 0, 0])
+    SCB::sys_reset()
 }
 
 /// Handler of processor faults. The cause may be a stack overflow: clears MOE before anything else, and begins a fresh

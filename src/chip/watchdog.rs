@@ -11,18 +11,28 @@ const UNLOCK: u16 = 0x5555;
 const RELOAD: u16 = 0xaaaa;
 
 /// The watchdog.
-pub struct Watchdog(IWDG);
+pub struct Watchdog {
+    timer: IWDG,
+    debug: DBGMCU,
+}
 
 impl Watchdog {
     /// Starts it, with [`board::WATCHDOG_US`].
-    pub fn start(timer: IWDG, debug: &DBGMCU) -> Self {
-        // It runs on while a debugger halts the core: a halt ends in a reset, so the power stage stays off after it. The
-        // bit survives a reset, so it is cleared here.
-        debug.apb1l_fz().modify(|_, w| w.dbg_iwdg_stop().clear_bit());
-        let mut watchdog = Self(timer);
+    pub fn start(timer: IWDG, debug: DBGMCU) -> Self {
+        let mut watchdog = Self { timer, debug };
+        watchdog.run_in_halts();
         watchdog.key(START);
         watchdog.set(board::WATCHDOG_PRESCALER, board::WATCHDOG_RELOAD);
         watchdog
+    }
+
+    /// Lets the watchdogs and the time base run on while a debugger halts the core: a halt ends in a reset, so the power
+    /// stage stays off after it. In each pass of the main loop, because OpenOCD and ST's server stop the watchdogs when
+    /// they attach (`stm32g4x.cfg`: DBGMCU_APB1_FZR1), and the bits survive a reset.
+    pub fn run_in_halts(&mut self) {
+        self.debug.apb1l_fz().modify(|_, w| {
+            w.dbg_iwdg_stop().clear_bit().dbg_wwdg_stop().clear_bit().dbg_tim5_stop().clear_bit()
+        });
     }
 
     /// Feeds it.
@@ -41,14 +51,14 @@ impl Watchdog {
 
     fn key(&mut self, key: u16) {
         // SAFETY: the three keys of the reference manual.
-        self.0.kr().write(|w| unsafe { w.bits(key) });
+        self.timer.kr().write(|w| unsafe { w.bits(key) });
     }
 
     /// Waits until the registers have taken an earlier change: six of its clocks behind the prescaler of that time. The wait
     /// is limited in case its clock does not run.
     fn wait(&mut self) {
         for _ in 0..board::WATCHDOG_SET_US {
-            if self.0.sr().read().bits() == 0 {
+            if self.timer.sr().read().bits() == 0 {
                 break;
             }
             self.key(RELOAD);
@@ -62,8 +72,8 @@ impl Watchdog {
         self.key(UNLOCK);
         // SAFETY: three bits and twelve bits; `board` keeps both inside.
         unsafe {
-            self.0.pr().write(|w| w.bits(u16::from(prescaler)));
-            self.0.rlr().write(|w| w.bits(reload));
+            self.timer.pr().write(|w| w.bits(u16::from(prescaler)));
+            self.timer.rlr().write(|w| w.bits(reload));
         }
         self.wait();
         self.key(RELOAD);

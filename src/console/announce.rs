@@ -83,7 +83,7 @@ impl Announcer {
             return self.learning(status, settings, now_ms);
         }
         let was = self.active;
-        if !matches!(state, State::Braking | State::Stopping) {
+        if !state.is_stopping() {
             self.active = state;
         }
         match state {
@@ -100,7 +100,7 @@ impl Announcer {
                     (State::Learning | State::Stopping, State::Learning) if !asked => {
                         Some(News::Off("the learning has ended"))
                     }
-                    (State::Stopping | State::Braking | State::VoltsPerHertz, _) => {
+                    (state, _) if state.is_stopping() || state == State::VoltsPerHertz => {
                         Some(News::Off("stopped"))
                     }
                     // At once, and answered.

@@ -15,7 +15,7 @@ use super::number::Significant;
 use super::{Console, reply};
 use crate::link::trace::{Plan, SIGNALS, Trigger};
 use crate::settings::FirmwareSettings;
-use crate::settings::staging::{Applied, Assignments};
+use crate::settings::staging::{Applied, Assignments, UNCONFIRMED};
 
 /// Work that takes long, or has to wait until the answer is sent.
 #[derive(Clone, Copy)]
@@ -88,9 +88,7 @@ impl Console {
             }
             Request::List(prefix) => self.begin(ListKind::Settings(prefix)),
             Request::Describe(prefix) => self.begin(ListKind::Describe(prefix)),
-            Request::Backup if self.settings.is_staged() => {
-                self.error(&"there are staged values: `apply` or `revert` first");
-            }
+            Request::Backup if self.settings.is_staged() => self.error(&STAGED),
             Request::Backup => self.begin(ListKind::Backup),
             Request::Learned => {
                 if self.unbelievable.is_some() || self.settings.in_force().learned.is_some() {
@@ -153,9 +151,11 @@ impl Console {
                 }
             }
             Request::Confirm if !drive.is_off() => self.error(&MUST_BE_OFF),
+            Request::Confirm if self.settings.is_staged() => self.error(&STAGED),
             Request::Confirm => {
                 self.settings.note(FirmwareSettings::confirm_board);
-                self.save(drive);
+                let boot_pin = self.settings.in_force().boot_pin_counts;
+                self.save(if boot_pin { BOOT_PIN } else { "" }, drive);
             }
             Request::Version => {
                 let version = fmt::from_fn(|f| drive.version(f));
@@ -193,6 +193,7 @@ impl Console {
             return;
         }
         let late = values.iter().find(|(key, _)| key.change() == Change::FromReset);
+        let confirmed = self.settings.latest().board_is_confirmed();
         match self.settings.set(values) {
             Err(why) => self.error(&why),
             Ok(true) => {
@@ -203,6 +204,9 @@ impl Console {
                 Some((key, _)) if self.settings.is_staged() => {
                     let when = "takes effect at the next reset, if saved";
                     self.out.line(format_args!("ok: staged; {} {when}", key.name()));
+                }
+                _ if confirmed && !self.settings.latest().board_is_confirmed() => {
+                    self.out.line(format_args!("ok: staged; {UNCONFIRMED}"));
                 }
                 _ => self.staged(),
             },
@@ -245,7 +249,7 @@ impl Console {
                 self.error(&WrongBoard(other, in_force.board.name));
             }
             Task::Start(_) | Task::Learn { .. } | Task::Commission(..)
-                if !in_force.board_is_confirmed() =>
+                if !self.settings.latest().board_is_confirmed() =>
             {
                 self.error(&NOT_CONFIRMED);
             }
@@ -279,16 +283,16 @@ impl Console {
             Task::Start(mode) => self.start(mode, drive),
             Task::Learn { again } => self.learn(again, drive),
             Task::Commission(first, last) => self.commission(first, last, drive),
-            _ => self.save(drive),
+            _ => self.save("", drive),
         }
     }
 
-    /// Saves the settings in force.
-    fn save(&mut self, drive: &mut impl DriveHandle) {
+    /// Saves the settings in force; `note` follows the `ok`.
+    fn save(&mut self, note: &str, drive: &mut impl DriveHandle) {
         match drive.save(self.settings.in_force()) {
             Ok(()) => {
                 self.unsaved = false;
-                self.ok();
+                self.out.line(format_args!("ok{note}"));
             }
             Err(why) => self.error(&why),
         }
@@ -384,5 +388,7 @@ impl Console {
 #[error("these lines belong to the board {0}, this is {1}; `revert` drops them")]
 struct WrongBoard(&'static str, &'static str);
 
-const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed: do the bench steps that `board` lists, then `confirm board`";
+const NOT_CONFIRMED: &str = "the board's polarities, dead time and scales are assumed, or were changed: do the bench steps that `board` lists, then `confirm board`";
+const STAGED: &str = "there are staged values: `apply` or `revert` first";
+const BOOT_PIN: &str = ": with the boot pin in use, see `board`";
 pub(super) const MUST_BE_OFF: &str = "the drive must be off: `stop` first";

@@ -6,7 +6,7 @@
 
 use core::fmt::{self, Write as _};
 
-use drive_core::{Command, Mode, State, Stop};
+use drive_core::{Command, Mode, Stop};
 use modbus_core::Exception;
 
 use super::Console;
@@ -165,8 +165,7 @@ impl Console {
 
     /// Gives the drive the speed of a run command, and ends the command if the drive has stopped.
     fn follow_order(&mut self, drive: &mut impl DriveHandle) {
-        let stopping =
-            drive.status().is_some_and(|s| matches!(s.state, State::Braking | State::Stopping));
+        let stopping = drive.status().is_some_and(|s| s.state.is_stopping());
         match self.bus.order {
             Order::Starting | Order::Run if drive.is_off() || stopping => {
                 self.bus.order = Order::Ended;
@@ -322,6 +321,13 @@ impl<D: DriveHandle> Access<'_, D> {
             let key = keys::number(first / 2 + n).ok_or(Exception::IllegalDataAddress)?;
             let half = |place| u32::from(words.get(2 * n + place).unwrap_or(0));
             let float = f32::from_bits(half(0) << 16 | half(1));
+            if key.hardware() {
+                let name = key.name();
+                self.console.bus.refused(&format_args!(
+                    "{name} belongs to the hardware: set it at the console"
+                ));
+                return Err(Exception::ServerDeviceFailure);
+            }
             // There is room.
             let _ = values.push((key, from_float(key, self.console.settings.latest(), float)?));
         }

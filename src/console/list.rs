@@ -72,10 +72,7 @@ impl Console {
             ListKind::Describe(prefix) => setting_from(line, prefix)
                 .map(|(key, next)| say(&Description::new(key, &self.settings), next)),
             ListKind::Backup => self.backup(line),
-            ListKind::Board => {
-                let confirmed = settings.board_is_confirmed();
-                reply::board(settings.board, confirmed, line).map(|text| say(&text, next + 1))
-            }
+            ListKind::Board => reply::board(settings, line).map(|text| say(&text, next + 1)),
             ListKind::Fault(fault) => reply::fault(fault, line).map(|text| say(&text, next + 1)),
             ListKind::History => {
                 reply::history(drive.history(), line).map(|text| say(&text, next + 1))

@@ -161,10 +161,10 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
 #[test]
 fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     let mut settings = FirmwareSettings::of_the_board();
-    settings.confirm_board();
     settings.drive.injection.synchronous.allow_unlearned = true;
     // The simulated converter is calibrated for its own reference.
     settings.drive.scales = drive_core::settings::Scales::default();
+    settings.confirm_board();
     let mut talk = Talk::new();
     talk.console = Console::new(settings);
     talk.drive.drive = Drive::new(settings.build().unwrap());
@@ -248,19 +248,18 @@ fn an_unconfirmed_board_does_not_start_until_it_is_confirmed_and_that_is_saved()
     assert!(talk.drive.commands.is_empty(), "{:?}", talk.drive.commands);
     let lines = talk.say("board\n");
     assert!(lines[0].starts_with("board reference: NUCLEO-G474RE"), "{lines:?}");
-    assert_eq!(lines.len(), 3 + boards::SELECTED.assumptions().count());
+    assert_eq!(lines.len(), 4 + boards::SELECTED.assumptions().count());
     assert!(lines[lines.len() - 2].starts_with("not confirmed"), "{lines:?}");
-    assert_eq!(talk.ask("confirm board"), "ok");
+    assert!(lines[lines.len() - 3].starts_with("boot pin: PB8 high at a reset"), "{lines:?}");
+    assert_eq!(talk.ask("confirm board"), "ok: with the boot pin in use, see `board`");
     let saved = talk.drive.saved.unwrap();
     assert!(saved.board_is_confirmed());
     // It outlasts the defaults: it belongs to the hardware.
     assert_eq!(talk.ask("defaults"), "ok: staged");
     assert_eq!(talk.ask("apply"), "ok");
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    // The number of another board, or of other values, does not count.
-    let mut other = saved;
-    other.command.confirmed = boards::ALL[1].confirmation();
-    assert!(!other.board_is_confirmed());
+    // The number does not count for another board.
+    assert!(!FirmwareSettings { board: boards::ALL[1], ..saved }.board_is_confirmed());
 }
 
 #[test]

@@ -63,7 +63,9 @@ impl Power {
                 | State::Learning
                 | State::Exciting,
             ) => Self::OperationEnabled,
-            Some(State::Braking | State::Stopping) => Self::QuickStopActive,
+            Some(State::Braking | State::BrakingByFrequency | State::Stopping) => {
+                Self::QuickStopActive
+            }
             Some(State::Fault(_)) => Self::Fault,
         }
     }

@@ -25,11 +25,13 @@ pub enum Reason {
     Code = 74,
     /// A bit of the coefficients has flipped; details: their hash now, and before.
     Coefficients = 75,
+    /// A configuration register has changed; details: address, its checked bits, those after the start.
+    Register = 77,
 }
 
 impl Reason {
     /// All reasons.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Panic,
         Self::HardFault,
         Self::NonMaskable,
@@ -38,6 +40,7 @@ impl Reason {
         Self::Drive,
         Self::Code,
         Self::Coefficients,
+        Self::Register,
     ];
 
     /// A short text.
@@ -51,6 +54,7 @@ impl Reason {
             Self::Drive => "fault of the drive",
             Self::Code => "code of the control changed",
             Self::Coefficients => "coefficients of the control changed",
+            Self::Register => "register of the chip changed",
         }
     }
 }
@@ -111,7 +115,7 @@ mod tests {
     #[test]
     fn numbers_follow_those_of_the_drive_and_never_change() {
         let codes: Vec<u8> = Reason::ALL.iter().map(|reason| *reason as u8).collect();
-        assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75]);
+        assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75, 77]);
         assert!(drive_core::Fault::ALL.iter().all(|fault| fault.code() < 64));
     }
 

@@ -9,7 +9,7 @@ use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
 use super::bus::{Baud, Commander, Format};
-use crate::boards;
+use crate::boards::{self, Board};
 use crate::hash;
 
 /// Longest time-out of commands, s.
@@ -206,6 +206,11 @@ impl Key {
         with!(self, |entry| entry.learned)
     }
 
+    /// Whether the power stage is at stake: only at the console, and to be confirmed.
+    pub fn hardware(self) -> bool {
+        with!(self, |entry| entry.hardware)
+    }
+
     /// The words that may be set; none for a number.
     pub fn words(self) -> &'static [&'static str] {
         with!(self, |entry| entry.words())
@@ -229,8 +234,9 @@ impl Key {
     /// The range beside the present settings; `None` for a word.
     pub fn range(self, settings: &FirmwareSettings) -> Option<(f32, f32)> {
         let range = with!(self, settings, |entry, s| entry.range(s));
-        // The timer makes no other dead times.
-        if self.name() == DEAD_TIME { Some(settings.board.dead_time_range_s) } else { range }
+        let Board { dead_time_s, dead_time_max_s, .. } = settings.board;
+        // The switches need that of the board, and the timer makes none above the other.
+        if self.name() == DEAD_TIME { Some((dead_time_s.value, *dead_time_max_s)) } else { range }
     }
 
     /// Checks the value in effect against its range.

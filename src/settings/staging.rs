@@ -48,6 +48,9 @@ pub enum SetError {
     Range(SettingsError),
 }
 
+/// A hardware setting has changed.
+pub const UNCONFIRMED: &str = "the board has to be confirmed again before a start";
+
 /// What the user has to know of settings that are in force now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Applied {
@@ -57,6 +60,8 @@ pub struct Applied {
     pub dead_time: bool,
     /// The analog watchdogs and the comparator follow at the next reset.
     pub protection: bool,
+    /// The board is not confirmed with these values.
+    pub unconfirmed: bool,
 }
 
 impl fmt::Display for Applied {
@@ -67,6 +72,7 @@ impl fmt::Display for Applied {
                 self.protection,
                 "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved",
             ),
+            (self.unconfirmed, UNCONFIRMED),
             (self.forgotten, "what was learned belonged to other settings and is forgotten"),
         ];
         let mut separator = ": ";
@@ -144,8 +150,9 @@ impl Staging {
     pub fn set_defaults(&mut self) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
         let mut settings = FirmwareSettings::of(self.in_force.board);
-        // A property of the hardware, not of the settings.
+        // Properties of the hardware, not of the settings.
         settings.command.confirmed = self.in_force.command.confirmed;
+        settings.boot_pin_counts = self.in_force.boot_pin_counts;
         *staged = Staged { settings, learned: true };
         self.drop_if_same();
     }
@@ -153,7 +160,12 @@ impl Staging {
     /// Stages settings of the drive that the commissioning has found. They are checked when they are put in force.
     pub fn stage(&mut self, found: Settings) {
         let staged = Self::staged(&mut self.staged, &self.in_force);
+        let confirmed = staged.settings.board_is_confirmed();
         staged.settings.drive = found;
+        // Its correction of the gains of two sensors against each other, a per cent, was measured.
+        if confirmed {
+            staged.settings.confirm_board();
+        }
         staged.settings.command.wiring_checked = true;
         self.drop_if_same();
     }
@@ -201,6 +213,7 @@ impl Staging {
             dead_time: old.inverter.dead_time_s != new.inverter.dead_time_s,
             protection: board::protection(settings.board, old)
                 != board::protection(settings.board, new),
+            unconfirmed: self.in_force.board_is_confirmed() && !settings.board_is_confirmed(),
         };
         self.in_force = *settings;
         self.staged = None;

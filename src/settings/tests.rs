@@ -24,8 +24,9 @@ fn row(key: Key) -> String {
         Change::Board => "; of the board",
     };
     let learned = if key.learned() { "; **L**" } else { "" };
+    let hardware = if key.hardware() { "; **H**" } else { "" };
     let (name, unit, help) = (key.name(), key.unit(), key.help());
-    format!("| `{name}` | {unit} | {default} | {range} | {help}{change}{learned} |")
+    format!("| `{name}` | {unit} | {default} | {range} | {help}{change}{learned}{hardware} |")
 }
 
 /// On a difference the message is the table as it should be.

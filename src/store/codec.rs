@@ -14,12 +14,13 @@
 use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use drive_core::settings::entry::Change;
 
 use super::flash::SLOT_WORDS;
 use super::learned;
 use crate::boards;
 use crate::settings::FirmwareSettings;
-use crate::settings::keys::{self, find_id};
+use crate::settings::keys::{self, Key, find_id};
 
 /// The layout that is written.
 pub const VERSION: u16 = 1;
@@ -183,11 +184,16 @@ pub fn settings(
     settings.board = boards::ALL[0];
     for word in FIRST..FIRST + entries {
         let (id, bits) = halves(read(word).ok_or(Rejected::Broken)?);
-        if let Some(key) = find_id(id) {
-            key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name()))?;
-        } else if let Some(index) = learned::index(id) {
-            words[index] = bits;
-            present |= 1 << index;
+        match find_id(id) {
+            // Numbers of the board are those of this image.
+            Some(Key::Drive(entry)) if entry.change == Change::Board => {}
+            Some(key) => key.set_bits(&mut settings, bits).ok_or(Rejected::Value(key.name()))?,
+            None => {
+                if let Some(index) = learned::index(id) {
+                    words[index] = bits;
+                    present |= 1 << index;
+                }
+            }
         }
     }
     if settings.board != defaults.board {

@@ -14,6 +14,7 @@ use crate::chip::StartError;
 use crate::chip::flash::Pages;
 use crate::chip::serial::Port;
 use crate::chip::watchdog::Watchdog;
+use crate::chip::window::Window;
 use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
@@ -28,6 +29,7 @@ use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Observation, Tracking};
 use induction_drive::settings::FirmwareSettings;
 use induction_drive::store::codec::Rejected;
+use induction_drive::store::history::History;
 use induction_drive::store::{Loaded, Saved};
 
 /// The parts that the main loop works with.
@@ -95,6 +97,7 @@ pub fn bring_up() -> Result<Board, StartError> {
     let encoder = encoder::Encoder::new(chip.TIM2, a.pa15, b.pb3, &mut rcc);
     // Before the control runs: it is made with the interrupts masked.
     let commissioning = singleton!(: Session = Session::new(&start.settings.drive)).ok_or(TWICE)?;
+    let window = Window::new(chip.WWDG, &mut rcc);
     let link = || -> Result<ControlLink, StartError> {
         let mut pwm = pwm?;
         clocked?;
@@ -108,28 +111,38 @@ pub fn bring_up() -> Result<Board, StartError> {
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
         let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
-        start_control(coefficients, pwm, dc_link?, adc?, encoder, resets)
+        start_control(coefficients, pwm, dc_link?, adc?, encoder, window?, resets)
     }();
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
     }
     // Only with a running control: without it the outputs stay off.
-    let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, &chip.DBGMCU));
-    let Start { saved, settings, rejected } = start;
+    let watchdog = link.is_ok().then(|| Watchdog::start(chip.IWDG, chip.DBGMCU));
+    let Start { saved, history, mut settings, rejected } = start;
+    settings.boot_pin_counts = board::boot_pin_counts(options);
     let tracking = singleton!(: Option<Tracking> = None).ok_or(TWICE)?;
     *tracking = Tracking::new(&settings.drive);
     commissioning.configured(&settings.drive);
     let not_started = link.as_ref().err().copied();
     let chip =
         Chip { cause, record, options, dual_bank, saved, rejected, dead_time_s, not_started };
-    let supervisor =
-        Supervisor::new(link.ok(), watchdog, chip, tracking, commissioning, &settings.drive);
+    let supervisor = Supervisor::new(
+        link.ok(),
+        watchdog,
+        chip,
+        history,
+        tracking,
+        commissioning,
+        &settings.drive,
+    );
     Ok(Board { settings, port, bus, supervisor })
 }
 
-/// Settings at start.
+/// The stored pages at start. All of them are read before an error of the flash becomes a break, for a power failure may
+/// have torn any.
 struct Start {
     saved: Saved<Pages>,
+    history: History,
     settings: FirmwareSettings,
     /// Reason why the saved settings were rejected, if they were.
     rejected: Option<Rejected>,
@@ -138,7 +151,8 @@ struct Start {
 /// The saved settings, or the defaults.
 fn load(pages: Pages) -> Start {
     let defaults = FirmwareSettings::of_the_board();
-    let (saved, loaded) = Saved::load(pages, &defaults);
+    let (mut saved, loaded) = Saved::load(pages, &defaults);
+    let history = History::load(saved.flash());
     let (mut settings, mut rejected) = match loaded {
         Loaded::Settings(settings) => (settings, None),
         Loaded::Rejected(why) => (defaults, Some(why)),
@@ -148,7 +162,7 @@ fn load(pages: Pages) -> Start {
     if settings.check().is_err() {
         (settings, rejected) = (defaults, Some(Rejected::Refused));
     }
-    Start { saved, settings, rejected }
+    Start { saved, history, settings, rejected }
 }
 
 impl Start {
@@ -171,7 +185,9 @@ impl Start {
 fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     let flags = rcc.csr().read();
     // The most specific cause first: every reset pulls the reset pin as well.
-    let cause = if flags.iwdgrstf().is_reset() {
+    let cause = if flags.wwdgrstf().is_reset() {
+        "window watchdog"
+    } else if flags.iwdgrstf().is_reset() {
         "watchdog"
     } else if flags.sftrstf().is_reset() {
         "software"
@@ -187,7 +203,8 @@ fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     let record = stop::take_record();
     // A fault of the drive does not reset the chip: after it, a reset by software comes from the debug probe.
     let stopped = record.is_some_and(|record| record.reason != Reason::Drive);
-    let unintended = flags.iwdgrstf().is_reset() || (flags.sftrstf().is_reset() && stopped);
+    let watchdog = flags.wwdgrstf().is_reset() || flags.iwdgrstf().is_reset();
+    let unintended = watchdog || (flags.sftrstf().is_reset() && stopped);
     rcc.csr().modify(|_, w| w.rmvf().clear());
     (cause, record, stop::count_reset(unintended))
 }
@@ -220,6 +237,7 @@ fn start_control(
     dc_link: dc_link::DcLink,
     adc: adc::Adc,
     encoder: encoder::Encoder,
+    window: Window,
     resets: u32,
 ) -> Result<ControlLink, StartError> {
     if resets > board::MOST_RESETS {
@@ -256,6 +274,7 @@ fn start_control(
         dc_link,
         adc,
         encoder,
+        window,
         status: send_status,
         commands: receive_commands,
         answers: send_answers,
@@ -268,5 +287,6 @@ fn start_control(
     if !comes_at_its_rate() {
         return Err("the control interrupt does not come at its rate");
     }
+    control::WATCHED.store(true, Ordering::Relaxed);
     Ok(ControlLink { status, commands, answers, learned, trace, stream, observations })
 }

@@ -23,6 +23,7 @@ use crate::chip::dc_link::DcLink;
 use crate::chip::encoder::Encoder;
 use crate::chip::pwm::Pwm;
 use crate::chip::time;
+use crate::chip::window::Window;
 use induction_drive::board;
 use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::stream::Source;
@@ -43,6 +44,8 @@ pub struct Control {
     pub adc: Adc,
     /// The encoder.
     pub encoder: Encoder,
+    /// The watchdog over this interrupt.
+    pub window: Window,
     /// Reports to the main loop.
     pub status: Sender<'static, Status>,
     /// Commands to the drive.
@@ -65,6 +68,8 @@ pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
 /// Whether the commissioning is to see what the drive does while it regulates.
 pub static OBSERVED: AtomicBool = AtomicBool::new(false);
+/// Whether the window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
+pub static WATCHED: AtomicBool = AtomicBool::new(false);
 /// Whether a deadline was ever missed.
 pub static MISSED: AtomicBool = AtomicBool::new(false);
 
@@ -85,6 +90,7 @@ impl Control {
             unreported: Hardware::empty(),
             began: 0,
             reported: None,
+            report_due: false,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -140,6 +146,7 @@ struct Running {
     began: u32,
     /// State in the last report.
     reported: Option<State>,
+    report_due: bool,
 }
 
 #[interrupt]
@@ -166,6 +173,7 @@ impl Running {
             dc_link,
             adc,
             encoder,
+            window,
             commands,
             answers,
             trace,
@@ -183,6 +191,11 @@ impl Running {
         }
         if !converters.ended {
             return;
+        }
+
+        // At the beginning, where it comes in equal steps; an interrupt that does not end is not fed again.
+        if WATCHED.load(Ordering::Relaxed) {
+            window.feed();
         }
 
         // The timer counts down from the top, where the sampling ended and an update came, and was at the top one
@@ -207,6 +220,14 @@ impl Running {
         if !converters.complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
+        let was_off = is_off(drive);
+        if dc_link.is_off() {
+            if was_off {
+                dc_link.restore();
+            } else {
+                hardware |= Hardware::CHOPPER_OFF;
+            }
+        }
         let codes = adc.read();
         let sample = Sample {
             current_a: codes.current_a,
@@ -218,7 +239,6 @@ impl Running {
             hardware,
         };
 
-        let was_off = is_off(drive);
         pwm.apply(drive.step(&sample));
 
         // The timer was at its top again before all compare values were written.
@@ -258,9 +278,10 @@ impl Running {
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // A new state is reported immediately.
-        let reports = self.reported != Some(drive.state())
+        // A new state is reported immediately, but not in the period of a command, which takes long enough.
+        self.report_due |= self.reported != Some(drive.state())
             || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        let reports = self.report_due && !commanded;
         let busy = reports || traced || commanded;
         stream.step(self.periods, busy, || drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);
@@ -269,6 +290,7 @@ impl Running {
             self.worst_cycles = cycles;
         }
         if reports {
+            self.report_due = false;
             self.report(sample, cycles);
         }
     }
@@ -296,7 +318,10 @@ impl Running {
             report.limiting = drive.limiting();
             report.room = drive.room();
             report.stator_resistance = drive.stator_resistance();
-            report.excited = drive.excited();
+            // The commissioning's part: while the drive regulates nothing of it changes.
+            if !(state.regulates() && self.reported == Some(state)) {
+                report.excited = drive.excited();
+            }
         });
         if sent {
             self.unreported = Hardware::empty();

@@ -20,9 +20,9 @@ pub struct Hours {
 }
 
 impl Hours {
-    /// The hours in the flash.
-    pub fn load(pages: &mut Pages, dual_bank: bool) -> Self {
-        Self { history: History::load(pages), counted_ms: 0, was_off: true, dual_bank }
+    /// Goes on with the history of the flash.
+    pub const fn new(history: History, dual_bank: bool) -> Self {
+        Self { history, counted_ms: 0, was_off: true, dual_bank }
     }
 
     /// All of them.

@@ -14,6 +14,7 @@ use heapless::spsc::Consumer;
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
 use crate::chip::{memory, pwm, stop, time};
+use crate::task::check::Check;
 use crate::task::clock::Clock;
 use crate::task::control;
 use crate::task::guard::{Guard, extended};
@@ -26,7 +27,6 @@ use induction_drive::link::mailbox::{Receiver, Sender};
 use induction_drive::link::stream::{Sample, Sink};
 use induction_drive::link::trace::{self, Plan};
 use induction_drive::link::{Answer, Status};
-use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
 use induction_drive::monitor::record::{Reason, Record};
 use induction_drive::monitor::watchdog::{FeedRule, Verdict};
 use induction_drive::rotor_tracking::{Observation, Report, Tracking};
@@ -65,7 +65,7 @@ pub struct Supervisor {
     clock: Clock,
     guard: Guard,
     /// `None` if the control does not run.
-    check: Option<MemoryCheck<5>>,
+    check: Option<Check>,
     /// Whether it has run long enough to forget earlier resets.
     well: bool,
     chip: Chip,
@@ -103,20 +103,17 @@ impl Supervisor {
     pub fn new(
         link: Option<ControlLink>,
         watchdog: Option<Watchdog>,
-        mut chip: Chip,
+        chip: Chip,
+        history: History,
         tracking: &'static mut Option<Tracking>,
         commissioning: &'static mut Session,
         settings: &Settings,
     ) -> Self {
         let clock = Clock::new();
-        let hours = Hours::load(chip.saved.flash(), chip.dual_bank);
+        let hours = Hours::new(history, chip.dual_bank);
         let periods = control::PERIODS.load(Ordering::Relaxed);
         let guard = watchdog.map(|watchdog| (watchdog, FeedRule::new(time::now(), periods)));
-        let check = link.is_some().then(|| {
-            let (code, source) = memory::control_code();
-            let (constants, changes) = control::constants();
-            MemoryCheck::new(CheckedMemory { code, source, constants, changes }, memory::word)
-        });
+        let check = link.as_ref().and_then(|_| Check::new());
         let (status, level, well) = (None, Level::Info, false);
         Self {
             link,
@@ -134,18 +131,9 @@ impl Supervisor {
         }
     }
 
-    /// Checks a slice of the control's memory. A flipped bit ends the run: start-up copies the code and computes the
-    /// coefficients afresh.
-    pub fn check_memory(&mut self) {
-        match self.check.as_mut().map(|check| check.slice(memory::word)) {
-            Some(Err(BitFlip::Code { address, found, copied })) => {
-                stop::end(Reason::Code, [address, found, copied, 0]);
-            }
-            Some(Err(BitFlip::Constants { found, before })) => {
-                stop::end(Reason::Coefficients, [found, before, 0, 0]);
-            }
-            Some(Ok(())) | None => {}
-        }
+    /// Checks a slice of the control's memory and of its registers.
+    pub fn check(&mut self) {
+        self.check.iter_mut().for_each(Check::slice);
     }
 
     /// Receives the reports of the control, logs them, and tracks the rotor time constant. Returns the time
@@ -166,6 +154,7 @@ impl Supervisor {
     /// Feeds the watchdog if the rule allows it; called at the end of each pass of the main loop.
     pub fn feed_watchdog(&mut self) {
         let Some((watchdog, rule)) = &mut self.guard else { return };
+        watchdog.run_in_halts();
         let missed = control::MISSED.load(Ordering::Relaxed);
         let periods = control::PERIODS.load(Ordering::Relaxed);
         match rule.judge(time::now(), periods, missed) {
@@ -241,6 +230,7 @@ impl Supervisor {
                 (Hardware::ANALOG_WATCHDOG, "over-current at a converter"),
                 (Hardware::DEADLINE_MISS, "a control period took too long"),
                 (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
+                (Hardware::CHOPPER_OFF, "the chip has switched the brake chopper off"),
             ] {
                 if (s.hardware - known).intersects(event) {
                     defmt::warn!("{}", text);

@@ -48,18 +48,13 @@ fn difference(expected: &Register, found: u32) -> Option<String> {
 /// board with the same image.
 pub fn dump(elf: &Path, name: &str, chip: &str) -> Result<()> {
     run::probe_rs()?;
-    let output = board::program("dump", elf).args(["--board", name]).output()?;
-    ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(output.stdout)?;
+    let text = run::said(board::program("dump", elf).args(["--board", name]))?;
     let mut differences = 0;
     for line in text.lines() {
         let expected = register(line)?;
         let mut read = run::command("probe-rs");
         read.args(["read", "--chip", chip, "b32", &format!("{:#x}", expected.address), "1"]);
-        let output = read.output().context("probe-rs")?;
-        let said = String::from_utf8_lossy(&output.stderr);
-        ensure!(output.status.success(), "probe-rs read: {said}");
-        match difference(&expected, word(&String::from_utf8_lossy(&output.stdout))?) {
+        match difference(&expected, word(&run::said(&mut read)?)?) {
             None => println!("{}: as on the virtual board", expected.name),
             Some(text) => {
                 differences += 1;

@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::toolchain::Target;
-use crate::{image, run, toolchain};
+use crate::{budget, image, run, toolchain};
 
 /// Environment variable by which the tests find the image.
 const ELF: &str = "INDUCTION_DRIVE_ELF";
@@ -23,15 +23,18 @@ pub fn test(target: &Target) -> Result<()> {
     }
     // Last: the others leave their image at its path.
     let elf = image::build_with(target)?;
-    let mut command = run::cargo("test --release --package virtual-board");
-    command.env(ELF, elf).env(BOARDS, image::folder()?);
+    let mut command = run::cargo("test --release --package virtual-board --no-fail-fast");
+    command.env(ELF, elf).env(BOARDS, run::folder(image::BOARDS)?);
     run::step("the images on the virtual board", &mut command)
 }
 
-/// Prints the estimated cycles of the control interrupt of this image; fails above the limits.
+/// Prints the estimated cycles of the control interrupt of this image; fails above the budgets.
 pub fn cycles(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    run::step("cycles of the control interrupt", &mut program("cycles", elf))
+    let budget::Cycles { to_last_compare, whole } = budget::read()?.cycles;
+    let mut command = program("cycles", elf);
+    command.args([to_last_compare.to_string(), whole.to_string()]);
+    run::step("cycles of the control interrupt", &mut command)
 }
 
 /// Injects faults into this image; fails if the outputs stay on with wrong control beyond a bound.

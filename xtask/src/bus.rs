@@ -79,17 +79,12 @@ impl Drop for Board {
 /// Runs the clients that are there.
 pub fn test(elf: &Path) -> Result<()> {
     toolchain::ensure_c_compiler()?;
-    let folder = run::target_dir()?.join("bus");
-    fs::create_dir_all(&folder)?;
+    let folder = run::folder("bus")?;
     let mut board = Board::start(elf, &folder)?;
     type Client = fn(&str, &Path) -> Result<f64>;
     let clients: [(&str, bool, Client); 3] = [
         ("mbpoll", there("mbpoll", "-V"), mbpoll),
-        (
-            "pymodbus",
-            python().arg("import pymodbus, serial").status().is_ok_and(|s| s.success()),
-            pymodbus,
-        ),
+        ("pymodbus", run::succeeds(python().arg("import pymodbus, serial")), pymodbus),
         ("vfdb_vfd", there("halcmd", "-V") && there("vfdb_vfd", "-h"), vfdb_vfd),
     ];
     for (name, installed, client) in clients {
@@ -107,12 +102,12 @@ pub fn test(elf: &Path) -> Result<()> {
 }
 
 fn there(program: &str, argument: &str) -> bool {
-    run::output(program, &[argument]).is_some()
+    run::output(program, &[argument]).is_ok()
 }
 
 fn python() -> Command {
     let mut command = Command::new("python3");
-    command.stderr(Stdio::null()).arg("-c");
+    command.arg("-c");
     command
 }
 
@@ -120,10 +115,7 @@ fn mbpoll(bus: &str, _: &Path) -> Result<f64> {
     let ask = |options: &[&str], words: &[&str]| -> Result<String> {
         let mut command = Command::new("mbpoll");
         command.args(["-m", "rtu", "-b", "19200", "-P", "even", "-a", "1", "-0", "-t", "4", "-1"]);
-        let output = command.args(options).arg(bus).arg("--").args(words).output()?;
-        let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        ensure!(output.status.success(), "{options:?}: {said}");
-        Ok(said)
+        run::said(command.args(options).arg(bus).arg("--").args(words))
     };
     ask(&["-r", "8192"], &["1"])?;
     ask(&["-r", "8192"], &["18", HUNDREDTHS])?;
@@ -156,18 +148,14 @@ print(page[12])
 
 fn pymodbus(bus: &str, _: &Path) -> Result<f64> {
     let seconds = RUN_UP.as_secs_f64().to_string();
-    let output = python().arg(PYMODBUS).args([bus, HUNDREDTHS, &seconds]).output()?;
-    ensure!(output.status.success(), "the script ended with {}", output.status);
-    Ok(String::from_utf8_lossy(&output.stdout).trim().parse()?)
+    Ok(run::said(python().arg(PYMODBUS).args([bus, HUNDREDTHS, &seconds]))?.parse()?)
 }
 
 fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
     let ini = folder.join("vfd.ini");
     let settings = "TYPE=rtu\nBAUD=19200\nBITS=8\nPARITY=even\nSTOPBITS=1\nTARGET=1";
     fs::write(&ini, format!("[VFD]\nDEVICE={bus}\n{settings}\n"))?;
-    let halcmd = |arguments: &[&str]| {
-        run::output("halcmd", arguments).with_context(|| format!("halcmd {arguments:?}"))
-    };
+    let halcmd = |arguments: &[&str]| run::output("halcmd", arguments);
     let mut component = Command::new("vfdb_vfd");
     component.args(["-n", "vfd", "-S", "VFD", "-I"]).arg(&ini);
     let mut component = component.stdout(Stdio::null()).spawn()?;
@@ -184,9 +172,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
             halcmd(&["setp", &format!("vfd.{name}"), value])?;
         }
         thread::sleep(RUN_UP);
-        let pin = |name: &str| -> Result<String> {
-            Ok(halcmd(&["-s", "getp", &format!("vfd.{name}")])?.trim().to_owned())
-        };
+        let pin = |name: &str| halcmd(&["-s", "getp", &format!("vfd.{name}")]);
         let (rpm, ok, errors) = (pin("motor-RPM")?, pin("modbus-ok")?, pin("error-count")?);
         ensure!(ok == "TRUE" && errors == "0", "modbus-ok {ok}, error-count {errors}");
         halcmd(&["setp", "vfd.enable", "0"])?;
@@ -195,7 +181,7 @@ fn vfdb_vfd(bus: &str, folder: &Path) -> Result<f64> {
     };
     let rpm = session();
     // Asked to end, so that it gives its name in the HAL back.
-    run::output("kill", &[&component.id().to_string()]);
+    let _ = run::output("kill", &[&component.id().to_string()]);
     component.wait()?;
     rpm
 }

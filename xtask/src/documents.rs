@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, ensure};
 
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 29] = [
+const ELSEWHERE: [(&str, &str); 28] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -25,7 +24,6 @@ const ELSEWHERE: [(&str, &str); 29] = [
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),
     ("cargo sim completion", "prints a script"),
-    ("cargo sim report", "every experiment runs in the tests; minutes"),
     ("cargo sim run NAME", "a placeholder"),
     ("cargo sim run GROUP", "a placeholder"),
     ("cargo sim run lock-monitor --set runs", "long proof"),
@@ -36,25 +34,34 @@ const ELSEWHERE: [(&str, &str); 29] = [
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),
-    (
-        "cargo sim identify-trace --input",
-        "a file of the reader's; a test runs it with a simulated trace",
-    ),
+    ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),
     ("cargo run --release -p hil-sim", "compiled by `cargo xtask test`; run by a person"),
     ("cargo flash", "named to be avoided"),
+];
+
+/// Documents whose Rust is compiled and run: doctests of `drive-core` and `motor-plant`, a test of `hil-sim`.
+const RUST: [&str; 4] = [
+    "drive-core/README.md",
+    "hil-sim/plant/README.md",
+    "docs/porting.md",
+    "docs/add-an-experiment.md",
 ];
 
 /// Reads the documents and runs their commands in a folder of their own.
 pub fn check() -> Result<()> {
     let mut commands: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut wrong = Vec::new();
     for path in sources::documents()? {
-        for command in commands_of(&sources::read(&path)?) {
+        let text = sources::read(&path)?;
+        if text.contains("```rust") && !RUST.iter().any(|known| path.ends_with(known)) {
+            wrong.push(format!("{}: nothing compiles its Rust", path.display()));
+        }
+        for command in commands_of(&text) {
             commands.entry(command).or_insert_with(|| path.clone());
         }
     }
     let binary = built_simulator()?;
-    let folder = run::target_dir()?.join("documents");
-    std::fs::create_dir_all(&folder)?;
+    let folder = run::folder("documents")?;
     let (mut ran, mut left) = (0, 0);
     for (command, document) in &commands {
         if elsewhere(command).is_some() {
@@ -62,28 +69,26 @@ pub fn check() -> Result<()> {
             continue;
         }
         let Some(arguments) = command.strip_prefix("cargo sim") else {
-            bail!("{}: `{command}` neither runs here nor stands in a list", document.display());
+            let document = document.display();
+            wrong.push(format!("{document}: `{command}` neither runs here nor stands in a list"));
+            continue;
         };
-        let output = Command::new(&binary)
-            .args(arguments.split_whitespace())
-            .current_dir(&folder)
-            .stdin(Stdio::null())
-            .output()
-            .with_context(|| format!("cannot run {}", binary.display()))?;
-        if !output.status.success() {
-            let error = String::from_utf8_lossy(&output.stderr).into_owned();
-            bail!("{}: `{command}` fails: {error}", document.display());
+        let mut sim = run::command(&binary);
+        let sim = sim.args(arguments.split_whitespace()).current_dir(&folder);
+        if let Err(error) = run::said(sim) {
+            wrong.push(format!("{}: `{command}` fails: {error}", document.display()));
         }
         ran += 1;
     }
     println!("commands of the documents: {ran} ran, {left} stand in the list with a reason");
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
     Ok(())
 }
 
 /// The simulator as `cargo sim` runs it.
 fn built_simulator() -> Result<PathBuf> {
     run::step("simulator", &mut run::cargo("build --release --quiet -p hil-sim"))?;
-    Ok(run::target_dir()?.join("release").join(format!("hil-sim{}", std::env::consts::EXE_SUFFIX)))
+    Ok(run::target_dir()?.join(format!("release/hil-sim{}", std::env::consts::EXE_SUFFIX)))
 }
 
 fn elsewhere(command: &str) -> Option<&'static (&'static str, &'static str)> {

@@ -22,9 +22,8 @@ const FOLDER: &str = "INDUCTION_DRIVE_FOREIGN";
 pub fn test() -> Result<()> {
     toolchain::ensure_c_compiler()?;
     let target = toolchain::for_target()?;
-    let folder = run::target_dir()?.join("foreign");
-    let programs = folder.join("programs");
-    fs::create_dir_all(&programs)?;
+    let folder = run::folder("foreign")?;
+    let programs = run::folder("foreign/programs")?;
     let hal = copy_of_hal(&folder)?;
     for (features, examples) in [("stm32g474", PLAIN), ("stm32g474,defmt", LOGGED)] {
         let mut build = cargo(&target, &hal, &folder);
@@ -62,8 +61,7 @@ fn cargo(target: &Target, workspace: &Path, folder: &Path) -> Command {
 
 /// A copy of the HAL's source, as a workspace of its own.
 fn copy_of_hal(folder: &Path) -> Result<PathBuf> {
-    let metadata = run::output("cargo", &["metadata", "--format-version", "1"]);
-    let metadata = metadata.context("cargo metadata")?;
+    let metadata = run::output("cargo", &["metadata", "--format-version", "1"])?;
     // The path of its manifest, without a parser for the whole.
     let source = metadata
         .split('"')

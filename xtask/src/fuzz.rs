@@ -3,10 +3,9 @@
 //! libFuzzer needs no nightly compiler: its instrumentation is a pass of LLVM that rustc takes by
 //! name. (The address sanitizer would; the fuzzed code has no `unsafe`.)
 
-use std::fs;
 use std::process::Command;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use crate::run;
 
@@ -26,20 +25,16 @@ pub fn fuzz(seconds: u32) -> Result<()> {
 
 /// The command that fuzzes one target for `seconds`, and goes on from the inputs found so far.
 pub fn command(name: &str, seconds: u32) -> Result<Command> {
-    let target_dir = run::target_dir()?.join("fuzz");
-    let host = run::output("rustc", &["--print", "host-tuple"]).context("rustc does not run")?;
-    let corpus = target_dir.join("corpus").join(name);
-    let findings = target_dir.join("findings").join(name);
-    for dir in [&corpus, &findings] {
-        fs::create_dir_all(dir).with_context(|| dir.display().to_string())?;
-    }
+    let host = run::output("rustc", &["--print", "host-tuple"])?;
+    let corpus = run::folder(format!("fuzz/corpus/{name}"))?;
+    let findings = run::folder(format!("fuzz/findings/{name}"))?;
     // With a target named, the flags are not for build scripts.
     let mut command = run::cargo(&format!("run --release --bin {name} --target {host}"));
     command
         .current_dir(run::root().join("fuzz"))
         .env("RUSTFLAGS", FLAGS)
         .arg("--target-dir")
-        .arg(&target_dir)
+        .arg(run::folder("fuzz")?)
         .arg("--")
         .arg(&corpus)
         .arg(format!("-artifact_prefix={}/", findings.display()))

@@ -13,6 +13,8 @@ pub const CHIP: &str = "STM32G474RETx";
 
 /// The variable by which the firmware learns its board when it is built.
 const BOARD: &str = "INDUCTION_DRIVE_BOARD";
+/// The directory of build results with the images of the other boards, one folder a board.
+pub const BOARDS: &str = "boards";
 /// The board whose image is built unless another is named.
 pub const REFERENCE: &str = "reference";
 
@@ -52,9 +54,7 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
     if board == REFERENCE {
         return Ok(elf);
     }
-    let folder = folder()?.join(board);
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let copy = folder.join("induction-drive");
+    let copy = run::folder(format!("{BOARDS}/{board}"))?.join("induction-drive");
     for extension in ["", "map"] {
         fs::copy(elf.with_extension(extension), copy.with_extension(extension))
             .with_context(|| copy.display().to_string())?;
@@ -62,16 +62,11 @@ pub fn build_for(target: &Target, board: &str) -> Result<PathBuf> {
     Ok(copy)
 }
 
-/// The folder with the images of the boards, one folder a board.
-pub fn folder() -> Result<PathBuf> {
-    Ok(run::target_dir()?.join("boards"))
-}
-
 /// Checks an image: what the control interrupt calls, paths of this machine, sections.
 fn check(elf: &Path) -> Result<()> {
     let bytes = fs::read(elf).with_context(|| elf.display().to_string())?;
     control::check(&bytes).context("the control interrupt")?;
-    stack::check_interrupts(&bytes).context("the bank of the settings")?;
+    stack::check_interrupts(&bytes).context("the interrupts")?;
     paths::check(&bytes)?;
     sections::check(&sources::read("memory.x")?, &sources::read(elf.with_extension("map"))?)
 }

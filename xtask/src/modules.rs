@@ -114,34 +114,30 @@ impl Reader<'_> {
         let mut tokens = tokens.into_iter();
         let (mut path, mut colons) = (prefix.to_vec(), 2);
         while let Some(token) = tokens.next() {
+            let mark = matches!(token, TokenTree::Punct(_) | TokenTree::Literal(_));
+            let ends = mark && token.to_string() != ":" || !mark && colons != 2;
+            if ends {
+                self.refer(&path);
+                (path, colons) = (prefix.to_vec(), 2);
+            }
             match token {
-                TokenTree::Punct(mark) if mark.as_char() == ':' => colons += 1,
-                TokenTree::Group(group) if colons == 2 && !path.is_empty() => {
-                    self.tokens(group.stream(), &path);
-                }
-                TokenTree::Ident(ident) if colons == 2 => {
+                TokenTree::Ident(ident) => {
                     path.push(ident);
                     colons = 0;
                 }
-                other => {
-                    self.refer(&path);
-                    (path, colons) = (prefix.to_vec(), 2);
-                    match other {
-                        TokenTree::Ident(ident) => {
-                            path.push(ident);
-                            colons = 0;
-                        }
-                        TokenTree::Group(group) if is_left_out(&group.stream().to_string()) => {
-                            // The item behind this attribute ends with a semicolon or with its body.
-                            tokens.find(|token| match token {
-                                TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
-                                other => other.to_string() == ";",
-                            });
-                        }
-                        TokenTree::Group(group) => self.tokens(group.stream(), &[]),
-                        _ => {}
-                    }
+                TokenTree::Group(group) if !ends && !path.is_empty() => {
+                    self.tokens(group.stream(), &path);
                 }
+                TokenTree::Group(group) if is_left_out(&group.stream().to_string()) => {
+                    // The item behind this attribute ends with a semicolon or with its body.
+                    tokens.find(|token| match token {
+                        TokenTree::Group(group) => group.delimiter() == Delimiter::Brace,
+                        other => other.to_string() == ";",
+                    });
+                }
+                TokenTree::Group(group) => self.tokens(group.stream(), &[]),
+                _ if !ends => colons += 1,
+                _ => {}
             }
         }
         self.refer(&path);

@@ -5,7 +5,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
@@ -15,8 +14,8 @@ use crate::{image, run, sources, toolchain};
 const PAGES: [&str; 4] =
     ["torque-steps", "speed-profile", "monte-carlo --set runs=12", "identify-machine"];
 /// Name, width in pixels and darkness of each view.
-const VIEWS: [(&str, u32, bool); 3] =
-    [("420", 420, false), ("420-dark", 420, true), ("1280", 1280, false)];
+const VIEWS: [View; 3] = [("420", 420, false), ("420-dark", 420, true), ("1280", 1280, false)];
+type View = (&'static str, u32, bool);
 /// Smallest text of a plot, pixels.
 const SMALLEST_PX: f64 = 9.0;
 
@@ -24,8 +23,7 @@ const SMALLEST_PX: f64 = 9.0;
 /// of a plot is too small to be read.
 pub fn pages() -> Result<()> {
     toolchain::ensure_chromium()?;
-    let folder = run::target_dir()?.join("pages");
-    fs::create_dir_all(&folder)?;
+    let folder = run::folder("pages")?;
     for arguments in PAGES {
         let mut command = run::cargo("run --quiet --release --package hil-sim -- run");
         let command = command.args(arguments.split(' ')).arg("--out").arg(&folder);
@@ -40,9 +38,9 @@ pub fn pages() -> Result<()> {
     }
     let mut wrong = Vec::new();
     for name in names {
-        for (view, width, dark) in VIEWS {
-            let page = Page { folder: &folder, name, view, width, dark };
-            wrong.extend(page.picture()?.complaint(&format!("{name}, {view}")));
+        for view in VIEWS {
+            let measured = picture(&folder, name, view)?;
+            wrong.extend(measured.complaint(&format!("{name}, {}", view.0)));
         }
         let pdf = format!("--print-to-pdf={}", folder.join(format!("{name}.pdf")).display());
         let page = folder.join(format!("{name}.html"));
@@ -62,15 +60,6 @@ fn live() -> Result<()> {
     run::step("live page", run::cargo(test).env("LIVE_ELF", elf))
 }
 
-/// A view of a page.
-struct Page<'a> {
-    folder: &'a Path,
-    name: &'a str,
-    view: &'a str,
-    width: u32,
-    dark: bool,
-}
-
 /// Sizes of a page in its frame, pixels.
 #[derive(Debug, PartialEq)]
 struct Measured {
@@ -80,43 +69,29 @@ struct Measured {
     smallest_text: f64,
 }
 
-impl Page<'_> {
-    /// Measures the page, then takes a picture of all of it.
-    fn picture(&self) -> Result<Measured> {
-        let page = sources::read(self.folder.join(format!("{}.html", self.name)))?;
-        let frame = self.folder.join(format!("{}-{}.frame.html", self.name, self.view));
-        let scheme = format!("--blink-settings=preferredColorScheme={}", u8::from(!self.dark));
-        fs::write(&frame, framed(&page, self.width, 900.0))?;
-        let found = chromium(self.folder, &frame, &["--dump-dom", &scheme])?;
-        let measured = Measured::from_dump(&found)
-            .with_context(|| format!("{} was not measured", frame.display()))?;
-        fs::write(&frame, framed(&page, self.width, measured.height))?;
-        let picture = self.folder.join(format!("{}-{}.png", self.name, self.view));
-        let picture = format!("--screenshot={}", picture.display());
-        let size = format!("--window-size={},{}", self.width.max(500), measured.height);
-        chromium(self.folder, &frame, &[&picture, &size, &scheme])?;
-        fs::remove_file(&frame)?;
-        Ok(measured)
-    }
+/// Measures a page, then takes a picture of all of it.
+fn picture(folder: &Path, name: &str, (view, width, dark): View) -> Result<Measured> {
+    let page = sources::read(folder.join(format!("{name}.html")))?;
+    let frame = folder.join(format!("{name}-{view}.frame.html"));
+    let scheme = format!("--blink-settings=preferredColorScheme={}", u8::from(!dark));
+    fs::write(&frame, framed(&page, width, 900.0))?;
+    let found = chromium(folder, &frame, &["--dump-dom", &scheme])?;
+    let measured = Measured::from_dump(&found)
+        .with_context(|| format!("{} was not measured", frame.display()))?;
+    fs::write(&frame, framed(&page, width, measured.height))?;
+    let picture = folder.join(format!("{name}-{view}.png"));
+    let picture = format!("--screenshot={}", picture.display());
+    let size = format!("--window-size={},{}", width.max(500), measured.height);
+    chromium(folder, &frame, &[&picture, &size, &scheme])?;
+    fs::remove_file(&frame)?;
+    Ok(measured)
 }
 
 /// A page with another one in a frame, which it measures.
 fn framed(page: &str, width: u32, height: f64) -> String {
     let page = page.replace('&', "&amp;").replace('"', "&quot;");
-    format!(
-        "<!DOCTYPE html><html><head><style>:root{{color-scheme:light dark}}body{{margin:0}}\
-         iframe{{border:0;display:block;width:{width}px;height:{height}px}}</style><script>\
-         addEventListener('load', () => {{\
-           const page = document.querySelector('iframe').contentDocument, root = page.documentElement;\
-           const size = text => {{\
-             const to = text.getScreenCTM();\
-             return parseFloat(getComputedStyle(text).fontSize) * Math.hypot(to.a, to.b);\
-           }};\
-           const sizes = [...page.querySelectorAll('.plot text')].map(size);\
-           document.body.dataset.measured =\
-             [root.scrollWidth, root.clientWidth, root.scrollHeight, Math.min(99, ...sizes)].join(' ');\
-         }});</script></head><body><iframe srcdoc=\"{page}\"></iframe></body></html>"
-    )
+    let size = format!("width:{width}px;height:{height}px");
+    include_str!("frame.html").replace("SIZE", &size).replace("PAGE", &page)
 }
 
 impl Measured {
@@ -145,17 +120,10 @@ impl Measured {
 
 /// Output of Chromium for a page.
 fn chromium(folder: &Path, page: &Path, options: &[&str]) -> Result<String> {
-    let profile = folder.join("profile");
-    let output = Command::new("chromium")
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
-        .arg(format!("--user-data-dir={}", profile.display()))
-        .args(options)
-        .arg(format!("file://{}", page.display()))
-        .output()
-        .context("chromium")?;
-    let errors = String::from_utf8_lossy(&output.stderr);
-    ensure!(output.status.success(), "chromium, {}:\n{errors}", output.status);
-    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    let mut command = run::command("chromium");
+    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]);
+    command.arg(format!("--user-data-dir={}", folder.join("profile").display()));
+    run::said(command.args(options).arg(format!("file://{}", page.display())))
 }
 
 #[cfg(test)]

@@ -1,12 +1,11 @@
 //! Commands: where they run, how they are shown, and how long they take.
 
-use std::env;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::sync::{Mutex, PoisonError};
+use std::process::Command;
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -29,6 +28,13 @@ pub fn target_dir() -> Result<PathBuf> {
     }
 }
 
+/// A directory of build results, made if it is not there.
+pub fn folder(name: impl AsRef<Path>) -> Result<PathBuf> {
+    let folder = target_dir()?.join(name);
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    Ok(folder)
+}
+
 /// The cargo that started this program, with arguments that have no spaces inside.
 pub fn cargo(arguments: &str) -> Command {
     let mut command = command(env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
@@ -43,31 +49,74 @@ pub fn command(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Names of the steps so far, and how long each took.
-static TIMES: Mutex<Vec<(String, Duration)>> = Mutex::new(Vec::new());
-
-/// Prints and runs one step of a task.
+/// Prints and runs one command of a task.
 pub fn step(name: &str, command: &mut Command) -> Result<()> {
     println!("\n==> {name}: {}", shown(command));
-    timed(name, || {
-        let status = command.status().with_context(|| format!("cannot run: {command:?}"))?;
-        ensure!(status.success(), "{name}, {status}\n    {command:?}");
-        Ok(())
-    })
-}
-
-/// Runs one step of a task and notes its time.
-pub fn timed(name: &str, step: impl FnOnce() -> Result<()>) -> Result<()> {
     let began = Instant::now();
-    step()?;
+    let status = command.status().with_context(|| format!("cannot run: {command:?}"))?;
+    ensure!(status.success(), "{name}, {status}\n    {command:?}");
     println!("    {name}: done in {:.0} s", began.elapsed().as_secs_f64());
-    TIMES.lock().unwrap_or_else(PoisonError::into_inner).push((name.to_owned(), began.elapsed()));
     Ok(())
 }
 
-/// Names of the steps so far, and how long each took.
-pub fn times() -> Vec<(String, Duration)> {
-    TIMES.lock().unwrap_or_else(PoisonError::into_inner).clone()
+/// The steps of a task that goes on when one fails: name, time, and how it ended; `None` if it was not run, because a
+/// step that it needs failed.
+#[derive(Default)]
+pub struct Steps(Vec<(&'static str, Duration, Option<Result<()>>)>);
+
+impl Steps {
+    /// Runs a step; its result, if it passes.
+    pub fn run<T>(&mut self, name: &'static str, step: impl FnOnce() -> Result<T>) -> Option<T> {
+        self.with(Some(()), name, |()| step())
+    }
+
+    /// Runs a step that is one command.
+    pub fn command(&mut self, name: &'static str, mut command: Command) {
+        self.run(name, || step(name, &mut command));
+    }
+
+    /// Runs a step with the result of an earlier one, if that passed.
+    pub fn with<N, T>(
+        &mut self,
+        needed: Option<N>,
+        name: &'static str,
+        step: impl FnOnce(N) -> Result<T>,
+    ) -> Option<T> {
+        let began = Instant::now();
+        let (passed, ended) = match needed.map(step) {
+            Some(Ok(passed)) => (Some(passed), Some(Ok(()))),
+            Some(Err(error)) => (None, Some(Err(error))),
+            None => (None, None),
+        };
+        self.0.push((name, began.elapsed(), ended));
+        passed
+    }
+
+    /// Prints how every step ended.
+    ///
+    /// # Errors
+    /// The steps that failed or were not run, with the reasons.
+    pub fn end(&self) -> Result<()> {
+        println!("\n{:<34}{:>8}  result", "step", "seconds");
+        let mut failed = Vec::new();
+        for (name, time, ended) in &self.0 {
+            let result = match ended {
+                Some(Ok(())) => "ok",
+                Some(Err(error)) => {
+                    failed.push(format!("{name}: {error:#}"));
+                    "FAILED"
+                }
+                None => {
+                    failed.push(format!("{name}: not run"));
+                    "not run: a step that it needs failed"
+                }
+            };
+            println!("{name:<34}{:>8.0}  {result}", time.as_secs_f64());
+        }
+        let all = self.0.len();
+        ensure!(failed.is_empty(), "{} of {all} steps:\n{}", failed.len(), failed.join("\n"));
+        Ok(())
+    }
 }
 
 /// The program and its arguments, without paths and variables.
@@ -86,14 +135,27 @@ pub fn limit<T: Display + PartialOrd>(what: &str, used: T, limit: T, unit: &str)
 
 /// Whether a command runs and succeeds; its output is not shown.
 pub fn succeeds(command: &mut Command) -> bool {
-    command.output().is_ok_and(|output| output.status.success())
+    said(command).is_ok()
 }
 
-/// The output of a command, if it runs and succeeds.
-pub fn output(program: &str, arguments: &[&str]) -> Option<String> {
-    let output = command(program).args(arguments).stderr(Stdio::null()).output().ok()?;
-    let text = String::from_utf8(output.stdout).ok()?;
-    output.status.success().then(|| text.trim().to_owned())
+/// The output of a command, without white space around it.
+///
+/// # Errors
+/// It does not run, or it fails: all that it said.
+pub fn said(command: &mut Command) -> Result<String> {
+    let output = command.output().with_context(|| format!("cannot run: {command:?}"))?;
+    let (text, errors) = (decoded(&output.stdout), decoded(&output.stderr));
+    ensure!(output.status.success(), "{}: {text}{errors}\n    {command:?}", output.status);
+    Ok(text)
+}
+
+fn decoded(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim().to_owned()
+}
+
+/// The same of a program with these arguments.
+pub fn output(program: &str, arguments: &[&str]) -> Result<String> {
+    said(command(program).args(arguments))
 }
 
 /// Fails if probe-rs is not there.
@@ -114,6 +176,32 @@ mod tests {
         let mut command = Command::new("/some/toolchain/bin/cargo");
         command.args(["doc", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings");
         assert_eq!(shown(&command), "cargo doc --no-deps");
+    }
+
+    #[test]
+    fn all_steps_run_and_those_that_failed_are_named() {
+        let mut steps = Steps::default();
+        assert_eq!(steps.run("one", || Ok(1)), Some(1));
+        let image = steps.run("image", || -> Result<u8> { bail!("no linker") });
+        assert_eq!(steps.with(image, "size", |_| -> Result<()> { unreachable!() }), None);
+        let mut ran = false;
+        steps.run("last", || {
+            ran = true;
+            Ok(())
+        });
+        assert!(ran);
+        let names: Vec<_> = steps.0.iter().map(|(name, ..)| *name).collect();
+        assert_eq!(names, ["one", "image", "size", "last"]);
+        let error = steps.end().unwrap_err().to_string();
+        assert_eq!(error, "2 of 4 steps:\nimage: no linker\nsize: not run");
+    }
+
+    #[test]
+    fn a_task_whose_steps_pass_passes() {
+        let mut steps = Steps::default();
+        let image = steps.run("image", || Ok(2));
+        assert_eq!(steps.with(image, "size", |image| Ok(image + 1)), Some(3));
+        assert!(steps.end().is_ok());
     }
 
     #[test]

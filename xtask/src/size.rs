@@ -1,4 +1,4 @@
-//! `cargo xtask size`: the use of each memory by the image, and its limits.
+//! `cargo xtask size`: the use of each memory by the image, and its budgets.
 
 use std::fs;
 use std::path::Path;
@@ -6,14 +6,12 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::map::{self, Entry, Level};
-use crate::{run, sources, stack};
+use crate::{budget, run, sources, stack};
 
-/// Most that variables may take, without the trace and the stack, bytes.
-const RAM_LIMIT: u64 = 24 * 1024;
 /// Part of the name of the trace's memory.
 const TRACE: &str = "TRACE_MEMORY";
 
-/// Prints the use of each memory by an image; fails above the limits.
+/// Prints the use of each memory by an image; fails above a budget.
 pub fn report(elf: &Path) -> Result<()> {
     let map = sources::read(elf.with_extension("map"))?;
     let sections = map::entries(&map, Level::Output);
@@ -34,15 +32,16 @@ pub fn report(elf: &Path) -> Result<()> {
     let trace = sum(&map::entries(&map, Level::Symbol), |symbol| symbol.name.contains(TRACE));
     println!("code {code}, constants {constants}, static RAM {ram} with {trace} for the trace");
 
-    let region = |name| regions.iter().find(|r| r.name == name).context("memory.x lacks a memory");
-    let (flash, stack) = (region("FLASH")?, region("STACK")?);
-    // 99/100 of the first bank (253.4 of 256 KiB). The linker checks the memories of the second, and CCM.
-    let flash_used = sum(&sections, |section| flash.takes(section));
-    run::limit("code and constants", flash_used, flash.length / 100 * 99, "bytes")?;
-    run::limit("static RAM without the trace", ram.saturating_sub(trace), RAM_LIMIT, "bytes")?;
+    let budgets = budget::read()?.bytes;
+    let bank = |bank: Region| sum(&sections, |section| bank.takes(section));
     let image = fs::read(elf).with_context(|| elf.display().to_string())?;
-    let most = stack::worst_case(&image).context("stack")?.into();
-    run::limit("stack in the worst case", most, stack.length, "bytes")
+    run::limit("control code", named(&[".ccm"]), budgets.control_code, "bytes")?;
+    run::limit("first bank of the flash", bank(Region::bank(0)), budgets.flash_bank, "bytes")?;
+    run::limit("second bank of the flash", bank(Region::bank(1)), budgets.flash_bank, "bytes")?;
+    let ram = ram.saturating_sub(trace);
+    run::limit("static RAM without the trace", ram, budgets.static_ram, "bytes")?;
+    let deepest = stack::worst_case(&image).context("stack")?.into();
+    run::limit("stack in the worst case", deepest, budgets.stack, "bytes")
 }
 
 fn sum(entries: &[Entry], which: impl Fn(&Entry) -> bool) -> u64 {
@@ -57,6 +56,12 @@ struct Region {
 }
 
 impl Region {
+    /// A bank of the flash, 0 or 1.
+    fn bank(index: u64) -> Self {
+        let length = 256 * 1024;
+        Self { name: String::new(), origin: 0x0800_0000 + index * length, length }
+    }
+
     /// Whether a section takes this memory: at run time, or by its contents before they are copied.
     fn takes(&self, section: &Entry) -> bool {
         let memory = self.origin..self.origin + self.length;

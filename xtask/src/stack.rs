@@ -8,7 +8,8 @@
 //!
 //! Own code, since cargo-call-stack needs a nightly compiler.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use anyhow::{Context, Result, bail, ensure};
 use object::read::elf::ElfFile32;
@@ -25,6 +26,8 @@ const INTERRUPTS: [&[&str]; 3] = [&["LPUART", "USART3"], &["ADC1_2"], &["NonMask
 /// Part of the name of the panic handler, which panics only once: it comes on top of everything else,
 /// once, and what it calls may call it without end only in appearance.
 const PANIC: &str = "rust_begin_unwind";
+/// Parts of the names of functions that panic.
+const PANICS: [&str; 5] = [PANIC, "panic", "unwrap_failed", "expect_failed", "index_fail"];
 /// The main program.
 const MAIN: &str = "main";
 /// Functions that only the processor calls, and that never return or have a stack of their own.
@@ -36,7 +39,7 @@ const PRINTERS: [&str; 3] =
 /// Parts of the names of the outputs' functions.
 const OUTPUTS: [&str; 2] = ["4core3fmt5Write9write_str", "4core3fmt5Write10write_char"];
 /// Part of the name of a veneer, which ends with the name of its target.
-const VENEER: &str = "LongThunk_";
+pub const VENEER: &str = "LongThunk_";
 /// Sections with code.
 const SECTIONS: [&str; 4] = [".text", ".ccm", ".design", ".background"];
 /// The section with code in the bank that is written: no interrupt may need it.
@@ -62,31 +65,50 @@ pub fn worst_case(image: &[u8]) -> Result<u32> {
     let panic = functions.values().find(|function| function.name.contains(PANIC));
     let panic = panic.map_or(Ok(0), |function| depth_of(&functions, &function.name))?;
     INTERRUPTS.iter().try_fold(main + panic, |sum, names| {
-        let depths = names.iter().map(|name| depth_of(&functions, name));
-        Ok(sum + EXCEPTION + depths.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0))
+        Ok(sum + EXCEPTION + most(names.iter().map(|name| depth_of(&functions, name)))?)
     })
 }
 
-/// Fails if an interrupt can come, by calls that name their target, to code in the bank of the flash that is written.
+fn most(mut depths: impl Iterator<Item = Result<u32>>) -> Result<u32> {
+    depths.try_fold(0, |most, depth| Ok(most.max(depth?)))
+}
+
+/// Fails if an interrupt can come to a panic, to code in the bank of the flash that is written, or to a call through a
+/// register, of which nobody knows the target.
 pub fn check_interrupts(image: &[u8]) -> Result<()> {
     let elf: ElfFile32 = ElfFile32::parse(image)?;
     let section = elf.section_by_name(WRITTEN_BANK).context(WRITTEN_BANK)?;
-    let bank = section.address()..section.address() + section.size();
-    let functions = functions(image)?;
-    let named = |name: &str| functions.iter().find(|(_, f)| f.name == name).map(|(at, _)| *at);
-    let mut left: Vec<u32> =
-        INTERRUPTS.iter().flat_map(|names| names.iter()).filter_map(|n| named(n)).collect();
-    let mut seen = left.clone();
-    while let Some(at) = left.pop() {
-        let Some(function) = functions.get(&at) else { continue };
-        ensure!(!bank.contains(&at.into()), "an interrupt can come to {}", function.name);
-        let target = function.name.split_once(VENEER).and_then(|(_, name)| named(name));
-        let next = function.calls.iter().copied().chain(target).filter(|at| !seen.contains(at));
-        let next: Vec<u32> = next.collect();
-        seen.extend(&next);
-        left.extend(next);
+    let begin = section.address() as u32;
+    check_reach(&functions(image)?, begin..begin + section.size() as u32)
+}
+
+fn check_reach(functions: &Functions, written_bank: Range<u32>) -> Result<()> {
+    let interrupts = INTERRUPTS.concat().into_iter();
+    let first = interrupts.map(|name| anyhow::Ok((find(functions, name)?, String::new())));
+    let mut left = first.collect::<Result<Vec<_>>>()?;
+    let mut seen = BTreeSet::new();
+    while let Some((at, path)) = left.pop() {
+        if !seen.insert(at) {
+            continue;
+        }
+        let function =
+            functions.get(&at).with_context(|| format!("no function at {at:#x}:{path}"))?;
+        let path = format!("{path} {}", function.name);
+        ensure!(!is_named(function, &PANICS), "an interrupt can panic:{path}");
+        ensure!(!written_bank.contains(&at), "in the bank that is written:{path}");
+        match function.name.split_once(VENEER) {
+            Some((_, target)) => left.push((find(functions, target)?, path.clone())),
+            None => ensure!(!function.calls_through_register, "a call through a register:{path}"),
+        }
+        left.extend(function.calls.iter().map(|to| (*to, path.clone())));
     }
     Ok(())
+}
+
+/// The address of the function of this name.
+fn find(functions: &Functions, name: &str) -> Result<u32> {
+    let found = functions.iter().find(|(_, function)| function.name == name);
+    Ok(*found.with_context(|| format!("the image has no function {name}"))?.0)
 }
 
 fn functions(image: &[u8]) -> Result<Functions> {
@@ -167,10 +189,7 @@ fn expanded(immediate: u32) -> u32 {
 
 /// The deepest the stack gets below the function of this name.
 fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
-    let (&start, _) = functions
-        .iter()
-        .find(|(_, function)| function.name == name)
-        .with_context(|| format!("the image has no function {name}"))?;
+    let start = find(functions, name)?;
     let called: Vec<u32> = functions.values().flat_map(|f| f.calls.iter().copied()).collect();
     let by_pointer: Vec<u32> = functions
         .iter()
@@ -180,15 +199,8 @@ fn depth_of(functions: &Functions, name: &str) -> Result<u32> {
     // How deep a call through a register may get, with none inside it, one, and so on.
     let deepest = |through: Through, which: &dyn Fn(u32) -> bool| {
         let mut known = BTreeMap::new();
-        functions.keys().filter(|at| which(**at)).try_fold(0, |deepest: u32, &at| {
-            Ok::<_, anyhow::Error>(deepest.max(depth(
-                functions,
-                at,
-                through,
-                &mut known,
-                &mut Vec::new(),
-            )?))
-        })
+        let inside = functions.keys().filter(|at| which(**at));
+        most(inside.map(|&at| depth(functions, at, through, &mut known, &mut Vec::new())))
     };
     let mut through = Through::default();
     through.output = deepest(through, &|at| is_named(&functions[&at], &OUTPUTS))?;
@@ -271,6 +283,53 @@ mod tests {
         assert_eq!(frame(&[(0xf5ad, 0x6d80)]), 1024);
         assert_eq!(frame(&[(0xf2ad, 0x4d4c)]), 1100);
         assert_eq!(frame(&[(0xf84d, 0xbd04)]), 4);
+    }
+
+    /// The interrupts at 0, 10, 20, 30, each of 10 bytes, and one more function: the control interrupt calls it through a
+    /// veneer.
+    fn interrupts(name: &str, at: u32) -> Functions {
+        let function = |name: &str, end, calls: &[u32]| Function {
+            name: name.into(),
+            end,
+            calls: calls.to_vec(),
+            ..Function::default()
+        };
+        let mut functions: Functions = (0..4)
+            .zip(INTERRUPTS.concat())
+            .map(|(n, name)| (10 * n, function(name, 10 * n + 10, &[])))
+            .collect();
+        let control = find(&functions, "ADC1_2").unwrap();
+        functions.get_mut(&control).unwrap().calls.push(40);
+        let mut veneer = function(&format!("__Thumbv7ABS{VENEER}middle"), 50, &[]);
+        veneer.calls_through_register = true;
+        functions.insert(40, veneer);
+        functions.insert(50, function("middle", 60, &[at]));
+        functions.insert(at, function(name, at + 10, &[50]));
+        functions
+    }
+
+    #[test]
+    fn an_interrupt_reaches_no_panic_no_unknown_target_and_not_the_written_bank() {
+        let error =
+            |functions: &Functions| check_reach(functions, 1000..2000).unwrap_err().to_string();
+        let mut sound = interrupts("leaf", 60);
+        check_reach(&sound, 1000..2000).unwrap();
+        assert!(error(&interrupts("leaf", 1500)).starts_with("in the bank that is written"));
+        for name in ["_RNvNtCs_4core9panicking5panic", "_RNvNtCs_4core6option13unwrap_failed"] {
+            let reached = error(&interrupts(name, 60));
+            assert!(reached.ends_with(&format!(" middle {name}")), "{reached}");
+        }
+        sound.get_mut(&60).unwrap().calls_through_register = true;
+        assert!(error(&sound).starts_with("a call through a register: ADC1_2"));
+        // A call to nowhere, and a veneer to nowhere.
+        sound.remove(&60);
+        assert!(error(&sound).starts_with("no function at 0x3c"));
+        sound.remove(&50);
+        assert!(error(&sound).contains("no function middle"));
+        // Not reached.
+        let mut other = interrupts("core::panicking", 60);
+        other.get_mut(&50).unwrap().calls.clear();
+        check_reach(&other, 1000..2000).unwrap();
     }
 
     #[test]

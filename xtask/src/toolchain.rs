@@ -113,7 +113,7 @@ fn provide(what: &str, there: impl Fn() -> bool, rustup: &str, packages: &str) -
         return Ok(());
     }
     let install = format!("apt-get install -y -q --no-install-recommends {packages}");
-    let is_root = run::output("id", &["-u"]).as_deref() == Some("0");
+    let is_root = run::output("id", &["-u"]).is_ok_and(|id| id == "0");
     let mut commands = vec!["apt-get update -q", &install];
     if !rustup.is_empty() && rustup_may_install() {
         commands = vec![rustup];
@@ -137,7 +137,7 @@ fn rustup_may_install() -> bool {
 /// Whether the toolchain in use has the core library of the target.
 fn has_target() -> bool {
     let library = run::output("rustc", &["--print", "target-libdir", "--target", TARGET]);
-    let entries = library.and_then(|dir| Path::new(&dir).read_dir().ok());
+    let entries = library.ok().and_then(|dir| Path::new(&dir).read_dir().ok());
     let mut files = entries.into_iter().flatten().flatten();
     files.any(|entry| entry.file_name().to_string_lossy().starts_with("libcore-"))
 }

@@ -1,6 +1,5 @@
 //! Programs from crates.io that cargo does not bring along, and the tasks that they do.
 
-use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
@@ -25,7 +24,7 @@ pub fn book() -> Result<()> {
 /// `cargo xtask mutants`: changes `drive-core` in the places of one shard, `K/N`, and runs its own tests on
 /// each change; fails if they catch too few.
 pub fn mutants(shard: &str) -> Result<()> {
-    let output = run::target_dir()?.join("mutants");
+    let output = run::folder("mutants")?;
     let mut command = run::command(tool("cargo-mutants", "27.1.0")?);
     command
         .args(["mutants", "--package", "drive-core", "--test-tool", "cargo", "-j2"])
@@ -34,7 +33,6 @@ pub fn mutants(shard: &str) -> Result<()> {
         .arg(&output)
         // With one target directory the two would wait for each other.
         .env_remove("CARGO_TARGET_DIR");
-    fs::create_dir_all(&output)?;
     // Missed mutants are judged below. Anything else than 0, missed (2) or time-out (3) is a failure.
     let status = command.status().context("cargo-mutants")?;
     ensure!(matches!(status.code(), Some(0 | 2 | 3)), "cargo-mutants: {status}");

@@ -111,6 +111,7 @@ impl InverterDrop {
 
     /// Processes period `elapsed` of the magnetisation. The last one computes the drop, and returns the stator
     /// resistance relative to the settings if it is plausible.
+    #[cold]
     pub fn step(
         &self,
         state: &mut InverterDropState,

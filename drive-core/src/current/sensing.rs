@@ -131,6 +131,7 @@ impl Sensing {
     /// # Errors
     /// [`Fault::OffsetA`], [`Fault::OffsetB`] or [`Fault::OffsetC`] when an offset is above the limit; the offsets in use
     /// stay unchanged.
+    #[cold]
     pub fn calibrate(
         &self,
         state: &mut SensingState,
@@ -152,6 +153,7 @@ impl Sensing {
     ///
     /// # Errors
     /// As [`calibrate`](Self::calibrate), at half its limit: the offsets change when the bridge switches.
+    #[cold]
     pub fn calibrate_again(&self, state: &mut SensingState, sample: &Sample) -> Result<(), Fault> {
         if self.shunts.is_some() {
             self.mean(state, sample, state.zeros, (SAMPLES_AGAIN, 0.5 * self.largest_offset))?;

@@ -122,6 +122,7 @@ impl Drive {
     ///
     /// # Errors
     /// [`Fault::NotCaught`] for a shaft that turns too fast.
+    #[cold]
     pub(super) fn catch(&mut self) -> Result<Dq, Fault> {
         let Some(c) = self.c.catching else {
             self.magnetising_from_here(0);
@@ -177,6 +178,7 @@ impl Drive {
 
     /// The state to go to when the start on a turning shaft ends so: a wrong speed shows as a voltage or a current that it does
     /// not explain.
+    #[cold]
     pub(super) fn why_not_caught(&self, off: State) -> State {
         use Fault::{CurrentNotAsPredicted, FluxNotAsPredicted, LostLock, NotCaught};
         match off {

@@ -38,8 +38,6 @@ use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
-/// Electrical speed up to which the shaft counts as standing when the lock is verified, turns/s: 30 rpm of four poles.
-const STANDING_HZ: f32 = 1.0;
 /// Control periods between two steps of the thermal loads, and the time, s.
 pub(super) const THERMAL_EVERY: u32 = 60;
 const THERMAL_S: f32 = THERMAL_EVERY as f32 * PERIOD_S;
@@ -221,7 +219,6 @@ impl Settings {
                     smoothing_s: t.loss_s,
                     allowed: t.allowed_loss,
                     carrier_a: injection.current_amplitude,
-                    standing_freq: STANDING_HZ * PERIOD_S,
                     period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
                 },
             )

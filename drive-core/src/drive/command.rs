@@ -14,7 +14,7 @@ pub enum Command {
     /// From off: calibrate the offsets, charge the bootstraps, magnetise, verify the lock where the
     /// angle comes from the injection, then regulate as `Mode` says.
     Start(Mode),
-    /// While regulating with the injection: no torque, magnetise again, verify that the flux is
+    /// While regulating with the injection, at rest: no torque, magnetise again, verify that the flux is
     /// tracked, then go on at zero torque. After a fault the same is done by a clear and a start.
     Relock,
     /// From off: the next start checks the wiring first; see [`crate::protect::wiring_check`].
@@ -22,7 +22,8 @@ pub enum Command {
     /// From off, or while the drive excites: this excitation of the motor at rest. From off the drive calibrates the
     /// offsets and charges the bootstraps first. See [`crate::commission`].
     Excite(Excitation),
-    /// Stop in this way. A drive that does not regulate torque, speed or position yet does it by [`Stop::Coast`].
+    /// Stop in this way. A drive that neither regulates torque, speed or position nor turns by voltage and frequency does it by
+    /// [`Stop::Coast`].
     Stop(Stop),
     /// Forget the latched fault and be off.
     Clear,
@@ -86,6 +87,8 @@ pub enum Refused {
     NotFinite,
     /// Not in this state.
     State(State),
+    /// Only while the shaft stands.
+    Turning,
     /// The encoder is needed for this mode and the settings name another angle source.
     NeedsEncoder,
     /// The injection is needed as angle source; to learn, with a demodulation that tracks.
@@ -116,6 +119,7 @@ impl core::fmt::Display for Refused {
         match self {
             Self::NotFinite => write!(f, "the value is not a finite number"),
             Self::State(state) => write!(f, "not possible while the drive is {state}"),
+            Self::Turning => write!(f, "the shaft turns: bring it to rest first"),
             Self::NeedsEncoder => write!(f, "this mode needs the encoder as angle source"),
             Self::NeedsInjection => {
                 write!(f, "this needs the injection, demodulated by a way that tracks")

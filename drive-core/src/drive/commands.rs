@@ -3,6 +3,7 @@
 use super::reference::References;
 use super::{ControlState, Drive};
 
+use crate::drive::allowed::allowed;
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::{Mode, State};
@@ -26,17 +27,14 @@ impl Drive {
     // Not inlined: it stays in the flash.
     #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
+        allowed(command, self.state, self.mode)?;
         match *command {
             Command::Start(mode) => self.start(mode),
             Command::Relock => self.relock(),
-            Command::CheckWiring => match self.state {
-                State::Off => {
-                    self.wiring_unchecked = true;
-                    Ok(Accepted::AsGiven)
-                }
-                State::Fault(fault) => Err(Refused::Fault(fault)),
-                state => Err(Refused::State(state)),
-            },
+            Command::CheckWiring => {
+                self.wiring_unchecked = true;
+                Ok(Accepted::AsGiven)
+            }
             Command::Excite(excitation) => self.take_excitation(excitation),
             Command::Stop(stop) => {
                 self.stop(stop);
@@ -49,7 +47,7 @@ impl Drive {
                 Ok(Accepted::AsGiven)
             }
             Command::Torque(i_q) => {
-                self.takes_references(Mode::Torque, i_q)?;
+                finite(i_q)?;
                 let i_d = self.control.references.current.d;
                 let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
                 let taken = limited(limited(i_q, largest), self.c.protection.i_q);
@@ -57,12 +55,9 @@ impl Drive {
                 Ok(accepted(i_q, taken))
             }
             Command::Speed(rpm) => self.turn_at(rpm, 0),
-            Command::Jog(rpm) => {
-                self.takes_now(Mode::Speed, rpm)?;
-                self.turn_at(rpm, JOG)
-            }
+            Command::Jog(rpm) => self.turn_at(rpm, JOG),
             Command::Position(turns) => {
-                self.takes_references(Mode::Position, turns)?;
+                finite(turns)?;
                 let taken = limited(turns, self.c.motion.position_limit);
                 if self.control.references.press.is_some() {
                     self.rest_here();
@@ -71,7 +66,7 @@ impl Drive {
                 Ok(accepted(turns, taken))
             }
             Command::Press(rpm, i_q) => {
-                self.takes_now(Mode::Position, rpm)?;
+                finite(rpm)?;
                 let max = self.c.protection.i_q;
                 if !(0.0..=max).contains(&i_q) {
                     return Err(Refused::OutOfRange { min: 0.0, max });
@@ -83,7 +78,7 @@ impl Drive {
                 Ok(accepted(rpm, taken))
             }
             Command::Home(turns) => {
-                self.takes_now(Mode::Position, turns)?;
+                finite(turns)?;
                 let max = self.c.motion.position_limit;
                 if turns.abs() > max {
                     return Err(Refused::OutOfRange { min: -max, max });
@@ -96,7 +91,7 @@ impl Drive {
                 Ok(Accepted::AsGiven)
             }
             Command::Magnetising(i_d) => {
-                self.takes_references(self.mode, i_d)?;
+                finite(i_d)?;
                 // Tables and monitor are those of one direct current.
                 if self.c.lock_monitor.is_some() {
                     return Err(Refused::FluxIsFixed);
@@ -112,7 +107,7 @@ impl Drive {
                 Ok(accepted(i_d, taken))
             }
             Command::TurnInjection(degrees) => {
-                self.takes_references(self.mode, degrees)?;
+                finite(degrees)?;
                 if self.c.source != AngleSource::Encoder {
                     return Err(Refused::NeedsEncoder);
                 }
@@ -121,7 +116,7 @@ impl Drive {
                 Ok(Accepted::AsGiven)
             }
             Command::TestVoltage(voltage) => {
-                self.takes_references(self.mode, voltage.d + voltage.q)?;
+                finite(voltage.d + voltage.q)?;
                 let max = self.c.largest_test_v;
                 let inside = |x: f32| (-max..=max).contains(&x);
                 if !(inside(voltage.d) && inside(voltage.q)) {
@@ -134,7 +129,7 @@ impl Drive {
                 if !self.c.track_rotor {
                     return Err(Refused::RotorNotTracked);
                 }
-                self.takes_references(self.mode, tau_r)?;
+                finite(tau_r)?;
                 let taken = self
                     .c
                     .indirect
@@ -143,19 +138,16 @@ impl Drive {
                 self.changes = self.changes.wrapping_add(1);
                 Ok(accepted(tau_r, taken))
             }
-            Command::Configure(ref coefficients) => match self.state {
-                State::Off | State::Fault(_) => {
-                    self.configure(coefficients);
-                    Ok(Accepted::AsGiven)
-                }
-                state => Err(Refused::State(state)),
-            },
+            Command::Configure(ref coefficients) => {
+                self.configure(coefficients);
+                Ok(Accepted::AsGiven)
+            }
         }
     }
 
     /// Takes the speed, for so many periods where it is a jog.
     fn turn_at(&mut self, rpm: f32, jog: u32) -> Result<Accepted, Refused> {
-        self.takes_references(Mode::Speed, rpm)?;
+        finite(rpm)?;
         let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
         let r = &mut self.control.references;
         (r.speed, r.jog) = (taken / 60.0, jog);
@@ -176,19 +168,17 @@ impl Drive {
     }
 
     pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
-        match (self.state, mode) {
-            (State::Fault(fault), _) => return Err(Refused::Fault(fault)),
-            (State::Off, _) if !self.is_charged() => return Err(Refused::NotCharged),
-            (State::Off, Mode::Learning) if !self.can_learn() => {
-                return Err(Refused::NeedsInjection);
-            }
-            (State::Off, Mode::VoltsPerHertz) if self.c.volts_per_hertz.is_none() => {
+        match mode {
+            _ if !self.is_charged() => return Err(Refused::NotCharged),
+            Mode::Learning if !self.can_learn() => return Err(Refused::NeedsInjection),
+            Mode::VoltsPerHertz if self.c.volts_per_hertz.is_none() => {
                 return Err(Refused::Nameplate);
             }
-            (State::Off, Mode::Learning | Mode::Commissioning | Mode::VoltsPerHertz) => {}
-            (State::Off, _) if self.c.unlearned => return Err(Refused::NotLearned),
-            (State::Off, _) => {}
-            (state, _) => return Err(Refused::State(state)),
+            Mode::Torque | Mode::Speed | Mode::Position if self.c.unlearned => {
+                return Err(Refused::NotLearned);
+            }
+            Mode::Torque | Mode::Speed | Mode::Position => {}
+            Mode::Learning | Mode::Commissioning | Mode::VoltsPerHertz => {}
         }
         let flux_left = self.flux_left();
         self.mode = mode;
@@ -219,14 +209,13 @@ impl Drive {
         Ok(Accepted::AsGiven)
     }
 
-    /// Magnetises again along phase a, as a start does, with the current flowing on.
+    /// Magnetises again along phase a, as a start at rest does, with the current flowing on.
     fn relock(&mut self) -> Result<Accepted, Refused> {
-        match self.state {
-            State::Fault(fault) => return Err(Refused::Fault(fault)),
-            State::Exciting => return Err(Refused::State(self.state)),
-            _ if self.c.source != AngleSource::Injection => return Err(Refused::NeedsInjection),
-            state if state == State::of_mode(self.mode) => {}
-            state => return Err(Refused::State(state)),
+        if self.c.source != AngleSource::Injection {
+            return Err(Refused::NeedsInjection);
+        }
+        if !self.stands() {
+            return Err(Refused::Turning);
         }
         self.control.references = self.no_torque(self.control.references.current.d);
         self.c.estimator.start(&mut self.control.estimator);
@@ -243,28 +232,10 @@ impl Drive {
             ..References::default()
         }
     }
+}
 
-    /// Whether a reference for `mode` can be taken now.
-    fn takes_references(&self, mode: Mode, value: f32) -> Result<(), Refused> {
-        let takes = match self.mode {
-            Mode::VoltsPerHertz => mode == Mode::Speed,
-            Mode::Learning | Mode::Commissioning => false,
-            own => own == mode,
-        };
-        match self.state {
-            State::Fault(fault) => Err(Refused::Fault(fault)),
-            State::Off | State::Stopping | State::Braking => Err(Refused::State(self.state)),
-            _ if !takes => Err(Refused::State(State::of_mode(self.mode))),
-            _ if !value.is_finite() => Err(Refused::NotFinite),
-            _ => Ok(()),
-        }
-    }
-
-    /// Whether a reference that must not wait for the end of a start can be taken for `mode`.
-    fn takes_now(&self, mode: Mode, value: f32) -> Result<(), Refused> {
-        self.takes_references(mode, value)?;
-        if self.state == State::of_mode(mode) { Ok(()) } else { Err(Refused::State(self.state)) }
-    }
+fn finite(value: f32) -> Result<(), Refused> {
+    if value.is_finite() { Ok(()) } else { Err(Refused::NotFinite) }
 }
 
 fn accepted(asked: f32, taken: f32) -> Accepted {

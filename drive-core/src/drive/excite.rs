@@ -71,17 +71,12 @@ impl Drive {
                 return Err(Refused::OutOfRange { min: -max, max });
             }
         }
-        match self.state {
-            State::Off => {
-                self.start(Mode::Commissioning)?;
-                self.control.excitation.wanted = wanted;
-            }
-            State::Exciting => {
-                self.control.excitation.wanted = wanted;
-                self.excite_from_here();
-            }
-            State::Fault(fault) => return Err(Refused::Fault(fault)),
-            state => return Err(Refused::State(state)),
+        if self.excites() {
+            self.control.excitation.wanted = wanted;
+            self.excite_from_here();
+        } else {
+            self.start(Mode::Commissioning)?;
+            self.control.excitation.wanted = wanted;
         }
         Ok(Accepted::AsGiven)
     }
@@ -111,8 +106,7 @@ impl Drive {
     }
 
     /// A step of the excitation.
-    // Not inlined: it runs while the motor is commissioned alone, and is no part of the path that `cargo xtask cycles` counts.
-    #[inline(never)]
+    #[cold]
     pub(super) fn excite(&mut self, measured: &Measured) -> Result<Compare, Fault> {
         let s = &mut self.control.excitation;
         let mut realised = AlphaBeta::ZERO;

@@ -30,6 +30,7 @@ impl Drive {
 
     /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
     /// result replaces the settings, and the drive stops.
+    #[cold]
     pub(super) fn learn(&mut self) -> Result<f32, State> {
         let (c, s) = (&self.c, &mut self.control);
         let t = s.seen;
@@ -63,7 +64,7 @@ impl Drive {
 
     /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the
     /// flash. Returns the state to be in.
-    #[inline(never)] // it has a place of its own in the memory
+    #[cold]
     pub(super) fn evaluate_learning(&mut self) -> State {
         let (c, s) = (&self.c, &mut self.control);
         s.all_measured = false;

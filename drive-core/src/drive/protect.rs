@@ -19,8 +19,10 @@ impl Coefficients {
         sample: &Sample,
         measured: &Measured,
     ) -> Result<(), Fault> {
-        if !sample.hardware.is_empty() {
-            return Err(of_hardware(sample.hardware));
+        let unused =
+            if self.dc_link.has_chopper() { Hardware::empty() } else { Hardware::CHOPPER_OFF };
+        if let Some(fault) = of_hardware(sample.hardware - unused) {
+            return Err(fault);
         }
         self.sensing.check(sensing, sample)?;
         let (limits, phases) = (&self.protection, &measured.phases);
@@ -84,6 +86,7 @@ impl Drive {
     }
 
     /// The fault when a result is not finite: settings, references or state, whichever is not.
+    #[cold]
     pub(super) fn not_finite(&self) -> Option<Fault> {
         let r = &self.control.references;
         if !self.c.is_finite() {
@@ -99,16 +102,16 @@ impl Drive {
 }
 
 /// The fault of the most telling event: the one that switched off first comes first.
-fn of_hardware(events: Hardware) -> Fault {
-    if events.intersects(Hardware::BREAK) {
-        Fault::Break
-    } else if events.intersects(Hardware::ANALOG_WATCHDOG) {
-        Fault::AnalogWatchdog
-    } else if events.intersects(Hardware::DEADLINE_MISS) {
-        Fault::DeadlineMiss
-    } else {
-        Fault::ConverterOverrun
-    }
+fn of_hardware(events: Hardware) -> Option<Fault> {
+    [
+        (Hardware::BREAK, Fault::Break),
+        (Hardware::ANALOG_WATCHDOG, Fault::AnalogWatchdog),
+        (Hardware::DEADLINE_MISS, Fault::DeadlineMiss),
+        (Hardware::CONVERTER_OVERRUN, Fault::ConverterOverrun),
+        (Hardware::CHOPPER_OFF, Fault::ChopperOff),
+    ]
+    .into_iter()
+    .find_map(|(event, fault)| events.intersects(event).then_some(fault))
 }
 
 #[cfg(test)]

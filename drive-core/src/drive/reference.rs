@@ -125,7 +125,7 @@ impl Drive {
 
     /// Why the torque is smaller than asked for.
     pub fn limiting(&self) -> Limiting {
-        let acts = self.state.has_torque() || self.state == State::VoltsPerHertz;
+        let acts = self.state.has_torque() || self.state.has_frequency();
         if acts { self.control.limiting } else { Limiting::No }
     }
 }

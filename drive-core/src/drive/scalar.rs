@@ -41,6 +41,7 @@ impl Settings {
                 impedance: plate.base_impedance(),
                 lost_v: self.share_of_dc_link(LOST_V),
                 ramp_hz_per_s: self.ramp_rpm_per_s() / 60.0 * pole_pairs,
+                quick_hz_per_s: self.quick_rpm_per_s() / 60.0 * pole_pairs,
                 slip_share: self.vf.slip_share,
             })
         })
@@ -52,13 +53,12 @@ impl Drive {
     ///
     /// # Errors
     /// The state to go to with the outputs off.
-    // Not inlined: it is no part of the path that `cargo xtask cycles` counts.
-    #[inline(never)]
+    #[cold]
     pub(super) fn turn_by_voltage(&mut self, measured: &Measured) -> Result<Compare, State> {
         let (c, s) = (&self.c, &mut self.control);
         let Some(turning) = &c.volts_per_hertz else { return Err(State::Off) };
         let rotor_freq = s.turning.rotor_freq();
-        let stops = self.state == State::Braking;
+        let stops = self.state == State::BrakingByFrequency;
         if stops && rotor_freq.abs() < STANDS {
             return Err(State::Off);
         }
@@ -71,7 +71,7 @@ impl Drive {
             }
         }
         let largest_v = c.modulator.circle(measured.dc_link);
-        let demand = Demand { freq, i_q: s.limits.i_q, largest_v };
+        let demand = Demand { freq, quick: s.quick_stop, i_q: s.limits.i_q, largest_v };
         let turned = turning.step(&mut s.turning, measured.current, &demand)?;
         if !(turned.voltage.d + turned.voltage.q + s.turning.freq).is_finite() {
             return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());

@@ -5,7 +5,7 @@ use crate::current::inverter_drop::InverterDropState;
 use crate::current::sensing::Measured;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
-use crate::io::{Compare, Sample};
+use crate::io::{Compare, PERIOD_S, Sample};
 use crate::math::frames::Dq;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
@@ -14,6 +14,9 @@ use crate::settings::AngleSource;
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
+
+/// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
+const STANDING_FREQ: f32 = PERIOD_S;
 
 /// How far a start is with the flux.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +50,7 @@ impl Drive {
     }
 
     /// A step without current control: off, in fault, or on the way to it.
+    #[cold]
     pub(super) fn prepare(&mut self, sample: &Sample) -> Result<Compare, State> {
         if matches!(self.state, State::Off | State::Fault(_)) {
             return Ok(Compare::OFF);
@@ -57,7 +61,9 @@ impl Drive {
             State::Calibrating => self.calibrate(sample)?,
             State::Precharge => self.precharge(sample)?,
             State::Exciting => self.excite(&measured)?,
-            State::VoltsPerHertz | State::Braking => return self.turn_by_voltage(&measured),
+            State::VoltsPerHertz | State::BrakingByFrequency => {
+                return self.turn_by_voltage(&measured);
+            }
             _ => self.check_wiring(sample, &measured)?,
         })
     }
@@ -133,6 +139,7 @@ impl Drive {
         self.c.catching.is_some() && State::of_mode(self.mode).regulates()
     }
 
+    #[cold]
     pub(super) fn magnetising_from_here(&mut self, encoder: u32) {
         let s = &mut self.control;
         (s.lock, s.inverter_drop) = (LockMonitorState::default(), InverterDropState::default());
@@ -150,6 +157,7 @@ impl Drive {
     }
 
     /// The current while the flux is built up, and while the saliency is checked, A.
+    #[cold]
     pub(super) fn magnetise(&mut self) -> Result<Dq, Fault> {
         let s = &mut self.control;
         let r = &mut s.references;
@@ -185,14 +193,19 @@ impl Drive {
     }
 
     /// The current while the lock is verified, A: the axis is tracked for a while without torque.
+    #[cold]
     pub(super) fn verify(&mut self) -> Result<Dq, Fault> {
         if self.elapsed >= self.c.sequence.verify {
-            let step = self.control.estimator.rotor_freq;
-            if self.c.lock_monitor.is_some_and(|monitor| !monitor.is_standstill(step)) {
+            if !self.stands() {
                 return Err(Fault::LostLock);
             }
             self.enter(State::of_mode(self.mode));
         }
         Ok(Dq { d: self.control.references.current.d, q: 0.0 })
+    }
+
+    /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
+    pub(super) fn stands(&self) -> bool {
+        self.rotor_freq().abs() <= STANDING_FREQ
     }
 }

@@ -55,6 +55,8 @@ pub enum State {
     Learning,
     /// Taking the speed to zero, then [`Stopping`](Self::Stopping).
     Braking,
+    /// Taking the frequency to zero, then off: a stop by ramp from [`VoltsPerHertz`](Self::VoltsPerHertz).
+    BrakingByFrequency,
     /// Taking the torque to zero, then off.
     Stopping,
     /// Outputs off until the fault is cleared.
@@ -92,12 +94,22 @@ impl State {
 
     /// Whether the outputs drive a current, for whatever purpose.
     pub(crate) const fn is_energised(self) -> bool {
-        self.has_current() || matches!(self, Self::Exciting | Self::VoltsPerHertz)
+        self.has_current() || self.has_frequency() || matches!(self, Self::Exciting)
+    }
+
+    /// Whether the motor turns by voltage and frequency.
+    pub(crate) const fn has_frequency(self) -> bool {
+        matches!(self, Self::VoltsPerHertz | Self::BrakingByFrequency)
     }
 
     /// Whether torque, speed or position is regulated as asked for.
     pub const fn regulates(self) -> bool {
         matches!(self, Self::Torque | Self::Speed | Self::Position)
+    }
+
+    /// Whether it is coming to an end with the outputs on.
+    pub const fn is_stopping(self) -> bool {
+        matches!(self, Self::Braking | Self::BrakingByFrequency | Self::Stopping)
     }
 
     /// Whether there is torque for a purpose: as asked for, or to come to rest.
@@ -128,7 +140,7 @@ impl fmt::Display for State {
             Self::Position => "regulating position",
             Self::VoltsPerHertz => "turning by voltage and frequency",
             Self::Learning => "learning",
-            Self::Braking => "braking to rest",
+            Self::Braking | Self::BrakingByFrequency => "braking to rest",
             Self::Stopping => "stopping",
             Self::Fault(fault) => return write!(f, "in fault {} ({fault})", fault.code()),
         })

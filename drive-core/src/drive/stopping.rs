@@ -2,21 +2,34 @@
 
 use super::Drive;
 use crate::drive::command::Stop;
-use crate::drive::state::{Mode, State};
+use crate::drive::state::State;
 
 impl Drive {
     pub(super) fn stop(&mut self, stop: Stop) {
         match (self.state, stop) {
-            (State::Off | State::Fault(_) | State::Stopping, _) | (State::Braking, Stop::Ramp) => {}
+            (State::Off | State::Fault(_) | State::Stopping, _)
+            | (State::Braking | State::BrakingByFrequency, Stop::Ramp) => {}
             (
                 State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting,
                 _,
-            ) => self.enter(State::Off),
-            (State::VoltsPerHertz, Stop::Ramp | Stop::Quick) => self.enter(State::Braking),
-            _ if self.mode == Mode::VoltsPerHertz => self.enter(State::Off),
-            (State::Braking, Stop::Quick) => self.control.quick_stop = true,
-            (state, Stop::Ramp | Stop::Quick) if state.regulates() => self.brake_from_here(stop),
-            _ => self.enter(State::Stopping),
+            )
+            | (State::VoltsPerHertz | State::BrakingByFrequency, Stop::Coast) => {
+                self.enter(State::Off);
+            }
+            (State::VoltsPerHertz, Stop::Ramp | Stop::Quick) => {
+                self.control.quick_stop = stop == Stop::Quick;
+                self.enter(State::BrakingByFrequency);
+            }
+            (State::Braking | State::BrakingByFrequency, Stop::Quick) => {
+                self.control.quick_stop = true;
+            }
+            (State::Torque | State::Speed | State::Position, Stop::Ramp | Stop::Quick) => {
+                self.brake_from_here(stop);
+            }
+            (State::Catching | State::Magnetising | State::Verifying | State::Learning, _)
+            | (State::Torque | State::Speed | State::Position | State::Braking, Stop::Coast) => {
+                self.enter(State::Stopping);
+            }
         }
     }
 

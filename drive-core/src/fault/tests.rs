@@ -51,6 +51,7 @@ fn codes_never_change() {
         (46, Fault::ThermistorShorted),
         (47, Fault::NotCaught),
         (48, Fault::Stalled),
+        (49, Fault::ChopperOff),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

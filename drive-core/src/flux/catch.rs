@@ -159,7 +159,6 @@ impl CatchState {
 
 impl Correlation {
     /// Adds the average `count` of those that are kept.
-    #[inline(never)] // inlined, it is there three times, and the CCM is nearly full
     fn add(&mut self, lag: usize, kept: &[Dq; KEPT], count: usize) {
         if count < 3 * lag {
             return;
@@ -177,7 +176,6 @@ impl Correlation {
     }
 
     /// Electrical turns per period, where it is more than noise.
-    #[inline(never)] // inlined, it is there three times, and the CCM is nearly full
     fn frequency(&self, (lag, least): (usize, f32)) -> Option<f32> {
         let least = least * self.power;
         if self.re * self.re + self.im * self.im <= least * least {

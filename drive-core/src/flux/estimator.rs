@@ -235,6 +235,7 @@ impl Estimator {
     }
 
     /// Runs the selected demodulator, all but the synchronous one.
+    #[cold]
     fn demodulate(&self, state: &mut EstimatorState, mut sample: CarrierSample, flux_freq: f32) {
         if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
             // These rotate the output of the band-pass.

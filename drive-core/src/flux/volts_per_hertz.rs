@@ -113,6 +113,8 @@ pub struct VoltsPerHertzSettings {
     pub lost_v: f32,
     /// Change of the frequency, Hz/s.
     pub ramp_hz_per_s: f32,
+    /// That of a quick stop, Hz/s.
+    pub quick_hz_per_s: f32,
     /// Share of the slip that is compensated.
     pub slip_share: f32,
 }
@@ -134,6 +136,7 @@ pub struct VoltsPerHertz {
     per_excess: f32,
     damping: f32,
     ramp: f32,
+    quick_ramp: f32,
     holds: u32,
     judged_after: u32,
     pulled_out: u32,
@@ -199,6 +202,8 @@ impl Default for VoltsPerHertzState {
 pub struct Demand {
     /// Frequency of the rotor that is asked for, electrical turns per period.
     pub freq: f32,
+    /// Whether by the ramp of a quick stop.
+    pub quick: bool,
     /// Least and largest torque current, A.
     pub i_q: (f32, f32),
     /// Largest voltage, V.
@@ -230,6 +235,8 @@ impl VoltsPerHertz {
     pub fn new(s: &VoltsPerHertzSettings) -> Self {
         const TAU: f32 = core::f32::consts::TAU;
         let (rated, flux) = (s.rated_volts_per_hz / TAU, s.volts_per_hz / TAU);
+        let steepest = s.frequency_hz / STEEPEST_S;
+        let ramp = |hz_per_s: f32| limited(hz_per_s, steepest) * PERIOD_S * PERIOD_S;
         let slip_hz = s.slip_hz * 1.5 * s.pole_pairs * rated * rated / (flux * s.torque_nm);
         Self {
             volts: s.volts_per_hz / PERIOD_S,
@@ -242,7 +249,8 @@ impl VoltsPerHertz {
             reactive_a: REACTIVE * s.limit_a,
             per_excess: s.frequency_hz * PERIOD_S * (PERIOD_S / EXCESS_S) / s.limit_a,
             damping: DAMPING * s.frequency_hz * PERIOD_S / s.rated_a,
-            ramp: limited(s.ramp_hz_per_s, s.frequency_hz / STEEPEST_S) * PERIOD_S * PERIOD_S,
+            ramp: ramp(s.ramp_hz_per_s),
+            quick_ramp: ramp(s.quick_hz_per_s),
             holds: periods(BOOST_HOLDS_S),
             judged_after: periods(JUDGED_AFTER_S),
             pulled_out: periods(PULLED_OUT_S),
@@ -319,7 +327,8 @@ impl VoltsPerHertz {
         let i_q = state.fast.q;
         let range = (within(-most, demand.i_q), within(most, demand.i_q));
         let excess = i_q - within(i_q, range);
-        let step = limited(demand.freq - state.ramp, self.ramp);
+        let ramp = if demand.quick { self.quick_ramp } else { self.ramp };
+        let step = limited(demand.freq - state.ramp, ramp);
         // Less acceleration, the less torque current is left for it.
         let room = if step < 0.0 { i_q - range.0 } else { range.1 - i_q };
         let share = within(room * self.per_room, (0.0, 1.0));

@@ -53,7 +53,6 @@ use crate::settings::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 ///     allowed: 0.55,
 ///     carrier_a: 0.26,
 ///     moved_a: 0.03,
-///     standing_freq: 1e-4,
 ///     period_s: 1.0 / 600.0,
 /// };
 /// let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
@@ -87,8 +86,6 @@ pub struct LockMonitor {
     moved: f32,
     /// Square of the minimum carrier current, A^2.
     least: f32,
-    /// Electrical speed below which the shaft counts as standing, turns per control period.
-    standing: f32,
 }
 
 /// Settings of the monitor.
@@ -104,8 +101,6 @@ pub struct LockMonitorSettings {
     pub carrier_a: f32,
     /// Change of the torque current in a carrier period that counts as a move, A.
     pub moved_a: f32,
-    /// Electrical speed below which the shaft counts as standing, turns per control period.
-    pub standing_freq: f32,
     /// Interval of the monitor's steps, s: the carrier period.
     pub period_s: f32,
 }
@@ -185,7 +180,6 @@ impl LockMonitor {
             baseline_smoothing: s.period_s / BASELINE_S,
             allowed: s.allowed,
             least: least * least,
-            standing: s.standing_freq,
         }
     }
 
@@ -261,11 +255,6 @@ impl LockMonitor {
         state.allowance =
             if rests { state.allowance - takes } else { (state.allowance + gives).min(most) };
         rests
-    }
-
-    /// Whether the electrical speed `rotor_freq`, turns per control period, counts as standstill.
-    pub fn is_standstill(&self, rotor_freq: f32) -> bool {
-        rotor_freq.abs() <= self.standing
     }
 }
 

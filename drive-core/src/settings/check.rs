@@ -4,12 +4,13 @@ use super::list::SETTINGS;
 use super::{Settings, SettingsError};
 
 impl Settings {
-    /// Checks every value against its range.
+    /// Checks every value against its range, the scales first: the rules of others follow from the sensors' range.
     ///
     /// # Errors
     /// [`SettingsError::Range`] with the first value outside its range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        SETTINGS.iter().try_for_each(|entry| entry.check(self))
+        let scales = SETTINGS.iter().filter(|entry| entry.name.starts_with("scales."));
+        scales.chain(SETTINGS).try_for_each(|entry| entry.check(self))
     }
 
     /// Whether results learned with the settings `other` are valid for these settings, too.

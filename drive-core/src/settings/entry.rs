@@ -26,6 +26,8 @@ pub struct Entry<S: 'static> {
     pub change: Change,
     /// Whether learned values hold for this value only.
     pub learned: bool,
+    /// Whether the power stage is at stake: a protection or the scale of its sensor.
+    pub hardware: bool,
     access: Access<S>,
     range: Range<S>,
 }
@@ -81,7 +83,8 @@ impl<S> Entry<S> {
         help: &'static str,
     ) -> Self {
         let range = Range::Fixed(0.0, 0.0);
-        Self { name, unit, help, change: Change::WhileOff, learned: false, access, range }
+        let change = Change::WhileOff;
+        Self { name, unit, help, change, learned: false, hardware: false, access, range }
     }
 
     /// Accepted from `min` to `max`, both included.
@@ -99,6 +102,12 @@ impl<S> Entry<S> {
     /// Learned values hold for this value only.
     pub const fn learned(mut self) -> Self {
         self.learned = true;
+        self
+    }
+
+    /// A wrong value may damage the power stage.
+    pub const fn hardware(mut self) -> Self {
+        self.hardware = true;
         self
     }
 
@@ -157,7 +166,9 @@ impl<S> Entry<S> {
             Access::Auto { .. } if text == AUTO => Ok(Value::Auto),
             Access::Auto { .. } => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
             Access::Whole { .. } => {
-                let max = self.largest_whole();
+                // Larger ones may not fit the type of the setting.
+                let Range::Fixed(_, max) = self.range else { return Err(ValueError::Whole(0)) };
+                let max = max as u32;
                 let value = text.parse().ok().filter(|value| *value <= max);
                 value.map(Value::Whole).ok_or(ValueError::Whole(max))
             }
@@ -218,14 +229,6 @@ impl<S> Entry<S> {
         match self.access {
             Access::Word { get, .. } => get(one) == get(other),
             _ => self.number(one) == self.number(other),
-        }
-    }
-
-    /// The largest whole number that the range ever allows; larger ones may not fit the type of the setting.
-    fn largest_whole(&self) -> u32 {
-        match self.range {
-            Range::Fixed(_, max) => max as u32,
-            Range::Beside(_) => u32::MAX,
         }
     }
 }

@@ -104,6 +104,8 @@ pub struct Scales {
     pub shunt_settle_s: f32,
     /// Dc-link voltage, V.
     pub dc_link: Line,
+    /// Code of the highest dc link that the power stage stands in operation. A code, so that no scale lifts it.
+    pub dc_link_highest: u16,
     /// Largest code of the current channels.
     pub full_scale: u16,
     /// Thermistor of the heat sink.
@@ -124,6 +126,7 @@ impl Default for Scales {
             sensors: CurrentSensors::InLine,
             shunt_settle_s: 2e-6,
             dc_link: Line { gain: 0.11, offset: 0.0 },
+            dc_link_highest: 4095,
             full_scale: 4095,
             ntc: Ntc::default(),
             current_delay_s: 30e-6,

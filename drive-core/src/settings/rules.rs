@@ -24,14 +24,14 @@
 //! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
-//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range |
+//! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range, and what the power stage stands |
 //! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the voltages that trip |
 //! | `braking.flux_a` | 1 A | rated current |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
 //! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
 //! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
 
-mod dc_link;
+pub mod dc_link;
 mod motion;
 mod volts_per_hertz;
 

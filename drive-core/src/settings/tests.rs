@@ -190,3 +190,46 @@ proptest! {
         }
     }
 }
+
+/// The settings that are changed are named, not those whose rules follow from them, with a range that holds a value.
+#[test]
+fn the_changed_setting_is_the_one_that_is_named() {
+    let refused = |change: fn(&mut Settings)| {
+        let mut settings = Settings::default();
+        change(&mut settings);
+        match settings.build().map(|_| ()) {
+            Err(error @ SettingsError::Range { name, min, max, .. }) => {
+                assert!(min < max, "{error}");
+                name
+            }
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(|s| s.scales.current_a.offset = 0.0), "scales.current_a.offset");
+    assert_eq!(refused(|s| s.scales.current_b.offset = 4.5), "scales.current_b.offset");
+    assert_eq!(refused(|s| s.scales.current_a.gain = 0.0), "scales.current_a.gain");
+    let third_without_zero: fn(&mut Settings) = |s| {
+        s.scales.sensors = CurrentSensors::LowSide;
+        s.scales.current_c.offset = -0.1;
+    };
+    assert_eq!(refused(third_without_zero), "scales.current_c.offset");
+    assert_eq!(refused(|s| s.limits.dc_under_v = Some(330.0)), "limits.dc_under_v");
+    assert_eq!(refused(|s| s.limits.dc_under_v = Some(290.0)), "limits.dc_under_v");
+    assert_eq!(refused(|s| s.limits.dc_over_v = Some(320.0)), "limits.dc_over_v");
+    let low_set: fn(&mut Settings) = |s| s.braking.low_v = Some(205.0);
+    assert_eq!(refused(low_set), "braking.low_v");
+    // An amplifier whose output falls with the current.
+    let mut falling = Settings::default();
+    falling.scales.current_a = Line { gain: -0.0024, offset: 4.9 };
+    assert!(falling.build().is_ok());
+}
+
+#[test]
+fn a_range_without_a_value_says_so() {
+    let (min, max) = (346.5, 295.45);
+    let error = SettingsError::Range { name: "braking.low_v", unit: "V", value: 379.5, min, max };
+    let text = error.to_string();
+    let whole =
+        "braking.low_v = 379.5: allowed is nothing beside other settings: 346.5 to 295.45 V";
+    assert_eq!(text, whole);
+}

@@ -393,3 +393,8 @@ impl Plant {
         self.hardware = self.hardware.union(events);
     }
 }
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -119,10 +119,14 @@ fn motor_text(motor: &Motor) -> Result<String, Error> {
     let mut table = Table::new("", &["key", "value", "unit", "source"]);
     for (key, value) in motor.settings() {
         let unit = Key::named(&key)?.first().map_or("", |key| key.unit()).to_owned();
-        let source = motor.source_of(&key).map_or(String::new(), |source| {
+        let source = motor.source_of(&key).map_or("no source stated".to_owned(), |source| {
             format!("{}{}", if source.unverified { "UNVERIFIED: " } else { "" }, source.from)
         });
         table.row([key, value.to_string(), unit, source].map(Cell::from));
+    }
+    for (key, value, why) in motor.implied(&config) {
+        let unit = Key::named(key)?.first().map_or("", |key| key.unit());
+        table.row([key, &value.to_string(), unit, why].map(Cell::from));
     }
     let m = config.drive.motor;
     Ok(format!(

@@ -336,7 +336,8 @@ keys! {
     /// The experiment battery.
     "battery." battery: BatteryConfig {
         /// Which runs: kinds for the twelve kinds, load for load steps, hold for torque near its largest at rest, forced
-        /// for a flux that is turned at once, restless for torque commands that never rest.
+        /// for a flux that is turned at once, restless for torque commands that never rest, dragged for a shaft that is
+        /// dragged through zero stator frequency under torque.
         runs: BatteryRuns = BatteryRuns::Kinds, [BatteryRuns], "";
         /// Load step of battery.runs = load, in relation to the torque at the nominal limit of the torque current.
         load_share: f64 = 0.4, [0 .. 2], "";
@@ -359,7 +360,7 @@ keys! {
     }
     /// The experiment record.
     "record." record: RecordConfig {
-        /// How long full torque is held at zero stator frequency.
+        /// How long the torque limit is held at zero stator frequency.
         minutes: f64 = 10.0, [0.05 .. 1000], "min";
         /// Where the rotor flux stands meanwhile, electrical, from phase a.
         flux_deg: f64 = 0.0, [-180 .. 180], "deg";

@@ -8,10 +8,26 @@ use std::path::Path;
 use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
-use super::{Config, Key, Value, flattened};
+use super::{Config, Key, Value, alias, flattened};
 use crate::error::{Error, nearest};
 
 static FILES: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/motors");
+
+/// What a file of one's own must say, because no rule gives it and nothing of another motor may stand in for it.
+const NEEDED: [&str; 12] = [
+    "nameplate.power_w",
+    "nameplate.voltage_v",
+    "nameplate.current_a",
+    "nameplate.frequency_hz",
+    "nameplate.speed_rpm",
+    "motor.r_s",
+    "motor.r_r",
+    "motor.l_ls",
+    "motor.l_lr",
+    "motor.l_m",
+    "motor.pole_pairs",
+    "inverter.dc_link_v",
+];
 
 /// Where numbers of a motor come from.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -29,14 +45,17 @@ pub struct Source {
 /// A motor with the inverter and the sensors that suit it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Motor {
-    /// Name on the command line: that of the file.
+    /// Name on the command line: that of the file; with `.toml` for a file of one's own.
     #[serde(skip)]
     pub name: String,
     /// Rated data in a line.
+    #[serde(default)]
     pub title: String,
     /// The motor, and what is special about it.
+    #[serde(default)]
     pub about: String,
-    /// Where the numbers come from.
+    /// Where the numbers come from; a file of one's own need not say it.
+    #[serde(default)]
     pub source: Vec<Source>,
     /// The settings, in groups.
     #[serde(flatten)]
@@ -89,23 +108,66 @@ impl Motor {
         self.source.iter().find(|source| source.keys.iter().any(|known| known == key))
     }
 
-    /// Sets the keys of the file.
+    /// Whether it is a file of one's own; the others come with the program.
+    fn is_own(&self) -> bool {
+        self.name.ends_with(".toml")
+    }
+
+    /// Sets the keys of the file, and those that a file of one's own leaves to [`implied`](Self::implied).
     ///
     /// # Errors
-    /// As [`Config::set`]; [`Error::Refused`] when a number has no source, or two.
+    /// As [`Config::set`]; [`Error::Refused`] when a number that comes with the program has no source, when one has two,
+    /// and with all that a file of one's own must say and does not.
     pub fn apply(&self, config: &mut Config) -> Result<(), Error> {
-        for (key, value) in self.settings() {
+        let (settings, name) = (self.settings(), &self.name);
+        let missing: Vec<_> =
+            NEEDED.into_iter().filter(|key| self.is_own() && !self.says(key)).collect();
+        if !missing.is_empty() {
+            let missing = missing.join(", ");
+            return Err(Error::Refused(format!("motor {name}: these are missing: {missing}")));
+        }
+        for (key, value) in settings {
             let sources = self.source.iter().flat_map(|source| &source.keys);
             let count = sources.filter(|known| **known == key).count();
-            if count != 1 {
-                let name = &self.name;
+            if count > 1 || count == 0 && !self.is_own() {
                 return Err(Error::Refused(format!(
                     "motor {name}: {key} has {count} sources; one [[source]] must name it"
                 )));
             }
             config.set(&key, &value)?;
         }
-        Ok(())
+        self.implied(config).into_iter().try_for_each(|(key, value, _)| config.set(key, &value))
+    }
+
+    /// Whether the file sets a key.
+    fn says(&self, key: &str) -> bool {
+        self.settings().iter().any(|(name, value)| alias::today(name, value).0 == key)
+    }
+
+    /// The keys that a file of one's own does not set and that follow from its nameplate, with the reason.
+    pub fn implied(&self, config: &Config) -> Vec<(&'static str, Value, &'static str)> {
+        let (base, four_digits) = (Config::default(), |value: f64| {
+            Value::Number(format!("{value:.3e}").parse().unwrap_or(value))
+        });
+        let range_a = four_digits(config.amperes(base.measurement.range_a));
+        let inertia = four_digits(base.motor.inertia * config.rated_nm() / base.rated_nm());
+        let flux = if self.says("sequence.i_d") { "sequence.i_d" } else { "sequence.flux" };
+        let all = [
+            (
+                "current_plant",
+                Value::Word("motor".to_owned()),
+                "by rule: as a commissioned drive has it",
+            ),
+            ("measurement.range_a", range_a, "by rule: 1.24 times the rated current, peak"),
+            ("motor.inertia", inertia, "assumed: in proportion to the rated torque"),
+            ("prepare.learn", Value::Switch(true), "by rule: the drive has not learned this motor"),
+            (
+                flux,
+                Value::Word("high".to_owned()),
+                "by rule: rated flux, or what the current allows",
+            ),
+        ];
+        all.into_iter().filter(|(key, ..)| self.is_own() && !self.says(key)).collect()
     }
 
     /// The lines that set the drive to this motor at the console.
@@ -150,6 +212,7 @@ mod tests {
             assert_eq!(named.len(), motor.settings().len(), "{}", motor.name);
             assert!(config.drive.check().is_ok(), "{}: {:?}", motor.name, config.drive.check());
             assert!(config.drive.build().is_ok(), "{}", motor.name);
+            assert!(!motor.title.is_empty() && motor.implied(&config).is_empty());
             assert!(!motor.about.trim().is_empty() && motor.console_lines().len() < 20);
         }
     }

@@ -65,6 +65,8 @@ words! {
         Forced = "forced",
         /// Torque commands that never rest.
         Restless = "restless",
+        /// The shaft dragged through zero stator frequency under torque.
+        Dragged = "dragged",
     }
 }
 

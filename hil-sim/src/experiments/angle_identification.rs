@@ -5,6 +5,8 @@ mod measure;
 mod model;
 
 use super::bode::{Bode, frequencies, largest_pole};
+use super::demodulators::demodulation::{BPF, Demodulation, LITERAL, RECTIFIED, SYNCHRONOUS};
+use super::injection_map::PP;
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
@@ -16,6 +18,7 @@ use drive_core::carrier::DemodulatorKind;
 use measure::{Record, SLOW, StepResponses};
 use model::{Model, PRINTED_PII, Pii, TABLE_6};
 use num_complex::Complex64;
+use std::f64::consts::{FRAC_2_PI, TAU};
 
 /// Section 3.11.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -33,23 +36,10 @@ const DESIGN_ROW: usize = 2;
 /// The printed zero with the digit that seems to be lost.
 const LIKELY_PII: Pii = Pii { z_s: 0.99, ..PRINTED_PII };
 /// Gain of band-pass and post-processing filter at dc.
-const LEAK: f64 = 0.0100 * 0.944_061;
+const LEAK: f64 = 0.0100 * PP;
 
-/// A demodulation whose angle plant is identified.
-struct Demodulation {
-    name: &'static str,
-    demodulator: DemodulatorKind,
-    /// Unit of a thousandth of the signal.
-    unit: &'static str,
-}
-
-const DEMODULATIONS: [Demodulation; 3] = [
-    Demodulation { name: "literal", demodulator: DemodulatorKind::Literal, unit: "mA" },
-    Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, unit: "mA" },
-    Demodulation {
-        name: "synchronous", demodulator: DemodulatorKind::Synchronous, unit: "10⁻³"
-    },
-];
+/// The demodulations whose angle plant is identified.
+const DEMODULATIONS: [Demodulation; 3] = [LITERAL, RECTIFIED, SYNCHRONOUS];
 
 /// Identification at one torque current.
 struct IdentifiedPoint {
@@ -87,21 +77,13 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         outcome.tables.push(identified(demodulation, points));
         metrics(&mut outcome, demodulation, points);
     }
-    for (demodulation, points) in all() {
-        outcome.tables.push(gains(demodulation, points, context.config));
-    }
+    outcome.tables.extend(all().map(|(s, points)| gains(s, points, context.config)));
     outcome.tables.push(controllers(all()));
-    for (demodulation, points) in all() {
-        outcome.figures.push(fit_figure(demodulation, &points[DESIGN_ROW]));
-    }
-    for (demodulation, points) in all() {
-        outcome.figures.push(bode_figure(demodulation, points));
-    }
-    for (demodulation, points) in all() {
-        outcome.figures.push(step_figure(demodulation, points));
-    }
-    outcome.figures.push(poles_figure(all()));
-    outcome.remarks = remarks();
+    outcome.figures.extend(all().map(|(s, points)| fit_figure(s, &points[DESIGN_ROW])));
+    outcome.figures.extend(all().map(|(s, points)| bode_figure(s, points)));
+    outcome.figures.extend(all().map(|(s, points)| step_figure(s, points)));
+    outcome.figures.push(poles_figure(&points));
+    outcome.remarks = remarks(&points);
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
 }
@@ -123,16 +105,14 @@ fn complex(pole: Complex64) -> String {
 
 fn poles_text(model: &Model) -> String {
     match model.poles() {
-        Some([p, _]) if p.im != 0.0 => {
-            format!("{:.4} ± j{:.4}", p.re, p.im.abs())
-        }
+        Some([p, _]) if p.im != 0.0 => format!("{:.4} ± j{:.4}", p.re, p.im.abs()),
         Some([p, q]) => format!("{}, {}", complex(p), complex(q)),
         None => "-".into(),
     }
 }
 
 fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table {
-    let gain = format!("static gain ({} / rad)", demodulation.unit);
+    let gain = format!("static gain ({} / rad)", demodulation.unit());
     let title = format!("Eq. 3.43 for {}, beside Table 6", demodulation.name);
     let mut table = Table::new(title, &[]).note(
         "Least squares of the output error (Steiglitz and McBride); the last column is what the one-step \
@@ -161,7 +141,7 @@ fn identified(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Table 
 
 /// The gains of the axis alone and of axis and current together, measured and predicted.
 fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Config) -> Table {
-    let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit);
+    let unit = |what: &str| format!("{what} ({} / rad)", demodulation.unit());
     let title = format!("Two plants: {}", demodulation.name);
     let mut table = Table::new(title, &[]).note(match demodulation.demodulator {
             DemodulatorKind::Literal => {
@@ -183,17 +163,14 @@ fn gains(demodulation: &Demodulation, points: &[IdentifiedPoint], config: &Confi
         });
     let (id, s) = (f64::from(config.drive.i_d()), plant_settings(config).saliency);
     let inductance = config.motor.l_ls + config.motor.l_lr; // near sigma L_s
-    let carrier =
-        f64::from(config.drive.carrier_v()) / (std::f64::consts::TAU * 600.0 * inductance);
+    let carrier = f64::from(config.drive.carrier_v()) / (TAU * 600.0 * inductance);
     for ((iq, ..), p) in TABLE_6.iter().zip(points) {
         let length = id.hypot(*iq);
         let cos_2_gamma = (id * id - iq * iq) / (length * length);
         let flux_part = 2.0 * s.a_psi.abs();
         let current_part = -2.0 * s.b1 * length * cos_2_gamma;
         let scale = match demodulation.demodulator {
-            DemodulatorKind::Rectified => {
-                2f64.sqrt() * carrier * 0.9452 * std::f64::consts::FRAC_2_PI * 0.944_061
-            }
+            DemodulatorKind::Rectified => 2f64.sqrt() * carrier * BPF * FRAC_2_PI * PP,
             _ => 1.0,
         };
         let predicted = match demodulation.demodulator {
@@ -227,7 +204,6 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
         let design = plants[DESIGN_ROW].design();
         for ((iq, ..), plant) in TABLE_6.iter().zip(plants) {
             let with = |pii: Pii| Cell::fixed(largest_pole(plant.closed_loop(pii)), 5);
-            let or_dash = |cell: Option<Cell>| cell.unwrap_or_else(|| "-".into());
             let here = design.filter(|_| *iq == TABLE_6[DESIGN_ROW].0);
             let poles = here.and_then(|(pii, _)| plant.closed_loop(pii)).map(|poles| {
                 let upper = poles.iter().filter(|p| p.im >= 0.0).map(|&p| complex(p));
@@ -238,20 +214,20 @@ fn controllers<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedP
                 ("iq (A)", Cell::fixed(*iq, 1)),
                 (
                     "largest pole, printed k_s, z_s = 0.90",
-                    or_dash(in_amperes.then(|| with(PRINTED_PII))),
+                    Cell::or_dash(in_amperes.then(|| with(PRINTED_PII))),
                 ),
-                ("printed k_s, z_s = 0.99", or_dash(in_amperes.then(|| with(LIKELY_PII)))),
-                ("designed for 1.5 A", or_dash(design.map(|(pii, _)| with(pii)))),
+                ("printed k_s, z_s = 0.99", Cell::or_dash(in_amperes.then(|| with(LIKELY_PII)))),
+                ("designed for 1.5 A", Cell::or_dash(design.map(|(pii, _)| with(pii)))),
                 (
                     "k_s (rad per signal)",
-                    or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
+                    Cell::or_dash(here.map(|(pii, _)| Cell::significant(pii.k_s, 3))),
                 ),
-                ("z_s", or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4)))),
+                ("z_s", Cell::or_dash(here.map(|(pii, _)| Cell::fixed(pii.z_s, 4)))),
                 (
                     "crossover (Hz)",
-                    or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / std::f64::consts::TAU, 1))),
+                    Cell::or_dash(here.map(|(_, w)| Cell::fixed(w * RATE_HZ / TAU, 1))),
                 ),
-                ("poles of the design", or_dash(poles.map(Cell::from))),
+                ("poles of the design", Cell::or_dash(poles.map(Cell::from))),
             ]);
         }
     };
@@ -274,7 +250,7 @@ fn fit_figure(demodulation: &Demodulation, p: &IdentifiedPoint) -> Figure {
     let turn = p.record.u.iter().map(|u| u.to_degrees() / 1e3).collect::<Vec<_>>();
     Figure::new(format!("fit_{}", demodulation.name), title, "Figure 34")
         .panel(
-            Panel::new("time (s)", format!("signal ({})", demodulation.unit))
+            Panel::new("time (s)", format!("signal ({})", demodulation.unit()))
                 .with(Series::line("measured, mean of 6 periods", line(&p.record.y)))
                 .with(Series::reference("Eq. 3.43", line(&model))),
         )
@@ -295,18 +271,16 @@ fn bode_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
                 .then(|| ("Table 6, 1.5 A".into(), scaled(Model::printed(DESIGN_ROW)))),
         )
         .collect();
-    let responses: Vec<_> =
-        models.iter().map(|(name, model)| (name.as_str(), |w: f64| model.response(w))).collect();
-    let as_functions: Vec<(&str, &dyn Fn(f64) -> Complex64)> =
-        responses.iter().map(|(name, response)| (*name, response as _)).collect();
-    let (gain, phase) = bode.panels(&as_functions);
-    let title = format!("{}: identified, gain in {} per rad", demodulation.name, demodulation.unit);
+    let (gain, phase) =
+        bode.panels(models.iter().map(|(name, model)| (name, |w: f64| model.response(w))));
+    let title =
+        format!("{}: identified, gain in {} per rad", demodulation.name, demodulation.unit());
     Figure::new(format!("bode_{}", demodulation.name), title, "Figure 35").panel(gain).panel(phase)
 }
 
 fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figure {
     let panel = |of: &str, pick: fn(&IdentifiedPoint) -> &Vec<f64>| {
-        let y = format!("{of} ({} / rad)", demodulation.unit);
+        let y = format!("{of} ({} / rad)", demodulation.unit());
         TABLE_6.iter().zip(points).fold(Panel::new("time (ms)", y), |panel, ((iq, ..), p)| {
             // Over a carrier period: the rest is ripple.
             let mean = |c: &[f64]| c.iter().sum::<f64>() / c.len() as f64 * 1e3;
@@ -324,15 +298,9 @@ fn step_figure(demodulation: &Demodulation, points: &[IdentifiedPoint]) -> Figur
         .panel(panel("with the current", |p| &p.steps.with_current))
 }
 
-fn poles_figure<'a>(
-    all: impl Iterator<Item = (&'a Demodulation, &'a [IdentifiedPoint])>,
-) -> Figure {
-    let arc = (0..=60)
-        .map(|n| {
-            let x: f64 = 0.004 * f64::from(n - 30);
-            (x.cos(), x.sin())
-        })
-        .collect();
+fn poles_figure(points: &[IdentifiedPoint]) -> Figure {
+    let turns = (0..=60).map(|n| 0.004 * f64::from(n - 30));
+    let arc = turns.map(|x| (x.cos(), x.sin())).collect();
     let mut panel = Panel::new("real part", "imaginary part").equal_axes();
     let mut add = |name: &str, plant: Model, pii: Option<Pii>| {
         let poles = pii.and_then(|pii| plant.closed_loop(pii));
@@ -340,7 +308,7 @@ fn poles_figure<'a>(
         panel.series.push(Series::points(name, points));
     };
     add("Table 6, printed controller", Model::printed(DESIGN_ROW), Some(PRINTED_PII));
-    for (demodulation, points) in all {
+    for (demodulation, points) in DEMODULATIONS.iter().zip(points.chunks(TABLE_6.len())) {
         let plant = points[DESIGN_ROW].models[1];
         add(&format!("{}, designed", demodulation.name), plant, plant.design().map(|d| d.0));
     }
@@ -348,7 +316,26 @@ fn poles_figure<'a>(
     Figure::new("poles", "Poles of the closed loop at iq = 1.5 A", "Eq. 3.44").panel(panel)
 }
 
-fn remarks() -> Vec<String> {
+/// Smallest and largest fit of Eq. 3.43, %.
+fn fits(points: &[IdentifiedPoint]) -> (f64, f64) {
+    let fits = points.iter().map(|p| p.models[1].fit(&p.record).1);
+    fits.fold((f64::MAX, f64::MIN), |(least, most), fit| (least.min(fit), most.max(fit)))
+}
+
+/// Largest distance of the poles from those of Table 6, in either part.
+fn distance(points: &[IdentifiedPoint]) -> f64 {
+    let of = |(row, p): (usize, &IdentifiedPoint)| {
+        let [ours, printed] = [&p.models[1], &Model::printed(row)].map(Model::poles);
+        let apart = ours?[0] - printed?[0];
+        Some(apart.re.abs().max(apart.im.abs()))
+    };
+    points.iter().enumerate().filter_map(of).fold(0.0, f64::max)
+}
+
+fn remarks(points: &[IdentifiedPoint]) -> Vec<String> {
+    let mut all = points.chunks(TABLE_6.len());
+    let literal = all.next().unwrap_or_default();
+    let [first, second] = [literal, all.next().unwrap_or_default()].map(fits);
     vec![
         "Two plants. With the encoder the current stays where it is when the injection axis is turned, so \
          the part of the saliency that belongs to the current is seen to turn, together with that of \
@@ -362,14 +349,20 @@ fn remarks() -> Vec<String> {
          leaking through the band-pass: with the current turning, its gain is zero. That is why an \
          identification that looks sound made a loop that cannot track."
             .into(),
-        "Eq. 3.43 fits the literal chain alone (its step response is that of the post-processing filter; \
-         its poles \
-         come out within 0.015 of those of Table 6, in either part). Where the carrier is \
-         seen, a step of the axis shows at once, before the carrier current has turned: for 2 samples, \
-         and in the rectified chain for the 8.8 samples of the band-pass as well, which it rotates \
-         afterwards. The signal answers to how fast the axis turns, not only to where it is. Eq. 3.43 has \
-         no zero for that: its fit is poor there and its gain too high (compare with the steps). In the \
-         loop it is a damping, without which the printed z_s = 0.90 loses the angle (see demodulators)."
-            .into(),
+        format!(
+            "Eq. 3.43 fits no chain well: the literal one by {:.0} to {:.0} %, whose step response is that of the \
+             post-processing filter and whose poles come out within {:.3} of those of Table 6 in either part; the \
+             rectified one by {:.0} to {:.0} %. Where the carrier is \
+             seen, a step of the axis shows at once, before the carrier current has turned: for 2 samples, \
+             and in the rectified chain for the 8.8 samples of the band-pass as well, which it rotates \
+             afterwards. The signal answers to how fast the axis turns, not only to where it is. Eq. 3.43 has \
+             no zero for that: its gain comes out too high (compare with the steps). In the \
+             loop it is a damping, without which the printed z_s = 0.90 loses the angle (see demodulators).",
+            first.0,
+            first.1,
+            distance(literal),
+            second.0,
+            second.1,
+        ),
     ]
 }

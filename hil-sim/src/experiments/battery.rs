@@ -1,4 +1,4 @@
-//! The battery: runs that shake the angle, on any simulated motor and with any drive.
+//! The battery: runs that shake the angle, on any simulated motor.
 //!
 //! The runs and the verdicts are those of a study of this drive on an independent saturating motor: what counts is not
 //! the error alone but whether the drive notices. A run is *lost* when the error is beyond 45° at any time, *wrong* when
@@ -7,7 +7,6 @@
 
 mod bench;
 mod disturbed;
-mod drive;
 mod kind;
 mod run;
 mod summary;
@@ -16,8 +15,7 @@ mod trial;
 use std::sync::OnceLock;
 
 pub(super) use bench::{Bench, Moment};
-pub use drive::{Condition, DriveUnderTest, Purpose};
-pub use kind::{KINDS, Kind, nominal_limit_a, torque_nm};
+pub use kind::{KINDS, Kind, allowed_a, nominal_limit_a, torque_nm};
 pub(super) use kind::{LoadTorque, Part, Shaft};
 pub(super) use run::{LONGEST_START_S, bring_up, follow};
 pub use run::{learned, trial};
@@ -31,7 +29,7 @@ use drive_core::settings::AngleSource;
 use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, check_model, plant_settings};
+use crate::config::{Config, built, check_model, plant_settings};
 use crate::error::Error;
 use crate::outcome::Outcome;
 
@@ -96,7 +94,7 @@ impl Battery {
             return Ok(drive);
         }
         let settings = &config.drive;
-        let drive = Drive::new(settings.build().map_err(Error::refused)?);
+        let drive = Drive::new(built(settings)?);
         let tracks = settings.angle_source == AngleSource::Injection
             && settings.injection.demodulator == DemodulatorKind::Synchronous;
         let drive = match config.prepare.learn && tracks {
@@ -142,6 +140,7 @@ impl Study for Battery {
                 let [always, after] = self.sizes(number);
                 disturbed::add(&mut bench, &disturbed::ALWAYS, &always);
                 disturbed::add(&mut bench, &disturbed::AFTER, &after);
+                kind.add(&mut bench);
                 trial(&bench, &plant_settings(&bench), drive, kind, seed)
             }
             Err(fault) => Ok(Trial::refused(kind, seed, *fault)),

@@ -33,13 +33,17 @@ pub struct Bode<'a> {
 
 impl Bode<'_> {
     /// The panels of gain and phase.
-    pub fn panels(&self, responses: &[(&str, &dyn Fn(f64) -> Complex64)]) -> (Panel, Panel) {
+    pub fn panels<N: AsRef<str>, F: Fn(f64) -> Complex64>(
+        &self,
+        responses: impl IntoIterator<Item = (N, F)>,
+    ) -> (Panel, Panel) {
         let mut gain = Panel::new(self.label, "gain (dB)").log_x();
         let mut phase = Panel::new(self.label, "phase (°)").log_x();
         for (name, response) in responses {
             let values: Vec<Complex64> = self.hz.iter().map(|&hz| response(omega_t(hz))).collect();
-            gain = gain.with(Series::line(*name, self.along(values.iter().map(|h| decibels(*h)))));
-            phase = phase.with(Series::line(*name, self.along(unwrapped(&values).into_iter())));
+            let (name, decibels) = (name.as_ref(), values.iter().map(|h| decibels(*h)));
+            gain = gain.with(Series::line(name, self.along(decibels)));
+            phase = phase.with(Series::line(name, self.along(unwrapped(&values).into_iter())));
         }
         (gain, phase)
     }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::statistics::{Study, whole};
 use super::{BENCH, Context, DRIVE, Experiment, machines, steady};
-use crate::config::{Config, PlantModel, plant_settings};
+use crate::config::{Config, PlantModel, built, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Outcome, Table};
 use crate::rig::Rig;
@@ -154,10 +154,8 @@ impl Commission {
         let filed = Circuit::of_plant(&self.config).values();
         let units = ["ohm", "H", "ohm", "H", "s"];
         for (n, ((name, filed), unit)) in filed.into_iter().zip(units).enumerate() {
-            let number = |value: Option<&f64>, places| match value {
-                Some(value) => Cell::fixed(*value, places),
-                None => Cell::from("-"),
-            };
+            let number =
+                |value: Option<&f64>, n| Cell::or_dash(value.map(|value| Cell::fixed(*value, n)));
             let found = record.found.get(n).filter(|_| record.refused.is_none());
             table.row([
                 Cell::from(format!("{name} ({unit})")),
@@ -308,10 +306,8 @@ impl Study for Commission {
             b.refused.is_some().cmp(&a.refused.is_some()).then(b.worst().total_cmp(&a.worst()))
         });
         for (number, record) in by_error.into_iter().take(LISTED) {
-            let errors = (0..names.len()).map(|n| match record.errors.get(n) {
-                Some(error) => Cell::fixed(*error, 2),
-                None => Cell::from("-"),
-            });
+            let error = |n: usize| record.errors.get(n).map(|error| Cell::fixed(*error, 2));
+            let errors = (0..names.len()).map(|n| Cell::or_dash(error(n)));
             let mut row = vec![Cell::from(number.to_string())];
             row.extend(errors);
             row.extend([Cell::fixed(record.seconds, 1), Cell::fixed(record.shaft_deg, 3)]);
@@ -344,7 +340,7 @@ fn session_table(record: &Record) -> Table {
 
 /// Phase margin, degrees, of the current loop of these settings on the true plant.
 fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
-    let [design, _] = settings.build().map_err(Error::refused)?.designs;
+    let [design, _] = built(settings)?.designs;
     // In this circuit the leakage lies on the stator's side, all of it.
     let circuit = EquivalentCircuit {
         r_s: truth.r_s,

@@ -99,10 +99,9 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
     }
     outcome.tables.push(table);
     outcome.figures.push(figure);
-    outcome.remarks.push(
+    outcome.remark(
         "The identified plant has no delay and no current filter in it; with those the same rule \
-         leaves less margin (see pi-design)."
-            .to_owned(),
+         leaves less margin (see pi-design).",
     );
     Ok(outcome)
 }

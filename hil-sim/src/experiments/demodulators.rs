@@ -1,6 +1,6 @@
 //! The five demodulations on one motor.
 
-mod demodulation;
+pub(super) mod demodulation;
 mod signal;
 mod tracked;
 
@@ -61,7 +61,7 @@ impl DemodulationResults {
     }
 
     fn delay_text(&self) -> Cell {
-        self.delay.map_or_else(|| "-".into(), |delay| Cell::fixed(delay, 1))
+        Cell::or_dash(self.delay.map(|delay| Cell::fixed(delay, 1)))
     }
 }
 
@@ -79,9 +79,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let all = || DEMODULATIONS.iter().zip(&found);
     outcome.tables.push(summary(all()));
     outcome.tables.push(seen_table(all()));
-    outcome.tables.push(tracked_table(all()));
+    outcome.tables.push(tracked_table(&found));
     outcome.figures.extend(all().map(|(demodulation, f)| map_figure(demodulation, f)));
-    outcome.figures.push(steps_figure(all()));
+    outcome.figures.push(steps_figure(&found));
     for (demodulation, f) in all() {
         let m = &mut outcome.metrics;
         let (seen, _) = f.at_one_ampere();
@@ -100,7 +100,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             }
         }
     }
-    outcome.remarks = remarks();
+    outcome.remarks = REMARKS.map(String::from).into();
     outcome.remarks.extend(assumptions(context.config));
     Ok(outcome)
 }
@@ -111,8 +111,7 @@ fn findings(
     seed: u64,
 ) -> Result<DemodulationResults, Error> {
     let mut isotropic = config.clone();
-    (isotropic.saliency.a_psi, isotropic.saliency.b1, isotropic.saliency.chi) =
-        (0.0, Some(0.0), 0.0);
+    injection_map::take_saliency(&mut isotropic);
     let map = |saliency: bool| {
         let variant = Variant {
             name: demodulation.name,
@@ -219,9 +218,7 @@ fn seen_table<'a>(all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationR
     table
 }
 
-fn tracked_table<'a>(
-    all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>,
-) -> Table {
+fn tracked_table(found: &[DemodulationResults]) -> Table {
     let mut heads =
         vec!["demodulation".to_owned(), "reference".to_owned(), "delay (samples)".to_owned()];
     heads.push("torque steps, rms (°)".into());
@@ -239,7 +236,7 @@ fn tracked_table<'a>(
              demodulation has its own loop. Delay: from a change of the motor's saliency to the signal, \
              the motor and the sampling included."
         ));
-    for (demodulation, f) in all {
+    for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for ((_, kind), tracked) in KINDS.iter().zip(&f.tracked) {
             let Some(t) = tracked else { continue };
             let mut row = vec![Cell::from(demodulation.name), Cell::from(*kind), f.delay_text()];
@@ -267,11 +264,7 @@ fn tracked_table<'a>(
 fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
     let panel = |family: &[Curve], of: &str| {
         let y = format!("{of} ({})", demodulation.unit());
-        IQ_A.iter()
-            .zip(family)
-            .fold(Panel::new("φ̂₂ − θ (° electrical)", y), |panel, (iq, curve)| {
-                panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
-            })
+        injection_map::panel(y, &IQ_A, family)
     };
     let title = format!("{}: over the injection angle", demodulation.name);
     Figure::new(format!("map_{}", demodulation.key()), title, "Figure 19")
@@ -279,16 +272,14 @@ fn map_figure(demodulation: &Demodulation, f: &DemodulationResults) -> Figure {
         .panel(panel(&f.maps[1], "without"))
 }
 
-fn steps_figure<'a>(
-    all: impl Iterator<Item = (&'a Demodulation, &'a DemodulationResults)>,
-) -> Figure {
+fn steps_figure(found: &[DemodulationResults]) -> Figure {
     let x = "time (s)";
     let mut panels = [
         Panel::new(x, "error, constant reference (°)").y_range(-60.0, 60.0),
         Panel::new(x, "error, learned reference (°)").y_range(-60.0, 60.0),
         Panel::new(x, "error, learned, retuned (°)").y_range(-20.0, 20.0),
     ];
-    for (demodulation, f) in all {
+    for (demodulation, f) in DEMODULATIONS.iter().zip(found) {
         for (panel, tracked) in panels.iter_mut().zip(&f.tracked) {
             if let Some(t) = tracked {
                 panel.series.push(Series::line(demodulation.name, t.steps.error.clone()));
@@ -299,24 +290,19 @@ fn steps_figure<'a>(
     panels.into_iter().fold(Figure::new("steps", title, "Figure 38"), Figure::panel)
 }
 
-fn remarks() -> Vec<String> {
-    vec![
-        "The zero of the printed controller, z_s = 0.90, lies at 100 Hz: below, it is a bare double \
+const REMARKS: [&str; 3] = [
+    "The zero of the printed controller, z_s = 0.90, lies at 100 Hz: below, it is a bare double \
          integrator. The rectified chain runs with it, because it rotates a current that the band-pass \
          has delayed, and so sees how fast the axis turns: a damping (with the rotation put before the \
          band-pass it loses the angle). Envelope and rms-impedance rotate first, which spares them the \
          compensation of that delay, and oscillate or lose the angle with z_s = 0.90; with z_s = 0.995 \
          both track like the rest. A learned reference takes the bias out of whatever sees the \
-         saliency."
-            .into(),
-        "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
+         saliency.",
+    "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
          envelope promising but for spurious oscillations: they are the leak of the fundamental, at \
-         600 Hz and 1200 Hz, and an average over one carrier period takes them out."
-            .into(),
-        "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
+         600 Hz and 1200 Hz, and an average over one carrier period takes them out.",
+    "Ha and Sul inject along the flux. No source gives their filter F3 or the length of the rms \
          filters (`injection.rms_samples`). Their impedance difference is shown as the current \
          difference that it stands for, I²/(√2 V) amperes an ohm (0.94 mA/Ω with 50 V on the \
-         motor of Table 5), and θ is counted from 90° ahead of the flux, so that the maps compare."
-            .into(),
-    ]
-}
+         motor of Table 5), and θ is counted from 90° ahead of the flux, so that the maps compare.",
+];

@@ -38,16 +38,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.tables.push(edges(&filters));
     let errors = precision::errors(&filters, samples, context, &mut outcome);
     outcome.tables.push(errors);
-    outcome.remarks.push(
+    outcome.remark(
         "Tables 7 and 8 hold elliptic designs without a misprint. \"LPF\" is a band stop: it \
          passes everything above 650 Hz and is no filter against noise or aliases. Its gain at dc \
-         is 0.944, which makes every real current 5.9 % too large; the drive divides by it."
-            .to_owned(),
+         is 0.944, which makes every real current 5.9 % too large; the drive divides by it.",
     );
-    outcome.remarks.push(
+    outcome.remark(
         "\"BPF\" attenuates dc by 40 dB only: of a current of 1 A, 10 mA come through, as much as \
-         the signal that the demodulation of the source looks for (see injection-map)."
-            .to_owned(),
+         the signal that the demodulation of the source looks for (see injection-map).",
     );
     let worst = |quantity: &str| {
         let forms = ["direct_1", "direct_2", "transposed_2"]
@@ -68,13 +66,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 fn bode(filters: &[Box<dyn ComparedFilter + Send>]) -> Figure {
     let hz = frequencies(10.0, 2990.0, 1500);
     let bode = Bode { hz: &hz, label: "frequency (Hz)", shown: |hz| hz };
-    let responses: Vec<_> = filters
-        .iter()
-        .map(|filter| (filter.name(), |omega_t: f64| filter.sections(omega_t)))
-        .collect();
-    let responses: Vec<(&str, &dyn Fn(f64) -> Complex64)> =
-        responses.iter().map(|(name, f)| (*name, f as &dyn Fn(f64) -> Complex64)).collect();
-    let (gain, phase) = bode.panels(&responses);
+    let (gain, phase) =
+        bode.panels(filters.iter().map(|f| (f.name(), |omega_t: f64| f.sections(omega_t))));
     Figure::new("bode", "The digital filters, as the drive computes them", "Figure 30")
         .panel(gain.y_range(-100.0, 5.0))
         .panel(phase)

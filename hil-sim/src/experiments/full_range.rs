@@ -1,7 +1,7 @@
 //! The whole range of the speed: torque, load steps, ramps, wrong parameters, turned flux, starts on a turning shaft, and the
 //! dc link, per region of the speed.
 //!
-//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless `sequence.i_d` says otherwise, or the
+//! Model A runs with a direct current of 1.4 A, the energy model with high flux, unless the settings say otherwise, or the
 //! drive commissions itself; it learns its tables at that current first.
 
 mod case;
@@ -22,7 +22,7 @@ use super::commission::commissioned;
 use super::statistics::{Study, whole};
 use super::torque::assumptions;
 use super::{BENCH, Context, DRIVE, Experiment};
-use crate::config::{Config, FluxLevel, PlantModel, RangeKind, check_model, plant_settings};
+use crate::config::{Config, FluxLevel, PlantModel, RangeKind, built, check_model, plant_settings};
 use crate::error::Error;
 use crate::outcome::Outcome;
 
@@ -40,7 +40,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 /// Runs of a kind in a region, unless `runs` says otherwise.
 const RUNS: u32 = 10;
 /// Direct current of model A, A on the dissertation's motor.
-const I_D_A: f64 = 1.4;
+pub const I_D_A: f64 = 1.4;
 /// Settings of the drive for the range, where they are not set: largest speed, speed that trips, rpm; ramp, rpm/s; of four
 /// poles.
 const LIMIT_RPM: f64 = 3600.0;
@@ -68,6 +68,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
     drive.limits.speed_rpm = drive.limits.speed_rpm.or(trip);
     if drive.sequence.i_d.is_none() {
         match config.model.plant {
+            PlantModel::A if drive.sequence.flux == Flux::High => {}
             PlantModel::A => drive.sequence.i_d = Some(i_d),
             _ => (drive.sequence.flux, config.model.flux_level) = (Flux::High, FluxLevel::High),
         }
@@ -82,7 +83,7 @@ pub fn for_the_range(config: &Config) -> Result<Config, Error> {
 /// When the settings are refused.
 pub fn learned_drive(config: &Config, seed: u64) -> Result<Result<Drive, u8>, Error> {
     let settings = &config.drive;
-    let drive = Drive::new(settings.build().map_err(Error::refused)?);
+    let drive = Drive::new(built(settings)?);
     let tracks = settings.angle_source == AngleSource::Injection
         && settings.injection.demodulator == DemodulatorKind::Synchronous;
     if tracks { learned(config, &plant_settings(config), drive, seed) } else { Ok(Ok(drive)) }

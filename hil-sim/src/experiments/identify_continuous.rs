@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::identification::Parameters;
 use crate::identification::study::MODELS;
 use crate::outcome::{Cell, Entry, Outcome, Table};
+use crate::stats::Stats;
 
 /// Tables 2, 3 and 5.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -52,17 +53,14 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "ω_m in Tables 2 and 3 (0.20 to 0.69 %) cannot be reproduced: Eq. 42 itself is 1.19, \
          2.38 and 4.73 % low at 50, 100 and 200 µs on this machine without any noise, and the \
          error of f_1b printed in Table 1 is up to twelve times larger than that of the speed that \
-         is proportional to it. Tables 2 and 3 are not of the same runs, or not by Eq. 42."
-            .to_owned(),
+         is proportional to it. Tables 2 and 3 are not of the same runs, or not by Eq. 42.",
         "r_s in Table 3 and in the S_s columns of Table 5 (4 to 20 %) is not reproduced: with \
          this signal it comes out three to seven times better at 50 and 100 µs. So is, two to \
          nine times, τ_r in the S_s columns of Table 5. τ_r by Model C at 375 rad/s and \
-         200 µs comes out two to six times worse."
-            .to_owned(),
+         200 µs comes out two to six times worse.",
         "The speeds of B and C agree to four digits in all six printed pairs: the columns B were \
-         computed from the coefficients of Model A. Here Model B is its own regression (Eq. 31)."
-            .to_owned(),
-    ]);
+         computed from the coefficients of Model A. Here Model B is its own regression (Eq. 31).",
+    ].map(String::from));
     Ok(outcome)
 }
 
@@ -73,9 +71,7 @@ fn means(all: &[(Entry, f64)], metrics: &mut crate::outcome::Metrics) -> Table {
     for model in MODELS {
         let mean = |parameter: &str| {
             let of = |e: &Entry| e.model == model && e.parameter == parameter;
-            let values: Vec<f64> =
-                all.iter().filter(|(e, _)| of(e)).map(|(e, _)| e.ours_pct).collect();
-            values.iter().sum::<f64>() / values.len() as f64
+            Stats::of(all.iter().filter(|(e, _)| of(e)).map(|(e, _)| e.ours_pct)).mean()
         };
         let means = Parameters::NAMES.map(mean);
         let key = model.to_lowercase();

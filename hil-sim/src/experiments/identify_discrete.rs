@@ -42,9 +42,8 @@ pub(super) fn both(
 pub(super) fn table(title: &str, entries: &[(Entry, f64)]) -> Table {
     let mut table = Table::new(title, &[]);
     for (entry, literal) in entries {
-        let number = |value: Option<f64>| {
-            value.map_or_else(|| Cell::from("-"), |value| Cell::significant(value, 3))
-        };
+        let number =
+            |value: Option<f64>| Cell::or_dash(value.map(|value| Cell::significant(value, 3)));
         table.record([
             ("model", Cell::from(entry.model)),
             ("signal", Cell::from(entry.signal)),
@@ -94,14 +93,12 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.entries = all.iter().map(|(entry, _)| *entry).collect();
     outcome.remarks.extend([
         "h_1b is never estimated: it is 3e-5 of h_1a. The claim that the errors of all others stay \
-         below 1 % at high speed does not hold in Table 1 itself (f_1b with S_g: 3.1 to 8.4 %)."
-            .to_owned(),
+         below 1 % at high speed does not hold in Table 1 itself (f_1b with S_g: 3.1 to 8.4 %).",
         "Not reproduced by either noise: h_1b and h_0b with S_s at 100 and 200 µs in Table 1, three \
-         to seven times worse here; they fix the small phase of h_1, which depends on how the tones \
+         to eight times worse here; they fix the small phase of h_1, which depends on how the tones \
          of the Schroeder signal are phased and laid on the axes, and that is not printed. No one \
          level of noise fits all: the S_s columns of Table 4 agree with the printed one, Table 1 \
-         with half of it."
-            .to_owned(),
-    ]);
+         with half of it.",
+    ].map(String::from));
     Ok(outcome)
 }

@@ -18,19 +18,18 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 fn run(_: &Context<'_>) -> Result<Outcome, Error> {
-    let heads = ["quantity", "h (µs)", "printed", "PX", "PX/printed", "rbv", "rbv/printed"];
-    let mut table = Table::new("Deterministic ratios", &heads);
+    let mut table = Table::new("Deterministic ratios", &[]);
     let mut outcome = Outcome::default();
     let (mut px, mut rbv) = (0.0f64, 0.0f64);
     for ratio in ratios::all() {
-        table.row([
-            Cell::from(ratio.quantity),
-            Cell::fixed(1e6 * ratio.h, 0),
-            Cell::significant(ratio.printed, 3),
-            Cell::significant(ratio.px, 3),
-            Cell::fixed(ratio.px / ratio.printed, 3),
-            Cell::significant(ratio.rbv, 3),
-            Cell::fixed(ratio.rbv / ratio.printed, 3),
+        table.record([
+            ("quantity", Cell::from(ratio.quantity)),
+            ("h (µs)", Cell::fixed(1e6 * ratio.h, 0)),
+            ("printed", Cell::significant(ratio.printed, 3)),
+            ("PX", Cell::significant(ratio.px, 3)),
+            ("PX/printed", Cell::fixed(ratio.px / ratio.printed, 3)),
+            ("rbv", Cell::significant(ratio.rbv, 3)),
+            ("rbv/printed", Cell::fixed(ratio.rbv / ratio.printed, 3)),
         ]);
         px = px.max((ratio.px / ratio.printed).ln().abs());
         rbv = rbv.max((ratio.rbv / ratio.printed).ln().abs());
@@ -42,27 +41,23 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
          have the inverse ratio of their values. (1 - f_11)/2: what separates σ l_s by Models B \
          and C in Tables 2 and 3. The error of τ_r by Model B is almost all bias.",
     ));
-    let mut machines = Table::new(
-        "Machines",
-        &["machine", "r_s (Ω)", "τ_r (s)", "σ l_s (H)", "l_s (H)", "r_s/(σ l_s) (1/s)"],
-    );
+    let mut machines = Table::new("Machines", &[]);
     for (name, machine) in [("PX", Parameters::PX), ("rbv", Parameters::RBV)] {
         let Parameters { r_s, tau_r, sigma_l_s, l_s, .. } = machine;
-        machines.row([
-            Cell::from(name),
-            Cell::fixed(r_s, 3),
-            Cell::fixed(tau_r, 5),
-            Cell::fixed(sigma_l_s, 6),
-            Cell::fixed(l_s, 4),
-            Cell::fixed(r_s / sigma_l_s, 1),
+        machines.record([
+            ("machine", Cell::from(name)),
+            ("r_s (Ω)", Cell::fixed(r_s, 3)),
+            ("τ_r (s)", Cell::fixed(tau_r, 5)),
+            ("σ l_s (H)", Cell::fixed(sigma_l_s, 6)),
+            ("l_s (H)", Cell::fixed(l_s, 4)),
+            ("r_s/(σ l_s) (1/s)", Cell::fixed(r_s / sigma_l_s, 1)),
         ]);
     }
     outcome.tables.push(machines);
-    outcome.remarks.push(
+    outcome.remark(
         "The simulated tables were not made with the machine of Table 6 (rbv). PX is inferred from \
          the tables; the paper does not name it. Errors in % do not depend on the level of voltage \
-         or impedance, so only r_s/(σ l_s), τ_r and l_s/(σ l_s) can be inferred at all."
-            .to_owned(),
+         or impedance, so only r_s/(σ l_s), τ_r and l_s/(σ l_s) can be inferred at all.",
     );
     Ok(outcome)
 }

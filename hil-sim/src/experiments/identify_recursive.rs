@@ -112,10 +112,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
             ("speed (rad/s)", Cell::fixed(speed, 1)),
             ("r_s converges (s)", Cell::fixed(times[0], 3)),
             ("τ_r converges (s)", Cell::fixed(times[1], 3)),
-            (
-                "paper, worst (s)",
-                paper.map_or_else(|| Cell::from("-"), |paper| Cell::fixed(paper, 1)),
-            ),
+            ("paper, worst (s)", Cell::or_dash(paper.map(|paper| Cell::fixed(paper, 1)))),
             ("speed, f32 − f64 (rad/s rms)", Cell::significant(noisy.speed_rms, 2)),
         ]);
         let key = format!("figure_{}", index + 2);
@@ -128,11 +125,10 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         "Convergence without noise, into 10 % of the final value by a moving median over 20 ms, \
          from a machine in its steady state; the input filters start at rest.",
     ));
-    outcome.remarks.push(
+    outcome.remark(
         "The figures of the paper are measured on the machine of Table 6; here the simulated \
          machine PX runs at the same speeds, with a tenth of the noise of section 5. The plain \
-         recursion as printed in textbooks loses its covariance within 20 ms in f32 and f64."
-            .to_owned(),
+         recursion as printed in textbooks loses its covariance within 20 ms in f32 and f64.",
     );
     Ok(outcome)
 }

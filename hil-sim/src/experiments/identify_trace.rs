@@ -210,10 +210,9 @@ fn outcome(
                     .with(Series::line("β", line(&|k| difference(k).im))),
             ),
     );
-    outcome.remarks.push(
+    outcome.remark(
         "The terminals determine four parameters. A T circuit with L_ls = L_lr has L_m = √(L_s (L_s − σL_s)), and \
-         r_r = L_s/τ_r."
-            .into(),
+         r_r = L_s/τ_r.",
     );
     outcome
 }

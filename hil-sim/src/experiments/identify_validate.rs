@@ -52,8 +52,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let c = [&by_sg, &by_ss].map(|regression| model_c(&regression.delta, H).array());
         let s = model_s(&by_ss, H, None).map(|fit| fit.parameters.array());
         for (k, name) in Parameters::NAMES.into_iter().enumerate() {
-            let value =
-                |x: Option<f64>| x.map_or_else(|| Cell::from("-"), |x| Cell::significant(x, 3));
+            let value = |x: Option<f64>| Cell::or_dash(x.map(|x| Cell::significant(x, 3)));
             table.record([
                 ("parameter", Cell::from(name)),
                 ("rbv, printed", value((k < 4).then(|| Parameters::RBV.array()[k]))),

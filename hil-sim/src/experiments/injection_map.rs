@@ -10,6 +10,9 @@ use crate::rig::Rig;
 use crate::stats::Stats;
 use drive_core::carrier::DemodulatorKind;
 
+/// Gain of the post-processing filter at dc.
+pub(super) const PP: f64 = 0.944_061;
+
 /// Figure 19.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "injection-map",
@@ -21,8 +24,6 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 const IQ_A: [f64; 7] = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
-/// Gain of the post-processing filter at dc.
-const PP_DC: f64 = 0.944_061;
 /// Step of phi2 - theta, degrees.
 const STEP_DEG: i32 = 15;
 /// Time for the filters to settle at each angle, and to average, s.
@@ -106,10 +107,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
     let mut outcome = Outcome::default();
     for (variant, family) in VARIANTS.iter().zip(curves.chunks(IQ_A.len())) {
-        let mut panel = Panel::new("φ̂₂ − θ (° electrical)", "Δi (mA)");
-        for (iq, curve) in IQ_A.iter().zip(family) {
-            panel = panel.with(Series::line(format!("iq = {iq} A"), curve.clone()));
-        }
+        let panel = panel("Δi (mA)", &IQ_A, family);
         outcome.figures.push(Figure::new(variant.name, variant.title, "Figure 19").panel(panel));
         for (iq, curve) in [(IQ_A[2], &family[2]), (IQ_A[4], &family[4])] {
             let name = format!("{}_at_90_deg_iq_{iq}a_ma", variant.name);
@@ -122,21 +120,31 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let same =
         Stats::of(isotropic.iter().flatten().zip(silent.iter().flatten()).map(|(a, b)| a.1 - b.1));
     outcome.metrics.set("literal_injection_makes_difference_ma", same.largest());
-    outcome.remarks.push(
+    outcome.remarks.extend([
         "As printed, the chain gives the curves of the source (about 10 mA at 90° whatever iq, \
          zeros at atan(iq/id)) on a motor without saliency and without injection: they are the \
          fundamental current leaking through the 40 dB of the band-pass at dc, which says nothing \
-         about the flux. The rectified chain sees the saliency."
-            .into(),
-    );
-    outcome.remarks.push(
+         about the flux. The rectified chain sees the saliency.",
         "The rectified chain, its delay compensated, gives about the same current difference at \
          ±90° for every iq from 1 A on, near 10 mA: the property on which section 3.3 builds. With \
          the delay of the band-pass (8.83 samples) left in, 2.4 mA per ampere are added by the slip \
-         of the flux, with or without saliency."
-            .into(),
-    );
+         of the flux, with or without saliency.",
+    ].map(String::from));
     Ok(outcome)
+}
+
+/// A family of curves, one a torque current, A.
+pub(super) fn panel(y: impl Into<String>, iq_a: &[f64], family: &[Curve]) -> Panel {
+    iq_a.iter()
+        .zip(family)
+        .fold(Panel::new("φ̂₂ − θ (° electrical)", y), |panel, (iq, curve)| {
+            panel.with(Series::line(format!("iq = {iq} A"), curve.clone()))
+        })
+}
+
+/// Makes the motor one without saliency.
+pub(super) fn take_saliency(config: &mut Config) {
+    (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, Some(0.0), 0.0);
 }
 
 /// Sweeps the injection angle with the encoder as angle source and the shaft locked. Where the carrier
@@ -146,7 +154,7 @@ pub(super) fn curve(config: &Config, seed: u64, variant: Variant, iq: f64) -> Re
     config.drive.injection.demodulator = variant.demodulator;
     config.drive.ignore_delays = !variant.compensate;
     if !variant.saliency {
-        (config.saliency.a_psi, config.saliency.b1, config.saliency.chi) = (0.0, Some(0.0), 0.0);
+        take_saliency(&mut config);
     }
     if !variant.inject {
         config.drive.injection.amplitude_v = Some(0.0);
@@ -198,7 +206,7 @@ fn table(curves: &[Curve], id: f64) -> Table {
     for (k, iq) in IQ_A.iter().enumerate() {
         table.record([
             ("iq (A)", Cell::fixed(*iq, 1)),
-            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP_DC * id, 3)),
+            ("leak predicts at -90° (mA)", Cell::fixed(2f64.sqrt() * 10.0 * PP * id, 3)),
             ("as printed, isotropic, at -90° (mA)", Cell::fixed(at(&curves[n + k], -90.0), 3)),
             ("leak predicts zero at (°)", Cell::fixed(-(iq / id).atan().to_degrees(), 2)),
             ("zero found at (°)", Cell::fixed(zero(&curves[n + k]), 2)),

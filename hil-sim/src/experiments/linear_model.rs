@@ -81,7 +81,7 @@ impl LinearModel {
         settings: &Settings,
         i_q: f64,
     ) -> Result<Self, Error> {
-        let built: Coefficients = settings.build().map_err(Error::refused)?;
+        let built: Coefficients = crate::config::built(settings)?;
         let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
         let circuit = tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr };
         let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;

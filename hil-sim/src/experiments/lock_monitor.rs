@@ -210,28 +210,26 @@ impl LockMonitor {
         m.set("false_alarm_rate_95", bound);
         m.set("healthy_loss_max", largest(|r| r.largest_loss));
         m.set("healthy_error_max_deg", largest(|r| r.largest_error));
-        let heads = ["runs", "false alarms", "rate per run, 95 % bound", "largest loss seen"];
-        let mut table = Table::new("False alarms", &heads).note(
+        let mut table = Table::new("False alarms", &[]).note(
             "A quarter each: constant torque within 150 rpm, within 300 rpm, the torque reversed \
              within 150 rpm, a load step of 0.6 Nm on a free shaft whose speed is regulated.",
         );
-        table.row([
-            Cell::fixed(runs.len() as f64, 0),
-            Cell::fixed(alarms.len() as f64, 0),
-            Cell::significant(bound, 2),
-            Cell::fixed(largest(|r| r.largest_loss), 2),
+        table.record([
+            ("runs", Cell::fixed(runs.len() as f64, 0)),
+            ("false alarms", Cell::fixed(alarms.len() as f64, 0)),
+            ("rate per run, 95 % bound", Cell::significant(bound, 2)),
+            ("largest loss seen", Cell::fixed(largest(|r| r.largest_loss), 2)),
         ]);
         outcome.tables.push(table);
         if !alarms.is_empty() {
-            let heads = ["seed", "kind", "iq (A)", "speed (rpm)", "fault"];
-            let mut table = Table::new("Every false alarm", &heads);
+            let mut table = Table::new("Every false alarm", &[]);
             for r in alarms {
-                table.row([
-                    Cell::from(r.case.seed.to_string()),
-                    Cell::from(r.kind.name()),
-                    Cell::fixed(r.case.iq, 3),
-                    Cell::fixed(r.case.rpm, 1),
-                    Cell::from(r.fault.map(|f| f.to_string()).unwrap_or_default()),
+                table.record([
+                    ("seed", Cell::from(r.case.seed.to_string())),
+                    ("kind", Cell::from(r.kind.name())),
+                    ("iq (A)", Cell::fixed(r.case.iq, 3)),
+                    ("speed (rpm)", Cell::fixed(r.case.rpm, 1)),
+                    ("fault", Cell::from(r.fault.map(|f| f.to_string()).unwrap_or_default())),
                 ]);
             }
             outcome.tables.push(table);
@@ -253,16 +251,14 @@ impl LockMonitor {
         let before = trials.iter().filter(|t| t.late_s <= 0.0).count();
         outcome.metrics.set("over_speed_late", late.len() as f64);
         outcome.metrics.set("over_speed_latest_s", latest);
-        let heads =
-            ["limit (rpm)", "trials", "off before the limit", "latest after it (s)", "not in time"];
-        let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &heads)
+        let mut table = Table::new("Shaft driven past the limit, 50 to 2000 rpm/s", &[])
             .note("The drive goes by its estimate, which is 50 rpm off at most; and a shaft that is sped up against the torque of the drive loses its flux earlier.");
-        table.row([
-            Cell::fixed(limit, 0),
-            Cell::fixed(trials.len() as f64, 0),
-            Cell::fixed(before as f64, 0),
-            Cell::fixed(latest, 3),
-            Cell::fixed(late.len() as f64, 0),
+        table.record([
+            ("limit (rpm)", Cell::fixed(limit, 0)),
+            ("trials", Cell::fixed(trials.len() as f64, 0)),
+            ("off before the limit", Cell::fixed(before as f64, 0)),
+            ("latest after it (s)", Cell::fixed(latest, 3)),
+            ("not in time", Cell::fixed(late.len() as f64, 0)),
         ]);
         outcome.tables.push(table);
         if !late.is_empty() {
@@ -277,8 +273,7 @@ impl LockMonitor {
 
     fn starts(&self, all: &[StartTrial], outcome: &mut Outcome) {
         let each = self.starts_each();
-        let heads = ["speed (rpm)", "of each", "starts", "relocks", "accepted at a wrong angle"];
-        let mut table = Table::new("Starts and relocks accepted on a turning shaft", &heads);
+        let mut table = Table::new("Starts and relocks accepted on a turning shaft", &[]);
         let (mut wrong_all, mut refused_at_rest) = (0, 0);
         for (rpm, trials) in START_RPM.into_iter().zip(all.chunks(2 * each)) {
             let (starts, relocks) = trials.split_at(each);
@@ -288,12 +283,12 @@ impl LockMonitor {
                 refused_at_rest = 2 * each - accepted(starts) - accepted(relocks);
             }
             let count = |n: usize| Cell::fixed(n as f64, 0);
-            table.row([
-                Cell::fixed(rpm, 0),
-                count(each),
-                count(accepted(starts)),
-                count(accepted(relocks)),
-                count(wrong),
+            table.record([
+                ("speed (rpm)", Cell::fixed(rpm, 0)),
+                ("of each", count(each)),
+                ("starts", count(accepted(starts))),
+                ("relocks", count(accepted(relocks))),
+                ("accepted at a wrong angle", count(wrong)),
             ]);
             wrong_all += wrong;
         }

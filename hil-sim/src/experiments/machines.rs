@@ -202,37 +202,25 @@ impl Study for Machines {
             m.set("worst_rms_deg", *worst);
             m.set("largest_deg", machines.iter().map(Machine::largest).fold(0.0, f64::max));
         }
-        let heads = [
-            "r_s (ohm)",
-            "r_r (ohm)",
-            "σL_s (mH)",
-            "L_m (mH)",
-            "a (%)",
-            "b (%/A)",
-            "carrier (V)",
-            "worst rms (°)",
-            "largest (°)",
-            "verdict",
-        ];
         let title = if self.draws { "Machines, the worst first" } else { "The motor" };
-        let mut table = Table::new(title, &heads).note(format!(
+        let mut table = Table::new(title, &[]).note(format!(
             "Good: every run within {}° rms and {}° at most, none lost.",
             GOOD_DEG.0, GOOD_DEG.1
         ));
         for machine in machines.iter().take(LISTED) {
             let (motor, drive) = (&machine.config.motor, &machine.config.drive);
             let saliency = plant_settings(&machine.config).saliency;
-            table.row([
-                Cell::fixed(motor.r_s, 3),
-                Cell::fixed(motor.r_r, 3),
-                Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2),
-                Cell::fixed(1e3 * motor.l_m, 1),
-                Cell::fixed(100.0 * saliency.a_psi, 2),
-                Cell::fixed(100.0 * saliency.b1, 2),
-                Cell::fixed(drive.carrier_v().into(), 1),
-                Cell::fixed(machine.rms(), 2),
-                Cell::fixed(machine.largest(), 2),
-                Cell::from(machine.verdict()),
+            table.record([
+                ("r_s (ohm)", Cell::fixed(motor.r_s, 3)),
+                ("r_r (ohm)", Cell::fixed(motor.r_r, 3)),
+                ("σL_s (mH)", Cell::fixed(1e3 * f64::from(drive.motor.sigma_l_s()), 2)),
+                ("L_m (mH)", Cell::fixed(1e3 * motor.l_m, 1)),
+                ("a (%)", Cell::fixed(100.0 * saliency.a_psi, 2)),
+                ("b (%/A)", Cell::fixed(100.0 * saliency.b1, 2)),
+                ("carrier (V)", Cell::fixed(drive.carrier_v().into(), 1)),
+                ("worst rms (°)", Cell::fixed(machine.rms(), 2)),
+                ("largest (°)", Cell::fixed(machine.largest(), 2)),
+                ("verdict", Cell::from(machine.verdict())),
             ]);
         }
         outcome.tables.push(table);

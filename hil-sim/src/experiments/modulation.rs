@@ -214,14 +214,10 @@ fn accuracy(inverter: &Inverter, outcome: &mut Outcome) -> Table {
     let mut table = Table::new("The modulator of the drive", &["check", "largest", "unit"]);
     let count = inverter.vdc / inverter.top;
     for (check, value, unit) in [
-        (
-            "mean voltage of a period against the one wanted, inside the circle".to_owned(),
-            error,
-            "V",
-        ),
-        ("angle of a voltage that is three times too long, after limiting".to_owned(), turned, "°"),
-        ("on-times T1 and T2 against those by Table 2".to_owned(), time_us, "µs"),
-        ("for comparison: one count of the timer".to_owned(), count, "V"),
+        ("mean voltage of a period against the one wanted, inside the circle", error, "V"),
+        ("angle of a voltage that is three times too long, after limiting", turned, "°"),
+        ("on-times T1 and T2 against those by Table 2", time_us, "µs"),
+        ("for comparison: one count of the timer", count, "V"),
     ] {
         table.row([Cell::from(check), Cell::significant(value, 2), Cell::from(unit)]);
     }

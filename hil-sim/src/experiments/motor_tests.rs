@@ -62,8 +62,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
 
 fn readings_table(ours: &Readings) -> Table {
     let printed = Readings::PRINTED;
-    let mut table =
-        Table::new("Readings", &["test", "reading", "printed", "simulated motor", "ratio"]);
+    let mut table = Table::new("Readings", &[]);
     let rows = [
         ("direct current", "voltage (V)", printed.dc.0, ours.dc.0),
         ("", "current (A)", printed.dc.1, ours.dc.1),
@@ -76,12 +75,12 @@ fn readings_table(ours: &Readings) -> Table {
         ("", "|z| (Ω)", printed.no_load_impedance(), ours.no_load_impedance()),
     ];
     for (test, reading, printed, ours) in rows {
-        table.row([
-            Cell::from(test),
-            Cell::from(reading),
-            Cell::significant(printed, 4),
-            Cell::significant(ours, 4),
-            Cell::fixed(ours / printed, 3),
+        table.record([
+            ("test", Cell::from(test)),
+            ("reading", Cell::from(reading)),
+            ("printed", Cell::significant(printed, 4)),
+            ("simulated motor", Cell::significant(ours, 4)),
+            ("ratio", Cell::fixed(ours / printed, 3)),
         ]);
     }
     table

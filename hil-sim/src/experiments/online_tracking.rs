@@ -4,7 +4,9 @@ use super::warming_rotor::{WarmingCase, WarmingMoment, run as simulate};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
 use crate::config::Config;
 use crate::error::Error;
-use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::outcome::{Cell, Figure, Metrics, Outcome, Panel, Series, Table};
+use crate::stats::Stats;
+use drive_core::identify::online::RotorEstimate;
 use drive_core::settings::AngleSource;
 
 /// Not in the sources: the recursive estimate in use.
@@ -59,8 +61,8 @@ struct FinalMeans {
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0u32), |(sum, n), x| (sum + x, n + 1));
-    (count > 0).then(|| sum / f64::from(count))
+    let stats = Stats::of(values);
+    (stats.count() > 0).then(|| stats.mean())
 }
 
 fn ending(moments: &[WarmingMoment]) -> FinalMeans {
@@ -106,8 +108,8 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         // The monitor knows one direct current: with it the drive refuses the steps of another.
         config.drive.injection.synchronous.monitor = false;
         config.inverter.residual_v = Some(residual(&config, share));
-        let seconds = SECONDS;
-        let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming: WARMING, seconds };
+        let (warming, seconds) = (WARMING, SECONDS);
+        let case = WarmingCase { speed_rpm, iq_a, excitation, used, warming, seconds };
         simulate(&config, &case, context.seed)
     })?;
     let endings: Vec<FinalMeans> = runs.iter().map(|moments| ending(moments)).collect();
@@ -127,7 +129,7 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or_else(|| Cell::from("too poor"), |value| Cell::fixed(value, decimals))
 }
 
-fn with_encoder(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Table {
+fn with_encoder(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     let mut table = Table::new("With the encoder: τ_r of the warm rotor, used by the drive", &[]);
     let (mut worst, mut angle, mut untracked) = ([0.0f64; 3], 0.0f64, 0.0f64);
     for (point, row) in POINTS.iter().zip(endings.chunks_exact(4)) {
@@ -154,7 +156,7 @@ fn with_encoder(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -
     table.note("Means of the last three of 18 s; r_r grows by 30 % between 4 and 10 s.")
 }
 
-fn without(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Table {
+fn without(endings: &[FinalMeans], metrics: &mut Metrics) -> Table {
     let mut table =
         Table::new("Without a sensor, the magnetising current moved by ±0.1 A at 2 Hz", &[]);
     let (mut tau, mut speed, mut still) = (0.0f64, 0.0f64, 0.0f64);
@@ -186,17 +188,29 @@ fn without(endings: &[FinalMeans], metrics: &mut crate::outcome::Metrics) -> Tab
     table
 }
 
+/// An estimate beside the motor's own value.
+fn traced(
+    label: &str,
+    moments: &[WarmingMoment],
+    estimate: fn(RotorEstimate) -> f32,
+    truth: fn(&WarmingMoment) -> f64,
+) -> Panel {
+    let estimate = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| estimate(e).into()));
+    let truth = moments.iter().map(|m| (m.t, truth(m))).collect();
+    Panel::new("time (s)", label)
+        .with(Series::line("estimate", moments.iter().map(estimate).collect()))
+        .with(Series::reference("motor", truth))
+}
+
+fn time_constant(moments: &[WarmingMoment]) -> Panel {
+    traced("rotor time constant (s)", moments, |e| e.tau_r, |m| m.tau_r)
+}
+
 fn figure(used: &[WarmingMoment], unused: &[WarmingMoment]) -> Figure {
-    let truth = used.iter().map(|m| (m.t, m.tau_r)).collect();
-    let estimate = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
     let angle =
         |moments: &[WarmingMoment]| moments.iter().map(|m| (m.t, m.angle_error_deg)).collect();
     Figure::new("tracking", "The rotor warms up: 150 rpm, 2 A, encoder", "")
-        .panel(
-            Panel::new("time (s)", "rotor time constant (s)")
-                .with(Series::line("estimate", used.iter().map(estimate).collect()))
-                .with(Series::reference("motor", truth)),
-        )
+        .panel(time_constant(used))
         .panel(
             Panel::new("time (s)", "flux angle error (° electrical)")
                 .with(Series::line("tracked", angle(used)))
@@ -205,22 +219,10 @@ fn figure(used: &[WarmingMoment], unused: &[WarmingMoment]) -> Figure {
 }
 
 fn speed_figure(moments: &[WarmingMoment]) -> Figure {
-    let estimate = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.omega_m.into()));
-    let truth = moments.iter().map(|m| (m.t, m.omega_m)).collect();
-    let tau = |m: &WarmingMoment| (m.t, m.estimate.map_or(f64::NAN, |e| e.tau_r.into()));
-    let tau_truth = moments.iter().map(|m| (m.t, m.tau_r)).collect();
     let title = "Speed and rotor time constant without a sensor: 150 rpm, 2 A";
     Figure::new("sensorless", title, "")
-        .panel(
-            Panel::new("time (s)", "speed (electrical rad/s)")
-                .with(Series::line("estimate", moments.iter().map(estimate).collect()))
-                .with(Series::reference("motor", truth)),
-        )
-        .panel(
-            Panel::new("time (s)", "rotor time constant (s)")
-                .with(Series::line("estimate", moments.iter().map(tau).collect()))
-                .with(Series::reference("motor", tau_truth)),
-        )
+        .panel(traced("speed (electrical rad/s)", moments, |e| e.omega_m, |m| m.omega_m))
+        .panel(time_constant(moments))
 }
 
 fn remarks(config: &Config) -> Vec<String> {

@@ -66,10 +66,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
                 .with(Series::line("delays left in", left)),
         ),
     );
-    outcome.remarks.push(
+    outcome.remark(
         "The current is measured 1.53 samples late by the low-pass and 0.18 by the analog filter; \
-         left in, the frame is turned by that many samples times the speed."
-            .into(),
+         left in, the frame is turned by that many samples times the speed.",
     );
     Ok(outcome)
 }

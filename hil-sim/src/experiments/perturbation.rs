@@ -239,29 +239,26 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         };
         of.chunks(10).enumerate().map(mean).collect::<Vec<_>>()
     };
-    let x = "time after the step (s)";
+    let panel = |y: String, measured: &[f64], predicted: &[f64]| {
+        Panel::new("time after the step (s)", y)
+            .with(Series::line("measured", line(measured)))
+            .with(Series::reference("linear model", line(predicted)))
+    };
     for m in &results {
-        figure = figure.panel(
-            Panel::new(x, format!("{} (°)", m.case.name))
-                .with(Series::line("measured", line(&m.angle)))
-                .with(Series::reference("linear model", line(&m.predicted))),
-        );
+        let name = m.case.name;
+        figure = figure.panel(panel(format!("{name} (°)"), &m.angle, &m.predicted));
         if is_load(&m) {
-            speeds = speeds.panel(
-                Panel::new(x, format!("{} (rpm)", m.case.name))
-                    .with(Series::line("measured", line(&m.speed)))
-                    .with(Series::reference("linear model", line(&m.predicted_speed))),
-            );
+            let y = format!("{name} (rpm)");
+            speeds = speeds.panel(panel(y, &m.speed, &m.predicted_speed));
         }
     }
     outcome.figures.push(figure);
     outcome.figures.push(speeds);
     outcome.remarks = assumptions(context.config);
-    outcome.remarks.push(
+    outcome.remark(
         "The model is linear about the operating point after the step: tracking loop with its \
          averages, slip fed forward, current loop, rotor flux, shaft and speed loop. What it leaves \
-         out is the way there: gain, slope of the saliency and flux at other currents."
-            .into(),
+         out is the way there: gain, slope of the saliency and flux at other currents.",
     );
     Ok(outcome)
 }

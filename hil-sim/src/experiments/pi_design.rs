@@ -107,11 +107,12 @@ fn w_plane(plant: FirstOrder, rule: RuleDesign) -> Figure {
     let with_zero = |w: f64| plant.response(w) * pi_response(1.0, rule.z_c, w);
     let grid = frequencies(1.0, 2800.0, 800);
     let bode = Bode { hz: &grid, label: "fictitious frequency v (Hz)", shown: fictitious };
-    let (gain, phase) = bode.panels(&[
+    let responses: [(&str, &dyn Fn(f64) -> Complex64); 3] = [
         ("G (Fig. 23)", &g),
         ("G/(z − 1) (Fig. 24)", &integrated),
         ("G (z − zc)/(z − 1) (Fig. 25)", &with_zero),
-    ]);
+    ];
+    let (gain, phase) = bode.panels(responses);
     let at = |low, high| {
         Series::limit("crossover by the rule", vec![(hz(rule.v), low), (hz(rule.v), high)])
     };
@@ -195,7 +196,7 @@ fn real_loop(design: &CurrentLoopDesign, physical: FirstOrder) -> Figure {
         format!("by the rule, kc = {:.1}", design.rule_k_c),
         format!("used, kc = {:.1}", design.k_c),
     ];
-    let (mut gain, mut phase) = bode.panels(&[(&names[0], &rule), (&names[1], &used)]);
+    let (mut gain, mut phase) = bode.panels([(&names[0], &rule), (&names[1], &used)]);
     // The phases are the same: dashed, the rule does not hide behind the other.
     for panel in [&mut gain, &mut phase] {
         panel.series[0].style = Style::Reference;

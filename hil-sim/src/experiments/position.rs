@@ -123,7 +123,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
          designed as if one of its integrators were not there. Here a PI controller of the speed, \
          designed for 60° of phase margin, stands inside a P controller of the position; the speed \
          it may ask for follows a braking curve and a ramp instead of the filter of Eq. 4.3. Inertia \
-         ({} kg m²) and friction are assumed: the source gives none.",
+         ({} kg m²) and friction are assumed. Eq. 4.1, the identified plant, has a mechanical time constant of \
+         10 ms / −ln 0.95782 = 0.232 s; with 0.322 Nm/A and its gain read in rad/s that is 0.0018 kg m² and 0.0079 Nm s. The \
+         shaft simulated here coasts far longer.",
         context.config.motor.inertia
     ));
     Ok(outcome)

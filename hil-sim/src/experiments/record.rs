@@ -1,29 +1,31 @@
-//! The record: full torque at zero stator frequency for minutes, a slow reversal of the speed under full torque, and how
-//! fast the torque follows.
+//! The record: the torque limit at zero stator frequency for minutes, a slow reversal of the speed under the same torque,
+//! and how fast the torque follows.
 
 mod held;
 mod step;
 
-use drive_core::{Accepted, Command, Mode};
+use drive_core::Command;
 
 use self::held::{Held, Standstill, reversing};
 use self::step::{CurrentLoop, PARTS, Response, measured};
-use super::battery::{nominal_limit_a, torque_nm};
+use super::battery::{allowed_a, nominal_limit_a};
 use super::steady::{bring_up, prepared};
 use super::torque::assumptions;
+use super::torque_limit::TorqueLimit;
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::Config;
+use crate::config::{Config, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
+use crate::plant::Plant;
 use crate::rig::{RATE_HZ, Rig};
 
 /// Not in the source.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "record",
     stands_for: "what section 5.2 leaves open",
-    about: "A drive that has learned: full torque at zero stator frequency for `record.minutes`, a reversal of the speed \
-            under full torque, and a torque step with what takes its time.",
-    uses: &[BENCH, DRIVE, &["record."]],
+    about: "A drive that has learned: at its torque limit: zero stator frequency for `record.minutes`, a reversal of the speed, \
+            and a torque step with what takes its time.",
+    uses: &[BENCH, DRIVE, &["record.", "after."]],
     not: &[FREE_SHAFT, SPEED_LOOP, &["injection.current_saliency"]],
     run,
 };
@@ -33,7 +35,7 @@ const SETTLING_S: f64 = 12.0;
 /// Speed from which, and to whose opposite, the shaft goes, rpm on four poles.
 const REVERSAL_RPM: f64 = 150.0;
 
-/// What is done with full torque, of either sign.
+/// What is done at the torque limit, of either sign.
 #[derive(Clone, Copy, PartialEq)]
 enum Course {
     Standstill,
@@ -66,17 +68,24 @@ impl Course {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut config = context.config.clone();
     config.prepare.learn = true;
-    let rig = prepared(&config.drive, &config, context.seed)?;
+    let mut rig = prepared(&config.drive, &config, context.seed)?;
+    let after = config.after_learning().map_err(Error::refused)?;
+    if plant_settings(&after) != plant_settings(&config) {
+        // The drive is off, and the motor at rest without flux: another one takes its place.
+        rig.plant = Plant::new(&plant_settings(&after), context.seed).map_err(Error::refused)?;
+    }
     let nominal = nominal_limit_a(&config);
-    let limit = limit_a(&rig, nominal)?;
+    let limit = allowed_a(&rig.drive, nominal)?;
+    let torque = TorqueLimit::new(&config, limit);
     let held = context.in_parallel("record", &COURSES, |_, &(course, sign)| {
-        hold(&config, rig.clone(), course, sign * limit)
+        hold(&after, rig.clone(), course, sign * limit)
     })?;
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;
     m.set("limit_a", limit);
     m.set("limit_pct", 100.0 * limit / nominal);
-    m.set("limit_nm", torque_nm(&config, limit));
+    m.set("limit_nm", torque.nm);
+    m.set("limit_pct_of_rated_torque", torque.percent);
     for course in [Course::Standstill, Course::Reversal] {
         let of = || COURSES.iter().zip(&held).filter(|((known, _), _)| *known == course);
         let worst = |value: &dyn Fn(&Held) -> f64| {
@@ -96,34 +105,25 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         m.set(format!("{key}_lost"), f64::from(u8::from(lost)));
     }
     for ((course, sign), held) in COURSES.iter().zip(&held) {
-        let name = || format!("{} at {:+.0} % torque", course.name(), 100.0 * sign);
+        let name = || format!("{} at {:+.2} Nm", course.name(), torque.nm * sign);
         if let Some(fault) = &held.fault {
             outcome.faults.push(format!("{}: {fault}", name()));
         } else if held.is_lost() {
             outcome.faults.push(format!("{}: angle lost", name()));
         }
     }
-    outcome.tables.push(held_table(&config, &held, limit));
+    outcome.tables.push(held_table(&held, &torque));
     for course in [Course::Standstill, Course::Reversal] {
         outcome.figures.push(held_figure(course, &held));
     }
     steps(&config, &rig, limit, &mut outcome)?;
     outcome.remarks = assumptions(&config);
-    outcome.remarks.push(format!(
-        "Full torque is that of the largest torque current that the drive accepts, {limit:.3} A of nominally {nominal:.3} A. \
-         Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux stands at record.flux_deg from phase a."
-    ));
+    outcome.remarks.push(torque.text(&config));
+    outcome.remark(
+        "Zero stator frequency: a dynamometer turns the rotor against the slip, so that the rotor flux stands at record.flux_deg \
+         from phase a.",
+    );
     Ok(outcome)
-}
-
-/// The largest torque current that the drive accepts, A.
-fn limit_a(rig: &Rig, nominal: f64) -> Result<f64, Error> {
-    let mut rig = rig.clone();
-    rig.command(&Command::Start(Mode::Torque))?;
-    Ok(match rig.command(&Command::Torque(nominal as f32))? {
-        Accepted::Limited(taken) => taken.into(),
-        Accepted::AsGiven => nominal,
-    })
 }
 
 /// Starts the drive, gives it its torque, and watches.
@@ -149,8 +149,8 @@ fn hold(config: &Config, mut rig: Rig, course: Course, i_q: f64) -> Result<Held,
     }
 }
 
-fn held_table(config: &Config, all: &[Held], limit: f64) -> Table {
-    let mut table = Table::new("Full torque held", &[]).note(
+fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
+    let mut table = Table::new("The torque limit held", &[]).note(
         "First and last: means over the first and the last tenth of the time. Torque: mean in relation to that of the \
          current; it includes the shape of the error.",
     );
@@ -158,7 +158,8 @@ fn held_table(config: &Config, all: &[Held], limit: f64) -> Table {
         let degrees = |value: f64| Cell::fixed(value, 2);
         table.record([
             ("course", Cell::from(course.name())),
-            ("torque (%)", Cell::fixed(100.0 * sign, 0)),
+            ("torque (Nm)", Cell::fixed(sign * torque.nm, 2)),
+            ("of rated (%)", Cell::fixed(sign * torque.percent, 0)),
             ("mean error (°)", degrees(held.error.mean())),
             ("first (°)", degrees(held.first.mean())),
             ("last (°)", degrees(held.last.mean())),
@@ -166,7 +167,7 @@ fn held_table(config: &Config, all: &[Held], limit: f64) -> Table {
             ("largest (°)", degrees(held.error.largest())),
             (
                 "torque of the command (%)",
-                Cell::fixed(100.0 * held.torque.mean() / torque_nm(config, sign * limit), 2),
+                Cell::fixed(100.0 * held.torque.mean() / (sign * torque.nm), 2),
             ),
             ("speed (rpm)", Cell::fixed(held.speed.mean(), 2)),
             ("end", Cell::from(held.fault.clone().unwrap_or_else(|| "regulates".to_owned()))),
@@ -178,11 +179,11 @@ fn held_table(config: &Config, all: &[Held], limit: f64) -> Table {
 fn held_figure(course: Course, all: &[Held]) -> Figure {
     let x = "time (s)";
     let labels = ["angle error (° electrical)", "torque (Nm)", "speed (rpm)"];
-    let mut figure = Figure::new(course.key(), format!("Full torque, {}", course.name()), "");
+    let mut figure = Figure::new(course.key(), format!("The torque limit, {}", course.name()), "");
     for (n, label) in labels.into_iter().enumerate() {
         let of = COURSES.iter().zip(all).filter(|((known, _), _)| *known == course);
         let panel = of.fold(Panel::new(x, label), |panel, ((_, sign), held)| {
-            let name = format!("{:+.0} %", 100.0 * sign);
+            let name = format!("{:+.0} % of the limit", 100.0 * sign);
             panel.with(Series::line(name, held.lines[n].clone()))
         });
         figure = figure.panel(panel);
@@ -190,7 +191,7 @@ fn held_figure(course: Course, all: &[Held]) -> Figure {
     figure
 }
 
-/// The step to full torque at rest.
+/// The step to the torque limit at rest.
 fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Result<(), Error> {
     let mut rig = rig.clone();
     bring_up(&mut rig, 0.0)?;
@@ -214,7 +215,7 @@ fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Resul
             ("90 % after (ms)", Cell::fixed(ms(response), 2)),
             ("within 2 % after (ms)", Cell::fixed(response.settled_ms(), 2)),
             ("overshoot (%)", Cell::fixed(100.0 * response.overshoot(), 1)),
-            ("cost to 90 % (ms)", cost.map_or(Cell::from("-"), |cost| Cell::fixed(cost, 2))),
+            ("cost to 90 % (ms)", Cell::or_dash(cost.map(|cost| Cell::fixed(cost, 2)))),
         ]);
     };
     row("motor, torque".to_owned(), &torque, None);
@@ -237,7 +238,7 @@ fn steps(config: &Config, rig: &Rig, limit: f64, outcome: &mut Outcome) -> Resul
         lines = lines.with(share(&format!("loop without {name}"), &without));
     }
     outcome.tables.push(table);
-    outcome.figures.push(Figure::new("step", "Step to full torque at rest", "").panel(lines));
+    outcome.figures.push(Figure::new("step", "Step to the torque limit at rest", "").panel(lines));
     Ok(())
 }
 

@@ -209,7 +209,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     for ((i_q, curve), slope) in currents.iter().zip(&curves).zip(slopes) {
         let cell = |e: i32| {
             let found = curve.iter().find(|point| point.0 == f64::from(e));
-            found.map_or_else(|| Cell::from("-"), |point| Cell::fixed(100.0 * point.1, 2))
+            Cell::or_dash(found.map(|point| Cell::fixed(100.0 * point.1, 2)))
         };
         let i_q_text = format!("{:.2}", i_q);
         let head = ("iq (A)".to_owned(), Cell::from(i_q_text.clone()));
@@ -219,7 +219,7 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
         let zeros: Vec<String> = zeros.iter().map(|e| format!("{e:.0}°")).collect();
         table.record([
             ("iq (A)", Cell::from(i_q_text.clone())),
-            ("k (1/rad)", slope.map_or_else(|| Cell::from("-"), |k| Cell::fixed(k, 4))),
+            ("k (1/rad)", Cell::or_dash(slope.map(|k| Cell::fixed(k, 4)))),
             (
                 "share of k without load",
                 match (slope, slopes[0]) {

@@ -57,17 +57,16 @@ impl Study for SaliencyCheck {
 
     fn outcome(&self, _: &Context<'_>, accepted: Vec<bool>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
-        let heads = ["share of the expected saliency", "starts", "accepted", "refused"];
-        let mut table = Table::new("Starts", &heads);
+        let mut table = Table::new("Starts", &[]);
         let runs = self.runs as f64;
         for ((share, name), accepted) in SHARES.iter().zip(accepted.chunks(self.runs)) {
             let count = accepted.iter().filter(|&&a| a).count() as f64;
             outcome.metrics.set(format!("accepted_{name}"), count);
-            table.row([
-                Cell::fixed(*share, 1),
-                Cell::fixed(runs, 0),
-                Cell::fixed(count, 0),
-                Cell::fixed(runs - count, 0),
+            table.record([
+                ("share of the expected saliency", Cell::fixed(*share, 1)),
+                ("starts", Cell::fixed(runs, 0)),
+                ("accepted", Cell::fixed(count, 0)),
+                ("refused", Cell::fixed(runs - count, 0)),
             ]);
         }
         outcome.metrics.set("runs", runs);

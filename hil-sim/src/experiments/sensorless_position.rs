@@ -184,20 +184,18 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     outcome.figures.push(step_figure(&without, &with));
     outcome.figures.push(drift_figure(&held));
     outcome.remarks = assumptions(config);
-    outcome.remarks.push(
+    outcome.remark(
         "The position is the flux angle less the integral of the slip. The injection observes the \
          flux; nothing observes the rotor inside it, so an error of the slip, i_q/(τ_r i_d), is an \
          error of the speed: at 1 A, 1 % of rotor resistance is 2.2 mechanical degrees per second, \
          whatever the estimator. What is not of the resistance comes from the angle error: by one \
-         degree at 1 A the slip is 16 electrical degrees per second off."
-            .into(),
+         degree at 1 A the slip is 16 electrical degrees per second off.",
     );
-    outcome.remarks.push(
+    outcome.remark(
         "Learning with the shaft locked takes the error of the resistance out: the slip that is \
          asked for is then the slip there is, and the reference makes the tracking loop find the same \
          orientation again, with an angle error but without a drift. What remains is what the \
-         resistance changes by afterwards, about 0.4 % a kelvin."
-            .into(),
+         resistance changes by afterwards, about 0.4 % a kelvin.",
     );
     Ok(outcome)
 }

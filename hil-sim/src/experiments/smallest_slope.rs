@@ -99,14 +99,14 @@ fn judged(steps: &[Step], config: &Config) -> Outcome {
          of the motor, from its equations. A step works when every run is accepted and none is lost, silently wrong or stopped.",
     );
     for step in steps {
-        let slope = step.slope.map_or(Cell::from("-"), |slope| Cell::fixed(slope, 4));
+        let slope = Cell::or_dash(step.slope.map(|slope| Cell::fixed(slope, 4)));
         let works = if step.works() { "yes" } else { "no" };
         let limit = step.summary.limit_share;
         let head = [
             ("share", Cell::fixed(step.share, 2)),
             ("slope (1/rad)", slope),
             ("works", Cell::from(works)),
-            ("limit (%)", limit.map_or(Cell::from("-"), |share| Cell::fixed(100.0 * share, 0))),
+            ("limit (%)", Cell::or_dash(limit.map(|share| Cell::fixed(100.0 * share, 0)))),
         ];
         table.record(head.into_iter().chain(step.summary.cells()));
     }

@@ -1,4 +1,4 @@
-//! One run at constant torque current and speed, of which sweep and statistics consist.
+//! One run at constant torque current and speed, of which statistics consist.
 
 use std::f64::consts::TAU;
 

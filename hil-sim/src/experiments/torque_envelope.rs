@@ -1,11 +1,11 @@
 //! The largest torque over speed and dc link, motoring and generating, as the drive gives it.
 
-use super::battery::{
-    Bench, Condition, DriveUnderTest as _, LONGEST_START_S, Purpose, Shaft, bring_up,
-    nominal_limit_a, torque_nm,
-};
-use super::full_range::{for_the_range, learned_drive};
+use drive_core::{Command, Drive, Mode};
+
+use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up, nominal_limit_a, torque_nm};
+use super::full_range::{I_D_A, for_the_range};
 use super::torque::assumptions;
+use super::torque_limit::{TorqueLimit, learned_limit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
 use crate::config::{Config, plant_settings};
 use crate::error::Error;
@@ -45,12 +45,7 @@ type Measured = Option<(f64, f64)>;
 
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let config = for_the_range(context.config)?;
-    let drive = match learned_drive(&config, context.seed)? {
-        Ok(drive) => drive,
-        Err(fault) => {
-            return Err(Error::Refused(format!("the drive does not learn: fault {fault}")));
-        }
-    };
+    let (drive, limit) = learned_limit(&config, context.seed)?;
     let mut points = Vec::new();
     for sign in [1.0, -1.0] {
         for link in LINKS {
@@ -61,34 +56,34 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let measured = context.in_parallel(EXPERIMENT.name, &points, |number, &point| {
         measure(&config, &drive, point, context.seed.wrapping_add(number))
     })?;
-    Ok(outcome(&config, &points, &measured))
+    Ok(outcome(&config, &limit, &points, &measured))
 }
 
 /// Mean torque, Nm, in the direction asked for, and largest phase current, A.
-fn measure(
-    config: &Config,
-    drive: &drive_core::Drive,
-    point: Point,
-    seed: u64,
-) -> Result<Measured, Error> {
+fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Measured, Error> {
     let (load, plant) = (Load::Speed { speed: 0.0 }, plant_settings(config));
     let mut bench = Bench::new(config, &plant, drive, load, seed)?;
-    bench.drive.start(Purpose::Torque).map_err(Error::Refused)?;
-    if bench.wait(LONGEST_START_S) != Condition::Regulating
+    bench.rig.command(&Command::Start(Mode::Torque))?;
+    if !bench.wait(LONGEST_START_S).regulates()
         || !bring_up(&mut bench, Shaft::Held(point.rpm), config)?
     {
         return Ok(None);
     }
     let volts = config.inverter.dc_link_v * point.link;
-    bench.plant.set_dc_link(volts).map_err(Error::refused)?;
+    bench.rig.plant.set_dc_link(volts).map_err(Error::refused)?;
     let most = point.sign * nominal_limit_a(config);
-    bench.drive.torque(most as f32).map_err(Error::Refused)?;
+    bench.torque(most as f32)?;
     bench.counted_from = Some(bench.time() + SETTLING_S);
     let still = bench.watch(SETTLING_S + MEAN_S);
     Ok(still.then(|| (point.sign * bench.torque.mean(), bench.peak_a)))
 }
 
-fn outcome(config: &Config, points: &[Point], measured: &[Measured]) -> Outcome {
+fn outcome(
+    config: &Config,
+    limit: &TorqueLimit,
+    points: &[Point],
+    measured: &[Measured],
+) -> Outcome {
     let mut outcome = Outcome::default();
     let mut table = Table::new("Largest torque", &[]);
     let mut figure = Figure::new("envelope", "Largest torque over the speed", "");
@@ -104,8 +99,8 @@ fn outcome(config: &Config, points: &[Point], measured: &[Measured]) -> Outcome 
             panel = panel.with(Series::line(volts(link), curve.collect()));
         }
         let ends = [0.0, config.rpm(STEP_RPM * f64::from(STEPS))];
-        let limit = ends.map(|rpm| (rpm, of_currents)).to_vec();
-        figure = figure.panel(panel.with(Series::limit("current limit at full flux", limit)));
+        let line = ends.map(|rpm| (rpm, of_currents)).to_vec();
+        figure = figure.panel(panel.with(Series::limit("current limit at full flux", line)));
     }
     for n in 0..=STEPS {
         let rpm = f64::from(n) * STEP_RPM;
@@ -113,14 +108,20 @@ fn outcome(config: &Config, points: &[Point], measured: &[Measured]) -> Outcome 
         for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
             for link in LINKS {
                 let found = at(sign, link).find(|(p, _)| p.rpm == rpm).and_then(|(_, m)| *m);
-                let cell = found.map_or(Cell::from("-"), |(nm, _)| Cell::fixed(nm, 2));
-                row.push((format!("{word}, {} (Nm)", volts(link)), cell));
+                let cell =
+                    |of, digits| Cell::or_dash(found.map(|(nm, _)| Cell::fixed(of * nm, digits)));
+                row.push((format!("{word}, {} (Nm)", volts(link)), cell(1.0, 2)));
+                if link == 1.0 {
+                    row.push((format!("{word} (% of rated)"), cell(100.0 / config.rated_nm(), 0)));
+                }
             }
         }
         table.record(row);
     }
     let m = &mut outcome.metrics;
     m.set("torque_limit_nm", of_currents);
+    m.set("torque_limit_pct_of_rated", limit.percent);
+    m.set("torque_rated_nm", config.rated_nm());
     for (point, nm) in points.iter().zip(measured).filter_map(|(p, m)| Some((p, (*m)?.0))) {
         let word = if point.sign > 0.0 { "motoring" } else { "generating" };
         let link = (point.link * config.inverter.dc_link_v).round();
@@ -132,5 +133,11 @@ fn outcome(config: &Config, points: &[Point], measured: &[Measured]) -> Outcome 
     outcome.tables.push(table.note("-: the drive did not start, or did not regulate to the end."));
     outcome.figures.push(figure);
     outcome.remarks = assumptions(config);
+    outcome.remarks.push(limit.text(config));
+    outcome.remarks.push(format!(
+        "Where neither `sequence.i_d` nor `sequence.flux=high` is set, this experiment sets the direct current with plant a to \
+         {:.2} A.",
+        config.amperes(I_D_A)
+    ));
     outcome
 }

@@ -76,6 +76,11 @@ pub fn least_squares<T: ComplexField<RealField = f64>>(
     Ok(Solution { theta, r, condition, residual })
 }
 
+/// Real and imaginary parts behind each other.
+pub fn parts<'a>(values: impl Iterator<Item = &'a Complex>) -> DVector<f64> {
+    DVector::from_vec(values.flat_map(|z| [z.re, z.im]).collect())
+}
+
 /// In-place scaling of one number.
 trait Unscale {
     fn unscale_mut(&mut self, by: f64);
@@ -142,10 +147,7 @@ impl Data {
                 _ => x.im,
             }
         });
-        let part =
-            |row: usize| if row.is_multiple_of(2) { i[row / 2 + 2].re } else { i[row / 2 + 2].im };
-        let y = DVector::from_fn(2 * count, |row, _| part(row));
-        let theta = least_squares(a, y)?.theta;
+        let theta = least_squares(a, parts(i[2..].iter().take(count)))?.theta;
         Ok(std::array::from_fn(|k| theta[k]))
     }
 
@@ -170,9 +172,7 @@ impl Data {
             };
             if row.is_multiple_of(2) { x.re } else { x.im }
         });
-        let part = |k: usize| if k.is_multiple_of(2) { rows[k / 2].0.re } else { rows[k / 2].0.im };
-        let y = DVector::from_fn(2 * rows.len(), |row, _| part(row));
-        let theta = least_squares(a, y)?.theta;
+        let theta = least_squares(a, parts(rows.iter().map(|row| &row.0)))?.theta;
         let [t1_minus_1, t2, t1_t3_minus_1, t2_t4, t5, t5_t6, t7] =
             std::array::from_fn(|k| theta[k]);
         Ok(FirstOrderTheta { t1_minus_1, t2, t1_t3_minus_1, t2_t4, t5, t5_t6, t7 })

@@ -8,6 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::batch::parts;
 use super::models::NotIdentifiable;
 use super::{Complex, Parameters};
 
@@ -78,11 +79,9 @@ impl Record {
 
     fn residual(&self, x: &DVector<f64>) -> Option<DVector<f64>> {
         let current = self.simulate(x);
-        let apart = |row: usize| {
-            let difference = self.i[row / 2] - current[row / 2];
-            if row.is_multiple_of(2) { difference.re } else { difference.im }
-        };
-        let residual = DVector::from_fn(2 * current.len(), |row, _| apart(row));
+        let apart: Vec<_> =
+            self.i.iter().zip(&current).map(|(i, simulated)| i - simulated).collect();
+        let residual = parts(apart.iter());
         residual.iter().all(|r| r.is_finite()).then_some(residual)
     }
 

@@ -83,11 +83,9 @@ pub fn errors(machine: Parameters, case: Case, noise: Noise, seed: u64, trials: 
     let coefficients = machine.continuous().series(h, 5).current_voltage().array();
     let one = |m: u64| {
         let data = trial.run(seed, m);
-        let regression = data.regression();
-        let none = |reason| (None, [Estimate::none(reason); 4]);
-        let regression = match regression {
+        let regression = match data.regression() {
             Ok(regression) => regression,
-            Err(reason) => return none(reason),
+            Err(reason) => return (None, [Estimate::none(reason); 4]),
         };
         let b = data.first_order().map(|theta| model_b(&theta, h));
         let s = model_s(&regression, h, None).map(|fit| Estimate::from(fit.parameters));

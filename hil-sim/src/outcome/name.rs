@@ -15,6 +15,21 @@ pub fn of_curve(panel: &str, series: &str) -> String {
     joined(&[quantity, series, unit])
 }
 
+/// A name in words: `angle_error_rms_deg` becomes `angle error rms (°)`.
+pub fn words(name: &str) -> String {
+    #[rustfmt::skip] // one a line would fill a page
+    const UNITS: [(&str, &str); 18] = [
+        ("_deg", "°"), ("_pct", "%"), ("_nm", "Nm"), ("_ma", "mA"), ("_ua", "µA"), ("_a", "A"), ("_v", "V"), ("_ms", "ms"),
+        ("_us", "µs"), ("_s", "s"), ("_rpm", "rpm"), ("_hz", "Hz"), ("_wb", "Wb"), ("_ohm", "Ω"), ("_milli", "10⁻³"),
+        ("_db", "dB"), ("_w", "W"), ("_h", "H"),
+    ];
+    let unit = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, unit)));
+    match unit.filter(|(quantity, _)| !quantity.ends_with("_per")) {
+        Some((quantity, unit)) => format!("{} ({unit})", quantity.replace('_', " ")),
+        None => name.replace('_', " "),
+    }
+}
+
 /// A name that `taken` does not have yet: with a number behind it where needed.
 pub fn unique(name: String, taken: &mut Vec<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}_{number}"));
@@ -87,6 +102,13 @@ fn spelled(letter: char) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_become_words_with_their_unit() {
+        assert_eq!(words("angle_error_rms_deg"), "angle error rms (°)");
+        assert_eq!(words("motor_kc_v_per_a"), "motor kc v per a");
+        assert_eq!(words("lost_runs"), "lost runs");
+    }
 
     #[test]
     fn names_end_in_their_unit() {

@@ -80,6 +80,11 @@ pub enum Cell {
 }
 
 impl Cell {
+    /// The cell, or a dash where there is none.
+    pub fn or_dash(cell: Option<Self>) -> Self {
+        cell.unwrap_or_else(|| "-".into())
+    }
+
     /// A number with this many decimals.
     pub fn fixed(value: f64, decimals: usize) -> Self {
         Self::number(value, format!("{value:.decimals$}"))

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::plot;
 use super::prose::{escape, number, prose};
 use crate::error::Error;
-use crate::outcome::{Cell, Metrics, Origin, Outcome, Table};
+use crate::outcome::{Cell, Metrics, Origin, Outcome, Table, name};
 
 /// An experiment and its outcome.
 pub struct Section<'a> {
@@ -28,20 +28,12 @@ pub struct Section<'a> {
 /// [`Error::Internal`] when a figure cannot be drawn.
 pub fn page(title: &str, origin: &Origin, sections: &[Section<'_>]) -> Result<String, Error> {
     let mut body = String::new();
-    if sections.len() > 1 {
-        body.push_str("<nav><h2>Contents</h2>\n<ol>\n");
-        for section in sections {
-            let (name, stands_for) = (escape(section.name), prose(section.stands_for));
-            let about = prose(section.about);
-            let _ = writeln!(
-                body,
-                "<li><a href=\"#{name}\">{name}</a> <span class=\"source\">{stands_for}</span><br>{about}</li>"
-            );
-        }
-        body.push_str("</ol></nav>\n");
+    let folded = sections.len() > 1;
+    if folded {
+        write_results(&mut body, sections);
     }
     for section in sections {
-        write_section(&mut body, section)?;
+        write_section(&mut body, section, folded)?;
     }
     let title = escape(title);
     let tab = match sections {
@@ -74,10 +66,40 @@ fn settings(changed: &[(String, String)]) -> String {
     }
 }
 
-/// Metrics in a list that is too long to stand before the figures.
-const LONG_LIST: usize = 24;
+/// A row for each experiment, those that failed first.
+fn write_results(body: &mut String, sections: &[Section<'_>]) {
+    body.push_str(
+        "<nav><h2>Results</h2>\n<table>\n<thead><tr><th>experiment</th><th>what it shows</th>\
+         <th>main number</th><th class=\"number\"></th><th>lost</th></tr></thead>\n<tbody>\n",
+    );
+    let failed = |section: &&Section<'_>| section.outcome.lost().is_some();
+    let rest = sections.iter().filter(|section| !failed(section));
+    for section in sections.iter().filter(failed).chain(rest) {
+        let (name, metrics) = (escape(section.name), &section.outcome.metrics);
+        let (what, value) = metrics.main().map_or_else(Default::default, |(name, value)| {
+            (escape(&name::words(name)), shown(&Metrics::cell(name, value)))
+        });
+        let lost = match section.outcome.lost() {
+            Some(_) => "<span class=\"lost\">failed</span>".to_owned(),
+            None => metrics.lost(),
+        };
+        let _ = writeln!(
+            body,
+            "<tr><td><a href=\"#{name}\">{name}</a></td>\
+             <td>{} <span class=\"source\">{}</span></td>\
+             <td>{what}</td><td class=\"number\">{value}</td><td>{lost}</td></tr>",
+            prose(section.about),
+            prose(section.stands_for),
+        );
+    }
+    body.push_str("</tbody></table></nav>\n");
+}
 
-fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> {
+/// Metrics before the figures; the rest is folded.
+const FIRST_METRICS: usize = 5;
+
+/// A section; with `folded` all but its head opens on request.
+fn write_section(body: &mut String, section: &Section<'_>, folded: bool) -> Result<(), Error> {
     let outcome = section.outcome;
     let (name, about) = (escape(section.name), prose(section.about));
     let (stands_for, command) = (prose(section.stands_for), escape(&section.command));
@@ -89,11 +111,11 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
     if let Some(lost) = outcome.lost() {
         let _ = writeln!(body, "<p class=\"lost\">{}</p>", prose(&lost));
     }
-    // Long lists do not stand between the reader and the figures.
-    let is_long = outcome.metrics.iter().count() > LONG_LIST;
-    if !is_long {
-        write_metrics(body, &outcome.metrics);
+    if folded {
+        let (plots, tables) = (outcome.figures.len(), outcome.tables.len());
+        let _ = writeln!(body, "<details><summary>{plots} plots, {tables} tables</summary>");
     }
+    write_metrics(body, &outcome.metrics);
     if let Some(steps) = &outcome.steps {
         write_table(body, &Table::of_steps(steps));
     }
@@ -114,9 +136,6 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
     for table in &outcome.tables {
         write_table(body, table);
     }
-    if is_long {
-        write_metrics(body, &outcome.metrics);
-    }
     for (title, text) in &outcome.texts {
         let _ = writeln!(body, "<h3>{}</h3>\n<pre>{}</pre>", escape(title), escape(text));
     }
@@ -127,21 +146,28 @@ fn write_section(body: &mut String, section: &Section<'_>) -> Result<(), Error> 
         }
         body.push_str("</ul>\n");
     }
-    body.push_str("</section>\n");
+    body.push_str(if folded { "</details>\n</section>\n" } else { "</section>\n" });
     Ok(())
 }
 
-/// Names, which end in their unit, and values.
+/// Names in words, and values.
 fn write_metrics(body: &mut String, metrics: &Metrics) {
     if metrics.is_empty() {
         return;
     }
     body.push_str("<dl class=\"metrics\">\n");
-    for (name, value) in metrics.iter() {
-        let (name, value) = (escape(name), shown(&Metrics::cell(name, value)));
-        let _ = writeln!(body, "<div><dt><code>{name}</code></dt><dd>{value}</dd></div>");
+    let all = metrics.iter().count();
+    for (number, (name, value)) in metrics.iter().enumerate() {
+        if number == FIRST_METRICS {
+            let more = format!("{} more numbers", all - number);
+            let _ =
+                writeln!(body, "</dl>\n<details><summary>{more}</summary>\n<dl class=\"metrics\">");
+        }
+        let (words, value) = (escape(&name::words(name)), shown(&Metrics::cell(name, value)));
+        let name = escape(name);
+        let _ = writeln!(body, "<div><dt title=\"{name}\">{words}</dt><dd>{value}</dd></div>");
     }
-    body.push_str("</dl>\n");
+    body.push_str(if all > FIRST_METRICS { "</dl>\n</details>\n" } else { "</dl>\n" });
 }
 
 /// A cell as HTML.

@@ -8,6 +8,7 @@ mod motor;
 mod options;
 mod outside;
 pub mod poison;
+pub mod rom;
 pub mod snapshot;
 
 use std::collections::VecDeque;
@@ -17,6 +18,7 @@ use drive_core::Sample;
 use hil_sim::plant::Plant;
 
 pub use control::{LongestPath, Period};
+pub use debugger::Debugger;
 use motor::Connection;
 pub use motor::Disturbance;
 pub use options::Options;
@@ -102,7 +104,7 @@ impl Board {
             lines: Vec::new(),
             since_log: 0,
             plant,
-            connection: Connection::new(options.power_stage, options.seed),
+            connection: Connection::new(&options),
             sleeping: false,
             hung: false,
             stalled_until: 0,

@@ -165,6 +165,10 @@ fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome
             let ms = AFTER_MS + if promised { bound } else { 0.0 };
             let mut outcome = judge::watch(&mut scene.board, trip_a, ms, promised)
                 .with_context(|| what.clone())?;
+            ensure!(
+                !class.ends || outcome.off_ms.is_some_and(|ms| ms <= bound),
+                "{what}: the outputs stay on"
+            );
             if outcome.off_ms.is_some() {
                 judge::reported(&mut scene.board, whole_start)
                     .with_context(|| format!("{what}; after the end"))?;

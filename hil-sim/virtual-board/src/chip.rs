@@ -29,12 +29,13 @@ use crate::periph::tim1::{Event, Tim1};
 use crate::periph::tim8::Tim8;
 use crate::periph::time_base::TimeBase;
 use crate::periph::usart::Usart;
+use crate::periph::wwdg::Wwdg;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
 use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
-use debugger::Halt;
+use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
@@ -96,12 +97,13 @@ pub struct Chip {
     /// Cycles of an instruction in the flash: 1 is the model of the tests of timing, 2 to 3 what a chip with 4 wait
     /// states, prefetch and caches is expected to take.
     pub flash_cycles: u64,
+    /// The control interrupt runs, and its cycles are counted.
+    pub in_control: bool,
     /// The emulated core is running, and its access that the memory protection denied.
     pub(crate) core_runs: bool,
     pub(crate) guard_hit: Option<u32>,
     /// A debugger has halted the core.
     pub(crate) halt: Option<Halt>,
-    pub(crate) frozen_watchdog: bool,
     /// Damage to the over-voltage protection.
     pub damage: Option<Damage>,
     /// Outputs came back with the core, and are looked at then.
@@ -147,6 +149,8 @@ pub struct Chip {
     pub usart3: Usart,
     /// Watchdog.
     pub iwdg: Iwdg,
+    /// Window watchdog.
+    pub wwdg: Wwdg,
     /// Debug support.
     pub debug: Store,
     /// The power stage at the pins of the gates.
@@ -177,8 +181,8 @@ impl Default for Chip {
             core_runs: false,
             guard_hit: None,
             flash_cycles: 1,
+            in_control: false,
             halt: None,
-            frozen_watchdog: false,
             damage: None,
             back_on: None,
             system_hz: 16_000_000,
@@ -203,6 +207,7 @@ impl Default for Chip {
             lpuart: Lpuart::default(),
             usart3: Usart::default(),
             iwdg: Iwdg::default(),
+            wwdg: Wwdg::default(),
             debug: Store::new(plain::DEBUG),
             gates,
         }
@@ -236,6 +241,7 @@ impl Chip {
         self.rcc = Rcc::new(cause);
         self.rcc.add_reset_flags(flags);
         self.rcc.crystal_lives = old.rcc.crystal_lives;
+        self.rcc.pll_locks = old.rcc.pll_locks;
         self.flash = old.flash.after_reset();
         self.tim1.fault_pin_high = old.tim1.fault_pin_high;
         self.tim1.drop_update = old.tim1.drop_update;
@@ -278,7 +284,8 @@ impl Chip {
             self.adc.next_event(),
             self.lpuart.next_event(),
             self.usart3.next_event(),
-            if self.frozen_watchdog { NEVER } else { self.iwdg.next_event() },
+            if self.stops(IWDG_STOP) { NEVER } else { self.iwdg.next_event() },
+            if self.stops(WWDG_STOP) { NEVER } else { self.wwdg.next_event() },
             self.scs.systick.next_event(),
             self.rcc.next_event(),
             self.comp.next_event(),
@@ -378,8 +385,11 @@ impl Chip {
         let driver = self.drives_bus();
         let lost = self.usart3.happen(now, driver);
         self.rules.require(!lost, Rule::BusDriver, || "a byte ended with PC12 not high".to_owned());
-        if !self.frozen_watchdog && self.iwdg.expired(now) {
+        if !self.stops(IWDG_STOP) && self.iwdg.expired(now) {
             self.reset = Some(Reset::Watchdog);
+        }
+        if !self.stops(WWDG_STOP) && self.wwdg.next_event() <= now {
+            self.reset = Some(Reset::Window);
         }
         if self.scs.systick.happen(now) {
             self.scs.pend(scs::SYSTICK);

@@ -1,9 +1,11 @@
 //! Cycles of instructions on a Cortex-M4F with memory without wait states (Cortex-M4 TRM,
-//! DDI0439).
+//! DDI0439), and the wait states of code in the flash.
 //!
 //! A static count of a block: an instruction that its IT condition skips counts as executed, an
 //! integer division as 6, and a floating-point result that the next instruction needs costs one
 //! more. An estimate: no board has confirmed it.
+
+use induction_drive::board::WAIT_STATES;
 
 /// More cycles for a branch that is taken: the pipeline fills again.
 pub const TAKEN: u32 = 2;
@@ -25,6 +27,13 @@ pub struct Block {
     pub cycles: u32,
     /// Whether that branch was taken.
     pub taken: bool,
+}
+
+/// Cycles that the core waits for a block of code in the flash: [`WAIT_STATES`] for every line of 8 bytes (dual bank). An upper
+/// bound: prefetch and instruction cache hide a part.
+pub fn waits(address: u32, size: u32) -> u32 {
+    let lines = ((address + size - 1) / 8 + 1).saturating_sub(address / 8);
+    u32::from(WAIT_STATES) * lines
 }
 
 /// Cycles of blocks, with the branches that were taken.

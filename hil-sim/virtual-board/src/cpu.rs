@@ -16,7 +16,7 @@ use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
 use unicorn_engine::{Context, Unicorn};
 
 use crate::chip::Chip;
-use crate::cost::Costs;
+use crate::cost::{self, Costs};
 use crate::memory::{self, Backing};
 use frame::BASIC;
 
@@ -132,6 +132,12 @@ impl Cpu {
             let mut costs = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |i| i.cycles);
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
                 if stopped(uc, address) {
+                    return;
+                }
+                if uc.get_data().in_control {
+                    let cycles = cost_of(&mut costs, uc, address as u32, size);
+                    let cycles = cycles + cost::waits(address as u32, size);
+                    uc.get_data_mut().block(address as u32, size, cycles);
                     return;
                 }
                 let instructions = cost_of(&mut lengths, uc, address as u32, size);

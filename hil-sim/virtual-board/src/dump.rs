@@ -6,7 +6,7 @@ use crate::{Board, Image, Options, PowerStage};
 
 /// The registers that the firmware sets up, by peripheral with its address: name and offset of each, and the bits that are
 /// the same after every start where these are not all, in hexadecimal.
-const REGISTERS: [(&str, u32, &str); 20] = [
+const REGISTERS: [(&str, u32, &str); 21] = [
     // Oscillator, PLL and clock security on; the trimming bits are the chip's own.
     (
         "RCC",
@@ -41,6 +41,7 @@ const REGISTERS: [(&str, u32, &str); 20] = [
     ("DBGMCU", 0xe004_2000, "APB1FZR1 08 1008, APB2FZ 10 2800"),
     ("MPU", 0xe000_ed90, "CTRL 04 7"),
     ("IWDG", 0x4000_3000, "PR 04 7, RLR 08 fff"),
+    ("WWDG", 0x4000_2c00, "CFR 04 3fff"),
 ];
 
 /// The time after which every start is over, control periods.

@@ -45,10 +45,14 @@ enum Task {
         #[arg(long, default_value = REFERENCE.name)]
         board: String,
     },
-    /// Counts the cycles of the control interrupt; fails above its limits.
+    /// Counts the cycles of the control interrupt; fails above its budgets.
     Cycles {
         /// The ELF.
         elf: PathBuf,
+        /// Budget to the last compare value, cycles.
+        to_compares: u32,
+        /// Budget of the whole interrupt, cycles.
+        whole: u32,
         /// Shows the functions of the blocks as well.
         #[arg(long)]
         functions: bool,
@@ -77,13 +81,13 @@ fn run(arguments: Arguments) -> Result<()> {
             let lines = dump::lines(Image::open(&elf)?, PowerStage::named(&board)?)?;
             lines.iter().for_each(|line| println!("{line}"));
         }
-        Task::Cycles { elf, functions } => {
+        Task::Cycles { elf, to_compares, whole, functions } => {
             let rows = cycles::measure(|| Image::open(&elf))?;
             print!("{}", cycles::table(&rows));
             if functions {
                 rows.iter().for_each(|row| print!("\n{}", cycles::functions(row)));
             }
-            cycles::check(&rows)?;
+            cycles::check(&rows, to_compares, whole)?;
         }
     }
     Ok(())

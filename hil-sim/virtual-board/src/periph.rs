@@ -15,6 +15,7 @@ pub mod tim1;
 pub mod tim8;
 pub mod time_base;
 pub mod usart;
+pub mod wwdg;
 
 use std::fmt;
 
@@ -32,6 +33,8 @@ pub enum Reset {
     Software,
     /// The independent watchdog.
     Watchdog,
+    /// The window watchdog.
+    Window,
 }
 
 /// As the firmware's log names it.
@@ -42,6 +45,7 @@ impl fmt::Display for Reset {
             Self::Pin => "reset by reset pin",
             Self::Software => "reset by software",
             Self::Watchdog => "reset by watchdog",
+            Self::Window => "reset by window watchdog",
         })
     }
 }

@@ -10,7 +10,9 @@ pub mod shunts;
 pub mod watch;
 
 use drive_core::Settings;
+use drive_core::settings::Ntc;
 use hil_sim::input::Input;
+use hil_sim::plant::{MeasurementSettings, PlantSettings};
 use hil_sim::{Config, Error};
 use induction_drive::boards::{self as boards_of_the_firmware, Board};
 
@@ -49,6 +51,24 @@ pub struct GateLimits {
     pub pulse_s: f64,
 }
 
+/// The voltage at the switches of the bridge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Switches {
+    /// Absolute maximum, drain to source or collector to emitter, V.
+    pub rated_v: f64,
+    /// What a turn-off adds to the dc link, V per ampere that it switches off: the inductance of the loop over the time in which
+    /// the current falls.
+    pub ringing_v_per_a: f64,
+}
+
+impl Switches {
+    /// Highest voltage at a switch beside this dc link, V, with these currents of the legs or none, A.
+    pub fn stress_v(&self, dc_link: f64, currents: [f64; 3]) -> f64 {
+        let largest = currents.into_iter().fold(0.0, |most, current| current.abs().max(most));
+        dc_link + self.ringing_v_per_a * largest
+    }
+}
+
 /// The sensors of the phase currents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensors {
@@ -67,6 +87,14 @@ pub struct PowerStage {
     pub driver: Driver,
     /// The signals that the switches stand.
     pub limits: GateLimits,
+    /// The voltage that they stand.
+    pub switches: Switches,
+    /// Resistor from the fault input to the supply of the chip, ohm.
+    pub fault_pull_ohm: f64,
+    /// Pins, as in [`GATE_PINS`], that it ties to nets of others: they stay analog.
+    pub analog_only: &'static [(usize, u32)],
+    /// Thermistor of the heat sink.
+    pub ntc: Ntc,
     /// The current sensors.
     pub sensors: Sensors,
     /// Voltage at the dc link for each volt at the chip's pin; none as the configuration says.
@@ -116,6 +144,13 @@ impl PowerStage {
             input.motor = self.motor.map(str::to_owned);
             input.assignments.splice(0..0, self.assignments());
         }
+    }
+
+    /// What its switches stand, V. A stage whose divider the configuration states has switches that suit it.
+    pub fn rated_v(&self, plant: &PlantSettings) -> f64 {
+        let own = MeasurementSettings::default().dc_link_v;
+        let scale = self.dc_link_divider.map_or(plant.measurement.dc_link_v / own, |_| 1.0);
+        scale * self.switches.rated_v
     }
 
     fn assignments(&self) -> Vec<String> {

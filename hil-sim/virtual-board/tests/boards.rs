@@ -9,6 +9,7 @@ use drive_core::State;
 use hil_sim::config::LoadMode;
 use hil_sim::plant::Load;
 use induction_drive::boards::{self, Currents, Level};
+use virtual_board::board::Debugger;
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::{ALL, CODES, REFERENCE, REFERENCE_V, Sensors, channel};
 use virtual_board::{Board, Image, Options, Pair, PowerStage};
@@ -73,6 +74,15 @@ fn the_firmware_and_the_power_stage_agree() {
         }
         assert_eq!(board.dc_link.pin.adc1().map(usize::from), Some(channel::DC_LINK));
         assert_eq!(board.heat_sink.adc2().map(usize::from), Some(channel::HEAT_SINK));
+        let analog = board.analog_only.iter().map(|pin| (pin.port as usize, u32::from(pin.number)));
+        assert_eq!(analog.collect::<Vec<_>>(), stage.analog_only, "{name}");
+        assert_eq!(f64::from(board.fault.pull_ohm.value), stage.fault_pull_ohm, "{name}");
+        assert_eq!(board.ntc.value, stage.ntc, "{name}");
+        assert_eq!(
+            f64::from(board.dc_link_limits.switches.value),
+            stage.switches.rated_v,
+            "{name}"
+        );
         // Dc link, 1 %.
         if let Some(divider) = stage.dc_link_divider {
             let volts = 2000.0 / CODES * REFERENCE_V * divider;
@@ -153,7 +163,7 @@ fn every_end_leaves_every_gate_off() -> Result<()> {
                 board.run_ticks(100)
             }),
             ("halt", &|board| {
-                board.attach();
+                board.attach(Debugger::ProbeRs);
                 board.halt(1.0)?;
                 assert!(!board.gates().any_on());
                 board.halt(20.0)?;
@@ -166,7 +176,7 @@ fn every_end_leaves_every_gate_off() -> Result<()> {
                 while board.resets.is_empty() {
                     board.run_ticks(2000)?;
                 }
-                assert_eq!(board.resets[0].1, Reset::Watchdog);
+                assert_eq!(board.resets[0].1, Reset::Window);
                 Ok(())
             }),
             ("supply", &|board| {

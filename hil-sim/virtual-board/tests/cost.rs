@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use virtual_board::cost::instructions;
+use virtual_board::cost::{instructions, waits};
 use virtual_board::cycles::{Row, check};
 
 fn cycles(code: &[u16]) -> Vec<u32> {
@@ -31,14 +31,30 @@ fn the_table_of_the_manual() {
 }
 
 #[test]
-fn an_interrupt_above_a_limit_is_refused_by_its_figure() {
-    let refused = |cycles, whole| {
-        let (blocks, functions) = (BTreeMap::new(), BTreeMap::new());
-        let row = Row { name: "x", instructions: 0, cycles, median: 0, whole, blocks, functions };
-        check(&[row]).err().map(|why| why.to_string())
+fn an_interrupt_above_a_budget_is_refused_by_its_figure() {
+    let refused = |cycles, whole, from_flash: bool| {
+        let (mut blocks, functions) = (BTreeMap::new(), BTreeMap::new());
+        if from_flash {
+            blocks.insert("flash", 100);
+        }
+        let (name, by_turn) = ("x", [0; 10]);
+        let row =
+            Row { name, instructions: 0, cycles, median: 0, whole, by_turn, blocks, functions };
+        check(&[row], 2650, 3700).err().map(|why| why.to_string())
     };
-    // 15 % of the 28 333 cycles of a period, and 3000 to the compare values.
-    assert_eq!(refused(3000, 4391), None);
-    assert!(refused(3000, 4392).is_some_and(|why| why.contains("4392 cycles, 4391 allowed")));
-    assert!(refused(3001, 4391).is_some_and(|why| why.contains("3001") && why.contains("3000")));
+    assert_eq!(refused(2650, 3700, false), None);
+    assert!(
+        refused(2650, 3701, false).is_some_and(|why| why.contains("3701 cycles, 3700 allowed"))
+    );
+    assert!(refused(2651, 3700, false).is_some_and(|w| w.contains("2651") && w.contains("2650")));
+    // States that run from the flash have half of the 28 334 cycles of a period.
+    assert_eq!(refused(14_167, 14_167, true), None);
+    assert!(refused(14_167, 14_168, true).is_some_and(|why| why.contains("14168")));
+}
+
+#[test]
+fn code_in_the_flash_waits_for_each_line_of_eight_bytes() {
+    assert_eq!(waits(0x0800_0000, 8), 4);
+    assert_eq!(waits(0x0800_0006, 4), 8);
+    assert_eq!(waits(0x0800_0000, 24), 12);
 }

@@ -1,9 +1,12 @@
 //! `cargo sim board`: a program talks to the drive through the pseudo-terminal, and the rotor does what it
 //! was told.
 
+#[path = "common/program.rs"]
+mod program;
+
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -13,26 +16,13 @@ use hil_sim::console::answer::is_unasked;
 use hil_sim::console::catalogue::Catalogue;
 use hil_sim::console::link::Link;
 use hil_sim::console::session::{Flow, Session};
+use program::{command, folder};
 use serde_json::Value;
 
 /// Longest wait for an answer on a busy machine; an answer takes 20 ms of simulated time.
 const ANSWER: Duration = Duration::from_secs(20);
 /// Longest wait for a state: a start takes 2 s, a stop 1 s of simulated time.
 const STATE: Duration = Duration::from_secs(40);
-
-fn command(out: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
-    command.arg("--out").arg(out).args(arguments);
-    command
-}
-
-/// A folder of its own for each test.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
 
 /// Lines of a reader, with a limit to waiting for them.
 fn lines(reader: impl std::io::Read + Send + 'static) -> Receiver<String> {
@@ -296,10 +286,14 @@ fn what_is_wrong_is_named_before_anything_begins() {
     refused(&run(&["--script", &script]), 2, &["line 2", "at soon: stop", "0 to 3600 s"]);
     assert!(std::fs::read_dir(&folder).unwrap().count() == 2, "no page is written");
 
-    // Room for the ELF to be read, but not for both ends of a pseudo-terminal.
-    let program = env!("CARGO_BIN_EXE_board");
-    let limited = ["-c", "ulimit -n 4; exec \"$0\"", program];
-    refused(&Command::new("sh").args(limited).output().unwrap(), 1, &["pseudo-terminal"]);
+    // Room for the ELF to be read, but not for both ends of a pseudo-terminal; also where a terminal hands descriptors
+    // down: one more below the limit would leave no room for the ELF.
+    let limited = "exec 3>&-; ulimit -n 4; exec \"$0\"";
+    for inherited in ["", "exec 3</dev/null 7</dev/null; "] {
+        let script = format!("{inherited}exec sh -c '{limited}' \"$0\"");
+        let output = Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_board")]).output();
+        refused(&output.unwrap(), 1, &["pseudo-terminal"]);
+    }
 }
 
 /// `cargo sim console` finds the commands and settings of the image, restores a file and plots a trace.
@@ -328,73 +322,4 @@ fn the_console_program_understands_the_image() {
     assert!(said[1].starts_with("20 records in") && plot.exists(), "{said:?}");
     board.kill().unwrap();
     board.wait().unwrap();
-}
-
-/// A session with a script, as fast as it goes; exit code and all that it showed.
-fn play(folder: &Path, script: &str, arguments: &[&str]) -> (Option<i32>, String) {
-    let file = folder.join("script.txt");
-    std::fs::write(&file, script).unwrap();
-    let mut command = command(folder, &["--fast", "--script"]);
-    let output = command.arg(&file).args(arguments).stdin(Stdio::null()).output().unwrap();
-    let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    (output.status.code(), text.concat())
-}
-
-#[test]
-fn saved_settings_outlast_reset_power_and_session() {
-    let folder = folder("flash");
-    let flash = folder.join("flash.bin").display().to_string();
-    let first = "at 1: set command.timeout_s 1234\n\
-                 expect ok\n\
-                 at 3: !unplug\n\
-                 expect last run: reset by power-on\n\
-                 wait 1: get command.timeout_s\n\
-                 expect command.timeout_s = 0\n\
-                 wait 0.1: set command.timeout_s 1234\n\
-                 expect ok\n\
-                 wait 2: save\n\
-                 expect ok\n\
-                 wait 0.1: !reset\n\
-                 expect last run: reset by reset pin\n\
-                 wait 1: get command.timeout_s\n\
-                 expect command.timeout_s = 1234\n";
-    let (code, shown) = play(&folder, first, &["--flash", &flash]);
-    assert_eq!(code, Some(0), "{shown}");
-    assert!(!shown.contains("INFO"), "the log is calm: {shown}");
-    let later = "at 1: get command.timeout_s\nexpect 1s command.timeout_s = 1234\n";
-    let (code, shown) = play(&folder, later, &["--flash", &flash]);
-    assert_eq!(code, Some(0), "{shown}");
-    let (code, shown) = play(&folder, later, &[]);
-    assert_eq!(code, Some(1), "without the file: {shown}");
-}
-
-#[test]
-fn an_error_in_a_script_ends_it_with_its_line() {
-    let folder = folder("strict");
-    let script = "at 1: torqe 1\nwait 0.5: status\n";
-    let (code, shown) = play(&folder, script, &[]);
-    assert_eq!(code, Some(1), "{shown}");
-    assert!(shown.contains("line 1: `at 1: torqe 1`: answered `error:"), "{shown}");
-    assert!(!shown.contains("> status"), "it has ended: {shown}");
-    let (code, shown) = play(&folder, script, &["--lenient"]);
-    assert_eq!(code, Some(0), "{shown}");
-    assert!(shown.contains("> status"), "it goes on: {shown}");
-}
-
-#[test]
-fn a_motor_with_other_sensors_is_told_its_settings() {
-    let folder = folder("sensors");
-    let keys = ["--set", "measurement.range_a=12", "--set", "inverter.dc_link_v=540"];
-    let shown = play(&folder, "at 0.5: !help\n", &keys).1;
-    // 12 A over 4.4727 A times the image's 2.4332 mA a code; 450 V times 540 over 311.
-    for line in ["set inverter.dc_link_v 540", "set scales.current_a.offset -12", "!reset"] {
-        assert!(shown.contains(line), "{line}: {shown}");
-    }
-    let value = |name: &str| -> f64 {
-        let (_, rest) = shown.split_once(&format!("set {name} ")).expect(name);
-        rest.lines().next().unwrap().parse().unwrap()
-    };
-    assert!((value("scales.current_a.gain") / (2.4332e-3 * 12.0 / 4.4727134) - 1.0).abs() < 1e-4);
-    assert!((value("scales.dc_link.gain") / (0.11 * 540.0 / 311.0) - 1.0).abs() < 1e-4);
-    assert!(!play(&folder, "at 0.1: !help\n", &[]).1.contains("set scales"));
 }

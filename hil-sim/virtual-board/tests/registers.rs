@@ -14,12 +14,13 @@ use virtual_board::chip::{Chip, clock_of, pins};
 use virtual_board::dump;
 
 /// Module of the access crate, name in `stm32-metapac`, base address. ADC2 is as ADC1.
-const BLOCKS: [(&str, &str, u32); 23] = [
+const BLOCKS: [(&str, &str, u32); 24] = [
     ("tim1", "TIM1", 0x4001_2c00),
     ("tim1", "TIM8", 0x4001_3400),
     ("tim2", "TIM2", 0x4000_0000),
     ("tim5", "TIM5", 0x4000_0c00),
     ("iwdg", "IWDG", 0x4000_3000),
+    ("wwdg", "WWDG", 0x4000_2c00),
     ("pwr", "PWR", 0x4000_7000),
     ("lpuart1", "LPUART1", 0x4000_8000),
     ("usart1", "USART3", 0x4000_4800),
@@ -65,6 +66,7 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
     ("IWDG_PR", 7, KEY),
     ("IWDG_RLR", 0xfff, KEY),
     ("IWDG_WINR", 0xfff, KEY),
+    ("WWDG_SR", 1, FLAGS),
     ("LPUART1_TDR", 0x1ff, "write-only"),
     ("USART3_CR1", u32::MAX, "FIFOEN is not modelled: the write is refused as unknown"),
     ("USART3_TDR", 0x1ff, "write-only"),

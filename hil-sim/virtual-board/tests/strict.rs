@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use hil_sim::Config;
+use virtual_board::board::Debugger;
 use virtual_board::cpu::Register;
 use virtual_board::periph::Reset;
 use virtual_board::periph::flash::DBANK;
@@ -62,13 +63,24 @@ fn our_image_breaks_no_rule() -> Result<()> {
     Ok(())
 }
 
-/// A probe halts the core, for two periods or longer, and lets it go: the outputs are off then, and stay off.
+/// A debugger halts the core, for two periods or longer, and lets it go: the outputs are off then, and stay off. After the
+/// longer ones the watchdog has reset the chip, whatever the debugger stops during a halt.
 #[test]
 fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
-    for ms in [0.35, 10.0, 1000.0] {
-        let mut board = common::regulating(11)?.board;
-        board.attach();
+    let mut regulating = common::regulating(11)?.board;
+    let state = regulating.keep()?;
+    for (debugger, ms) in
+        Debugger::ALL.into_iter().flat_map(|d| [(d, 0.35), (d, 10.0), (d, 1000.0)])
+    {
+        let board = &mut regulating;
+        board.go_back(&state)?;
+        board.resets.clear();
+        board.attach(debugger);
+        // A pass of the main loop.
+        board.run_periods(2)?;
         board.halt(ms)?;
+        let reset = board.resets.last().map(|reset| reset.1);
+        assert!(ms < 5.0 || reset == Some(Reset::Window), "{debugger:?}, {ms} ms: {reset:?}");
         board.resume();
         // For a period at most, if the watchdog has not reset the chip in the meantime.
         let mut on = 0;
@@ -76,8 +88,9 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
             board.run_ticks(2000)?;
             on += u32::from(board.chip().tim1.outputs_on());
         }
-        println!("halt of {ms} ms: on for {} us", 2000 * on / 170);
-        assert!(on <= if ms < 5.0 { 15 } else { 0 }, "on {on} times after a halt of {ms} ms");
+        println!("{debugger:?}, halt of {ms} ms: on for {} us", 2000 * on / 170);
+        let allowed = if ms < 5.0 { 15 } else { 0 };
+        assert!(on <= allowed, "on {on} times after a halt of {ms} ms by {debugger:?}");
         assert!(board.violations().is_empty(), "{}", text(board.violations()));
     }
     Ok(())
@@ -87,7 +100,7 @@ fn after_halt_and_resume_the_outputs_are_off() -> Result<()> {
 #[test]
 fn a_detached_probe_changes_nothing() -> Result<()> {
     let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 12))?;
-    board.attach();
+    board.attach(Debugger::ProbeRs);
     board.run_periods(START)?;
     board.detach();
     board.run_periods(START)?;
@@ -149,6 +162,24 @@ fn a_stack_in_the_guard_faults() -> Result<()> {
     Ok(())
 }
 
+/// A PLL that does not lock: the chip stays on its internal oscillator, and says why it does not start. (At the console only a
+/// terminal with 16/170 of the rate could read it.)
+#[test]
+fn a_pll_that_does_not_lock_is_refused() -> Result<()> {
+    for crystal in [true, false] {
+        let mut board = Board::new(Image::built()?, Options::new(&Config::default(), 18))?;
+        board.chip().rcc.pll_locks = false;
+        board.set_crystal(crystal);
+        board.run_periods(START)?;
+        let log = board.take_log()?;
+        let told =
+            |line: &String| line.contains("not started") && line.contains("PLL does not lock");
+        assert!(log.iter().any(told), "{log:#?}");
+        assert!(!board.chip().tim1.outputs_on() && board.resets.is_empty());
+    }
+    Ok(())
+}
+
 /// A chip whose option bytes make one bank of the flash does not start.
 #[test]
 fn a_single_bank_chip_is_refused() -> Result<()> {
@@ -193,7 +224,7 @@ fn the_old_image_is_caught() -> Result<()> {
     let running = || -> Result<Board> {
         let mut board = Board::new(image()?, Options::new(&Config::default(), 1))?;
         board.collect_violations();
-        board.attach();
+        board.attach(Debugger::ProbeRs);
         board.run_periods(START)?;
         Ok(board)
     };

@@ -249,13 +249,39 @@ fn settings_by_the_bus_go_the_way_of_the_console() {
     assert_eq!((both.set("motor.r_s", 5.4), both.write(0x4fff, 1)), (4, 4));
     both.write(0x2000, 1);
     assert_eq!(
-        (both.set("limits.trip_a", 4.0), both.write(0x4fff, 3), both.read(0x4fff)),
+        (both.set("limits.current_a", 3.0), both.write(0x4fff, 3), both.read(0x4fff)),
         (0, 0, 0)
     );
-    assert_eq!((both.set("limits.trip_a", f32::NAN), both.write(0x4fff, 2)), (0, 0));
+    assert_eq!((both.set("limits.current_a", f32::NAN), both.write(0x4fff, 2)), (0, 0));
     both.serve();
     assert_eq!(both.talk.drive.saved.unwrap().drive.motor.r_s, 5.5);
     assert_eq!(both.write(0x4fff, 9), 3);
+}
+
+/// Every hardware setting, with the value that it has, in the range or not; the console says once why.
+#[test]
+fn settings_of_the_hardware_are_not_for_the_bus() {
+    let mut both = Both::by_bus();
+    let settings = FirmwareSettings::of_the_board();
+    let hardware: Vec<_> = keys::all().filter(|key| key.hardware()).collect();
+    for name in ["inverter.dead_time_s", "scales.current_a.gain", "limits.dc_over_v"] {
+        assert!(hardware.iter().any(|key| key.name() == name), "{name}");
+    }
+    for key in hardware {
+        for value in [key.number(&settings).unwrap_or(0.0), f32::NAN] {
+            assert_eq!(both.set(key.name(), value), 4, "{}", key.name());
+        }
+        let said = both.talk.say("");
+        assert_eq!(
+            said,
+            [format!(
+                "bus: refused: {} belongs to the hardware: set it at the console",
+                key.name()
+            )]
+        );
+    }
+    // Not beside others either.
+    assert_eq!(both.read(0x4fff), 0);
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::settings::staging::UNCONFIRMED;
 
 #[test]
 fn lists_end_with_ok_and_the_next_line_cuts_them_short() {
@@ -79,7 +80,7 @@ fn object(line: &str) -> std::collections::BTreeMap<String, String> {
 #[test]
 fn describe_prints_each_setting_as_json() {
     let mut talk = Talk::new();
-    assert_eq!(talk.ask("set limits.heat_sink_c 70"), "ok: staged");
+    assert_eq!(talk.ask("set limits.heat_sink_c 70"), format!("ok: staged; {UNCONFIRMED}"));
     let mut staged = FirmwareSettings::of_the_board();
     staged.drive.limits.heat_sink_c = 70.0;
     let all = talk.say("describe\n");
@@ -159,9 +160,9 @@ fn what_is_learned_is_listed_saved_and_forgotten_with_its_settings() {
     assert_eq!(talk.ask("save"), "ok");
     assert_eq!(talk.drive.saved.unwrap().learned, Some(found()));
     // What it does not depend on leaves it, and the drive works with it.
-    assert_eq!(talk.ask("set limits.dc_over_v 390"), "ok: staged");
+    assert_eq!(talk.ask("set limits.dc_over_v 390"), format!("ok: staged; {UNCONFIRMED}"));
     let limits = "the limits hold in software; analog watchdogs and comparator follow from the next reset on, if saved";
-    assert_eq!(talk.ask("apply"), format!("ok: {limits}"));
+    assert_eq!(talk.ask("apply"), format!("ok: {limits}; {UNCONFIRMED}"));
     let Some(Command::Configure(with)) = talk.drive.commands.last() else { panic!("no order") };
     let mut settings = FirmwareSettings::of_the_board();
     settings.drive.limits.dc_over_v = Some(390.0);

@@ -3,6 +3,7 @@ use drive_core::identify::learning::Learned;
 use drive_core::settings::table::Grid;
 
 use super::*;
+use crate::settings::staging::UNCONFIRMED;
 
 /// A console whose settings in force and staged are these, by name.
 fn shown(talk: &Talk, name: &str) -> (String, String) {
@@ -80,16 +81,18 @@ fn ranges_are_those_beside_the_staged_values() {
     let mut talk = Talk::new();
     assert!(talk.ask("set limits.trip_a 20").starts_with("error: limits.trip_a = 20: allowed is"));
     let scales = "set scales.current_a.gain 0.05 scales.current_a.offset -100";
-    assert_eq!(talk.ask(scales), "ok: staged");
+    // Of the hardware.
+    assert_eq!(talk.ask(scales), format!("ok: staged; {UNCONFIRMED}"));
     assert_eq!(talk.ask(&scales.replace("_a.", "_b.")), "ok: staged");
     assert_eq!(talk.ask("set limits.trip_a 20 limits.current_a 15"), "ok: staged");
     // What a later value makes wrong is found when all is put in force; the drive stays as it is.
     assert_eq!(talk.ask("set limits.trip_a 10"), "ok: staged");
     let refused =
         "error: limits.current_a = 15: allowed is 0.01 to 10 A; not in force, still staged";
-    for line in ["apply", "save", "start"] {
+    for line in ["apply", "save"] {
         assert_eq!(talk.say(format!("{line}\n")), ["designing...", refused]);
     }
+    assert!(talk.ask("start").starts_with("error: the board's polarities"));
     assert!(talk.drive.commands.is_empty() && talk.drive.saved.is_none());
     assert_eq!(talk.ask("set limits.current_a 8"), "ok: staged");
     assert!(talk.ask("apply").starts_with("ok: the limits hold in software"));
@@ -136,7 +139,11 @@ fn start_and_save_put_staged_values_in_force_first() {
     let said = talk.say("save\n");
     assert_eq!(
         said,
-        ["designing...", "applied: the dead time holds from the next reset on, if saved", "ok"]
+        [
+            "designing...",
+            "applied: the dead time holds from the next reset on, if saved; the board has to be confirmed again before a start",
+            "ok"
+        ]
     );
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.6);
 }
@@ -166,7 +173,7 @@ fn a_backup_restores_settings_and_what_was_learned() {
         "set injection.monitor no injection.amplitude_v 0 injection.demodulator rectified",
         "set command.timeout_s 7.25 limits.trip_a auto",
     ] {
-        assert_eq!(talk.ask(line), "ok: staged");
+        assert!(talk.ask(line).starts_with("ok: staged"));
     }
     let refused = "error: there are staged values: `apply` or `revert` first";
     assert_eq!(talk.ask("backup"), refused);

@@ -3,6 +3,7 @@
 
 use num_complex::Complex64;
 
+mod allowed;
 mod stops;
 
 use super::*;
@@ -13,6 +14,7 @@ const J: Complex64 = Complex64::I;
 
 /// The motor of the settings. Its saliency is that of the settings as well: L x = sigma L_s (x - s x*) with
 /// s = a e^(2j phi) + b i²/|i|.
+#[derive(Clone)]
 struct Motor {
     settings: Settings,
     current: Complex64,
@@ -116,6 +118,7 @@ fn motor_settings(source: AngleSource) -> Settings {
     settings
 }
 
+#[derive(Clone)]
 struct Bench {
     drive: Drive,
     motor: Motor,

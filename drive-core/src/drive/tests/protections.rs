@@ -39,6 +39,21 @@ fn every_protection_switches_off_in_the_same_step() {
 }
 
 #[test]
+fn a_chopper_that_is_off_is_a_fault_where_there_is_a_resistor() {
+    for ohm in [0.0, 100.0] {
+        let mut settings = settings();
+        settings.braking.ohm = ohm;
+        let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
+        drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(run_to(&mut drive, &mut load, State::Torque));
+        let compare = drive.step(&Sample { hardware: Hardware::CHOPPER_OFF, ..load.sample() });
+        assert_eq!(compare.enabled, ohm == 0.0);
+        let fault = State::Fault(Fault::ChopperOff);
+        assert_eq!(drive.state(), if ohm > 0.0 { fault } else { State::Torque });
+    }
+}
+
+#[test]
 fn over_speed_trips() {
     // This load has no back-emf: with the check that would miss it out of the way.
     let mut settings = settings();

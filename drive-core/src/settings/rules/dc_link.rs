@@ -6,13 +6,43 @@ use crate::io::{CONVERTER_CODES, periods};
 use crate::settings::Settings;
 use crate::supply::Relay;
 
+/// Highest dc link above which a drive trips, in relation to the highest in operation.
+pub const OVER_OF_HIGHEST: f32 = 1.05;
+/// Highest dc link in operation, in relation to the highest nominal one: generating torque has a band between them.
+pub const HIGHEST_OF_NOMINAL: f32 = 1.06;
+/// Rules end this far within the limits of the power stage, since they round to four digits.
+const WITHIN: f32 = 0.998;
+/// Band in which generating torque is limited, in relation to the distance from the nominal voltage: widened by 1.4 at
+/// speed it stays clear of that.
+const BAND: f32 = 0.64;
 /// Largest change of a dc link that counts as steady, with 311 V.
 const STEADY_V: f32 = 5.0;
 
 impl Settings {
+    /// Largest dc link without generating torque, in relation to the voltage that trips.
+    pub(in crate::settings) const HIGH_OF_TRIP: f32 = 0.975;
+    /// Least dc link without motoring torque, likewise.
+    pub(in crate::settings) const LOW_OF_TRIP: f32 = 1.15;
+
+    /// Highest dc link that the power stage stands in operation, V.
+    pub fn highest_dc_link_v(&self) -> f32 {
+        self.scales.dc_link.at(self.scales.dc_link_highest)
+    }
+
+    /// Largest nominal dc link, V.
+    pub(in crate::settings) fn dc_link_max_v(&self) -> f32 {
+        f32::min(self.highest_dc_link_v() / HIGHEST_OF_NOMINAL, 1000.0)
+    }
+
+    /// Largest dc link above which the drive may trip, V.
+    pub(in crate::settings) fn dc_over_max_v(&self) -> f32 {
+        f32::min(OVER_OF_HIGHEST * self.highest_dc_link_v(), self.dc_link_range_v())
+    }
+
     /// Dc link above which the drive trips, V.
     pub fn dc_over_v(&self) -> f32 {
-        let rule = || f32::min(self.share_of_dc_link(400.0), 0.95 * self.dc_link_range_v());
+        let board = f32::min(WITHIN * self.dc_over_max_v(), 0.95 * self.dc_link_range_v());
+        let rule = || f32::min(self.share_of_dc_link(400.0), board);
         or_rule(self.limits.dc_over_v, rule)
     }
 
@@ -23,13 +53,14 @@ impl Settings {
 
     /// Dc link without generating torque, V.
     pub fn dc_high_v(&self) -> f32 {
-        let rule = || f32::min(self.share_of_dc_link(390.0), 0.975 * self.dc_over_v());
-        or_rule(self.braking.high_v, rule)
+        let board =
+            f32::min(Self::HIGH_OF_TRIP * self.dc_over_v(), WITHIN * self.highest_dc_link_v());
+        or_rule(self.braking.high_v, || f32::min(self.share_of_dc_link(390.0), board))
     }
 
     /// Dc link without motoring torque, V.
     pub fn dc_low_v(&self) -> f32 {
-        let rule = || f32::max(self.share_of_dc_link(260.0), 1.15 * self.dc_under_v());
+        let rule = || f32::max(self.share_of_dc_link(260.0), Self::LOW_OF_TRIP * self.dc_under_v());
         or_rule(self.braking.low_v, rule)
     }
 
@@ -52,8 +83,10 @@ impl Settings {
     pub(crate) fn dc_link_limits(&self) -> DcLinkSettings {
         let (high_v, low_v) = (self.dc_high_v(), self.dc_low_v());
         let s = &self.braking;
+        let band_v =
+            f32::min(self.share_of_dc_link(50.0), BAND * (high_v - self.inverter.dc_link_v));
         DcLinkSettings {
-            from_v: high_v - self.share_of_dc_link(50.0),
+            from_v: high_v - band_v,
             high_v,
             low_v,
             floor_v: 0.25 * low_v + 0.75 * self.dc_under_v(),

@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Compare;
+use drive_core::{Accepted, Command, Drive, State};
 
-use super::drive::{Condition, DriveUnderTest};
 use super::trial::{CLASSES_PER_DEG, LARGEST_CLASS, Trial};
 use crate::config::{Config, open_phase};
 use crate::error::Error;
-use crate::plant::{Load, Plant, PlantSettings};
-use crate::rig::{RATE_HZ, wrapped_degrees};
+use crate::experiments::torque::LOST_DEG;
+use crate::plant::{Complex, Load, Plant, PlantSettings};
+use crate::rig::{RATE_HZ, Rig, wrapped_degrees};
 use crate::stats::Stats;
 
 /// An error beyond this, degrees, is wrong, unless the run says otherwise.
@@ -54,20 +54,16 @@ pub struct Moment {
     pub torque: f64,
     /// Length of the stator current, A peak.
     pub current: f64,
-    /// Length of the rotor flux, Wb peak.
-    pub flux: f64,
+    /// Rotor flux of the motor from phase a, Wb peak.
+    pub flux: Complex,
     /// The dc link, V.
     pub dc_link: f64,
 }
 
 /// A drive and a plant, and what is seen of them.
-pub struct Bench<D> {
-    /// The plant.
-    pub plant: Plant,
-    /// The drive.
-    pub drive: D,
-    pending: Compare,
-    periods: u64,
+pub struct Bench {
+    /// Drive and plant.
+    pub rig: Rig,
     /// Flux of the magnetising current, Wb.
     nominal_flux: f64,
     /// Time from which on the error is counted, s; unset before the first reference, and after the flux was turned.
@@ -90,6 +86,7 @@ pub struct Bench<D> {
     pub trace: Option<Vec<Moment>>,
     counts: Vec<u32>,
     wrong: Lasting,
+    lost: Lasting,
     flux_off: Lasting,
     /// Whether angle or flux was off at any time since the first reference, and whether one is now.
     was_off: bool,
@@ -98,7 +95,7 @@ pub struct Bench<D> {
     turned: bool,
 }
 
-impl<D: DriveUnderTest> Bench<D> {
+impl Bench {
     /// A copy of a drive that is off, and the plant with another load.
     ///
     /// # Errors
@@ -106,7 +103,7 @@ impl<D: DriveUnderTest> Bench<D> {
     pub fn new(
         config: &Config,
         plant: &PlantSettings,
-        drive: &D,
+        drive: &Drive,
         load: Load,
         seed: u64,
     ) -> Result<Self, Error> {
@@ -115,10 +112,7 @@ impl<D: DriveUnderTest> Bench<D> {
         let mut plant = Plant::new(&settings, seed).map_err(Error::refused)?;
         plant.set_open_phase(open_phase(config)).map_err(Error::refused)?;
         Ok(Self {
-            plant,
-            drive: drive.clone(),
-            pending: Compare::OFF,
-            periods: 0,
+            rig: Rig::of(plant, drive.clone()),
             nominal_flux: settings.machine.lm * f64::from(config.drive.i_d()),
             counted_from: None,
             torque: Stats::default(),
@@ -131,6 +125,7 @@ impl<D: DriveUnderTest> Bench<D> {
             trace: None,
             counts: vec![0; LARGEST_CLASS + 1],
             wrong: Lasting::default(),
+            lost: Lasting::default(),
             flux_off: Lasting::default(),
             was_off: false,
             is_off: false,
@@ -140,41 +135,36 @@ impl<D: DriveUnderTest> Bench<D> {
 
     /// Time from the beginning, s.
     pub fn time(&self) -> f64 {
-        self.periods as f64 / RATE_HZ
+        self.rig.time()
     }
 
-    /// One period; the plant is delayed as [`drive_core::io`] says.
+    /// One period.
     fn step(&mut self) {
-        let sample = self.plant.sample();
-        let compare = self.drive.step(&sample);
-        if !compare.enabled {
-            self.pending = Compare::OFF;
-        }
-        self.plant.set_chopper(self.drive.chopper());
-        self.plant.advance(&self.pending, 1.0 / RATE_HZ);
-        self.peak_a = self.plant.phase_currents().iter().fold(self.peak_a, |a, i| a.max(i.abs()));
+        let is_recorded = self.trace.is_some() && self.rig.periods().is_multiple_of(TRACE_EVERY);
+        let t = self.time();
+        self.rig.step();
+        let plant = &self.rig.plant;
+        self.peak_a = plant.phase_currents().iter().fold(self.peak_a, |a, i| a.max(i.abs()));
         let (least, most) = self.dc_link_v;
-        let v = self.plant.dc_link();
+        let v = plant.dc_link();
         self.dc_link_v = (least.min(v), most.max(v));
-        if self.periods.is_multiple_of(TRACE_EVERY) {
-            self.record();
+        if is_recorded {
+            self.record(t);
         }
-        self.pending = compare;
-        self.periods += 1;
     }
 
-    /// Adds the present moment to the record.
-    fn record(&mut self) {
-        let (t, plant, error_deg) = (self.time(), &self.plant, self.error_deg);
+    /// Adds a moment to the record.
+    fn record(&mut self, t: f64) {
+        let (plant, error_deg) = (&self.rig.plant, self.error_deg);
         let Some(trace) = &mut self.trace else { return };
-        let regulates = self.drive.condition() == Condition::Regulating;
+        let regulates = self.rig.drive.state().regulates();
         trace.push(Moment {
             t,
             error_deg: if regulates { error_deg } else { f64::NAN },
             rpm: plant.mechanical_speed() * 60.0 / TAU,
             torque: plant.torque(),
             current: plant.current().norm(),
-            flux: plant.rotor_flux().norm(),
+            flux: plant.rotor_flux(),
             dc_link: plant.dc_link(),
         });
     }
@@ -189,47 +179,55 @@ impl<D: DriveUnderTest> Bench<D> {
         (0..(seconds * RATE_HZ).round() as u64).for_each(|_| self.step());
     }
 
-    /// Until the drive has left [`Condition::Busy`], or for so many seconds.
-    pub fn wait(&mut self, seconds: f64) -> Condition {
+    /// Until the drive is off, stopped by a fault or regulating, or for this many seconds.
+    pub fn wait(&mut self, seconds: f64) -> State {
         for _ in 0..(seconds * RATE_HZ) as u64 {
             self.step();
-            if self.drive.condition() != Condition::Busy {
+            let state = self.rig.drive.state();
+            if state.regulates() || matches!(state, State::Off | State::Fault(_)) {
                 break;
             }
         }
-        self.drive.condition()
+        self.rig.drive.state()
     }
 
-    /// Couples another load.
+    /// Gives a torque current, A peak; returns that which the drive takes. It may limit it.
     ///
     /// # Errors
-    /// When it is out of range.
-    pub fn set_load(&mut self, load: Load) -> Result<(), Error> {
-        self.plant.set_load(load).map_err(Error::refused)
+    /// When it is refused.
+    pub fn torque(&mut self, i_q: f32) -> Result<f32, Error> {
+        match self.rig.command(&Command::Torque(i_q))? {
+            Accepted::Limited(taken) => Ok(taken),
+            Accepted::AsGiven => Ok(i_q),
+        }
     }
 
     /// Turns the rotor flux of the motor at once. The error is counted no more, and how long angle and flux are off is
     /// counted from here.
     pub fn turn_flux(&mut self, degrees: f64) {
-        self.plant.turn_rotor_flux(degrees.to_radians());
+        self.rig.plant.turn_rotor_flux(degrees.to_radians());
         (self.turned, self.counted_from) = (true, None);
-        (self.wrong, self.flux_off) = (Lasting::default(), Lasting::default());
+        (self.wrong, self.lost, self.flux_off) = Default::default();
     }
 
     /// Runs for some seconds, or until the drive no longer regulates; says whether it still does.
     pub fn watch(&mut self, seconds: f64) -> bool {
         for _ in 0..(seconds * RATE_HZ).round() as u64 {
-            let (t, flux, torque) = (self.time(), self.plant.rotor_flux(), self.plant.torque());
+            let (t, plant) = (self.time(), &self.rig.plant);
+            let (flux, torque) = (plant.rotor_flux(), plant.torque());
             self.step();
-            if self.drive.condition() != Condition::Regulating {
+            let drive = &self.rig.drive;
+            if !drive.state().regulates() {
                 return false;
             }
-            let error = wrapped_degrees(flux.arg() - self.drive.flux_turns() * TAU);
+            let estimate = f64::from(drive.telemetry().phi.to_turns());
+            let error = wrapped_degrees(flux.arg() - estimate * TAU);
             let share = flux.norm() / self.nominal_flux;
             self.error_deg = error;
             let (wrong, flux_off) =
                 (error.abs() > self.wrong_deg, share < FLUX_OFF.0 || share > FLUX_OFF.1);
             self.wrong.push(t, wrong);
+            self.lost.push(t, error.abs() > LOST_DEG);
             self.flux_off.push(t, flux_off);
             self.is_off = wrong || flux_off;
             if !self.turned {
@@ -247,13 +245,14 @@ impl<D: DriveUnderTest> Bench<D> {
 
     /// Fills in what was seen of the run; `still` says whether the drive regulated to its end.
     pub fn finish(self, still: bool, trial: &mut Trial) {
-        if !still && let Condition::Fault(code) = self.drive.condition() {
-            trial.trip = Some(code);
+        if !still && let State::Fault(fault) = self.rig.drive.state() {
+            trial.trip = Some(fault.code());
             trial.sound_stop = !self.was_off;
         }
         trial.error = self.error;
         trial.largest_deg = self.largest_deg;
         trial.wrong_s = self.wrong.longest;
+        trial.lost_s = self.lost.longest;
         trial.flux_off_s = self.flux_off.longest;
         trial.stuck = still && self.is_off && trial.is_silent();
         let classes = (0..).zip(self.counts).filter(|(_, count)| *count > 0);

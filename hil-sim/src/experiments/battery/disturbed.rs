@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
 
 use crate::config::Config;
 
@@ -45,6 +46,47 @@ pub static AFTER: [Disturbance; 8] = [
     one_sided("Coulomb 0.05 Nm", |c, x| c.shaft.static_nm += c.newton_metres(0.05) * x),
     one_sided("once a turn 0.03 Nm", |c, x| c.shaft.once_nm += c.newton_metres(0.03) * x),
 ];
+
+/// A difference between phases or sensors that a drive has not learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Asymmetry {
+    /// None.
+    None,
+    /// Gains of the current sensors that differ by this, in thousandths.
+    Gains(i16),
+    /// Cross-talk from channel b to channel a, likewise.
+    CrossTalk(i16),
+    /// Saliency fixed to the stator of a motor of iron, likewise.
+    StatorFixed(i16),
+}
+
+impl Asymmetry {
+    /// In words.
+    pub fn name(self) -> String {
+        let percent = |thousandths: i16| f64::from(thousandths) / 10.0;
+        match self {
+            Self::None => "nothing changed".to_owned(),
+            Self::Gains(by) => format!("gains {:+} %", percent(by)),
+            Self::CrossTalk(by) => format!("cross-talk {:+} %", percent(by)),
+            Self::StatorFixed(by) => format!("stator-fixed {:+} %", percent(by)),
+        }
+    }
+
+    /// Adds it to the bench.
+    pub fn add(self, config: &mut Config) {
+        let share = |thousandths: i16| f64::from(thousandths) / 1e3;
+        let sensors = &mut config.measurement;
+        match self {
+            Self::None => {}
+            Self::Gains(by) => {
+                sensors.gain_error_a += 0.5 * share(by);
+                sensors.gain_error_b -= 0.5 * share(by);
+            }
+            Self::CrossTalk(by) => sensors.cross_talk_a += share(by),
+            Self::StatorFixed(by) => config.iron.stator_fixed += share(by),
+        }
+    }
+}
 
 /// Sizes of disturbances, each in relation to its full size: those of the configuration, and what is drawn.
 pub fn sizes(config: &Config, all: &[Disturbance], seed: u64) -> Vec<f64> {

@@ -1,9 +1,12 @@
 //! The kinds of runs, each with what the drive is asked for over time.
 
+use drive_core::{Accepted, Command, Drive, Mode};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
+use super::disturbed::Asymmetry;
 use crate::config::{BatteryRuns, Config};
+use crate::error::Error;
 
 /// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,6 +38,9 @@ pub enum Kind {
         /// Whether the flux is turned.
         forced: bool,
     },
+    /// Constant torque current while a dynamometer drags the shaft through zero stator frequency, into or out of
+    /// generating; an asymmetry appears after the learning.
+    Dragged(Asymmetry),
 }
 
 /// The twelve kinds, in the order of the runs.
@@ -63,6 +69,15 @@ const RESTLESS: [Kind; 6] = [
     Kind::Restless { hz: 600, forced: true },
     Kind::Restless { hz: 6000, forced: true },
 ];
+const DRAGGED: [Kind; 7] = [
+    Kind::Dragged(Asymmetry::None),
+    Kind::Dragged(Asymmetry::Gains(10)),
+    Kind::Dragged(Asymmetry::Gains(-10)),
+    Kind::Dragged(Asymmetry::CrossTalk(10)),
+    Kind::Dragged(Asymmetry::CrossTalk(-10)),
+    Kind::Dragged(Asymmetry::StatorFixed(10)),
+    Kind::Dragged(Asymmetry::StatorFixed(-10)),
+];
 
 /// The kinds that a configuration asks for, and how many runs there are unless it says.
 pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
@@ -74,6 +89,7 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
         BatteryRuns::Hold => (vec![Kind::Hold], 64),
         BatteryRuns::Forced => (FORCED.to_vec(), 90 * FORCED.len()),
         BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
+        BatteryRuns::Dragged => (DRAGGED.to_vec(), 24 * DRAGGED.len()),
     }
 }
 
@@ -104,6 +120,13 @@ const TURN_DEG: (f64, f64) = (60.0, 180.0);
 const TURN_S: (f64, f64) = (1.0, 4.0);
 /// How far a current that never rests is from the constant one at the most, A.
 const RESTLESS_A: f64 = 0.2;
+/// A dragged shaft: least torque current, in relation to the largest; acceleration, rpm/s; speeds to which and from which it is
+/// dragged, rpm; acceleration without torque, rpm/s; time under torque before and after, s.
+const DRAGGED_SHARE: f64 = 0.75;
+const DRAGGED_RPM_PER_S: (f64, f64) = (5.0, 300.0);
+const DRAGGED_RPM: (f64, f64) = (150.0, 300.0);
+const UNLOADED_RPM_PER_S: f64 = 600.0;
+const DRAGGED_S: (f64, f64) = (1.5, 20.0);
 
 /// A load torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,6 +154,8 @@ pub struct Part {
     pub reference: (f64, f64),
     /// Torque of the load where the shaft is free.
     pub load: LoadTorque,
+    /// Speed of the dynamometer at the beginning and at the end, rpm; straight between them. None: as it is.
+    pub shaft_rpm: Option<(f64, f64)>,
     /// Turn of the rotor flux at the beginning, electrical degrees.
     pub turn_deg: f64,
     /// Length, s.
@@ -141,7 +166,12 @@ impl Part {
     /// A constant reference.
     pub fn constant(reference: f64, seconds: f64) -> Self {
         let reference = (reference, reference);
-        Self { reference, load: LoadTorque::Nm(0.0), turn_deg: 0.0, seconds }
+        Self { reference, load: LoadTorque::Nm(0.0), shaft_rpm: None, turn_deg: 0.0, seconds }
+    }
+
+    /// A constant torque current while the dynamometer changes its speed by so many rpm/s.
+    fn dragged(i_q: f64, rpm: (f64, f64), rate: f64) -> Self {
+        Self { shaft_rpm: Some(rpm), ..Self::constant(i_q, (rpm.1 - rpm.0).abs() / rate) }
     }
 
     /// A load that comes and goes while a speed is held, rpm.
@@ -180,6 +210,7 @@ impl Kind {
             Self::Restless { hz, forced } => {
                 format!("steps at {hz} Hz{}", if forced { ", flux turned" } else { "" })
             }
+            Self::Dragged(asymmetry) => format!("dragged, {}", asymmetry.name()),
         }
     }
 
@@ -188,11 +219,19 @@ impl Kind {
         matches!(self, Self::Forced(_) | Self::Restless { forced: true, .. })
     }
 
+    /// Adds to the bench what belongs to the kind.
+    pub fn add(self, config: &mut Config) {
+        if let Self::Dragged(asymmetry) = self {
+            asymmetry.add(config);
+        }
+    }
+
     /// The shaft.
     pub fn shaft(self) -> Shaft {
         match self {
             Self::Constant(0) | Self::Forced(0) => Shaft::Locked,
             Self::Constant(rpm) | Self::Forced(rpm) => Shaft::Held(rpm.into()),
+            Self::Dragged(_) => Shaft::Held(0.0),
             Self::Steps | Self::Reversals | Self::Ramp | Self::Hold | Self::Restless { .. } => {
                 Shaft::Locked
             }
@@ -241,6 +280,22 @@ impl Kind {
                 let turned = Part { turn_deg: turn(random), ..Part::constant(i_q, TURN_S.1) };
                 vec![Part::constant(i_q, TURN_S.0), turned]
             }
+            Self::Dragged(_) => {
+                let i_q = sign * random.random_range(DRAGGED_SHARE..=1.0) * MOST_A;
+                let (least, most) = DRAGGED_RPM_PER_S;
+                let rate = least * (most / least).powf(random.random_range(0.0..=1.0));
+                // At this speed the torque brakes.
+                let braked = -sign * random.random_range(DRAGGED_RPM.0..=DRAGGED_RPM.1);
+                let held = |seconds| Part::constant(i_q, seconds);
+                let (mut parts, ends) = if random.random() {
+                    (Vec::new(), (0.0, braked))
+                } else {
+                    (vec![Part::dragged(0.0, (0.0, braked), UNLOADED_RPM_PER_S)], (braked, 0.0))
+                };
+                let dragged = Part::dragged(i_q, ends, rate);
+                parts.extend([held(DRAGGED_S.0), dragged, held(DRAGGED_S.1)]);
+                parts
+            }
             Self::Restless { hz, forced } => {
                 let middle = sign * random.random_range(0.0..=MOST_A - RESTLESS_A);
                 let turned = (TURN_S.0 * f64::from(hz)) as usize;
@@ -261,6 +316,19 @@ impl Kind {
 fn turn(random: &mut impl Rng) -> f64 {
     let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
     sign * random.random_range(TURN_DEG.0..=TURN_DEG.1)
+}
+
+/// The torque current that a drive which is off would take when it is asked for this one, A peak.
+///
+/// # Errors
+/// When it is refused.
+pub fn allowed_a(drive: &Drive, asked: f64) -> Result<f64, Error> {
+    let mut drive = drive.clone();
+    drive.command(&Command::Start(Mode::Torque)).map_err(Error::refused)?;
+    match drive.command(&Command::Torque(asked as f32)).map_err(Error::refused)? {
+        Accepted::Limited(taken) => Ok(taken.into()),
+        Accepted::AsGiven => Ok(asked),
+    }
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use drive_core::{Command, Drive, Mode, State};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::bench::Bench;
-use super::drive::{Condition, DriveUnderTest, Purpose};
-use super::kind::{Kind, Part, Shaft, nominal_limit_a, torque_nm};
+use super::kind::{Kind, Part, Shaft, allowed_a, nominal_limit_a, torque_nm};
 use super::trial::Trial;
 use crate::config::Config;
 use crate::error::Error;
@@ -22,22 +22,22 @@ const RAMP_RPM_PER_S: f64 = 600.0;
 /// Longest start and longest learning, s.
 pub const LONGEST_START_S: f64 = 30.0;
 const LONGEST_LEARNING_S: f64 = 1000.0;
+
 /// Lets a drive learn with the shaft locked; returns it off, or the number of the fault with which it refused.
 ///
 /// # Errors
 /// When the plant is refused, or the drive neither learns nor says why.
-pub fn learned<D: DriveUnderTest>(
+pub fn learned(
     config: &Config,
     plant: &PlantSettings,
-    drive: D,
+    drive: Drive,
     seed: u64,
-) -> Result<Result<D, u8>, Error> {
+) -> Result<Result<Drive, u8>, Error> {
     let mut bench = Bench::new(config, plant, &drive, Load::Locked, seed)?;
-    let refused = |why| Error::Refused(format!("the drive does not learn: {why}"));
-    bench.drive.start(Purpose::Learning).map_err(refused)?;
+    bench.rig.command(&Command::Start(Mode::Learning))?;
     match bench.wait(LONGEST_LEARNING_S) {
-        Condition::Off => Ok(Ok(bench.drive)),
-        Condition::Fault(code) => Ok(Err(code)),
+        State::Off => Ok(Ok(bench.rig.drive)),
+        State::Fault(fault) => Ok(Err(fault.code())),
         other => Err(Error::Internal(format!(
             "after {LONGEST_LEARNING_S} s of learning the drive is {other}"
         ))),
@@ -48,66 +48,55 @@ pub fn learned<D: DriveUnderTest>(
 ///
 /// # Errors
 /// When the plant is refused, or the drive refuses a command.
-pub fn trial<D: DriveUnderTest>(
+pub fn trial(
     config: &Config,
     plant: &PlantSettings,
-    drive: &D,
+    drive: &Drive,
     kind: Kind,
     seed: u64,
 ) -> Result<Trial, Error> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let parts = kind.parts(&mut random);
     let mut trial = Trial::new(kind, seed);
-    trial.limit_share = limit_share(config, drive);
-    let (load, purpose) = match kind.shaft() {
-        Shaft::Locked => (Load::Locked, Purpose::Torque),
-        Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Purpose::Torque),
-        Shaft::Free => (Load::Free { torque: 0.0 }, Purpose::Speed),
+    let nominal = nominal_limit_a(config);
+    trial.limit_share = allowed_a(drive, nominal).ok().map(|taken| taken / nominal);
+    let (load, mode) = match kind.shaft() {
+        Shaft::Locked => (Load::Locked, Mode::Torque),
+        Shaft::Held(_) => (Load::Speed { speed: 0.0 }, Mode::Torque),
+        Shaft::Free => (Load::Free { torque: 0.0 }, Mode::Speed),
     };
     let mut bench = Bench::new(config, plant, drive, load, seed)?;
-    bench.drive.start(purpose).map_err(Error::Refused)?;
+    bench.rig.command(&Command::Start(mode))?;
     match bench.wait(LONGEST_START_S) {
-        Condition::Regulating => {}
-        Condition::Fault(code) => return Ok(Trial { refused: Some(code), ..trial }),
+        state if state.regulates() => {}
+        State::Fault(fault) => return Ok(Trial { refused: Some(fault.code()), ..trial }),
         other => return Err(Error::Internal(format!("after a start the drive is {other}"))),
     }
     let mut still = bring_up(&mut bench, kind.shaft(), config)?;
     if still {
         bench.counted_from = Some(bench.time() + SETTLING_S);
-        let taken = follow(&mut bench, purpose, config, &parts)?;
+        let taken = follow(&mut bench, mode, config, &parts)?;
         still = taken.is_some();
         let constant = taken.filter(|_| matches!(kind, Kind::Constant(_)));
         trial.torque_error = constant.map(|i_q| {
             let error = (bench.torque.mean() - torque_nm(config, i_q)) * i_q.signum();
-            error / torque_nm(config, nominal_limit_a(config))
+            error / torque_nm(config, nominal)
         });
     }
     bench.finish(still, &mut trial);
     Ok(trial)
 }
 
-/// The torque current that a drive which is off would take, in relation to the nominal limit; none where it says nothing.
-fn limit_share<D: DriveUnderTest>(config: &Config, drive: &D) -> Option<f64> {
-    let (mut asked, nominal) = (drive.clone(), nominal_limit_a(config));
-    asked.start(Purpose::Torque).ok()?;
-    let taken = asked.torque(nominal as f32).ok()?;
-    Some(f64::from(taken) / nominal)
-}
-
 /// Brings a held shaft up to speed without torque; says whether the drive regulated to the end.
 ///
 /// # Errors
 /// When the plant is refused.
-pub fn bring_up<D: DriveUnderTest>(
-    bench: &mut Bench<D>,
-    shaft: Shaft,
-    config: &Config,
-) -> Result<bool, Error> {
+pub fn bring_up(bench: &mut Bench, shaft: Shaft, config: &Config) -> Result<bool, Error> {
     let Shaft::Held(rpm) = shaft else { return Ok(true) };
     let speed = config.rpm(rpm) * TAU / 60.0;
     let steps = (rpm.abs() / RAMP_RPM_PER_S / PACE_S).ceil() as u32;
     for n in 1..=steps {
-        bench.set_load(Load::Speed { speed: speed * f64::from(n) / f64::from(steps) })?;
+        bench.rig.set_load(Load::Speed { speed: speed * f64::from(n) / f64::from(steps) })?;
         if !bench.watch(PACE_S) {
             return Ok(false);
         }
@@ -120,32 +109,38 @@ pub fn bring_up<D: DriveUnderTest>(
 ///
 /// # Errors
 /// When the plant is refused, or the drive refuses a reference.
-pub fn follow<D: DriveUnderTest>(
-    bench: &mut Bench<D>,
-    purpose: Purpose,
+pub fn follow(
+    bench: &mut Bench,
+    mode: Mode,
     config: &Config,
     parts: &[Part],
 ) -> Result<Option<f64>, Error> {
     let mut taken = 0.0;
     for part in parts {
-        if purpose == Purpose::Speed {
-            bench.set_load(Load::Free { torque: part.load.newton_metres(config) })?;
+        if mode == Mode::Speed {
+            bench.rig.set_load(Load::Free { torque: part.load.newton_metres(config) })?;
         }
         if part.turn_deg != 0.0 {
             bench.turn_flux(part.turn_deg);
         }
-        let (from, to) = part.reference;
-        let steps = if from == to { 1 } else { (part.seconds / PACE_S).round() as u32 };
+        let changes = part.reference.0 != part.reference.1 || part.shaft_rpm.is_some();
+        let steps = if changes { (part.seconds / PACE_S).round() as u32 } else { 1 };
         for n in 1..=steps {
-            let reference = from + (to - from) * f64::from(n) / f64::from(steps);
-            let given = match purpose {
-                Purpose::Speed => {
+            let between =
+                |(from, to): (f64, f64)| from + (to - from) * f64::from(n) / f64::from(steps);
+            let reference = between(part.reference);
+            if let Some(rpm) = part.shaft_rpm.map(between) {
+                bench.rig.set_load(Load::Speed { speed: config.rpm(rpm) * TAU / 60.0 })?;
+            }
+            taken = match mode {
+                Mode::Speed => {
                     let rpm = config.rpm(reference) as f32;
-                    bench.drive.speed(rpm).map(|()| rpm)
+                    bench.rig.command(&Command::Speed(rpm))?;
+                    rpm
                 }
-                _ => bench.drive.torque(config.amperes(reference) as f32),
-            };
-            taken = given.map_err(Error::Refused)?.into();
+                _ => bench.torque(config.amperes(reference) as f32)?,
+            }
+            .into();
             if !bench.watch(part.seconds / f64::from(steps)) {
                 return Ok(None);
             }
@@ -156,52 +151,89 @@ pub fn follow<D: DriveUnderTest>(
 
 #[cfg(test)]
 mod tests {
-    use drive_core::{Compare, Drive, Sample};
-
+    use super::super::disturbed::Asymmetry;
     use super::*;
     use crate::config::plant_settings;
-
-    /// A drive that takes no more than this torque current, A.
-    #[derive(Clone)]
-    struct Lower(Drive, f32);
-
-    impl DriveUnderTest for Lower {
-        fn step(&mut self, sample: &Sample) -> Compare {
-            self.0.step(sample)
-        }
-        fn start(&mut self, purpose: Purpose) -> Result<(), String> {
-            DriveUnderTest::start(&mut self.0, purpose)
-        }
-        fn torque(&mut self, i_q: f32) -> Result<f32, String> {
-            DriveUnderTest::torque(&mut self.0, i_q.clamp(-self.1, self.1))
-        }
-        fn speed(&mut self, rpm: f32) -> Result<(), String> {
-            DriveUnderTest::speed(&mut self.0, rpm)
-        }
-        fn condition(&self) -> Condition {
-            self.0.condition()
-        }
-        fn flux_turns(&self) -> f64 {
-            self.0.flux_turns()
-        }
-    }
 
     /// A lower limit is seen in every run, and the torque is judged by the command that was taken: with 0.5 A for any
     /// command the error stays that of a sound drive, a few per cent of the torque at the limit.
     #[test]
     fn a_lower_limit_is_seen_and_torque_is_judged_by_what_was_taken() {
         let config = Config::default();
-        let drive = Drive::new(config.drive.build().unwrap());
-        let of = |limit: f32| {
-            let drive = Lower(drive.clone(), limit);
+        let of = |limit: Option<f32>| {
+            let mut settings = config.drive;
+            // Beside the 0.7 A of the flux this leaves 0.5 A.
+            (settings.limits.current_a, settings.limits.inverter_a) = (limit, Some(3.5));
+            settings.braking.flux_a = Some(0.0);
+            if limit.is_some() {
+                // The tables of the injection hold for the usual limit.
+                settings.angle_source = drive_core::settings::AngleSource::Encoder;
+            }
+            let drive = Drive::new(settings.build().unwrap());
             trial(&config, &plant_settings(&config), &drive, Kind::Constant(0), 5).unwrap()
         };
-        let (lower, whole) = (of(0.5), of(10.0));
+        let (lower, whole) = (of(Some(0.74_f32.sqrt())), of(None));
         assert_eq!((lower.is_limited(), whole.is_limited()), (true, false));
         assert!((lower.limit_share.unwrap() - 0.5 / 3.0).abs() < 1e-6, "{:?}", lower.limit_share);
         for trial in [lower, whole] {
             let error = trial.torque_error.unwrap();
             assert!(error.abs() < 0.04, "{error}");
         }
+    }
+
+    /// A dragged shaft takes the rotor flux of the motor through zero frequency while the torque brakes or drives: its angle,
+    /// from the plant, turns one way before and the other way after, and between them the torque is that of 2.25 A or more
+    /// beside the 0.7 A of the flux, 3/2 P L_m^2/L_r i_d i_q. Into and out of generating, at 5 to 300 rpm/s.
+    #[test]
+    fn a_dragged_shaft_takes_the_flux_through_zero_frequency_under_torque() {
+        let config = Config::default();
+        let drive = Drive::new(config.drive.build().unwrap());
+        let plant = plant_settings(&config);
+        let (mut into, mut out_of, mut rates) = (0, 0, Vec::new());
+        for seed in 0..12 {
+            let kind = Kind::Dragged(Asymmetry::None);
+            let mut parts = kind.parts(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+            let dragged = parts.iter().rev().find(|part| part.shaft_rpm.is_some()).unwrap();
+            let (rpm, sign) = (dragged.shaft_rpm.unwrap(), dragged.reference.0.signum());
+            rates.push((rpm.1 - rpm.0).abs() / dragged.seconds);
+            // The long hold is not needed.
+            parts.last_mut().unwrap().seconds = 0.5;
+            let load = Load::Speed { speed: 0.0 };
+            let mut bench = Bench::new(&config, &plant, &drive, load, seed).unwrap();
+            bench.trace = Some(Vec::new());
+            bench.rig.command(&Command::Start(Mode::Torque)).unwrap();
+            assert_eq!(bench.wait(LONGEST_START_S), State::Torque);
+            let started = bench.time();
+            assert!(follow(&mut bench, Mode::Torque, &config, &parts).unwrap().is_some(), "{seed}");
+            // Frequency of the flux over 0.2 s, Hz, in the direction of the torque.
+            let moments = bench.trace.unwrap();
+            let torque: Vec<_> = moments.iter().filter(|m| m.t > started + 1.5).collect();
+            let hz: Vec<f64> = torque
+                .windows(41)
+                .map(|m| {
+                    let turned = m.windows(2).map(|two| {
+                        let change = two[1].flux.arg() - two[0].flux.arg();
+                        crate::rig::wrapped_degrees(change) / 360.0
+                    });
+                    sign * turned.sum::<f64>() / (m[40].t - m[0].t)
+                })
+                .collect();
+            let (first, last) = (hz[0], hz[hz.len() - 1]);
+            assert!(first * last < 0.0 && first.abs().min(last.abs()) > 1.0, "{first} {last} Hz");
+            if last < 0.0 {
+                into += 1
+            } else {
+                out_of += 1
+            }
+            let crossing = hz.iter().position(|hz| hz * first <= 0.0).unwrap();
+            let nm = sign * torque[crossing + 20].torque;
+            assert!(nm > 0.9 * torque_nm(&config, 2.25), "{seed}: {nm} Nm");
+        }
+        assert!(into >= 3 && out_of >= 3, "{into} into, {out_of} out of generating");
+        let (least, most) = (
+            rates.iter().copied().fold(f64::MAX, f64::min),
+            rates.iter().copied().fold(0.0, f64::max),
+        );
+        assert!((5.0..15.0).contains(&least) && most > 100.0 && most <= 300.0, "{rates:?}");
     }
 }

@@ -28,6 +28,8 @@ pub struct Summary {
     pub lost: usize,
     /// Runs wrong for long, and the longest time, s.
     pub wrong: (usize, f64),
+    /// Runs beyond 45° for long, and the longest time, s.
+    pub lost_for_long: (usize, f64),
     /// Runs with the flux off for long, and the longest time, s.
     pub flux_off: (usize, f64),
     /// Runs wrong or with the flux off for long, and those of them that were so to the end.
@@ -59,6 +61,8 @@ impl Summary {
             all.lost += usize::from(trial.is_lost());
             all.wrong.0 += usize::from(trial.is_wrong());
             all.wrong.1 = all.wrong.1.max(trial.wrong_s);
+            all.lost_for_long.0 += usize::from(trial.is_lost_for_long());
+            all.lost_for_long.1 = all.lost_for_long.1.max(trial.lost_s);
             all.flux_off.0 += usize::from(trial.is_flux_off());
             all.flux_off.1 = all.flux_off.1.max(trial.flux_off_s);
             all.silent += usize::from(trial.is_silent());
@@ -85,6 +89,8 @@ impl Summary {
         metrics.set("lost_runs", self.lost as f64);
         metrics.set("wrong_runs", self.wrong.0 as f64);
         metrics.set("wrong_longest_s", self.wrong.1);
+        metrics.set("beyond_45_deg_runs", self.lost_for_long.0 as f64);
+        metrics.set("beyond_45_deg_longest_s", self.lost_for_long.1);
         metrics.set("flux_off_runs", self.flux_off.0 as f64);
         metrics.set("flux_off_longest_s", self.flux_off.1);
         metrics.set("silent_runs", self.silent as f64);
@@ -113,10 +119,8 @@ impl Summary {
 
     /// As cells of a row, with the heads of their columns.
     pub fn cells(&self) -> Vec<(&'static str, Cell)> {
-        let degrees = |value: f64| match self.error.count() {
-            0 => Cell::from("-"),
-            _ => Cell::fixed(value, 2),
-        };
+        let regulated = self.error.count() > 0;
+        let degrees = |value| Cell::or_dash(regulated.then(|| Cell::fixed(value, 2)));
         vec![
             ("runs", Cell::from(self.runs.to_string())),
             ("rms (°)", degrees(self.error.rms())),
@@ -124,6 +128,7 @@ impl Summary {
             ("largest (°)", degrees(self.error.largest())),
             ("lost", Cell::from(self.lost.to_string())),
             ("wrong (longest)", Cell::from(lasting(self.wrong))),
+            ("beyond 45° (longest)", Cell::from(lasting(self.lost_for_long))),
             ("flux off (longest)", Cell::from(lasting(self.flux_off))),
             ("stuck", Cell::from(self.stuck.to_string())),
             ("trips, fault: runs", Cell::from(by_fault(&self.trips))),

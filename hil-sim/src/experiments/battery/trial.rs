@@ -32,6 +32,8 @@ pub struct Trial {
     pub largest_deg: f64,
     /// Longest time for which the angle was wrong while the drive regulated, s; after a turn of the flux, if there is one.
     pub wrong_s: f64,
+    /// Longest time for which the error was beyond 45° while the drive regulated, s; likewise.
+    pub lost_s: f64,
     /// Longest time for which the flux was off while the drive regulated, s; likewise.
     pub flux_off_s: f64,
     /// Whether the angle was wrong or the flux off to the end of the run, and long enough to be noticed.
@@ -58,6 +60,7 @@ impl Trial {
             histogram: Vec::new(),
             largest_deg: 0.0,
             wrong_s: 0.0,
+            lost_s: 0.0,
             flux_off_s: 0.0,
             stuck: false,
             limit_share: None,
@@ -81,6 +84,11 @@ impl Trial {
     /// Whether the angle was wrong for so long that the drive should have noticed.
     pub fn is_wrong(&self) -> bool {
         self.wrong_s > UNNOTICED_S
+    }
+
+    /// Whether the angle was lost for so long.
+    pub fn is_lost_for_long(&self) -> bool {
+        self.lost_s > UNNOTICED_S
     }
 
     /// Whether the flux was off for so long.

@@ -185,16 +185,7 @@ impl Study for Refusals {
 
     fn outcome(&self, _: &Context<'_>, records: Vec<Record>) -> Result<Outcome, Error> {
         let mut outcome = Outcome::default();
-        let heads = [
-            "defect",
-            "machines",
-            "named",
-            "unchanged",
-            "within (s)",
-            "largest (A)",
-            "last other answer, or an answer",
-        ];
-        let mut table = Table::new("Refusals", &heads);
+        let mut table = Table::new("Refusals", &[]);
         let (mut named, mut unchanged) = (0, 0);
         for (defect, records) in DEFECTS.iter().zip(records.chunks(self.runs)) {
             let count = |of: fn(&Record) -> bool| records.iter().filter(|&r| of(r)).count();
@@ -203,14 +194,17 @@ impl Study for Refusals {
             unchanged += kept;
             let most = |of: fn(&Record) -> f64| records.iter().map(of).fold(0.0, f64::max);
             let other = records.iter().rfind(|r| !r.named).or(records.last());
-            table.row([
-                Cell::from(defect.name),
-                Cell::fixed(records.len() as f64, 0),
-                Cell::fixed(by_name as f64, 0),
-                Cell::fixed(kept as f64, 0),
-                Cell::fixed(most(|r| r.seconds), 1),
-                Cell::fixed(most(|r| r.largest_a), 2),
-                Cell::from(other.map_or(String::new(), |r| r.answer.clone())),
+            table.record([
+                ("defect", Cell::from(defect.name)),
+                ("machines", Cell::fixed(records.len() as f64, 0)),
+                ("named", Cell::fixed(by_name as f64, 0)),
+                ("unchanged", Cell::fixed(kept as f64, 0)),
+                ("within (s)", Cell::fixed(most(|r| r.seconds), 1)),
+                ("largest (A)", Cell::fixed(most(|r| r.largest_a), 2)),
+                (
+                    "last other answer, or an answer",
+                    Cell::from(other.map_or(String::new(), |r| r.answer.clone())),
+                ),
             ]);
         }
         outcome.metrics.set("sessions", records.len() as f64);

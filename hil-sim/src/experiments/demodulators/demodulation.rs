@@ -1,5 +1,6 @@
 //! The demodulations that are compared, and the drives that use them.
 
+use crate::experiments::injection_map::PP;
 use drive_core::Settings;
 use drive_core::settings::table::ReferenceTable;
 
@@ -22,49 +23,53 @@ pub struct Demodulation {
     pub constant_a: f64,
 }
 
-/// Gains at 600 Hz of the band-pass, at dc of the post-processing filter, and of a rectifier.
-const BPF: f64 = 0.9452;
-const PP: f64 = 0.944_061;
+/// Gain of the band-pass at 600 Hz.
+pub const BPF: f64 = 0.9452;
+/// Gain of a rectifier.
 const RECTIFIER: f64 = std::f64::consts::FRAC_2_PI;
 /// Gain of the rectified chain.
-const RECTIFIED: f64 = BPF * RECTIFIER * PP;
+const RECTIFIED_GAIN: f64 = BPF * RECTIFIER * PP;
 const PRINTED_REFERENCE_A: f64 = 0.010;
+
+/// The chain as printed.
+pub const LITERAL: Demodulation =
+    Demodulation::new("literal", DemodulatorKind::Literal, 1.0, PRINTED_REFERENCE_A);
+/// The printed chain with a rectifier that works.
+pub const RECTIFIED: Demodulation =
+    Demodulation { name: "rectified", demodulator: DemodulatorKind::Rectified, ..LITERAL };
+/// The drive's own.
+pub const SYNCHRONOUS: Demodulation =
+    Demodulation::new("synchronous", DemodulatorKind::Synchronous, 1.0, 0.0);
 
 /// All of them.
 pub const DEMODULATIONS: [Demodulation; 5] = [
-    Demodulation {
-        name: "literal",
-        demodulator: DemodulatorKind::Literal,
-        gain: 1.0,
-        constant_a: PRINTED_REFERENCE_A,
-    },
-    Demodulation {
-        name: "rectified",
-        demodulator: DemodulatorKind::Rectified,
-        gain: 1.0,
-        constant_a: PRINTED_REFERENCE_A,
-    },
-    Demodulation {
-        name: "rms-impedance",
-        demodulator: DemodulatorKind::RmsImpedance,
-        gain: PP / BPF / RECTIFIED,
-        constant_a: 0.0,
-    },
-    Demodulation {
-        name: "envelope",
-        demodulator: DemodulatorKind::Envelope,
-        gain: BPF / RECTIFIED,
-        constant_a: PRINTED_REFERENCE_A * BPF / RECTIFIED,
-    },
-    Demodulation {
-        name: "synchronous",
-        demodulator: DemodulatorKind::Synchronous,
-        gain: 1.0,
-        constant_a: 0.0,
-    },
+    LITERAL,
+    RECTIFIED,
+    Demodulation::new(
+        "rms-impedance",
+        DemodulatorKind::RmsImpedance,
+        PP / BPF / RECTIFIED_GAIN,
+        0.0,
+    ),
+    Demodulation::new(
+        "envelope",
+        DemodulatorKind::Envelope,
+        BPF / RECTIFIED_GAIN,
+        PRINTED_REFERENCE_A * BPF / RECTIFIED_GAIN,
+    ),
+    SYNCHRONOUS,
 ];
 
 impl Demodulation {
+    const fn new(
+        name: &'static str,
+        demodulator: DemodulatorKind,
+        gain: f64,
+        constant_a: f64,
+    ) -> Self {
+        Self { name, demodulator, gain, constant_a }
+    }
+
     /// The name in metrics and file names.
     pub fn key(&self) -> String {
         self.name.replace('-', "_")

@@ -1,7 +1,10 @@
 //! The verdict over the runs, per kind and region.
 
+use drive_core::fault::Fault;
+
 use super::case::Case;
 use super::trial::Run;
+use crate::config::RangeKind;
 use crate::experiments::battery::Moment;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::stats::Stats;
@@ -9,7 +12,8 @@ use crate::stats::Stats;
 /// The meaning of the columns.
 pub const REMARK: &str = "Error: true minus estimated, over all samples that count: at constant torque and in reversals from 0.5 s \
     after the first torque on, after a start on a turning shaft from 0.1 s to 0.7 s after the torque, until the flux is turned, and \
-    otherwise from the end of the run-up on. Lost: stopped by a fault, or beyond 45° at any time; a turned flux may end in a stop. Refused: not started. \
+    otherwise from the end of the run-up on. Lost: stopped by a fault, or beyond 45° at any time; a turned flux may end in a stop. \
+    Refused: not started; no failure where the shaft turns too fast to be caught (fault 47). \
     Silent: beyond 45° for more than 0.5 s while the drive regulates. Current: the largest of a phase, carrier included. Took: until \
     a turning shaft was caught, or a braked one stood.";
 
@@ -106,10 +110,7 @@ pub fn of(cases: &[Case], done: &[(Case, usize, Run)], outcome: &mut Outcome) {
 }
 
 fn cells(verdict: &Verdict) -> Vec<(&'static str, Cell)> {
-    let number = |value: f64, decimals: usize| match value.is_finite() {
-        true => Cell::fixed(value, decimals),
-        false => Cell::from("-"),
-    };
+    let number = |value: f64, n| Cell::or_dash(value.is_finite().then(|| Cell::fixed(value, n)));
     let count = |count: usize| Cell::from(count.to_string());
     vec![
         ("runs", count(verdict.runs)),
@@ -126,10 +127,20 @@ fn cells(verdict: &Verdict) -> Vec<(&'static str, Cell)> {
     ]
 }
 
+/// Speed of the shaft beyond which a start refuses to follow it, rpm on four poles.
+const CAUGHT_RPM: f64 = 2700.0;
+
+/// The refusal of a shaft that turns too fast to be caught: a number of the table, and no failure.
+fn too_fast(case: &Case, run: &Run) -> bool {
+    let turning = matches!(case.kind, RangeKind::TurningStart | RangeKind::ResidualStart);
+    let caught = format!("fault {}", Fault::NotCaught.code());
+    turning && run.rpm.abs() > CAUGHT_RPM && run.refused.as_ref() == Some(&caught)
+}
+
 /// Why a run is none that a drive should have.
 fn failure(case: &Case, run: &Run) -> Option<String> {
     if let Some(why) = &run.refused {
-        return Some(format!("not started: {why}"));
+        return (!too_fast(case, run)).then(|| format!("not started: {why}"));
     }
     let reasons = [
         (run.silent_s > SILENT_S).then(|| format!("beyond 45° for {:.2} s", run.silent_s)),
@@ -153,6 +164,6 @@ pub fn figure(moments: &[Moment]) -> Figure {
         .panel(panel("speed (rpm)", |m| m.rpm))
         .panel(panel("torque (Nm)", |m| m.torque))
         .panel(panel("current (A)", |m| m.current))
-        .panel(panel("rotor flux (Wb)", |m| m.flux))
+        .panel(panel("rotor flux (Wb)", |m| m.flux.norm()))
         .panel(panel("dc link (V)", |m| m.dc_link))
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Drive;
+use drive_core::{Command, Drive, Mode, State, Stop};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,7 @@ use super::case::{Case, sign};
 use crate::config::{Config, RangeKind, plant_settings};
 use crate::error::Error;
 use crate::experiments::battery::{
-    Bench, Condition, DriveUnderTest as _, LONGEST_START_S, LoadTorque, Moment, Part, Purpose,
-    Shaft, bring_up, follow, nominal_limit_a,
+    Bench, LONGEST_START_S, LoadTorque, Moment, Part, Shaft, bring_up, follow, nominal_limit_a,
 };
 use crate::experiments::torque::LOST_DEG;
 use crate::plant::Load;
@@ -127,7 +126,7 @@ pub struct Trial<'a> {
     sign: f64,
     turn_deg: f64,
     off_s: f64,
-    bench: Bench<Drive>,
+    bench: Bench,
     took_s: Option<f64>,
 }
 
@@ -194,8 +193,8 @@ impl<'a> Trial<'a> {
             Err(End::Failed(error)) => return Err(error),
         };
         let bench = self.bench;
-        let trip = match bench.drive.condition() {
-            Condition::Fault(code) if refused.is_none() => Some(code),
+        let trip = match bench.rig.drive.state() {
+            State::Fault(fault) if refused.is_none() => Some(fault.code()),
             _ => None,
         };
         let run = Run {
@@ -242,7 +241,8 @@ impl<'a> Trial<'a> {
             RangeKind::TurningStart => self.turning_start(),
             RangeKind::ResidualStart => {
                 self.up_to_speed()?;
-                self.bench.drive.stop();
+                // Refused by a drive that has stopped itself.
+                let _ = self.bench.rig.command(&Command::Stop(Stop::Coast));
                 self.bench.wait(LONGEST_START_S);
                 self.bench.coast(self.off_s);
                 self.turning_start()
@@ -253,7 +253,7 @@ impl<'a> Trial<'a> {
                 let nominal = self.config.inverter.dc_link_v;
                 self.bench.counted_from = Some(self.bench.time());
                 for (mains, seconds) in [(0.0, OUTAGE_S), (nominal, 2.0)] {
-                    self.bench.plant.set_mains(mains).map_err(Error::refused)?;
+                    self.bench.rig.plant.set_mains(mains).map_err(Error::refused)?;
                     self.follow(&[Part::constant(rpm, seconds)])?;
                 }
                 Ok(())
@@ -262,17 +262,17 @@ impl<'a> Trial<'a> {
         }
     }
 
-    fn purpose(&self) -> Purpose {
-        if self.case.shaft(self.rpm) == Shaft::Free { Purpose::Speed } else { Purpose::Torque }
+    fn mode(&self) -> Mode {
+        if self.case.shaft(self.rpm) == Shaft::Free { Mode::Speed } else { Mode::Torque }
     }
 
     /// Starts, and waits until the drive regulates.
     fn start(&mut self) -> Result<(), End> {
-        let purpose = self.purpose();
-        self.bench.drive.start(purpose).map_err(End::Refused)?;
+        let started = self.bench.rig.command(&Command::Start(self.mode()));
+        started.map_err(|why| End::Refused(why.to_string()))?;
         match self.bench.wait(LONGEST_START_S) {
-            Condition::Regulating => Ok(()),
-            Condition::Fault(code) => Err(End::Refused(format!("fault {code}"))),
+            state if state.regulates() => Ok(()),
+            State::Fault(fault) => Err(End::Refused(format!("fault {}", fault.code()))),
             other => Err(End::Refused(format!("the drive is {other}"))),
         }
     }
@@ -291,8 +291,8 @@ impl<'a> Trial<'a> {
     }
 
     fn follow(&mut self, parts: &[Part]) -> Result<(), End> {
-        let purpose = self.purpose();
-        still(follow(&mut self.bench, purpose, self.config, parts)?.is_some())
+        let mode = self.mode();
+        still(follow(&mut self.bench, mode, self.config, parts)?.is_some())
     }
 
     /// Follows, and counts the error after so many seconds.
@@ -314,7 +314,7 @@ impl<'a> Trial<'a> {
             for n in 1..=steps {
                 let share = f64::from(n) / f64::from(steps);
                 let (rs, rr) = (rs * (1.0 + RISE.0 * share), rr * (1.0 + RISE.1 * share));
-                self.bench.plant.set_resistances(rs, rr).map_err(Error::refused)?;
+                self.bench.rig.plant.set_resistances(rs, rr).map_err(Error::refused)?;
                 still(self.bench.watch(WARMING_S / f64::from(steps)))?;
             }
         }
@@ -324,7 +324,7 @@ impl<'a> Trial<'a> {
     /// A start while a dynamometer turns the shaft, then torque.
     fn turning_start(&mut self) -> Result<(), End> {
         let speed = self.config.rpm(self.rpm) * TAU / 60.0;
-        self.bench.set_load(Load::Speed { speed })?;
+        self.bench.rig.set_load(Load::Speed { speed })?;
         let (from, i_q) = (self.bench.time(), self.sign * CAUGHT_A);
         self.bench.peak_a = 0.0;
         self.start()?;
@@ -350,7 +350,7 @@ impl<'a> Trial<'a> {
         let from = self.bench.time();
         self.bench.counted_from = Some(from);
         let stopped = self.config.rpm(STOPPED_RPM) * TAU / 60.0;
-        while self.bench.plant.mechanical_speed().abs() > stopped {
+        while self.bench.rig.plant.mechanical_speed().abs() > stopped {
             self.follow(&[Part::constant(0.0, 0.02)])?;
             if self.bench.time() - from > LONGEST_STOP_S {
                 return Ok(());
@@ -369,7 +369,7 @@ impl<'a> Trial<'a> {
             let steps = 60;
             for n in 1..=steps {
                 let share = from + (to - from) * f64::from(n) / f64::from(steps);
-                self.bench.plant.set_dc_link(nominal * share).map_err(Error::refused)?;
+                self.bench.rig.plant.set_dc_link(nominal * share).map_err(Error::refused)?;
                 still(self.bench.watch(SAG_RAMP_S / f64::from(steps)))?;
             }
             still(self.bench.watch(SAG_S))?;

@@ -268,7 +268,10 @@ pub fn start(config: &Config, rpm: f64, seed: u64, relock: bool) -> Result<Start
     let mut rig = if relock {
         let mut rig = at_speed(config, OperatingPoint { rpm, iq: 1.0, seed })?;
         rig.run(0.5, |_| {});
-        rig.command(&Command::Relock)?;
+        // Refused while the shaft turns.
+        if rig.command(&Command::Relock).is_err() {
+            return Ok(result);
+        }
         while !matches!(rig.drive.state(), State::Torque | State::Fault(_)) {
             rig.step();
         }

@@ -9,7 +9,7 @@ use drive_core::tuning::{
     CurrentLoopDesign, DIRECT_SHARE, EquivalentCircuit, FirstOrder, motor_plant,
 };
 
-use crate::config::Config;
+use crate::config::{Config, built};
 use crate::error::Error;
 use crate::rig::{RATE_HZ, Rig};
 
@@ -100,7 +100,7 @@ impl CurrentLoop {
         let circuit =
             EquivalentCircuit { r_s: m.r_s, r_r: m.r_r, l_m: m.l_m, l_ls: m.l_ls, l_lr: m.l_lr };
         let plant = motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
-        let design = config.drive.build().map_err(Error::refused)?.designs[1];
+        let design = built(&config.drive)?.designs[1];
         Ok(Self { design, plant, parts: [true; 4] })
     }
 

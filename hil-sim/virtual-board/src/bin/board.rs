@@ -56,6 +56,7 @@ fn run(mut options: Options) -> Result<()> {
     }
     let mut board =
         Board::new(image, virtual_board::Options::on(stage, &config, options.input.seed))?;
+    let kept = options.flash.as_deref().is_some_and(Path::exists);
     let flash = options.flash.as_deref().map(|path| FlashFile::open(path, &mut board.chip().flash));
     let flash = flash.transpose()?;
 
@@ -65,12 +66,19 @@ fn run(mut options: Options) -> Result<()> {
     say(&format!(
         "type `cargo sim console --port {port}` elsewhere, or commands here; !help lists the board's own"
     ));
+    if !kept && config.drive.injection.synchronous.allow_unlearned {
+        say(
+            "Its flash begins with `injection.allow_unlearned yes`: the drive starts before it has learned. `defaults` takes that back.",
+        );
+    }
     let set_lines = virtual_board::Options::set_lines(stage, &config);
     if !set_lines.is_empty() {
         say(
             "The image needs other settings for this motor and its sensors. With the drive off, before `save`:",
         );
         set_lines.iter().for_each(|line| say(&format!("    {line}")));
+        // Scales are of the hardware.
+        ["apply", "confirm board"].into_iter().for_each(|line| say(&format!("    {line}")));
     }
     let inputs = Inputs {
         terminal: typed_lines(options.attached.then(|| stop.clone())),

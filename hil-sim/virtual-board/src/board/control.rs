@@ -68,6 +68,10 @@ impl Board {
         if ended[0] && !ended[1] {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
+        // With the drive off the firmware switches it on again instead.
+        if !chip.tim8.main_output() && chip.tim1.main_output() {
+            hardware |= Hardware::CHOPPER_OFF;
+        }
         let [one, two] = chip.adc.data();
         // With three shunts both convert the third current second.
         let (current_c, slow) = match chip.gates.stage().sensors {
@@ -95,6 +99,7 @@ impl Board {
         let Some(entered) = self.entered.take() else { return };
         let took_order = entered.had_order && !self.has_order();
         let chip = self.cpu.chip_mut();
+        chip.in_control = false;
         let (compared, up_to) = chip.compared;
         let way = |blocks: &[Block], accesses: u64| {
             let accesses = (accesses - entered.accesses) as u32;

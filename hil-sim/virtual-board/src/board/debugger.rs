@@ -4,18 +4,45 @@ use anyhow::Result;
 
 use super::Board;
 use crate::chip::TICKS_PER_S;
-use crate::chip::debugger::LOW_POWER;
-use crate::periph::plain::DBG_CR;
+use crate::chip::debugger::{LOW_POWER, TIM5_STOP, WATCHDOG_STOPS};
+use crate::periph::plain::{DBG_APB1_FZ, DBG_CR};
+
+/// A program at the debug port, by its effect on DBGMCU as it attaches. All keep the port alive in low-power modes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Debugger {
+    /// probe-rs.
+    ProbeRs,
+    /// OpenOCD with `target/stm32g4x.cfg`, event `examine-end`: it stops both watchdogs while the core is halted.
+    OpenOcd,
+    /// ST's server with its option that suspends the watchdogs; taken here for the worst, it stops TIM5 as well.
+    StServer,
+}
+
+impl Debugger {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::ProbeRs, Self::OpenOcd, Self::StServer];
+
+    /// The peripherals of APB1 that it stops while the core is halted.
+    const fn stops(self) -> u32 {
+        match self {
+            Self::ProbeRs => 0,
+            Self::OpenOcd => WATCHDOG_STOPS,
+            Self::StServer => WATCHDOG_STOPS | TIM5_STOP,
+        }
+    }
+}
 
 impl Board {
-    /// A debugger attaches: it keeps the debug port alive in low-power modes.
-    pub fn attach(&mut self) {
+    /// A debugger attaches.
+    pub fn attach(&mut self, debugger: Debugger) {
         let debug = &mut self.chip().debug;
-        let cr = debug.get(DBG_CR);
-        debug.write(DBG_CR, cr | LOW_POWER);
+        for (register, bits) in [(DBG_CR, LOW_POWER), (DBG_APB1_FZ, debugger.stops())] {
+            let old = debug.get(register);
+            debug.write(register, old | bits);
+        }
     }
 
-    /// It detaches, and clears what it has set.
+    /// It detaches, and clears the bits of low-power modes.
     pub fn detach(&mut self) {
         self.resume();
         let debug = &mut self.chip().debug;

@@ -6,11 +6,11 @@ use hil_sim::plant::Plant;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::Board;
+use super::{Board, Options};
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
-use crate::power_stage::{PowerStage, Sensors, channel};
+use crate::power_stage::{Sensors, channel};
 
 /// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
@@ -26,6 +26,8 @@ pub(super) struct Connection {
     dead_time: Option<u32>,
     /// Duty of the chopper and relay that it sees.
     dc_link: (f64, bool),
+    /// What the switches stand, V.
+    rated_v: f64,
     /// The last sample.
     pub sample: Sample,
     shunts: Option<ShuntReader>,
@@ -56,7 +58,8 @@ struct Top {
 }
 
 impl Connection {
-    pub(super) fn new(stage: &PowerStage, seed: u64) -> Self {
+    pub(super) fn new(options: &Options) -> Self {
+        let (stage, seed) = (options.power_stage, options.seed);
         let shunts = match stage.sensors {
             Sensors::InLine => None,
             Sensors::LowSide(shunts) => {
@@ -77,6 +80,7 @@ impl Connection {
             applied: Compare::OFF,
             dead_time: None,
             dc_link: (0.0, false),
+            rated_v: stage.rated_v(&options.plant),
             sample: Sample::default(),
             shunts,
         }
@@ -204,6 +208,13 @@ impl Board {
         }
         self.connection.sample = self.plant.sample();
         self.show_sample();
+        // The currents of the period that ends, at whose vectors they were switched off.
+        let currents = if outputs_on { self.plant.phase_currents() } else { [0.0; 3] };
+        let stress_v = stage.switches.stress_v(self.plant.dc_link(), currents);
+        let rated_v = self.connection.rated_v;
+        if stress_v > rated_v && !self.cpu.chip().forgiving {
+            bail!("the switches see {stress_v:.1} V and stand {rated_v} V");
+        }
         match pulses {
             Err(_) if outputs_on && self.cpu.chip().forgiving => self.short_pulses += 1,
             Err(bad) if outputs_on => bail!("bad gate signals: {bad}"),

@@ -42,6 +42,7 @@ impl Options {
         if let Some(divider) = stage.dc_link_divider {
             plant.measurement.dc_link_v = divider * REFERENCE_V / CODES;
         }
+        plant.measurement.heat_sink_code = stage.ntc.code(config.measurement.heat_sink_c as f32);
         if let Some((delay_s, drop_v)) = stage.delay_and_drop {
             plant.inverter.propagation_us = delay_s * 1e6;
             plant.inverter.residual_v = drop_v;

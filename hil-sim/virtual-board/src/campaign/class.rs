@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt};
 
-use super::faults::{current, flip, losing, name, noise, slow_sensor};
+use super::faults::{current, flip, flip_register, losing, name, noise, slow_sensor};
 use super::scene::{Source, Target};
 use crate::board::Board;
 use crate::chip::TICKS_PER_S;
@@ -44,12 +44,14 @@ pub struct Class {
     pub sources: &'static [Source],
     /// The procedure of its runs.
     pub run: Run,
+    /// Whether the outputs must be off after the bound, correct control or not.
+    pub ends: bool,
 }
 
 /// A class of faults that are injected while the drive regulates with either angle source.
 const fn regulating(name: &'static str, bound: Bound, inject: Inject) -> Class {
     let at_speed = Some(bound);
-    Class { name, bound, at_speed, sources: BOTH, run: Run::Regulating(inject) }
+    Class { name, bound, at_speed, sources: BOTH, run: Run::Regulating(inject), ends: false }
 }
 
 impl Class {
@@ -61,6 +63,11 @@ impl Class {
     /// This class with another bound at speed.
     const fn at_speed(self, bound: Bound) -> Self {
         Self { at_speed: Some(bound), ..self }
+    }
+
+    /// The same, after which the outputs must be off.
+    const fn ends(self) -> Self {
+        Self { ends: true, ..self }
     }
 
     /// The same, but no part of a campaign at speed.
@@ -212,6 +219,8 @@ const CLASSES: &[Class] = &[
     regulating("bit flip in the coefficients", CHECK, |board, target, rng| {
         flip(board, rng, target.coefficients)
     }),
+    regulating("bit flip in a register", REGISTERS, |board, _, rng| flip_register(board, rng))
+        .ends(),
     regulating("bit flip in the drive's state", LOCK, |board, target, rng| {
         flip(board, rng, target.state)
     })
@@ -247,7 +256,10 @@ const CLASSES: &[Class] = &[
     }),
     regulating(
         "conversion trigger lost",
-        (WATCHDOG_MS, "one converter: its own period; both: no interrupt, the watchdog is not fed"),
+        (
+            WINDOW_MS,
+            "one converter: its own period; both: no interrupt, the window watchdog is not fed",
+        ),
         |board, _, rng| {
             let which = rng.random_range(0..3_usize);
             // For good, or for a while: up to longer than the watchdog waits.
@@ -283,14 +295,17 @@ const CLASSES: &[Class] = &[
             format!("{ms:.3} ms")
         },
     ),
-    regulating(
-        "core hangs",
-        (WATCHDOG_MS, "the watchdog, 4.2 to 4.9 ms after it was last fed"),
-        |board, _, _| {
-            board.hang();
-            String::new()
-        },
-    ),
+    regulating("TIM1 stops", WINDOW, |board, _, _| {
+        let cr1 = board.chip().read(TIM1_CR1, 4);
+        board.chip().write(TIM1_CR1, 4, cr1 & !1);
+        String::new()
+    })
+    .ends(),
+    regulating("core hangs", WINDOW, |board, _, _| {
+        board.hang();
+        String::new()
+    })
+    .ends(),
     regulating(
         "stack overflow",
         (2.0 * STEP_MS, "the next interrupt does not find room for its frame"),
@@ -306,6 +321,7 @@ const CLASSES: &[Class] = &[
         at_speed: None,
         sources: &[Source::Sensorless],
         run: Run::DamagedPage,
+        ends: false,
     },
     Class {
         name: "power lost in an operation of save",
@@ -313,6 +329,7 @@ const CLASSES: &[Class] = &[
         at_speed: None,
         sources: &[Source::Sensorless],
         run: Run::Saving,
+        ends: false,
     },
     Class {
         name: "reset pin at any time",
@@ -320,6 +337,7 @@ const CLASSES: &[Class] = &[
         at_speed: Some(RESET),
         sources: BOTH,
         run: Run::Reset,
+        ends: false,
     },
 ];
 
@@ -357,5 +375,11 @@ const LOCK_AT_SPEED: Bound = (
 /// Compared and hashed by the main loop, 64 words of 5300 a pass, a pass a control period: 14 ms for all.
 const CHECK: Bound =
     (20.0, "the main loop has looked at all of it after 14 ms, later if the console is busy");
-const WATCHDOG_MS: f64 = 6.0;
+const REGISTERS: Bound =
+    (5.0, "the main loop has looked at all of them after 1.7 ms, later if the console is busy");
+/// The window watchdog bites 482 us after it was fed at the latest; the truth is compared once in a period.
+const WINDOW_MS: f64 = 0.7;
+const WINDOW: Bound =
+    (WINDOW_MS, "the window watchdog, 0.48 ms after it was last fed at the latest");
+const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;

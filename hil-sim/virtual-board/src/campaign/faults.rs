@@ -2,6 +2,7 @@
 
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
+use induction_drive::monitor::register_check::{CONTROL, Register};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -82,6 +83,36 @@ pub fn slow_sensor(
         1 => "open".into(),
         2 => "saturated".into(),
         _ => format!("{rms:.0} codes of noise"),
+    }
+}
+
+/// Bits that are at the gates at once, before any software. TIM1: clock of the dead time (CR1), polarity (CCER). Ports: the
+/// functions of PA7 to PA10, PB0 and PB1; which level another function gives is not modelled.
+const AT_THE_GATES: [(u32, u32); 5] = [
+    (0x4001_2c00, 3 << 8),
+    (0x4001_2c20, 0xaaa),
+    (0x4800_0020, 0xf << 28),
+    (0x4800_0024, 0xfff),
+    (0x4800_0420, 0xff),
+];
+
+/// Flips a bit that can be written of a register that the firmware checks.
+pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
+    loop {
+        let Register { address, mask } = CONTROL[rng.random_range(0..CONTROL.len())];
+        let bit = rng.random_range(0..32);
+        if mask >> bit & 1 == 0
+            || AT_THE_GATES.iter().any(|g| g.0 == address && g.1 >> bit & 1 == 1)
+        {
+            continue;
+        }
+        let chip = board.chip();
+        let before = chip.read(address, 4);
+        chip.write(address, 4, before ^ 1 << bit);
+        // Neither reserved nor locked.
+        if (chip.read(address, 4) ^ before) & mask != 0 {
+            return format!("bit {bit} of {address:#010x}");
+        }
     }
 }
 

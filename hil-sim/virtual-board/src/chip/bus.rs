@@ -10,6 +10,7 @@ use crate::scs;
 
 pub(super) const TIM2: u32 = 0x4000_0000;
 pub(super) const TIM5: u32 = 0x4000_0c00;
+pub(super) const WWDG: u32 = 0x4000_2c00;
 const IWDG: u32 = 0x4000_3000;
 pub(super) const PWR: u32 = 0x4000_7000;
 pub(super) const USART3: u32 = 0x4000_4800;
@@ -167,6 +168,7 @@ impl Chip {
                 value
             }
             IWDG => self.iwdg.read(offset, now),
+            WWDG => self.wwdg.read(offset, now),
             SYSCFG => match offset {
                 0x200..0x220 => self.comp.read(offset - 0x200),
                 _ => self.syscfg.read(offset),
@@ -211,6 +213,7 @@ impl Chip {
             LPUART1 => self.lpuart.write(offset, value, now)?,
             USART3 => self.usart3.write(offset, value, now)?,
             IWDG => self.iwdg.write(offset, value, rules)?,
+            WWDG => self.wwdg.write(offset, value, now)?,
             SYSCFG => match offset {
                 0x200..0x220 => self.comp.write(offset - 0x200, value, now)?,
                 _ => self.syscfg.write(offset, value)?,
@@ -247,7 +250,8 @@ impl Chip {
                 self.monitor_supply();
             }
             SYSCFG if address & 0x3ff >= 0x200 => self.check_reference(address & 0x3ff),
-            SYSCFG => self.monitor_supply(),
+            // A break that lasts takes MOE away again.
+            SYSCFG | TIM8 => self.monitor_supply(),
             _ => {}
         }
     }

@@ -3,7 +3,7 @@
 use super::Chip;
 use super::bus::{
     ADC1, DAC1, DAC3, FLASH_REGISTERS, GPIO_FIRST, GPIO_LAST, LPUART1, PWR, SYSCFG, TIM1, TIM2,
-    TIM5, TIM8, USART3,
+    TIM5, TIM8, USART3, WWDG,
 };
 use crate::periph::rcc::{AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR};
 use crate::rules::Rule;
@@ -26,6 +26,7 @@ pub fn clock_of(address: u32) -> Option<(&'static str, u32, u32)> {
         TIM8 => ("TIM8", APB2ENR, 13),
         TIM2 => ("TIM2", APB1ENR1, 0),
         TIM5 => ("TIM5", APB1ENR1, 3),
+        WWDG => ("WWDG", APB1ENR1, 11),
         GPIO_FIRST..=GPIO_LAST => {
             let port = (address - GPIO_FIRST) >> 10;
             (PORTS[port as usize], AHB2ENR, port)

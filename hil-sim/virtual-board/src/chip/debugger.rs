@@ -9,7 +9,13 @@ pub const LOW_POWER: u32 = 7;
 /// DBGMCU: clock of the core goes on while it sleeps.
 const SLEEP: u32 = 1;
 /// DBGMCU: the watchdog stops while the core is halted.
-const IWDG_STOP: u32 = 1 << 12;
+pub(super) const IWDG_STOP: u32 = 1 << 12;
+/// DBGMCU: the window watchdog stops while the core is halted.
+pub(super) const WWDG_STOP: u32 = 1 << 11;
+/// DBGMCU: both watchdogs stop while the core is halted.
+pub const WATCHDOG_STOPS: u32 = IWDG_STOP | WWDG_STOP;
+/// DBGMCU: TIM5 stops while the core is halted.
+pub const TIM5_STOP: u32 = 1 << 3;
 /// DBGMCU: TIM1 stops while the core is halted.
 const TIM1_STOP: u32 = 1 << 11;
 
@@ -34,7 +40,6 @@ impl Chip {
             return;
         }
         self.halt = Some(Halt { since: self.now, outputs: self.tim1.outputs_on() });
-        self.frozen_watchdog = self.debug.get(DBG_APB1_FZ) & IWDG_STOP != 0;
         if self.debug.get(DBG_APB2_FZ) & TIM1_STOP != 0 {
             self.tim1.freeze(self.now);
             self.look_at_gates();
@@ -47,15 +52,27 @@ impl Chip {
         self.halt.is_some() && self.debug.get(DBG_APB2_FZ) & TIM8_STOP != 0
     }
 
+    /// Whether a halt stops this peripheral of APB1.
+    pub(super) fn stops(&self, bit: u32) -> bool {
+        self.halt.is_some() && self.debug.get(DBG_APB1_FZ) & bit != 0
+    }
+
     /// Lets the core go on.
     pub fn resume(&mut self) {
-        let Some(halt) = self.halt.take() else { return };
-        let stood = self.now - halt.since;
-        self.tim1.thaw(self.now);
-        self.look_at_gates();
-        if std::mem::take(&mut self.frozen_watchdog) {
+        let Some(Halt { since, .. }) = self.halt else { return };
+        let stood = self.now - since;
+        if self.stops(IWDG_STOP) {
             self.iwdg.delay(stood);
         }
+        if self.stops(WWDG_STOP) {
+            self.wwdg.delay(stood);
+        }
+        if self.stops(TIM5_STOP) {
+            self.tim5.delay(stood);
+        }
+        let Some(halt) = self.halt.take() else { return };
+        self.tim1.thaw(self.now);
+        self.look_at_gates();
         // The cycle counter does not count in debug state.
         self.scs.stand_still(stood);
         let back = halt.outputs && self.tim1.outputs_on();

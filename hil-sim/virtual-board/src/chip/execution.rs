@@ -92,7 +92,7 @@ impl Chip {
         }
     }
 
-    /// A block in CCM is about to be executed.
+    /// A block in CCM, or in the flash while the control interrupt runs, is about to be executed.
     #[inline]
     pub fn block(&mut self, address: u32, size: u32, cycles: u32) {
         let taken = self.last_block.is_some_and(|(_, end)| end != address);
@@ -109,8 +109,9 @@ impl Chip {
         }
     }
 
-    /// Blocks since the last call.
+    /// The control interrupt begins: keeps the blocks from now on.
     pub fn begin_interrupt(&mut self) {
+        self.in_control = self.keep_blocks;
         self.blocks.clear();
         self.compared = (0, self.accesses);
         self.last_block = None;

@@ -8,7 +8,9 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use drive_stream::{Piece, Splitter};
 use hil_sim::board::LogLevel;
+use hil_sim::rig::RATE_HZ;
 
 use super::flash_file::FlashFile;
 use super::own::Own;
@@ -75,6 +77,8 @@ pub struct Session {
     inputs: Inputs,
     typed: Assembler,
     said: Assembler,
+    /// Passes over the frames of a stream.
+    wire: Splitter,
     resets: usize,
     last: Option<Period>,
     /// The drive's flux angle, the motor's, turns, and the motor's flux, Wb, in the last period.
@@ -97,6 +101,7 @@ impl Session {
             inputs,
             typed: Assembler::default(),
             said: Assembler::default(),
+            wire: Splitter::default(),
             resets: 0,
             last: None,
             flux: None,
@@ -273,10 +278,22 @@ impl Session {
             self.resets = n + 1;
             let cause = self.board.resets[n].1;
             self.add(Source::Board, cause.to_string());
+            // A frame that the reset cut short takes no text with it.
+            self.wire = Splitter::default();
         }
         let bytes = std::mem::take(&mut self.board.chip().lpuart.wire.from_chip);
-        for line in self.said.push(&bytes) {
+        let text = |byte: &u8| match self.wire.push(*byte) {
+            Piece::Text(byte) => Some(byte),
+            _ => None,
+        };
+        let text: Vec<u8> = bytes.iter().filter_map(text).collect();
+        for line in self.said.push(&text) {
+            let begun = line.strip_prefix("ok: every ").and_then(|rest| rest.split(' ').next());
+            let rate = begun.and_then(|periods| periods.parse::<f64>().ok()).map(|n| RATE_HZ / n);
             self.add(Source::Said, line);
+            if let Some(rate) = rate {
+                self.add(Source::Board, format!("stream: {rate:.0} frames/s, not shown here"));
+            }
         }
         self.pty.write(&bytes)?;
         let answered = self.board.take_bus();

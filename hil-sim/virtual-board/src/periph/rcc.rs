@@ -45,11 +45,12 @@ registers! {
 const HSEON: u32 = 1 << 16;
 const CSSON: u32 = 1 << 19;
 const CSSF: u32 = 1 << 8;
-/// Flags of resets in CSR: software, reset pin, power, watchdog.
+/// Flags of resets in CSR: software, reset pin, power, watchdogs.
 const SFT: u32 = 1 << 28;
 const PIN: u32 = 1 << 26;
 const BOR: u32 = 1 << 27;
 const IWDG: u32 = 1 << 29;
+const WWDG: u32 = 1 << 30;
 const FLAGS: u32 = 0xfe00_0000;
 
 /// When clocks of peripherals were switched on.
@@ -69,6 +70,8 @@ pub struct Rcc {
     cifr: u32,
     /// Whether the crystal oscillates when it is on.
     pub crystal_lives: bool,
+    /// Whether the PLL locks when it is on.
+    pub pll_locks: bool,
     failed: bool,
     /// The last clocks switched on by each enable register: their bits, and when.
     on: [(u32, On); 7],
@@ -83,12 +86,14 @@ impl Rcc {
             Reset::Pin => PIN,
             Reset::Software => SFT | PIN,
             Reset::Watchdog => IWDG | PIN,
+            Reset::Window => WWDG | PIN,
         };
         Self {
             store: Store::new(KNOWN),
             flags,
             cifr: 0,
             crystal_lives: true,
+            pll_locks: true,
             failed: false,
             on: [(0, On::default()); 7],
             ticks_per_cycle: HSI_TICKS,
@@ -177,7 +182,7 @@ impl Rcc {
                 value & !(1 << 10 | 1 << 17 | 1 << 25)
                     | (value & 1 << 8) << 2
                     | hse << 1
-                    | (value & 1 << 24) << 1
+                    | (value & u32::from(self.pll_locks) << 24) << 1
             }
             CFGR => value & !0xc | (value & 3) << 2,
             CIFR => self.cifr,

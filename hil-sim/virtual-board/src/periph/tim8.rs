@@ -42,6 +42,11 @@ impl Tim8 {
         f64::from(get(CCR1)) / (f64::from(get(ARR)) + 1.0)
     }
 
+    /// The bit MOE.
+    pub fn main_output(&self) -> bool {
+        self.0.get(BDTR) & MOE != 0
+    }
+
     /// A fault inside the chip pulls the break.
     pub fn system_break(&mut self) {
         let bdtr = self.0.get(BDTR);

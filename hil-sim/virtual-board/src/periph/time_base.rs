@@ -26,6 +26,11 @@ impl Default for TimeBase {
 }
 
 impl TimeBase {
+    /// Its clock stood still for some ticks.
+    pub fn delay(&mut self, ticks: u64) {
+        self.from += ticks;
+    }
+
     /// Reads a register at the time `now`, ticks.
     pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
         match offset {

@@ -1,16 +1,22 @@
 //! The boards, each with its sources. "Assumed" is a value that no source gives.
 
+use drive_core::settings::Ntc;
+
 use super::driver::{Driver, Input, Pull};
 use super::shunts::Shunts;
-use super::{GateLimits, PowerStage, Sensors};
+use super::{GateLimits, PowerStage, Sensors, Switches};
 
 /// All of them.
 pub const ALL: [&PowerStage; 3] = [&REFERENCE, &IHM08M1, &IHM023V3];
 
 /// TTL levels: below 0.8 V is low, above 2.0 V high.
 const TTL: (f64, f64) = (0.8, 2.0);
-/// L6398 (data sheet, electrical characteristics: V_il 0.8 V at most, V_ih 1.9 V at least), and L6390 alike.
-const L639X: (f64, f64) = (0.8, 1.9);
+/// L6398 (data sheet, p. 8: low up to 0.8 V, high from 1.9 to 2.25 V on, by the part), and L6390 (p. 11) alike.
+const L639X: (f64, f64) = (0.8, 2.25);
+/// Ringing at a turn-off: 20 nH of the loop, and a current that falls in 40 ns (assumed).
+const RINGING: f64 = 20e-9 / 40e-9;
+/// Pull-up of the fault input that the documentation asks for (assumed on all boards).
+const FAULT_PULL_OHM: f64 = 4700.0;
 
 /// HIN of L6398 and L6390: active high; its pull-down draws 260 uA at most from 15 V (L6390 data sheet, p. 11), typically
 /// 175 uA.
@@ -54,6 +60,11 @@ pub const REFERENCE: PowerStage = PowerStage {
     },
     // 2.2 us (section 3.9). A microsecond, less the rounding to counts.
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
+    // Those of a drive for 230 V (assumed).
+    switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
+    fault_pull_ohm: FAULT_PULL_OHM,
+    analog_only: &[],
+    ntc: Ntc::DEFAULT,
     sensors: Sensors::InLine,
     dc_link_divider: None,
     delay_and_drop: None,
@@ -61,7 +72,8 @@ pub const REFERENCE: PowerStage = PowerStage {
     supply_v: None,
 };
 
-/// X-NUCLEO-IHM08M1 at 48 V: L6398 with STL220N6F7.
+/// X-NUCLEO-IHM08M1 at 42 V: L6398 with STL220N6F7. PA11, PB14 and PB15 are at nets of the fault input and of a gate (R73,
+/// R74, R86).
 ///
 /// Pins, dividers and shunts: UM1996 and UM2505 as tabulated by okhsunrog/oxifoc, docs/hw/nucleo-g474re-ihm08m1.md
 /// (9e87244), which calculated gain and offset. The sign is that of a shunt between switch and ground at a non-inverting
@@ -72,13 +84,17 @@ const IHM08M1: PowerStage = PowerStage {
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 320e-9 },
     // Assumed: the MOSFETs switch in less than 100 ns, so the driver's own dead time is enough.
     limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
+    switches: Switches { rated_v: 60.0, ringing_v_per_a: RINGING },
+    fault_pull_ohm: FAULT_PULL_OHM,
+    analog_only: &[(0, 11), (1, 14), (1, 15)],
+    ntc: Ntc::DEFAULT,
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.010 * 5.18, zero_v: 1.71, ..AMPLIFIERS }),
     // 169 and 9.31 kOhm.
     dc_link_divider: Some(19.15),
     // 125 ns (L6398 data sheet). A switch drops little; assumed.
     delay_and_drop: Some((125e-9, 0.1)),
     motor: Some("rewound-48v"),
-    supply_v: Some(48.0),
+    supply_v: Some(42.0),
 };
 
 /// STEVAL-IHM023V3 behind X-NUCLEO-IHM09M1 at 320 V: L6390 with STGP10H60DF. Its sources are thin: shunts, gain, bias and
@@ -89,6 +105,10 @@ const IHM023V3: PowerStage = PowerStage {
     driver: Driver { high: HIN, low: LIN, interlock: true, dead_time_s: 180e-9 },
     // Assumed: an IGBT is off within 0.5 us.
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
+    switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
+    fault_pull_ohm: FAULT_PULL_OHM,
+    analog_only: &[],
+    ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },
     sensors: Sensors::LowSide(Shunts { volts_per_a: -0.15 * 1.7, zero_v: 1.7, ..AMPLIFIERS }),
     dc_link_divider: Some(1.0 / 0.0075),
     // 125 ns (L6390 data sheet); drop of an IGBT, assumed.

@@ -50,6 +50,13 @@ pub enum BadGates {
         /// Time in which both are off, ticks.
         dead_time: u32,
     },
+    /// A pin that the power stage ties to nets of others is not analog.
+    NotAnalog {
+        /// Its port, 0 is A.
+        port: usize,
+        /// Its number.
+        pin: u32,
+    },
     /// A switch of a leg is on for too short a time.
     Pulse {
         /// Leg, 0 is a.
@@ -76,6 +83,9 @@ impl fmt::Display for BadGates {
             }
             Self::Short { leg, dead_time } => {
                 write!(f, "leg {} has a dead time of {:.2} us", LEGS[leg], us(dead_time))
+            }
+            Self::NotAnalog { port, pin } => {
+                write!(f, "P{}{pin} is not analog", char::from(b'A' + port as u8))
             }
             Self::Pulse { leg, ticks } => {
                 write!(f, "leg {} has a pulse of {:.2} us", LEGS[leg], us(ticks))

@@ -2,7 +2,7 @@
 
 use super::PowerStage;
 use super::bridge::{BadGates, Bridge};
-use crate::periph::gpio::Gpio;
+use crate::periph::gpio::{Gpio, Pad};
 use crate::periph::tim1::Tim1;
 
 /// A violation, and where and when it was seen.
@@ -48,7 +48,10 @@ impl GateWatch {
     /// Looks at the gates at the core's place `at` and at a time.
     pub fn look(&mut self, gpio: &[Gpio], tim1: &Tim1, at: u32, time: u64) {
         self.bridge = Bridge::new(self.stage, gpio, tim1);
-        if let Err(what) = self.bridge.check(self.stage) {
+        let mut pins = self.stage.analog_only.iter();
+        let strayed = pins.find(|(port, pin)| gpio[*port].pad(*pin) != Pad::Analog);
+        let strayed = strayed.map(|(port, pin)| BadGates::NotAnalog { port: *port, pin: *pin });
+        if let Some(what) = strayed.or_else(|| self.bridge.check(self.stage).err()) {
             self.seen.get_or_insert(Seen { what, at, time });
         }
     }

@@ -1,0 +1,78 @@
+//! Which command is taken in which state, whatever its value. [Control law](../../../docs/control-law.md) has the table.
+
+use crate::drive::command::{Command, Refused};
+use crate::drive::state::{Mode, State};
+
+/// Modes that regulate torque, speed or position.
+const REGULATING: &[Mode] = &[Mode::Torque, Mode::Speed, Mode::Position];
+
+/// States in which a command is taken.
+struct Taken {
+    off: bool,
+    fault: bool,
+    /// In the states before [`State::of_mode`], for these modes.
+    starting: bool,
+    modes: &'static [Mode],
+}
+
+impl Taken {
+    const OFF: Self = Self { off: true, fault: false, starting: false, modes: &[] };
+
+    const fn running(modes: &'static [Mode]) -> Self {
+        Self { off: false, modes, ..Self::OFF }
+    }
+
+    /// From the start command on.
+    const fn from_start(modes: &'static [Mode]) -> Self {
+        Self { starting: true, ..Self::running(modes) }
+    }
+}
+
+/// Whether `command` is taken in `state` of a drive that was started in `mode`.
+///
+/// # Errors
+/// The state, or the latched fault, that refuses it.
+pub(super) fn allowed(command: &Command, state: State, mode: Mode) -> Result<(), Refused> {
+    let taken = match command {
+        // Off and stopping stay as they are.
+        Command::Stop(_) | Command::Clear => return Ok(()),
+        Command::Start(_) | Command::CheckWiring => Taken::OFF,
+        Command::Configure(_) => Taken { fault: true, ..Taken::OFF },
+        Command::Excite(_) => Taken { modes: &[Mode::Commissioning], ..Taken::OFF },
+        Command::Relock => Taken::running(REGULATING),
+        Command::Torque(_) => Taken::from_start(&[Mode::Torque]),
+        Command::Speed(_) => Taken::from_start(&[Mode::Speed, Mode::VoltsPerHertz]),
+        Command::Jog(_) => Taken::running(&[Mode::Speed]),
+        Command::Position(_) => Taken::from_start(&[Mode::Position]),
+        Command::Press(..) | Command::Home(_) => Taken::running(&[Mode::Position]),
+        Command::Magnetising(_)
+        | Command::TurnInjection(_)
+        | Command::TestVoltage(_)
+        | Command::RotorTimeConstant(_) => Taken::from_start(REGULATING),
+    };
+    let of_mode = taken.modes.contains(&mode);
+    let is_taken = match state {
+        State::Fault(_) if taken.fault => true,
+        State::Fault(fault) => return Err(Refused::Fault(fault)),
+        State::Off => taken.off,
+        State::Calibrating
+        | State::Precharge
+        | State::CheckingWiring
+        | State::Catching
+        | State::Magnetising
+        | State::Verifying => {
+            if taken.starting && !of_mode {
+                return Err(Refused::State(State::of_mode(mode)));
+            }
+            taken.starting
+        }
+        State::Torque
+        | State::Speed
+        | State::Position
+        | State::VoltsPerHertz
+        | State::Learning
+        | State::Exciting => of_mode,
+        State::Braking | State::BrakingByFrequency | State::Stopping => false,
+    };
+    if is_taken { Ok(()) } else { Err(Refused::State(state)) }
+}

@@ -1,0 +1,271 @@
+//! Every command in every state, and the commands that once did harm where they do not belong.
+
+use core::mem::discriminant;
+use std::collections::HashSet;
+
+use super::*;
+use crate::drive::excitation::{Excitation, Regulator};
+use crate::protect::wiring_check::WiringSettings;
+
+const MODES: [Mode; 6] = [
+    Mode::Torque,
+    Mode::Speed,
+    Mode::Position,
+    Mode::VoltsPerHertz,
+    Mode::Learning,
+    Mode::Commissioning,
+];
+
+/// Columns of the table.
+fn columns() -> Vec<(&'static str, Vec<Command>)> {
+    use Command::*;
+    let regulator = Regulator { k_c: 25.0, z_c: 0.97, direct: 0.0, filtered: false };
+    let (amperes, carrier) = (0.5, AlphaBeta::ZERO);
+    let current = Excitation::Current { amperes, regulator, carrier, binary: false };
+    let settings = motor_settings(AngleSource::Injection).build().unwrap();
+    vec![
+        ("start, learn", MODES[..5].iter().map(|mode| Start(*mode)).collect()),
+        ("check of the wiring", vec![CheckWiring]),
+        ("commission", vec![Excite(current), Excite(pulses())]),
+        ("stop", [super::Stop::Coast, super::Stop::Ramp, super::Stop::Quick].map(Stop).into()),
+        ("clear", vec![Clear]),
+        ("settings", vec![Configure(settings)]),
+        ("relock", vec![Relock]),
+        ("torque", vec![Torque(0.2)]),
+        ("speed", vec![Speed(30.0)]),
+        ("jog", vec![Jog(30.0)]),
+        ("position", vec![Position(0.02)]),
+        ("home", vec![Press(30.0, 0.3), Home(0.0)]),
+        (
+            "flux, test voltage",
+            vec![
+                Magnetising(0.7),
+                TurnInjection(1.0),
+                TestVoltage(Dq::new(1.0, 1.0)),
+                RotorTimeConstant(0.1),
+            ],
+        ),
+    ]
+}
+
+fn pulses() -> Excitation {
+    Excitation::Pulses(WiringSettings {
+        sigma_ls: 0.0515,
+        expected_a: 0.2,
+        noise_a: 0.05,
+        highest_v: 60.0,
+    })
+}
+
+/// A drive in this state that was started in this mode; none where no start of the mode comes by.
+fn bench(state: State, mode: Mode) -> Option<Bench> {
+    let mut bench = Bench::new(&motor_settings(AngleSource::Injection));
+    if mode == Mode::Learning {
+        bench.motor.load = None;
+    }
+    if state == State::CheckingWiring {
+        bench.drive.command(&Command::CheckWiring).unwrap();
+    }
+    let start = match (mode, state) {
+        (Mode::Commissioning, State::CheckingWiring) => Command::Excite(pulses()),
+        (Mode::Commissioning, _) => Command::Excite(Excitation::Rest),
+        _ => Command::Start(mode),
+    };
+    bench.drive.command(&start).unwrap();
+    for _ in 0..18_000 {
+        let now = bench.drive.state();
+        if now == state {
+            return Some(bench);
+        }
+        // The run has begun without it.
+        if now == State::of_mode(mode) {
+            return None;
+        }
+        bench.step();
+    }
+    panic!("{mode:?}: {}", bench.drive.state())
+}
+
+fn running(mode: Mode) -> Bench {
+    bench(State::of_mode(mode), mode).unwrap()
+}
+
+/// Runs at 300 rpm.
+fn turning(mode: Mode) -> Bench {
+    let mut bench = running(mode);
+    // The boost of a drive that turns by voltage and frequency takes a second.
+    bench.run(1.5);
+    bench.drive.command(&Command::Speed(300.0)).unwrap();
+    bench.run(1.8);
+    assert!((bench.motor.rpm() - 300.0).abs() < 30.0, "{}", bench.motor.rpm());
+    bench
+}
+
+/// The rows of the table, and the drives that must all agree with them.
+fn rows() -> Vec<(&'static str, Vec<Bench>)> {
+    let starting = |mode: Mode| -> Vec<Bench> {
+        [
+            State::Calibrating,
+            State::Precharge,
+            State::CheckingWiring,
+            State::Catching,
+            State::Magnetising,
+            State::Verifying,
+        ]
+        .into_iter()
+        .filter_map(|state| bench(state, mode))
+        .collect()
+    };
+    let then = |mut bench: Bench, stop: Stop| {
+        bench.drive.command(&Command::Stop(stop)).unwrap();
+        bench.step();
+        bench
+    };
+    let mut fault = running(Mode::Torque);
+    let broken = Sample { hardware: Hardware::BREAK, ..fault.motor.sample() };
+    fault.drive.step(&broken);
+    let mut torque = running(Mode::Torque);
+    torque.drive.command(&Command::Torque(1.0)).unwrap();
+    torque.run(0.1);
+    vec![
+        ("off", vec![Bench::new(&motor_settings(AngleSource::Injection))]),
+        ("in fault", vec![fault]),
+        ("starting, for torque", starting(Mode::Torque)),
+        ("starting, for speed", starting(Mode::Speed)),
+        ("starting, for position", starting(Mode::Position)),
+        ("starting, for vf", starting(Mode::VoltsPerHertz)),
+        ("starting, to learn", starting(Mode::Learning)),
+        ("starting, to commission; pulses", starting(Mode::Commissioning)),
+        ("regulating torque", vec![running(Mode::Torque)]),
+        ("regulating speed", vec![running(Mode::Speed)]),
+        ("regulating position", vec![running(Mode::Position)]),
+        ("turning by voltage and frequency", vec![turning(Mode::VoltsPerHertz)]),
+        ("learning", vec![running(Mode::Learning)]),
+        ("exciting the motor at rest", vec![running(Mode::Commissioning)]),
+        (
+            "braking to rest, stopping",
+            vec![
+                then(turning(Mode::Speed), Stop::Ramp),
+                then(turning(Mode::VoltsPerHertz), Stop::Ramp),
+                then(torque, Stop::Coast),
+            ],
+        ),
+    ]
+}
+
+/// The table of docs/control-law.md, cell by cell. A command that is refused changes nothing, and is refused by the state or
+/// the fault; one that is taken leads to no fault.
+#[test]
+fn every_command_is_taken_or_refused_in_every_state() {
+    let columns = columns();
+    let heads: Vec<_> = columns.iter().map(|(name, _)| *name).collect();
+    let mut table = format!("| state | {} |\n", heads.join(" | "));
+    let mut seen = HashSet::new();
+    for (name, benches) in rows() {
+        table += &format!("| {name} |");
+        for (column, commands) in &columns {
+            let mut cell = None;
+            for (bench, command) in benches
+                .iter()
+                .flat_map(|bench| commands.iter().map(move |command| (bench, command)))
+            {
+                let (state, mode) = (bench.drive.state(), bench.drive.mode);
+                seen.insert((discriminant(&state), discriminant(&mode)));
+                let mut after = bench.clone();
+                let answer = after.drive.command(command);
+                let refused = match answer {
+                    Err(Refused::State(by)) => {
+                        assert!(by == state || by == State::of_mode(mode), "{by}");
+                        true
+                    }
+                    Err(Refused::Fault(by)) => {
+                        assert_eq!(state, State::Fault(by));
+                        true
+                    }
+                    _ => false,
+                };
+                if answer.is_err() {
+                    let [before, after] = [bench, &after].map(|b| format!("{:?}", b.drive));
+                    assert_eq!(before, after, "{command:?} while {state}");
+                } else if !matches!(state, State::Fault(_)) {
+                    after.run(0.2);
+                    let now = after.drive.state();
+                    assert!(!matches!(now, State::Fault(_)), "{command:?} while {state}: {now}");
+                }
+                let agreed = *cell.get_or_insert(refused);
+                assert_eq!(refused, agreed, "{column} while {state}, {mode:?}: {answer:?}");
+            }
+            table += if cell == Some(true) { " - |" } else { " yes |" };
+        }
+        table.push('\n');
+    }
+    // Each of the 17 states and of the 6 modes was there.
+    let states: HashSet<_> = seen.iter().map(|(state, _)| state).collect();
+    let modes: HashSet<_> = seen.iter().map(|(_, mode)| mode).collect();
+    assert_eq!((states.len(), modes.len()), (17, MODES.len()));
+    let manual = include_str!("../../../../../docs/control-law.md").replace('`', "");
+    for line in table.lines() {
+        assert!(manual.contains(line), "not in docs/control-law.md: {line}\n{table}");
+    }
+}
+
+/// A frame that is held on a turning shaft is a fault, and so are the pulses of the wiring check.
+#[test]
+fn a_relock_is_refused_while_the_shaft_turns_and_the_drive_runs_on() {
+    for (mode, refused) in [
+        (Mode::Speed, Refused::Turning),
+        (Mode::VoltsPerHertz, Refused::State(State::VoltsPerHertz)),
+    ] {
+        let mut bench = turning(mode);
+        assert_eq!(bench.drive.command(&Command::Relock), Err(refused));
+        bench.run(1.5);
+        assert_eq!(bench.drive.state(), State::of_mode(mode));
+        assert!((bench.motor.rpm() - 300.0).abs() < 30.0, "{}", bench.motor.rpm());
+    }
+    // At rest it goes on with the run: a second later it holds the shaft.
+    let mut bench = running(Mode::Speed);
+    assert_eq!(bench.drive.command(&Command::Relock), Ok(Accepted::AsGiven));
+    assert!(bench.run_to(State::Speed), "{}", bench.drive.state());
+    bench.run(1.0);
+    assert!(bench.motor.rpm().abs() < 6.0, "{}", bench.motor.rpm());
+    let mut learning = running(Mode::Learning);
+    learning.run(1.0);
+    let refused = Err(Refused::State(State::Learning));
+    assert_eq!(learning.drive.command(&Command::Relock), refused);
+}
+
+/// By voltage and frequency: a quick stop is quicker than one by the ramp, also in the midst of that, and the shaft is at rest
+/// but for the slip when the outputs go off. No observer runs that would track a resistance.
+#[test]
+fn a_quick_stop_by_voltage_and_frequency_brakes_to_rest() {
+    let from_300 = turning(Mode::VoltsPerHertz);
+    let seconds = |stops: &[(f64, Stop)]| {
+        let mut bench = from_300.clone();
+        let mut periods = 0;
+        for (until, stop) in stops {
+            bench.drive.command(&Command::Stop(*stop)).unwrap();
+            while bench.drive.state() != State::Off && f64::from(periods) < until * 6000.0 {
+                bench.step();
+                periods += 1;
+                assert_eq!(bench.drive.stator_resistance(), None);
+            }
+        }
+        assert_eq!(bench.drive.state(), State::Off);
+        (f64::from(periods) / 6000.0, bench.motor.rpm())
+    };
+    let ramp = seconds(&[(9.0, Stop::Ramp)]);
+    let quick = seconds(&[(9.0, Stop::Quick)]);
+    let harder = seconds(&[(0.2, Stop::Ramp), (9.0, Stop::Quick)]);
+    let no_softer = seconds(&[(0.1, Stop::Quick), (9.0, Stop::Ramp)]);
+    println!("{ramp:.3?} {quick:.3?} {harder:.3?} {no_softer:.3?}");
+    // 300 rpm/s, and the rated speed in 2 s: 750 rpm/s.
+    assert!((0.9..1.1).contains(&ramp.0), "{ramp:?}");
+    assert!((0.3..0.55).contains(&quick.0), "{quick:?}");
+    assert!((quick.0 + 0.05..ramp.0 - 0.3).contains(&harder.0), "{harder:?}");
+    assert!((no_softer.0 - quick.0).abs() < 0.02, "{no_softer:?}");
+    for (_, rpm) in [ramp, quick, harder, no_softer] {
+        assert!(rpm.abs() < 40.0, "{rpm}");
+    }
+    let coast = seconds(&[(0.1, Stop::Coast)]);
+    assert!(coast.0 == 0.0 && coast.1 > 270.0, "{coast:?}");
+}

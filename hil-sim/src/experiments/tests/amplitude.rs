@@ -1,0 +1,33 @@
+//! Angle error at standstill over the amplitude of the carrier.
+
+use super::steady::{OperatingPoint, steady_run};
+use super::torque::assumptions;
+use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
+use crate::error::Error;
+use crate::outcome::{Cell, Outcome, Table};
+
+/// Not a figure of the source.
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "amplitude",
+    stands_for: "section 3.4",
+    about: "Angle error at standstill for three amplitudes of the carrier.",
+    uses: &[BENCH, DRIVE, &["prepare.learn", "seconds"]],
+    not: &[FREE_SHAFT, SPEED_LOOP, &["injection.amplitude_v"]],
+    run,
+};
+
+fn run(context: &Context<'_>) -> Result<Outcome, Error> {
+    let mut outcome = Outcome::default();
+    let mut table = Table::new("Angle error", &["amplitude (V)", "rms (°)"]);
+    for volts in [40.0, 50.0, 80.0] {
+        let mut config = context.config.clone();
+        config.drive.injection.amplitude_v = Some(volts as f32);
+        let case = OperatingPoint { rpm: 0.0, iq: 1.0, seed: context.seed };
+        let run = steady_run(&config, case, context.seconds.unwrap_or(2.0))?;
+        table.row([Cell::fixed(volts, 0), Cell::fixed(run.error.rms(), 2)]);
+        outcome.metrics.set(format!("rms_at_{volts}_v_deg"), run.error.rms());
+    }
+    outcome.tables.push(table);
+    outcome.remarks = assumptions(context.config);
+    Ok(outcome)
+}

@@ -1,0 +1,106 @@
+//! The largest torque of a drive at rest: how much it is, which limit binds, and what raises it.
+
+use std::f64::consts::{SQRT_2, TAU};
+
+use drive_core::Drive;
+use drive_core::settings::Flux;
+
+use super::battery::{allowed_a, torque_nm};
+use super::full_range::learned_drive;
+use crate::config::Config;
+use crate::error::Error;
+
+/// Values that differ by less, relatively, are the same limit.
+const SAME: f64 = 2e-3;
+/// A direct current below this share of the most useful one is the first thing to raise.
+const LOW_FLUX: f64 = 0.9;
+
+/// What binds where no setting does.
+const LEARNED: &str = "the last learned torque current, or that up to which the learned slope of the saliency is large enough";
+
+/// A torque limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueLimit {
+    /// Torque current, A peak.
+    pub i_q: f64,
+    /// Torque at the right angle, Nm.
+    pub nm: f64,
+    /// Torque in % of the rated one.
+    pub percent: f64,
+    /// Which limit binds, in words.
+    pub binds: String,
+    /// How to get more, in words.
+    pub more: String,
+}
+
+/// The drive of a configuration, off, which has learned where it can, and its torque limit.
+///
+/// # Errors
+/// When settings or plant are refused, or the drive does not learn.
+pub fn learned_limit(config: &Config, seed: u64) -> Result<(Drive, TorqueLimit), Error> {
+    let drive = learned_drive(config, seed)?;
+    let drive = drive
+        .map_err(|fault| Error::Refused(format!("the drive does not learn: fault {fault}")))?;
+    let limit = TorqueLimit::new(config, allowed_a(&drive, config.amperes(100.0))?);
+    Ok((drive, limit))
+}
+
+impl TorqueLimit {
+    /// That of a drive which takes at most this torque current, A peak.
+    pub fn new(config: &Config, i_q: f64) -> Self {
+        let nm = torque_nm(config, i_q);
+        let binds = binding(config, i_q);
+        let more = more(config, binds.is_none());
+        let binds = binds.unwrap_or_else(|| LEARNED.to_owned());
+        Self { i_q, nm, percent: 100.0 * nm / config.rated_nm(), binds, more }
+    }
+
+    /// In words.
+    pub fn text(&self, config: &Config) -> String {
+        let Self { i_q, nm, percent, binds, more } = self;
+        format!(
+            "Torque limit at rest: {nm:.2} Nm, {percent:.0} % of the rated torque of {:.1} Nm, by {i_q:.2} A of torque current \
+             beside {:.2} A of direct current. Binds: {binds}. {more}",
+            config.rated_nm(),
+            config.drive.i_d()
+        )
+    }
+}
+
+/// The setting that binds; none where it is what the drive has learned.
+fn binding(config: &Config, i_q: f64) -> Option<String> {
+    let drive = &config.drive;
+    let (limit, i_d) = (f64::from(drive.current_limit_a()), f64::from(drive.i_d()));
+    let is = |other: f64| (i_q / other - 1.0).abs() < SAME;
+    if is((limit * limit - i_d * i_d).max(0.0).sqrt()) {
+        let range = f64::from(drive.sensor_range_a());
+        let by_range = limit < (1.0 - SAME) * f64::from(drive.share_of_rated(3.5));
+        Some(match drive.limits.current_a {
+            None if by_range => format!(
+                "the current limit of {limit:.2} A, which is that of the sensors (`measurement.range_a` = {range:.2} A)"
+            ),
+            _ => format!("the current limit of {limit:.2} A (`limits.current_a`)"),
+        })
+    } else {
+        is(drive.i_q_limit_a().into()).then(|| "`speed.i_q_limit_a`".to_owned())
+    }
+}
+
+fn more(config: &Config, is_learned: bool) -> String {
+    let (drive, plate) = (&config.drive, &config.drive.nameplate);
+    let i_d = f64::from(drive.i_d());
+    let rated_flux =
+        f64::from(plate.voltage_v) * (2.0_f64 / 3.0).sqrt() / (TAU * f64::from(plate.frequency_hz));
+    let of_rated_flux = rated_flux / config.motor.l_m;
+    let is_low = i_d < LOW_FLUX * of_rated_flux.min(f64::from(drive.rated_a()) / SQRT_2);
+    if !is_low && !is_learned {
+        return "More: a larger `limits.current_a`, and current sensors of a larger range."
+            .to_owned();
+    }
+    let by_rule = drive.sequence.flux == Flux::High && drive.sequence.i_d.is_none();
+    let how = if by_rule { "" } else { "`sequence.flux=high` with `sequence.i_d=auto`, or " };
+    format!(
+        "More: a larger direct current, which is {:.0} % of that of the rated flux: {how}a larger `sequence.i_d`.",
+        100.0 * i_d / of_rated_flux
+    )
+}

@@ -1,0 +1,147 @@
+//! A motor of one's own, of which a file says the nameplate, the circuit and the dc link: it works the first time.
+
+mod cli_common;
+
+use std::path::Path;
+
+use cli_common::{folder, hil_sim, text};
+use drive_core::settings::PlantSource;
+use hil_sim::config::motors::Motor;
+use hil_sim::{Config, experiments};
+
+/// 1.5 kW, 400 V, 50 Hz, 4 poles, of efficiency class IE2, on 560 V.
+const LARGE: &str = "
+[nameplate]
+power_w = 1500
+voltage_v = 400
+current_a = 3.4
+frequency_hz = 50
+speed_rpm = 1435
+[motor]
+r_s = 4.6
+r_r = 3.3
+l_ls = 0.0135
+l_lr = 0.0135
+l_m = 0.33
+pole_pairs = 2
+[inverter]
+dc_link_v = 560
+";
+
+/// 250 W, wound for 48 V dc.
+const SMALL: &str = "
+[nameplate]
+power_w = 250
+voltage_v = 32
+current_a = 8
+frequency_hz = 50
+speed_rpm = 1400
+[motor]
+r_s = 0.22
+r_r = 0.13
+l_ls = 0.0008
+l_lr = 0.0008
+l_m = 0.009
+pole_pairs = 2
+[inverter]
+dc_link_v = 48
+";
+
+fn written(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a file");
+    path.to_str().expect("a path of letters").to_owned()
+}
+
+/// Neither is lost nor stopped, with eight seeds each.
+#[test]
+fn nameplate_and_circuit_are_enough() {
+    let folder = folder("own-motor");
+    for (name, text) in [("large.toml", LARGE), ("small.toml", SMALL)] {
+        let motor = written(&folder, name, text);
+        let config = Config::load(Some(&motor), None, &[]).expect("a motor");
+        for experiment in ["torque-steps", "speed-profile"] {
+            for seed in 1..=8 {
+                let outcome = experiments::run(experiment, &config, seed);
+                let outcome = outcome.unwrap_or_else(|e| panic!("{name} {experiment} {seed}: {e}"));
+                let largest = outcome.metrics.get("angle_error_max_deg").expect("an angle");
+                println!("{name} {experiment} {seed}: {largest:.1}");
+                let lost = outcome.lost();
+                assert!(lost.is_none() && largest < 45.0, "{name} {experiment} {seed}: {lost:?}");
+            }
+        }
+    }
+}
+
+/// The sensors of the dissertation's bench reach 1.24 times the rated current of its motor, and so do those of a motor of
+/// one's own; the drive has learned it, at high flux; and its current limit is not that of the sensors.
+#[test]
+fn sensors_and_flux_follow_the_nameplate() {
+    let folder = folder("own-motor-rules");
+    let config = Config::load(Some(&written(&folder, "m.toml", LARGE)), None, &[]).unwrap();
+    let rated_a = 3.4 * 2.0_f64.sqrt();
+    assert!((config.measurement.range_a / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
+    assert!((f64::from(config.drive.sensor_range_a()) / (1.2355 * rated_a) - 1.0).abs() < 1e-3);
+    assert!((f64::from(config.drive.current_limit_a()) / rated_a - 0.967).abs() < 2e-3);
+    // 0.55 times the rated current; the rated flux would need 3.15 A.
+    assert!((f64::from(config.drive.i_d()) / (0.55 * rated_a) - 1.0).abs() < 2e-3);
+    assert!(config.prepare.learn);
+    assert_eq!(config.drive.current_plant.source, PlantSource::Motor);
+    // The inertia of 0.012 kg m2 belongs to 6.1 Nm.
+    let inertia = 0.012 * 9.982 / 6.107;
+    assert!((config.motor.inertia / inertia - 1.0).abs() < 2e-3, "{}", config.motor.inertia);
+    // A file that says them is followed.
+    let more = "[sequence]\ni_d = 1.0\n[measurement]\nrange_a = 20.0\n[prepare]\nlearn = false\n";
+    let said = written(&folder, "said.toml", &format!("{LARGE}{more}"));
+    let config = Config::load(Some(&said), None, &[]).unwrap();
+    assert_eq!((config.measurement.range_a, config.drive.i_d()), (20.0, 1.0));
+    assert!(!config.prepare.learn);
+    // The other experiments of the whole range take the same motor as it is.
+    let envelope = hil_sim(&folder, &["run", "torque-envelope", "--motor", "m.toml", "--json"]);
+    assert_eq!(envelope.status.code(), Some(0), "{}", text(&envelope.stderr));
+}
+
+/// All that a file lacks is told at once, and a value that nobody set is told as such.
+#[test]
+fn errors_name_what_was_set_and_all_that_is_missing() {
+    let folder = folder("own-motor-errors");
+    let told = |name: &str, file: &str, options: &[&str]| {
+        written(&folder, name, file);
+        let run = [&["run", "torque-steps", "--motor", name][..], options].concat();
+        let output = hil_sim(&folder, &run);
+        assert_eq!(output.status.code(), Some(2));
+        text(&output.stderr).to_owned()
+    };
+    let missing = told("part.toml", "[motor]\nr_s = 4.6\nl_m = 0.33\n", &[]);
+    for key in ["nameplate.power_w", "nameplate.speed_rpm", "motor.r_r", "motor.pole_pairs"] {
+        assert!(missing.contains(key), "{key}: {missing}");
+    }
+    assert!(missing.contains("inverter.dc_link_v") && !missing.contains("motor.l_m"), "{missing}");
+    // A rule whose value another setting leaves no room for.
+    let rule = told("m.toml", LARGE, &["--set", "limits.current_a=1"]);
+    assert!(rule.contains("braking.flux_a") && rule.contains("was not set"), "{rule}");
+    let low = told("m.toml", LARGE, &["--set", "limits.dc_under_v=594"]);
+    assert!(low.contains("limits.dc_under_v = 594") && !low.contains("not set"), "{low}");
+    let set = told("m.toml", LARGE, &["--set", "sequence.i_d=9"]);
+    assert!(set.contains("sequence.i_d = 9") && !set.contains("not set"), "{set}");
+}
+
+/// The example of the page is a whole file.
+#[test]
+fn the_example_of_the_page_is_a_motor() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/motors.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let format = page.split("## Format").nth(1).expect("the section");
+    let example = format.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+    let folder = folder("own-motor-page");
+    let file = written(&folder, "example.toml", example.expect("an example"));
+    let config = Config::load(Some(&file), None, &[]).expect("a motor");
+    assert!(config.drive.build().is_ok());
+    // It says all that a motor of the program says: the rules add the current loop alone, and every number has its source.
+    let motor = Motor::find(&file).expect("a motor");
+    let implied: Vec<&str> = motor.implied(&config).iter().map(|(key, ..)| *key).collect();
+    assert_eq!(implied, ["current_plant"]);
+    assert!(motor.settings().iter().all(|(key, _)| motor.source_of(key).is_some()));
+    let output = hil_sim(&folder, &["motors", "example.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}

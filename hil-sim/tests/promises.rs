@@ -1,0 +1,65 @@
+//! Numbers that the first pages print are those of the run that they name.
+
+use hil_sim::Config;
+use hil_sim::experiments::{DEFAULT, run};
+
+/// Numbers of an experiment.
+fn numbers<const N: usize>(experiment: &str, seed: u64, names: [&str; N]) -> [f64; N] {
+    let metrics = run(experiment, &Config::default(), seed).unwrap().metrics;
+    names.map(|name| metrics.get(name).unwrap())
+}
+
+/// Angle error of the torque steps with a seed: rms and largest, degrees.
+fn error(seed: u64) -> (f64, f64) {
+    numbers(DEFAULT, seed, ["angle_error_rms_deg", "angle_error_max_deg"]).into()
+}
+
+/// A page on one line.
+fn page(name: &str) -> String {
+    let path = format!("{}/../{name}", env!("CARGO_MANIFEST_DIR"));
+    std::fs::read_to_string(path).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn the_angle_error_of_the_first_command_is_the_printed_one() {
+    let (rms, most) = error(1);
+    let [first, book, figures] = ["README.md", "docs/README.md", "docs/figures.md"].map(page);
+    let sentence = format!("flux angle is {rms:.1}° rms and {most:.0}° at most");
+    assert!(first.contains(&sentence) && book.contains(&sentence), "{sentence}");
+    let seeds: Vec<_> = (1..=8).map(error).collect();
+    let ends = |of: fn(&(f64, f64)) -> f64| {
+        let values = seeds.iter().map(of);
+        (values.clone().fold(f64::MAX, f64::min), values.fold(f64::MIN, f64::max))
+    };
+    let ((a, b), (c, d)) = (ends(|seed| seed.0), ends(|seed| seed.1));
+    let row = format!(
+        "angle error {rms:.1}° rms, {most:.0}° at most; seeds 1 to 8: {a:.1}° to {b:.1}° rms, {c:.1}° to {d:.1}° at most"
+    );
+    assert!(figures.contains(&row), "{row}");
+}
+
+#[test]
+fn the_figures_are_those_of_the_runs() {
+    let [left_in, torque] = numbers(
+        "encoder-orientation",
+        1,
+        ["angle_error_uncompensated_max_deg", "torque_error_max_pct"],
+    );
+    let distortion = ["current_distortion_uncompensated_pct", "current_distortion_compensated_pct"];
+    let [plain, compensated] = numbers("dead-time", 1, distortion);
+    let [rms, peak] = numbers("filters", 1, ["pp_sections_error_rms_a", "pp_sections_error_max_a"]);
+    let steps = ["current_step_error_max_deg", "current_step_warm_error_max_deg"];
+    let [reversal, warm] = numbers("perturbation", 1, steps);
+    let figures = page("docs/figures.md");
+    for row in [
+        format!("(delays left in: up to {left_in:.1}°)"),
+        format!("encoder | within {torque:.2} % |"),
+        format!("{plain:.1} % without compensation, {compensated:.2} % with it"),
+        format!("≤ {:.0} µA rms, {:.0} µA peak", rms * 1e6, peak * 1e6),
+        format!(
+            "angle error ≤ {reversal:.1}° in 24 runs; rotor 30 % warmer than believed: ≤ {warm:.1}° |"
+        ),
+    ] {
+        assert!(figures.contains(&row), "docs/figures.md lacks: {row}");
+    }
+}

@@ -1,0 +1,82 @@
+//! The window watchdog (RM0440, section 43) on a bus clock of one tick a cycle. Its prescaler runs on whatever is written.
+
+use super::{Effect, NEVER};
+
+/// Cycles of the bus clock per count, before its own divider.
+const CLOCK: u64 = 4096;
+const WDGA: u32 = 1 << 7;
+/// Bits of the counter and of the window.
+const COUNT: u32 = 0x7f;
+/// A counter below this resets the chip.
+const LAST: u32 = 0x40;
+
+/// The watchdog.
+#[derive(Clone, Debug)]
+pub struct Wwdg {
+    /// Counter as it was written last, with WDGA; and when.
+    control: u32,
+    written: u64,
+    config: u32,
+    /// The counter ran out, or was written outside the window.
+    bites_at: u64,
+}
+
+impl Default for Wwdg {
+    fn default() -> Self {
+        Self { control: COUNT, written: 0, config: COUNT, bites_at: NEVER }
+    }
+}
+
+impl Wwdg {
+    /// When it resets the chip.
+    pub fn next_event(&self) -> u64 {
+        self.bites_at
+    }
+
+    /// Its clock stood still for some ticks.
+    pub fn delay(&mut self, ticks: u64) {
+        self.written += ticks;
+        self.bites_at = self.bites_at.saturating_add(ticks);
+    }
+
+    /// Ticks per count.
+    fn divider(&self) -> u64 {
+        CLOCK << (self.config >> 11 & 7)
+    }
+
+    fn counter(&self, now: u64) -> u32 {
+        let counts = now / self.divider() - self.written / self.divider();
+        (self.control & COUNT).saturating_sub(counts.min(u64::from(COUNT)) as u32)
+    }
+
+    /// Reads a register.
+    pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
+        Some(match offset {
+            0x00 => self.control & WDGA | self.counter(now),
+            0x04 => self.config,
+            0x08 => 0,
+            _ => return None,
+        })
+    }
+
+    /// Writes a register.
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        match offset {
+            0x00 => {
+                let runs = self.control & WDGA != 0;
+                let early = runs && self.counter(now) > self.config & COUNT;
+                let counts = u64::from(value & COUNT).saturating_sub(u64::from(LAST) - 1);
+                self.control = value & COUNT | (self.control | value) & WDGA;
+                self.written = now;
+                if self.control & WDGA != 0 {
+                    let end = (now / self.divider() + counts) * self.divider();
+                    self.bites_at = if early || counts == 0 { now } else { end };
+                }
+            }
+            0x04 => self.config = value & 0x3a7f,
+            0x08 => {}
+            _ => return None,
+        }
+        Some(Effect::Look)
+    }
+}

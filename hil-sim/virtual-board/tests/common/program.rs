@@ -1,0 +1,19 @@
+//! The program of `cargo sim board`, and a folder for what it writes.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A session that writes to a folder.
+pub fn command(out: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_board"));
+    command.arg("--out").arg(out).args(arguments);
+    command
+}
+
+/// A folder of its own for each test.
+pub fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}

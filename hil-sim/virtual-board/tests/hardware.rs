@@ -1,0 +1,223 @@
+//! The image against what may hurt its power stage: typed protections and scales, the boot pin, braking.
+
+use anyhow::{Context, Result};
+use drive_core::{Fault, State};
+use hil_sim::Config;
+use hil_sim::config::LoadMode;
+use virtual_board::board::rom::{N_BOOT0, N_SWBOOT0};
+use virtual_board::periph::Reset;
+use virtual_board::power_stage::driver::Request;
+use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
+use virtual_board::{Board, Image, Options, Pair};
+
+/// Periods from a reset to the greeting, at most.
+const START: u64 = 30_000;
+
+fn board(stage: &'static PowerStage) -> Result<Board> {
+    let mut board =
+        Board::new(Image::built_for(stage.name)?, Options::on(stage, &stage.config()?, 5))?;
+    said(&mut board, "last run: ")?;
+    Ok(board)
+}
+
+/// Waits for a text from the console.
+fn said(board: &mut Board, text: &str) -> Result<String> {
+    let mut heard = String::new();
+    for _ in 0..START / 100 {
+        board.run_periods(100)?;
+        while board.next_period().is_some() {}
+        heard += &board.take_console();
+        if heard.contains(text) && heard.ends_with('\n') {
+            return Ok(heard);
+        }
+    }
+    anyhow::bail!("no {text:?} in {heard:?}")
+}
+
+/// Types a line; its answer begins so.
+fn ask(board: &mut Board, line: &str, answer: &str) -> Result<String> {
+    board.run_periods(120)?;
+    board.take_console();
+    board.type_line(line);
+    said(board, answer).context(line.to_owned())
+}
+
+const REFUSED: &str =
+    "error: the board's polarities, dead time and scales are assumed, or were changed";
+
+/// A dead time below that of the board is refused by its range; a longer one, a scale and a limit that trips end the
+/// confirmation while they are staged.
+#[test]
+fn a_typed_protection_ends_the_confirmation() -> Result<()> {
+    for stage in ALL {
+        let mut board = board(stage)?;
+        let settings = stage.firmware_settings();
+        let own = settings.inverter.dead_time_s;
+        let said = ask(&mut board, "set inverter.dead_time_s 0.0000005", "error: ")?;
+        assert!(said.contains(&format!("0.0000005: allowed is {own} to ")), "{said}");
+        for (name, value) in [
+            ("inverter.dead_time_s", 1.2 * own),
+            ("scales.current_b.gain", 1.1 * settings.scales.current_b.gain),
+            ("scales.dc_link.gain", 1.1 * settings.scales.dc_link.gain),
+            ("limits.trip_a", 0.99 * settings.trip_a()),
+            ("limits.dc_over_v", 0.99 * settings.dc_over_v()),
+        ] {
+            ask(&mut board, &format!("set {name} {value}"), "ok: staged; ")?;
+            ask(&mut board, "start torque", REFUSED).with_context(|| name.to_owned())?;
+            assert!(!board.gates().any_on(), "{name}");
+            ask(&mut board, "confirm board", "error: there are staged values")?;
+            ask(&mut board, "revert", "ok")?;
+        }
+    }
+    Ok(())
+}
+
+/// A scale in force and saved, until the board is confirmed with it.
+#[test]
+fn a_changed_scale_is_confirmed_before_a_start() -> Result<()> {
+    let mut board = board(&REFERENCE)?;
+    let gain = 1.1 * REFERENCE.firmware_settings().scales.current_b.gain;
+    ask(&mut board, &format!("set scales.current_b.gain {gain}"), "ok: staged; ")?;
+    let said = ask(&mut board, "save", "ok\r\n")?;
+    assert!(said.contains("the board has to be confirmed again"), "{said}");
+    board.reset(Reset::Pin);
+    self::said(&mut board, "last run: ")?;
+    ask(&mut board, "start torque", REFUSED)?;
+    assert!(!board.gates().any_on());
+    ask(&mut board, "confirm board", "ok")?;
+    ask(&mut board, "start torque", "ok")?;
+    Ok(())
+}
+
+/// The gates that ask for on, or may, of a chip that stands still.
+fn gates_on(board: &mut Board) -> Vec<String> {
+    let chip = board.chip();
+    let driver = chip.gates.stage().driver;
+    let mut on = Vec::new();
+    for (leg, name) in ["a", "b", "c"].into_iter().enumerate() {
+        let requests = driver.requests(leg, &chip.gpio, &chip.tim1, true);
+        for (side, request) in ["high", "low"].into_iter().zip(requests) {
+            match request {
+                Request::Undefined => on.push(format!("{side} {name} perhaps")),
+                Request::Known(wave) if wave.at(0) => on.push(format!("{side} {name}")),
+                Request::Known(_) => {}
+            }
+        }
+    }
+    on
+}
+
+/// PB8 high at a reset with the option bytes from the factory: ST's boot loader runs and holds gate pins. With nSWBOOT0 = 0 and
+/// nBOOT0 = 1 the pin does not count and the image starts with every gate off.
+#[test]
+fn the_boot_loader_drives_gates_unless_the_option_bytes_leave_it_out() -> Result<()> {
+    let expected: [&[&str]; 3] = [
+        &["high b"],
+        &["high a perhaps", "low a", "high b", "high c perhaps"],
+        &["high a perhaps", "low a", "high b", "high c perhaps"],
+    ];
+    for (stage, expected) in ALL.into_iter().zip(expected) {
+        let mut board = board(stage)?;
+        assert_eq!(gates_on(&mut board), [""; 0], "{}", stage.name);
+        assert!(!board.reset_with_boot_pin(false), "a low pin");
+        assert!(board.reset_with_boot_pin(true));
+        assert_eq!(gates_on(&mut board), expected, "{}", stage.name);
+        let why = board.run_periods(1).expect_err("nothing was noticed").to_string();
+        assert!(why.contains("bad gate signals"), "{why}");
+        // Never the image.
+        let mut off = self::board(stage)?;
+        off.chip().flash.options &= !(N_SWBOOT0 | N_BOOT0);
+        assert!(off.reset_with_boot_pin(false));
+        let mut safe = self::board(stage)?;
+        safe.chip().flash.options &= !N_SWBOOT0;
+        safe.chip().flash.options |= N_BOOT0;
+        for high in [true, false] {
+            assert!(!safe.reset_with_boot_pin(high));
+            said(&mut safe, "last run: ")?;
+            assert_eq!(gates_on(&mut safe), [""; 0], "{}", stage.name);
+        }
+    }
+    Ok(())
+}
+
+/// The console says whether the boot pin counts, with the command that ends it, and the confirmation holds for that state.
+#[test]
+fn the_option_bytes_are_part_of_what_is_confirmed() -> Result<()> {
+    let mut board = board(&REFERENCE)?;
+    let said = ask(&mut board, "board", "confirmed\r\nok")?;
+    assert!(said.contains("boot pin: PB8 high at a reset"), "{said}");
+    assert!(said.contains("-ob nSWBOOT0=0 nBOOT0=1"), "{said}");
+    ask(&mut board, "confirm board", "ok: with the boot pin in use")?;
+    board.chip().flash.options &= !N_SWBOOT0;
+    board.reset(Reset::Pin);
+    self::said(&mut board, "last run: ")?;
+    let said = ask(&mut board, "board", "not confirmed")?;
+    assert!(said.contains("boot pin: not in use"), "{said}");
+    ask(&mut board, "start torque", REFUSED)?;
+    let said = ask(&mut board, "confirm board", "ok")?;
+    assert!(!said.contains("boot pin"), "{said}");
+    ask(&mut board, "start torque", "ok")?;
+    Ok(())
+}
+
+/// Against the strongest pull of the chip, which the image sets towards a trip, the resistor of the stage makes a level that
+/// is sure.
+#[test]
+fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
+    for stage in ALL {
+        let mut board = board(stage)?;
+        assert_eq!(board.chip().gpio[0].pull(6), Some(false), "{}", stage.name);
+        let volts = 3.3 * 25e3 / (25e3 + stage.fault_pull_ohm);
+        assert!(volts > 2.6, "{}: {volts} V", stage.name);
+    }
+    Ok(())
+}
+
+/// A shaft that stops from 1400 rpm on the board with 60 V transistors, whose supply takes nothing back: the voltage of the link
+/// and that at the switches, V, and the state in which the drive ends.
+fn braking(capacitor_f: f64, rpm_per_s: f64) -> Result<(f64, f64, State)> {
+    let stage = PowerStage::named("nucleo-g474re-ihm08m1")?;
+    let mut config: Config = stage.config()?;
+    config.load.mode = LoadMode::Free;
+    config.motor.inertia *= 4.0;
+    let link = &mut config.dc_link;
+    (link.capacitor_f, link.source, link.load_w, link.pulses) = (capacitor_f, 0.1, 0.5, 0);
+    let options = Options::on(stage, &config, 1).set_up(&config)?;
+    let mut pair = Pair::new(Image::built_for(stage.name)?, options)?;
+    let set = "set motor.inertia 0.004 speed.limit_rpm 1500 speed.ramp_rpm_per_s";
+    for line in ["angle encoder", &format!("{set} {rpm_per_s}"), "start speed"] {
+        pair.order(line)?;
+    }
+    pair.until_state(State::Speed)?;
+    pair.order("speed 1400")?;
+    pair.run(15_000, |_, _| {})?;
+    let rpm = |pair: &Pair| pair.board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+    assert!(rpm(&pair) > 1350.0, "{} rpm", rpm(&pair));
+    pair.order("speed 0")?;
+    let (mut link_v, mut stress_v) = (0.0_f64, 0.0_f64);
+    for _ in 0..4500 {
+        pair.run(1, |_, _| {})?;
+        let plant = &pair.board.plant;
+        link_v = link_v.max(plant.dc_link());
+        stress_v = stress_v.max(stage.switches.stress_v(plant.dc_link(), plant.phase_currents()));
+    }
+    println!("{:.0} rpm, link {link_v:.1} V, switches {stress_v:.1} V", rpm(&pair));
+    assert!(rpm(&pair) < 1300.0, "{} rpm", rpm(&pair));
+    Ok((link_v, stress_v, pair.shadow.drive.state()))
+}
+
+/// The link with the ringing of every turn-off stays below what the transistors stand, whether the capacitor is large enough
+/// for the braking, or so small that the drive trips.
+#[test]
+fn braking_stays_below_what_the_transistors_stand() -> Result<()> {
+    let rated_v = PowerStage::named("nucleo-g474re-ihm08m1")?.switches.rated_v;
+    let (link_v, stress_v, state) = braking(1e-3, 3000.0)?;
+    assert!(link_v > 46.0 && link_v < 0.9 * rated_v, "{link_v} V");
+    assert!(stress_v < 0.95 * rated_v, "{stress_v} V");
+    assert_eq!(state, State::Fault(Fault::DcLinkOverVoltage));
+    let (link_v, stress_v, state) = braking(4.7e-3, 1000.0)?;
+    assert!(link_v > 44.0 && link_v < 49.0, "{link_v} V");
+    assert!(stress_v < 0.95 * rated_v, "{stress_v} V");
+    assert_eq!(state, State::Speed);
+    Ok(())
+}

@@ -1,0 +1,188 @@
+//! Check of the chip's configuration for flipped bits, a slice in each pass of the main loop.
+//!
+//! The lock of TIM1 keeps dead time, polarity and break from a program, not from a disturbance, and the divider of the dead
+//! time's clock (CKD) is not under it. The values after the start, which reads its settings back, are the reference.
+
+/// Registers read in a pass of the main loop.
+const SLICE: usize = 8;
+
+/// A register and its bits that stay from the start to the next reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// Address.
+    pub address: u32,
+    /// Bits.
+    pub mask: u32,
+}
+
+/// A register that has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Changed {
+    /// Address.
+    pub address: u32,
+    /// The checked bits now.
+    pub found: u32,
+    /// The same after the start.
+    pub expected: u32,
+}
+
+/// Direction of a counter.
+const DIR: u32 = 1 << 4;
+/// Main output enable.
+const MOE: u32 = 1 << 15;
+/// Output of a comparator.
+const OUTPUT: u32 = 1 << 30;
+/// Of a converter: enabled, started, its regulator on, not in deep power-down.
+const ADC_RUNS: u32 = 1 | 1 << 3 | 1 << 28 | 1 << 29;
+/// The oscillators, the clock security system, and the PLL.
+const CLOCKS: u32 = 1 << 8 | 3 << 16 | 1 << 19 | 3 << 24;
+
+/// Addresses of peripherals, with the offsets of their registers (RM0440).
+const CONFIGURED: [(u32, &[u16]); 17] = [
+    // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, AF1
+    (0x4001_2c00, &[0, 4, 8, 0xc, 0x18, 0x1c, 0x20, 0x28, 0x2c, 0x30, 0x40, 0x44, 0x60]),
+    // TIM8: CR1, CCMR1, CCER, ARR, BDTR, AF1
+    (0x4001_3400, &[0, 0x18, 0x20, 0x2c, 0x44, 0x60]),
+    // TIM5, the time base: CR1, ARR
+    (0x4000_0c00, &[0, 0x2c]),
+    // TIM2, the encoder: CR1, SMCR, CCMR1, CCER, ARR
+    (0x4000_0000, &[0, 8, 0x18, 0x20, 0x2c]),
+    // ADC1 and ADC2: IER, CR, CFGR, SMPR1, TR1, JSQR; CCR of both
+    (0x5000_0000, &[4, 8, 0xc, 0x14, 0x20, 0x4c]),
+    (0x5000_0100, &[4, 8, 0xc, 0x14, 0x20, 0x4c]),
+    (0x5000_0300, &[8]),
+    // DAC3: CR, DHR12R1, MCR
+    (0x5000_1000, &[0, 8, 0x3c]),
+    // COMP1: CSR
+    (0x4001_0200, &[0]),
+    // SYSCFG: CFGR2
+    (0x4001_0000, &[0x1c]),
+    // Ports A, B, C: MODER, OTYPER, PUPDR, AFRL, AFRH
+    (0x4800_0000, &[0, 4, 0xc, 0x20, 0x24]),
+    (0x4800_0400, &[0, 4, 0xc, 0x20, 0x24]),
+    (0x4800_0800, &[0, 4, 0xc, 0x20, 0x24]),
+    // NVIC: enabled interrupts 0 to 95; priorities of ADC1_2, USART3, LPUART
+    (0xe000_e000, &[0x100, 0x104, 0x108, 0x410, 0x424, 0x458]),
+    // FLASH: ACR
+    (0x4002_2000, &[0]),
+    // RCC: CR, CFGR, PLLCFGR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, CCIPR
+    (0x4002_1000, &[0, 8, 0xc, 0x4c, 0x58, 0x5c, 0x60, 0x88]),
+    // PWR: CR1, CR2, CR5
+    (0x4000_7000, &[0, 4, 0x80]),
+];
+
+/// The bits that stay, of registers that hold others as well.
+const PARTS: [(u32, u32); 12] = [
+    (0x4001_2c00, !DIR),
+    (0x4001_2c44, !MOE),
+    (0x4001_3444, !MOE),
+    (0x4000_0000, !DIR),
+    (0x5000_0008, ADC_RUNS),
+    (0x5000_0108, ADC_RUNS),
+    (0x4001_0200, !OUTPUT),
+    (0x4001_001c, 0xf),
+    (0xe000_e410, 0xff << 16),
+    (0xe000_e424, 0xff << 24),
+    (0xe000_e458, 0xff << 24),
+    (0x4002_1000, CLOCKS),
+];
+
+/// Number of the registers below.
+const COUNT: usize = 77;
+
+/// The registers on which the control depends.
+pub const CONTROL: [Register; COUNT] = {
+    let mut registers = [Register { address: 0, mask: u32::MAX }; COUNT];
+    let (mut n, mut group) = (0, 0);
+    while group < CONFIGURED.len() {
+        let (base, offsets) = CONFIGURED[group];
+        let mut i = 0;
+        while i < offsets.len() {
+            registers[n].address = base + offsets[i] as u32;
+            let mut part = 0;
+            while part < PARTS.len() {
+                if PARTS[part].0 == registers[n].address {
+                    registers[n].mask = PARTS[part].1;
+                }
+                part += 1;
+            }
+            (n, i) = (n + 1, i + 1);
+        }
+        group += 1;
+    }
+    assert!(n == COUNT);
+    registers
+};
+
+/// The check and its progress.
+#[derive(Debug)]
+pub struct RegisterCheck {
+    registers: &'static [Register],
+    expected: &'static mut [u32],
+    next: usize,
+}
+
+impl RegisterCheck {
+    /// A check of these registers, with their contents now; `read` reads the word at an address.
+    pub fn new(
+        registers: &'static [Register],
+        expected: &'static mut [u32],
+        read: impl Fn(u32) -> u32,
+    ) -> Self {
+        for (Register { address, mask }, expected) in registers.iter().zip(expected.iter_mut()) {
+            *expected = read(*address) & mask;
+        }
+        Self { registers, expected, next: 0 }
+    }
+
+    /// Checks the next slice.
+    ///
+    /// # Errors
+    /// A register has changed.
+    pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Changed> {
+        let both = self.registers.iter().zip(self.expected.iter());
+        for (&Register { address, mask }, &expected) in both.skip(self.next).take(SLICE) {
+            let found = read(address) & mask;
+            if found != expected {
+                return Err(Changed { address, found, expected });
+            }
+        }
+        self.next = if self.next + SLICE < self.registers.len() { self.next + SLICE } else { 0 };
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHOLE: usize = CONTROL.len().div_ceil(SLICE);
+
+    #[test]
+    fn a_flip_is_found_in_one_whole_look_and_only_in_bits_that_stay() {
+        let place = |at| CONTROL.iter().position(|register| register.address == at).unwrap();
+        let sound: Vec<u32> =
+            (0..CONTROL.len() as u32).map(|n| n.wrapping_mul(2_654_435_769)).collect();
+        for (which, bit) in (0..CONTROL.len()).flat_map(|n| (0..32).map(move |bit| (n, bit))) {
+            let expected = Box::leak(Box::new([0; CONTROL.len()]));
+            let mut check = RegisterCheck::new(&CONTROL, expected, |at| sound[place(at)]);
+            let passes = (which + bit) % (2 * WHOLE);
+            assert!((0..passes).all(|_| check.slice(|at| sound[place(at)]).is_ok()));
+            let mut words = sound.clone();
+            words[which] ^= 1 << bit;
+            let Register { address, mask } = CONTROL[which];
+            let changed =
+                Changed { address, found: words[which] & mask, expected: sound[which] & mask };
+            let found = (0..WHOLE).try_for_each(|_| check.slice(|at| words[place(at)]));
+            let stays = mask >> bit & 1 == 1;
+            assert_eq!(found, if stays { Err(changed) } else { Ok(()) }, "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn no_register_is_there_twice() {
+        let mut addresses = CONTROL.map(|register| register.address);
+        addresses.sort_unstable();
+        assert!(addresses.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+}
