@@ -23,7 +23,7 @@ pub struct Status {
     /// Signals of the drive in the same period.
     pub telemetry: Telemetry,
     /// Core cycles of the longest control period so far.
-    pub worst_cycles: u32,
+    pub worst_cycles: [u32; 2],
     /// Core cycles of the last control period.
     pub last_cycles: u32,
     /// Latest start of the control interrupt after its samples were ready, core cycles.

@@ -355,7 +355,9 @@ impl Console {
         if let Trigger::Level { signal, level, .. } = &mut plan.trigger
             && let Some(signal) = SIGNALS.get(usize::from(*signal))
         {
-            *level /= signal.factor(self.settings.in_force().drive.motor.pole_pairs);
+            let drive_core::settings::Line { gain, offset } =
+                signal.line(&self.settings.in_force().drive);
+            *level = (*level - offset) / gain;
         }
         if !drive.begin_trace(&plan) {
             return self.error(&"a trace is being recorded; `trace off` ends it");

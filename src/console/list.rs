@@ -102,10 +102,10 @@ impl Console {
         };
         let (from_trigger, record) = drive.traced(i)?;
         let seconds = f32::from(from_trigger) * f32::from(*divider) * PERIOD_S;
-        let pole_pairs = self.settings.in_force().drive.motor.pole_pairs;
+        let settings = &self.settings.in_force().drive;
         let values = fmt::from_fn(|f| {
             record.iter().zip(choice.signals()).try_for_each(|(value, signal)| {
-                write!(f, ",{}", Significant(value * signal.factor(pole_pairs), TRACE_DIGITS))
+                write!(f, ",{}", Significant(signal.shown(*value, settings), TRACE_DIGITS))
             })
         });
         self.out.line(format_args!("{seconds:.6}{values}"));

@@ -6,6 +6,7 @@ use core::fmt;
 use drive_core::current::voltage_limit::VoltageLimit;
 use drive_core::dc_link::Limiting;
 use drive_core::io::PERIOD_S;
+use drive_core::settings::CurrentSensors;
 use drive_core::{Settings, State};
 
 use super::Console;
@@ -64,6 +65,14 @@ fn line(
         write!(f, "torque {torque:.2} Nm, speed {rpm:.1} rpm, position {:.3} turns, ", t.turns)?;
         write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
     }
+    if s.state == State::Off {
+        let (a, b) =
+            (scales.current_a.at(s.sample.current_a), scales.current_b.at(s.sample.current_b));
+        write!(f, "sensors a {a:.2} A, b {b:.2} A, ")?;
+        if scales.sensors == CurrentSensors::LowSide {
+            write!(f, "c {:.2} A, ", scales.current_c.at(s.sample.current_c))?;
+        }
+    }
     if s.state == State::Off || s.state.regulates() {
         torque_range(f, s, settings)?;
     }
@@ -72,7 +81,9 @@ fn line(
     let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
     write!(f, "dc link {dc_link:.0} V, ")?;
     write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
-    write!(f, "{} of {} cycles, latest start {latency_us:.1} us, ", s.last_cycles, s.worst_cycles)?;
+    let [without, with] = s.worst_cycles;
+    write!(f, "{} of {without} cycles, {with} with a command, ", s.last_cycles)?;
+    write!(f, "latest start {latency_us:.1} us, ")?;
     write!(f, "stack {used} of {size}")
 }
 

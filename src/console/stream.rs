@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use drive_core::Settings;
 use drive_core::io::PERIOD_S;
 use drive_stream::{Frame, LONGEST, MOST_SIGNALS, wire_bytes};
 use thiserror::Error;
@@ -48,11 +49,12 @@ impl Wire {
     }
 
     /// Makes the frame of a sample, and counts those before it that were dropped.
-    fn make(&mut self, sample: &Sample, pole_pairs: u8) {
+    fn make(&mut self, sample: &Sample, settings: &Settings) {
         let Some(stream) = &self.stream else { return };
-        let values = stream.choice.values(&sample.telemetry);
+        let mut values = trace::Record::default();
+        stream.choice.record(&mut values, &sample.telemetry, &sample.codes);
         let values = values.iter().zip(stream.choice.signals());
-        let values = values.map(|(value, signal)| value * signal.factor(pole_pairs)).collect();
+        let values = values.map(|(value, signal)| signal.shown(*value, settings)).collect();
         let Sample { sequence, period, .. } = *sample;
         let missing = sequence.wrapping_sub(self.next.unwrap_or(sequence));
         self.dropped = self.dropped.wrapping_add(missing.into());
@@ -120,13 +122,13 @@ impl Console {
         port: &mut impl Port,
         drive: &mut impl DriveHandle,
     ) -> bool {
-        let pole_pairs = self.settings.in_force().drive.motor.pole_pairs;
+        let settings = &self.settings.in_force().drive;
         let wire = &mut self.wire;
         // As many as the queue holds at most: the main loop goes on.
         for _ in 0..=board::STREAM_SAMPLES {
             if wire.waiting == 0 {
                 let Some(sample) = drive.sampled() else { return true };
-                wire.make(&sample, pole_pairs);
+                wire.make(&sample, settings);
             }
             if !port.write(wire.frame.get(..wire.waiting).unwrap_or_default()) {
                 return false;

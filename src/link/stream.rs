@@ -3,9 +3,9 @@
 use core::array::from_fn;
 use core::sync::atomic::{AtomicU16, Ordering};
 
-use drive_core::Telemetry;
-
 use super::mailbox::{Mailbox, Receiver, Sender, split_all};
+use super::trace::CurrentCodes;
+use drive_core::Telemetry;
 
 /// Signals of the drive in one control period.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,6 +16,8 @@ pub struct Sample {
     pub period: u32,
     /// The signals.
     pub telemetry: Telemetry,
+    /// Codes of the current sensors.
+    pub codes: CurrentCodes,
 }
 
 /// Most control periods that a sample waits for one that does no other work.
@@ -63,7 +65,13 @@ impl<const N: usize> Queue<N> {
 impl<const N: usize> Source<'_, N> {
     /// Takes a sample of the present control period, if one is due. In a `busy` period, which does other work, it waits for
     /// the next, two periods at most: the longest control periods get no longer, and the rate stays.
-    pub fn step(&mut self, period: u32, busy: bool, telemetry: impl FnOnce() -> Telemetry) {
+    pub fn step(
+        &mut self,
+        period: u32,
+        busy: bool,
+        codes: &CurrentCodes,
+        telemetry: impl FnOnce() -> Telemetry,
+    ) {
         let divider = self.divider.load(Ordering::Relaxed);
         if divider == 0 {
             return;
@@ -78,10 +86,10 @@ impl<const N: usize> Source<'_, N> {
         }
         self.wait = divider.saturating_sub(self.late);
         self.late = 0;
-        self.take(period, telemetry);
+        self.take(period, codes, telemetry);
     }
 
-    fn take(&mut self, period: u32, telemetry: impl FnOnce() -> Telemetry) {
+    fn take(&mut self, period: u32, codes: &CurrentCodes, telemetry: impl FnOnce() -> Telemetry) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         // Without room the sample is missing, which the receiver sees by the sequence number.
@@ -89,6 +97,7 @@ impl<const N: usize> Source<'_, N> {
             place.send_with(|sample| {
                 (sample.sequence, sample.period) = (sequence, period);
                 sample.telemetry = telemetry();
+                sample.codes = *codes;
             })
         });
         if sent {
@@ -123,7 +132,7 @@ mod tests {
         let mut period = 0;
         let mut run = |source: &mut Source<7>, periods: u32| {
             for _ in 0..periods {
-                source.step(period, false, Telemetry::default);
+                source.step(period, false, &[0; 3], Telemetry::default);
                 period += 1;
             }
         };
@@ -149,7 +158,8 @@ mod tests {
         let mut queue = Queue::<16>::new(Sample::default());
         let (mut source, mut sink) = queue.split();
         sink.ask(3);
-        (0..periods).for_each(|period| source.step(period, busy(period), Telemetry::default));
+        (0..periods)
+            .for_each(|period| source.step(period, busy(period), &[0; 3], Telemetry::default));
         core::iter::from_fn(|| sink.fetch()).map(|sample| sample.period).collect()
     }
 

@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use drive_core::Telemetry;
 
-pub use signals::{MOST, Record, SIGNALS, Signal, SignalChoice, find};
+pub use signals::{CurrentCodes, MOST, Record, SIGNALS, Signal, SignalChoice, find};
 
 /// What starts the part of a trace that is kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,13 +123,13 @@ impl<const N: usize> Inner<N> {
     }
 
     /// Number of records behind that of the trigger, if it has come with the record just written.
-    fn triggered(&self, t: &Telemetry, fault: bool) -> Option<usize> {
+    fn triggered(&self, t: &Telemetry, codes: &CurrentCodes, fault: bool) -> Option<usize> {
         let size = self.size();
         match self.plan.trigger {
             Trigger::Now => Some(size.saturating_sub(1)),
             Trigger::Fault => fault.then_some(0),
             Trigger::Level { signal, level, above } => {
-                let value = signals::value(signal, t);
+                let value = signals::value(signal, t, codes);
                 let beyond = if above { value > level } else { value < level };
                 let before = (size / 4).min(self.written.saturating_sub(1));
                 beyond.then_some(size.saturating_sub(before + 1))
@@ -141,11 +141,21 @@ impl<const N: usize> Inner<N> {
 impl<const N: usize> Recorder<'_, N> {
     /// Records the present control period, if one is due, and tells whether it was; `fault` says whether the drive is in a
     /// fault.
-    pub fn step(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) -> bool {
-        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, telemetry)
+    pub fn step(
+        &mut self,
+        fault: bool,
+        codes: &CurrentCodes,
+        telemetry: impl FnOnce() -> Telemetry,
+    ) -> bool {
+        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, codes, telemetry)
     }
 
-    fn record(&mut self, fault: bool, telemetry: impl FnOnce() -> Telemetry) -> bool {
+    fn record(
+        &mut self,
+        fault: bool,
+        codes: &CurrentCodes,
+        telemetry: impl FnOnce() -> Telemetry,
+    ) -> bool {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         // A fault is recorded at once: what follows it stands still.
@@ -157,14 +167,14 @@ impl<const N: usize> Recorder<'_, N> {
         let t = telemetry();
         let size = inner.size();
         if let Some(place) = inner.records.get_mut(inner.next) {
-            *place = inner.plan.choice.values(&t);
+            inner.plan.choice.record(place, &t, codes);
             inner.next = if inner.next + 1 < size { inner.next + 1 } else { 0 };
             inner.written = size.min(inner.written + 1);
         }
         match inner.left {
             Some(left) => inner.left = Some(left.saturating_sub(1)),
             None => {
-                inner.left = inner.triggered(&t, fault);
+                inner.left = inner.triggered(&t, codes, fault);
                 inner.behind = inner.left.unwrap_or(0);
             }
         }

@@ -87,52 +87,41 @@ const PARTS: [(u32, u32); 12] = [
     (0x4002_1000, CLOCKS),
 ];
 
-/// Number of the registers below.
-const COUNT: usize = 77;
-
-/// The registers on which the control depends.
-pub const CONTROL: [Register; COUNT] = {
-    let mut registers = [Register { address: 0, mask: u32::MAX }; COUNT];
-    let (mut n, mut group) = (0, 0);
+/// Number of these registers.
+pub const COUNT: usize = {
+    let (mut count, mut group) = (0, 0);
     while group < CONFIGURED.len() {
-        let (base, offsets) = CONFIGURED[group];
-        let mut i = 0;
-        while i < offsets.len() {
-            registers[n].address = base + offsets[i] as u32;
-            let mut part = 0;
-            while part < PARTS.len() {
-                if PARTS[part].0 == registers[n].address {
-                    registers[n].mask = PARTS[part].1;
-                }
-                part += 1;
-            }
-            (n, i) = (n + 1, i + 1);
-        }
+        count += CONFIGURED[group].1.len();
         group += 1;
     }
-    assert!(n == COUNT);
-    registers
+    count
 };
+
+/// The registers on which the control depends.
+pub fn control() -> impl Iterator<Item = Register> {
+    let addresses = CONFIGURED
+        .iter()
+        .flat_map(|(base, offsets)| offsets.iter().map(move |offset| base + u32::from(*offset)));
+    addresses.map(|address| {
+        let part = PARTS.iter().find(|part| part.0 == address);
+        Register { address, mask: part.map_or(u32::MAX, |part| part.1) }
+    })
+}
 
 /// The check and its progress.
 #[derive(Debug)]
 pub struct RegisterCheck {
-    registers: &'static [Register],
-    expected: &'static mut [u32],
+    expected: &'static mut [u32; COUNT],
     next: usize,
 }
 
 impl RegisterCheck {
-    /// A check of these registers, with their contents now; `read` reads the word at an address.
-    pub fn new(
-        registers: &'static [Register],
-        expected: &'static mut [u32],
-        read: impl Fn(u32) -> u32,
-    ) -> Self {
-        for (Register { address, mask }, expected) in registers.iter().zip(expected.iter_mut()) {
-            *expected = read(*address) & mask;
+    /// A check of these registers with their contents now; `read` reads the word at an address.
+    pub fn new(expected: &'static mut [u32; COUNT], read: impl Fn(u32) -> u32) -> Self {
+        for (Register { address, mask }, expected) in control().zip(expected.iter_mut()) {
+            *expected = read(address) & mask;
         }
-        Self { registers, expected, next: 0 }
+        Self { expected, next: 0 }
     }
 
     /// Checks the next slice.
@@ -140,14 +129,14 @@ impl RegisterCheck {
     /// # Errors
     /// A register has changed.
     pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Changed> {
-        let both = self.registers.iter().zip(self.expected.iter());
-        for (&Register { address, mask }, &expected) in both.skip(self.next).take(SLICE) {
+        let both = control().zip(self.expected.iter());
+        for (Register { address, mask }, &expected) in both.skip(self.next).take(SLICE) {
             let found = read(address) & mask;
             if found != expected {
                 return Err(Changed { address, found, expected });
             }
         }
-        self.next = if self.next + SLICE < self.registers.len() { self.next + SLICE } else { 0 };
+        self.next = if self.next + SLICE < COUNT { self.next + SLICE } else { 0 };
         Ok(())
     }
 }
@@ -156,21 +145,20 @@ impl RegisterCheck {
 mod tests {
     use super::*;
 
-    const WHOLE: usize = CONTROL.len().div_ceil(SLICE);
+    const WHOLE: usize = COUNT.div_ceil(SLICE);
 
     #[test]
     fn a_flip_is_found_in_one_whole_look_and_only_in_bits_that_stay() {
-        let place = |at| CONTROL.iter().position(|register| register.address == at).unwrap();
-        let sound: Vec<u32> =
-            (0..CONTROL.len() as u32).map(|n| n.wrapping_mul(2_654_435_769)).collect();
-        for (which, bit) in (0..CONTROL.len()).flat_map(|n| (0..32).map(move |bit| (n, bit))) {
-            let expected = Box::leak(Box::new([0; CONTROL.len()]));
-            let mut check = RegisterCheck::new(&CONTROL, expected, |at| sound[place(at)]);
+        let place = |at| control().position(|register| register.address == at).unwrap();
+        let sound: Vec<u32> = (0..COUNT as u32).map(|n| n.wrapping_mul(2_654_435_769)).collect();
+        for (which, bit) in (0..COUNT).flat_map(|n| (0..32).map(move |bit| (n, bit))) {
+            let expected = Box::leak(Box::new([0; COUNT]));
+            let mut check = RegisterCheck::new(expected, |at| sound[place(at)]);
             let passes = (which + bit) % (2 * WHOLE);
             assert!((0..passes).all(|_| check.slice(|at| sound[place(at)]).is_ok()));
             let mut words = sound.clone();
             words[which] ^= 1 << bit;
-            let Register { address, mask } = CONTROL[which];
+            let Register { address, mask } = control().nth(which).unwrap();
             let changed =
                 Changed { address, found: words[which] & mask, expected: sound[which] & mask };
             let found = (0..WHOLE).try_for_each(|_| check.slice(|at| words[place(at)]));
@@ -181,7 +169,7 @@ mod tests {
 
     #[test]
     fn no_register_is_there_twice() {
-        let mut addresses = CONTROL.map(|register| register.address);
+        let mut addresses: Vec<u32> = control().map(|register| register.address).collect();
         addresses.sort_unstable();
         assert!(addresses.windows(2).all(|pair| pair[0] < pair[1]));
     }

@@ -185,21 +185,15 @@ impl Start {
 fn last_run(rcc: &pac::RCC) -> (&'static str, Option<Record>, u32) {
     let flags = rcc.csr().read();
     // The most specific cause first: every reset pulls the reset pin as well.
-    let cause = if flags.wwdgrstf().is_reset() {
-        "window watchdog"
-    } else if flags.iwdgrstf().is_reset() {
-        "watchdog"
-    } else if flags.sftrstf().is_reset() {
-        "software"
-    } else if flags.oblrstf().is_reset() {
-        "option bytes"
-    } else if flags.lpwrrstf().is_reset() {
-        "low-power"
-    } else if flags.borrstf().is_reset() {
-        "power-on"
-    } else {
-        "reset pin"
-    };
+    let causes = [
+        (flags.wwdgrstf().is_reset(), "window watchdog"),
+        (flags.iwdgrstf().is_reset(), "watchdog"),
+        (flags.sftrstf().is_reset(), "software"),
+        (flags.oblrstf().is_reset(), "option bytes"),
+        (flags.lpwrrstf().is_reset(), "low-power"),
+        (flags.borrstf().is_reset(), "power-on"),
+    ];
+    let cause = causes.iter().find(|cause| cause.0).map_or("reset pin", |cause| cause.1);
     let record = stop::take_record();
     // A fault of the drive does not reset the chip: after it, a reset by software comes from the debug probe.
     let stopped = record.is_some_and(|record| record.reason != Reason::Drive);

@@ -6,7 +6,7 @@ use crate::chip::{memory, stop};
 use crate::task::control;
 use induction_drive::monitor::memory_check::{BitFlip, CheckedMemory, MemoryCheck};
 use induction_drive::monitor::record::Reason;
-use induction_drive::monitor::register_check::{CONTROL, Changed, RegisterCheck};
+use induction_drive::monitor::register_check::{COUNT, Changed, RegisterCheck};
 
 /// The check and its progress.
 pub struct Check {
@@ -17,13 +17,13 @@ pub struct Check {
 impl Check {
     /// The check of a control that runs; on the first call only.
     pub fn new() -> Option<Self> {
-        let expected = singleton!(: [u32; CONTROL.len()] = [0; CONTROL.len()])?;
+        let expected = singleton!(: [u32; COUNT] = [0; COUNT])?;
         let (code, source) = memory::control_code();
         let (constants, changes) = control::constants();
         let checked = CheckedMemory { code, source, constants, changes };
         Some(Self {
             memory: MemoryCheck::new(checked, memory::word),
-            registers: RegisterCheck::new(&CONTROL, expected, memory::word),
+            registers: RegisterCheck::new(expected, memory::word),
         })
     }
 

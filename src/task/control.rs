@@ -83,7 +83,7 @@ impl Control {
         let running = Running {
             control: self,
             periods: 0,
-            worst_cycles: 0,
+            worst_cycles: [0; 2],
             worst_latency: 0,
             late: Hardware::empty(),
             over_current: Hardware::empty(),
@@ -134,7 +134,8 @@ static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 struct Running {
     control: Control,
     periods: u32,
-    worst_cycles: u32,
+    /// Of periods without a command, and with one.
+    worst_cycles: [u32; 2],
     worst_latency: u32,
     /// Deadline miss of the last period.
     late: Hardware,
@@ -261,15 +262,14 @@ impl Running {
         dc_link.set(drive.brake_duty(), relay);
 
         // Between two steps: a command acts from the next step on.
-        let answer = commands.take_with(|command| drive.command(command));
-        let commanded = answer.is_some();
-        if let Some(answer) = answer {
-            // There is room: the main loop takes the last answer before it sends a command.
-            answers.send(answer);
-        }
+        // There is room for the answer: the main loop takes the last one before it sends a command.
+        let answered = commands
+            .take_with(|command| answers.send_with(|answer| *answer = drive.command(command)));
+        let commanded = answered.is_some();
         IS_OFF.store(is_off(drive), Ordering::Relaxed);
         let fault = matches!(drive.state(), State::Fault(_));
-        let traced = trace.step(fault, || drive.telemetry());
+        let codes = [codes.current_a, codes.current_b, codes.current_c];
+        let traced = trace.step(fault, &codes, || drive.telemetry());
         let commissioned = OBSERVED.load(Ordering::Relaxed) && drive.state().regulates();
         if drive.tracks_rotor() || drive.excites() || commissioned {
             // Without room the period is missing, which the main loop detects by its number.
@@ -283,12 +283,12 @@ impl Running {
             || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
         let reports = self.report_due && !commanded;
         let busy = reports || traced || commanded;
-        stream.step(self.periods, busy, || drive.telemetry());
+        stream.step(self.periods, busy, &codes, || drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
-        if cycles > self.worst_cycles {
-            self.worst_cycles = cycles;
-        }
+        let [without, with] = &mut self.worst_cycles;
+        let worst = if commanded { with } else { without };
+        *worst = cycles.max(*worst);
         if reports {
             self.report_due = false;
             self.report(sample, cycles);

@@ -249,7 +249,7 @@ impl Supervisor {
                 rpm,
                 scales.dc_link.at(s.sample.dc_link),
                 scales.ntc.celsius(s.sample.heat_sink),
-                s.worst_cycles,
+                s.worst_cycles[0],
             );
         }
     }

@@ -89,6 +89,7 @@ impl Drive {
     }
 
     /// The telemetry of the last step.
+    #[inline(always)] // written where it goes, without a copy
     pub fn telemetry(&self) -> Telemetry {
         let (t, s) = (&self.control.seen, &self.control);
         Telemetry {

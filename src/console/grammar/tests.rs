@@ -149,7 +149,7 @@ fn what_is_half_wrong_is_refused_whole() {
     }
     let signals = parse("trace 5 i_x").unwrap_err().to_string();
     assert!(
-        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" turns"),
+        signals.starts_with("no such signal: i_x; ") && signals.ends_with(" i_c_a"),
         "{signals}"
     );
     let near = parse("trace 5 sped_rpm").unwrap_err().to_string();

@@ -92,7 +92,7 @@ impl DriveHandle for FakeDrive {
             state: self.drive.state(),
             sample: self.sample,
             telemetry: self.drive.telemetry(),
-            worst_cycles: u32::MAX,
+            worst_cycles: [u32::MAX; 2],
             last_cycles: 800,
             worst_latency: u32::MAX,
             hardware: Hardware::empty(),

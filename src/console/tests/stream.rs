@@ -11,7 +11,7 @@ impl Talk {
         let mut telemetry = Telemetry { turns: 0.5, ..Telemetry::default() };
         telemetry.current.q = i_q;
         telemetry.rotor_freq = 10.0 * PERIOD_S;
-        let sample = Due { sequence, period: 7 * u32::from(sequence), telemetry };
+        let sample = Due { sequence, period: 7 * u32::from(sequence), telemetry, codes: [0; 3] };
         self.drive.streamed.1.push_back(sample);
     }
 

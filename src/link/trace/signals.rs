@@ -1,7 +1,8 @@
 //! The signals that can be recorded.
 
-use drive_core::Telemetry;
 use drive_core::io::PERIOD_S;
+use drive_core::settings::{CurrentSensors, Line};
+use drive_core::{Settings, Telemetry};
 use heapless::Vec;
 
 /// A signal of a trace.
@@ -21,7 +22,12 @@ enum Unit {
     Frequency,
     /// Electrical turns per control period, shown in mechanical rpm.
     Speed,
+    /// Code of a current sensor, shown in A without the offset that a start measures.
+    Sensor(usize),
 }
+
+/// Codes of the current sensors a, b and c, also while the drive is off; c is 0 where there is none.
+pub type CurrentCodes = [u16; 3];
 
 impl Signal {
     const fn new(name: &'static str, old: &'static str) -> Self {
@@ -33,18 +39,32 @@ impl Signal {
         self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 
-    /// Factor from the recorded value to the unit of the name, for a motor with these pole pairs.
-    pub fn factor(&self, pole_pairs: u8) -> f32 {
-        match self.unit {
+    /// The line from the recorded value to the unit of the name, with these settings; 0 for a sensor that there is not.
+    pub fn line(&self, settings: &Settings) -> Line {
+        let scales = &settings.scales;
+        let gain = match self.unit {
             Unit::Named => 1.0,
             Unit::Frequency => 1.0 / PERIOD_S,
-            Unit::Speed => 60.0 / PERIOD_S / f32::from(pole_pairs),
-        }
+            Unit::Speed => 60.0 / PERIOD_S / f32::from(settings.motor.pole_pairs),
+            Unit::Sensor(0) => return scales.current_a,
+            Unit::Sensor(1) => return scales.current_b,
+            Unit::Sensor(_) if scales.sensors == CurrentSensors::LowSide => {
+                return scales.current_c;
+            }
+            Unit::Sensor(_) => 0.0,
+        };
+        Line { gain, offset: 0.0 }
+    }
+
+    /// The recorded value in the unit of the name.
+    pub fn shown(&self, value: f32, settings: &Settings) -> f32 {
+        let Line { gain, offset } = self.line(settings);
+        gain * value + offset
     }
 }
 
 /// Signals that can be recorded. The names end with the unit; a name of earlier firmware is understood, too.
-pub const SIGNALS: [Signal; 13] = [
+pub const SIGNALS: [Signal; 16] = [
     Signal::new("phi_deg", ""),
     Signal { name: "flux_hz", old: "flux_step", unit: Unit::Frequency },
     Signal { name: "speed_rpm", old: "rotor_step", unit: Unit::Speed },
@@ -58,6 +78,9 @@ pub const SIGNALS: [Signal; 13] = [
     Signal::new("saliency", ""),
     Signal::new("dc_link_v", "dc_link"),
     Signal::new("turns", ""),
+    Signal { name: "i_a_a", old: "i_a", unit: Unit::Sensor(0) },
+    Signal { name: "i_b_a", old: "i_b", unit: Unit::Sensor(1) },
+    Signal { name: "i_c_a", old: "i_c", unit: Unit::Sensor(2) },
 ];
 
 /// Index of the signal with this name.
@@ -100,18 +123,16 @@ impl SignalChoice {
         self.signals.iter().filter_map(|signal| SIGNALS.get(usize::from(*signal)))
     }
 
-    /// Values of the signals.
-    pub fn values(&self, t: &Telemetry) -> Record {
-        let mut record = [0.0; MOST];
+    /// Writes the values of the signals.
+    pub fn record(&self, record: &mut Record, t: &Telemetry, codes: &CurrentCodes) {
         for (place, signal) in record.iter_mut().zip(&self.signals) {
-            *place = value(*signal, t);
+            *place = value(*signal, t, codes);
         }
-        record
     }
 }
 
 /// The value of a signal as it is recorded.
-pub(super) fn value(signal: u8, t: &Telemetry) -> f32 {
+pub(super) fn value(signal: u8, t: &Telemetry, codes: &CurrentCodes) -> f32 {
     match signal {
         0 => t.phi.to_bits() as f32 * (180.0 / 2_147_483_648.0),
         1 => t.flux_freq,
@@ -125,6 +146,7 @@ pub(super) fn value(signal: u8, t: &Telemetry) -> f32 {
         9 => t.delta_i,
         10 => t.saliency,
         11 => t.dc_link,
-        _ => t.turns,
+        12 => t.turns,
+        _ => codes.get(usize::from(signal) - 13).map_or(0.0, |code| f32::from(*code)),
     }
 }

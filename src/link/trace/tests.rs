@@ -1,8 +1,13 @@
+use drive_core::Telemetry;
+use drive_core::settings::{CurrentSensors, Settings};
+
 use super::*;
 
 fn plan(records: u16, divider: u16, trigger: Trigger) -> Plan {
     Plan { records, divider, choice: SignalChoice::usual(), trigger }
 }
+
+const CODES: CurrentCodes = [13, 14, 15];
 
 fn at(turns: f32) -> Telemetry {
     Telemetry { turns, ..Telemetry::default() }
@@ -23,9 +28,9 @@ fn records_every_nth_period_and_gives_them_back_when_done() {
     for period in 0..5 {
         assert!(reader.recording());
         assert_eq!(reader.get(0), None);
-        recorder.step(false, || at(period as f32));
+        recorder.step(false, &CODES, || at(period as f32));
     }
-    recorder.step(false, Telemetry::default);
+    recorder.step(false, &CODES, Telemetry::default);
     assert_eq!(all(&reader), [(0, 0.0), (1, 2.0), (2, 4.0)]);
 }
 
@@ -35,7 +40,7 @@ fn asks_for_no_more_than_there_is_room() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(100, 1, Trigger::Now)));
     for _ in 0..4 {
-        recorder.step(false, Telemetry::default);
+        recorder.step(false, &CODES, Telemetry::default);
     }
     assert!(!reader.recording());
     assert!(reader.get(3).is_some() && reader.get(4).is_none());
@@ -47,17 +52,17 @@ fn a_trace_of_a_fault_ends_with_it() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 2, Trigger::Fault)));
     for period in 0..10 {
-        recorder.step(false, || at(period as f32));
+        recorder.step(false, &CODES, || at(period as f32));
     }
     assert!(reader.recording());
     // In a period that would not be due.
-    recorder.step(false, || at(10.0));
-    recorder.step(true, || at(11.0));
+    recorder.step(false, &CODES, || at(10.0));
+    recorder.step(true, &CODES, || at(11.0));
     assert_eq!(all(&reader), [(-3, 6.0), (-2, 8.0), (-1, 10.0), (0, 11.0)]);
     // One that comes before the ring is full.
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, || at(1.0));
-    recorder.step(true, || at(2.0));
+    recorder.step(false, &CODES, || at(1.0));
+    recorder.step(true, &CODES, || at(2.0));
     assert_eq!(all(&reader), [(-1, 1.0), (0, 2.0)]);
 }
 
@@ -73,7 +78,7 @@ fn a_level_keeps_a_quarter_from_before_it() {
                 break;
             }
             let turns = if above { n } else { 40 - n };
-            recorder.step(false, || at(turns as f32));
+            recorder.step(false, &CODES, || at(turns as f32));
         }
         all(reader)
     };
@@ -91,9 +96,9 @@ fn a_trace_that_waits_for_its_trigger_can_be_ended() {
     let trace = Trace::<4>::new();
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, Telemetry::default);
+    recorder.step(false, &CODES, Telemetry::default);
     reader.cancel();
-    recorder.step(true, Telemetry::default);
+    recorder.step(true, &CODES, Telemetry::default);
     assert!(!reader.recording() && reader.get(0).is_none());
     assert!(reader.begin(&plan(1, 1, Trigger::Now)));
 }
@@ -128,13 +133,18 @@ fn signals_are_recorded_as_they_were_chosen() {
         "saliency",
         "dc_link",
         "turns",
+        "i_a",
+        "i_b",
+        "i_c",
     ];
     for (i, (signal, old)) in SIGNALS.iter().zip(old).enumerate() {
         let mut choice = SignalChoice::none();
         assert!(choice.add(find(signal.name).unwrap()) && choice.add(find("turns").unwrap()));
         assert_eq!(find(old), find(signal.name), "{old}");
         let expected = if i == 0 { 90.0 } else { i as f32 };
-        assert_eq!(choice.values(&telemetry)[..2], [expected, 12.0], "{}", signal.name);
+        let mut record = Record::default();
+        choice.record(&mut record, &telemetry, &CODES);
+        assert_eq!(record[..2], [expected, 12.0], "{}", signal.name);
         let names: Vec<&str> = choice.signals().map(|signal| signal.name).collect();
         assert_eq!(names, [signal.name, "turns"]);
     }
@@ -145,9 +155,27 @@ fn signals_are_recorded_as_they_were_chosen() {
 /// 1/4 of a revolution of a four-pole shaft a second is 1/2 electrical turn a second, 15 rpm.
 #[test]
 fn speeds_are_shown_in_the_unit_of_their_name() {
-    let factor = |name: &str| SIGNALS[usize::from(find(name).unwrap())].factor(2);
+    let settings = Settings::default();
+    assert_eq!(settings.motor.pole_pairs, 2);
+    let factor = |name: &str| SIGNALS[usize::from(find(name).unwrap())].shown(1.0, &settings);
     let per_period = 0.5 * drive_core::io::PERIOD_S;
     assert!((factor("speed_rpm") * per_period - 15.0).abs() < 1e-4);
     assert!((factor("flux_hz") * per_period - 0.5).abs() < 1e-6);
     assert_eq!(factor("i_q_a"), 1.0);
+}
+
+/// A code of a sensor is shown by the calibration of that sensor, also while the drive is off.
+#[test]
+fn sensors_are_shown_in_amperes() {
+    let mut settings = Settings::default();
+    let shown = |name: &str, settings: &Settings| {
+        SIGNALS[usize::from(find(name).unwrap())].shown(2500.0, settings)
+    };
+    let scales = settings.scales;
+    assert_eq!(shown("i_a_a", &settings), scales.current_a.at(2500));
+    assert_eq!(shown("i_b_a", &settings), scales.current_b.at(2500));
+    assert_eq!(shown("i_c_a", &settings), 0.0);
+    settings.scales.sensors = CurrentSensors::LowSide;
+    settings.scales.current_c.gain *= 2.0;
+    assert_eq!(shown("i_c_a", &settings), settings.scales.current_c.at(2500));
 }

@@ -2,7 +2,7 @@
 
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
-use induction_drive::monitor::register_check::{CONTROL, Register};
+use induction_drive::monitor::register_check::{COUNT, Register, control};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -99,7 +99,7 @@ const AT_THE_GATES: [(u32, u32); 5] = [
 /// Flips a bit that can be written of a register that the firmware checks.
 pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
     loop {
-        let Register { address, mask } = CONTROL[rng.random_range(0..CONTROL.len())];
+        let Register { address, mask } = control().nth(rng.random_range(0..COUNT)).unwrap();
         let bit = rng.random_range(0..32);
         if mask >> bit & 1 == 0
             || AT_THE_GATES.iter().any(|g| g.0 == address && g.1 >> bit & 1 == 1)
