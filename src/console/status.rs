@@ -7,7 +7,7 @@ use drive_core::current::voltage_limit::VoltageLimit;
 use drive_core::dc_link::Limiting;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::CurrentSensors;
-use drive_core::{Settings, State};
+use drive_core::{Hardware, Settings, State};
 
 use super::Console;
 use super::handle::DriveHandle;
@@ -51,6 +51,9 @@ fn line(
     let settings = &settings.drive;
     let (t, motor, scales) = (&s.telemetry, &settings.motor, &settings.scales);
     write!(f, "{}; {power}; ", s.state)?;
+    if s.hardware.contains(Hardware::BREAK) {
+        write!(f, "fault input trips; ")?;
+    }
     if s.limiting != Limiting::No {
         write!(f, "limiting now, because: {}; ", s.limiting)?;
     }
@@ -79,7 +82,7 @@ fn line(
     // Dc link and heat sink from the sample: the drive's own values stand still while it is off.
     let dc_link = scales.dc_link.at(s.sample.dc_link);
     let latency_us = s.worst_latency as f32 / CYCLES_PER_US as f32;
-    write!(f, "dc link {dc_link:.0} V, ")?;
+    write!(f, "dc link {dc_link:.1} V, ")?;
     write!(f, "heat sink {:.0} degC; ", scales.ntc.celsius(s.sample.heat_sink))?;
     let [without, with] = s.worst_cycles;
     write!(f, "{} of {without} cycles, {with} with a command, ", s.last_cycles)?;

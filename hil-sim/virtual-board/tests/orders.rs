@@ -5,8 +5,9 @@ mod common;
 use anyhow::{Context, Result};
 use drive_core::State;
 use hil_sim::Config;
+use hil_sim::config::LoadMode;
 use induction_drive::board::PWM_TOP;
-use virtual_board::Pair;
+use virtual_board::{Board, Image, Options, Pair};
 
 /// Longest until an order is taken, periods: one that changes a setting runs the design rules first.
 const LONGEST: usize = 30_000;
@@ -57,5 +58,47 @@ fn an_order_leaves_most_of_the_period() -> Result<()> {
     pair.until_state(State::Torque)?;
     let (taken, _) = cost(&mut pair, "stop")?;
     assert!(taken < PERIOD / 5, "stop: {taken} cycles");
+    Ok(())
+}
+
+/// With voltage and frequency there is no angle to find again: the order is refused and changes nothing. A quick stop brakes the
+/// shaft, faster than the ramp.
+#[test]
+fn with_voltage_and_frequency_an_angle_is_not_found_again_and_a_stop_brakes() -> Result<()> {
+    let mut config = Config::default();
+    config.load.mode = LoadMode::Free;
+    let mut seconds = [0.0; 2];
+    for (stop, seconds) in ["stop ramp", "stop quick"].into_iter().zip(&mut seconds) {
+        let mut board = Board::new(Image::built()?, Options::new(&config, 6))?;
+        let rpm = |board: &Board| board.plant.mechanical_speed() * 30.0 / std::f64::consts::PI;
+        let run = |board: &mut Board, periods: u64| -> Result<String> {
+            board.run_periods(periods)?;
+            while board.next_period().is_some() {}
+            Ok(board.take_console())
+        };
+        run(&mut board, 12_000)?;
+        for (line, periods) in [("start vf", 6000), ("speed 300", 12_000)] {
+            board.type_line(line);
+            let said = run(&mut board, periods)?;
+            assert!(said.starts_with("ok"), "{line}: {said}");
+        }
+        let before = rpm(&board);
+        assert!((270.0..330.0).contains(&before), "{before} rpm");
+        board.type_line("relock");
+        let said = run(&mut board, 600)?;
+        assert!(said.starts_with("error: ") && (rpm(&board) - before).abs() < 5.0, "{said}");
+        board.type_line(stop);
+        let mut periods = 0;
+        while board.chip().tim1.outputs_on() {
+            run(&mut board, 10)?;
+            periods += 10;
+            assert!(periods < 12_000, "{stop}: {} rpm", rpm(&board));
+        }
+        *seconds = f64::from(periods) / 6000.0;
+        println!("{said}{stop}: {seconds:.2} s, {:.1} rpm", rpm(&board));
+        assert!(rpm(&board).abs() < 40.0, "{stop}: {} rpm", rpm(&board));
+    }
+    let [ramp, quick] = seconds;
+    assert!(quick < 0.5 * ramp && ramp < 1.5, "{seconds:?}");
     Ok(())
 }
