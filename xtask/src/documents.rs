@@ -8,7 +8,7 @@ use anyhow::{Result, ensure};
 use crate::{run, sources};
 
 /// Commands that are not run here, by their beginning, and the reason. The longest beginning that fits counts.
-const ELSEWHERE: [(&str, &str); 28] = [
+const ELSEWHERE: [(&str, &str); 30] = [
     ("cargo xtask test", "runs this"),
     ("cargo xtask", "a part of `cargo xtask test`, or a tool that needs minutes"),
     ("cargo xtask flash", "needs a board"),
@@ -30,8 +30,13 @@ const ELSEWHERE: [(&str, &str); 28] = [
     ("cargo sim run saliency-check --set runs=1000", "long proof"),
     ("cargo sim run monte-carlo --set runs=1000", "long proof"),
     ("cargo sim run machines --set", "long proof"),
+    (
+        "cargo sim run battery --plant r --set flux_level=high --set sequence.flux=high --set prepare.learn=yes --set battery.runs=dragged",
+        "long; fails for the runs that the drive does not notice",
+    ),
     ("cargo sim merge", "the files are the reader's; a test merges shards"),
     ("cargo sim run torque-steps --motor my-motor.toml", "a file of the reader's"),
+    ("cargo sim motors my-motor.toml", "a file of the reader's; a test runs it"),
     ("cargo sim run torque-steps --config hil-sim/examples/bench.toml", "a test runs it"),
     ("cargo sim run profile --input", "a test runs it with the file of the examples"),
     ("cargo sim identify-trace --input", "a file of the reader's; a test runs it with a trace"),

@@ -77,7 +77,7 @@ const PROGRAMS: &[Program] = &[
         ..runs("embassy-clock", EMBASSY)
     },
     Program {
-        ends: Some(("register 0x40008000 written with 0x2000", UNMODELLED)),
+        done: |board| is(board.take_console() == "hello from embassy\n"),
         ..runs("embassy-serial", EMBASSY)
     },
     Program { done: |board| is(board.chip().tim1.outputs_on()), ..runs("embassy-pwm", EMBASSY) },
