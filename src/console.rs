@@ -98,12 +98,12 @@ const BYTES_AT_ONCE: usize = 64;
 
 impl Console {
     /// A console; the drive has these settings.
-    pub const fn new(settings: FirmwareSettings) -> Self {
+    pub fn new(settings: FirmwareSettings) -> Self {
         Self {
             settings: Staging::new(settings),
             unsaved: false,
             reader: LineReader::new(),
-            out: OutputLine::new(),
+            out: OutputLine::default(),
             list: None,
             task: None,
             announcer: Announcer::new(),
@@ -121,7 +121,7 @@ impl Console {
             restore: Restore::new(),
             wire: Wire::new(),
             foreign: None,
-            bus: Bus::new(),
+            bus: Bus::default(),
         }
     }
 

@@ -79,7 +79,7 @@ fn words() -> Vec<&'static str> {
         "above", "fault", "now", "check", "00000000",
     ];
     let words: Vec<_> =
-        COMMANDS.into_iter().chain(settings).chain(levels).chain(others).chain(signals).collect();
+        COMMANDS.split(' ').chain(settings).chain(levels).chain(others).chain(signals).collect();
     assert!(words.len() <= 256, "{} words", words.len());
     words
 }

@@ -62,9 +62,7 @@ impl Adc {
             pins::analog(pin);
         }
 
-        if !clock_on!(rcc.ahb2enr(), adc12en) {
-            return Err("the converters have no clock");
-        }
+        clock_on!(rcc.ahb2enr(), adc12en, "ADC12")?;
         // See board::ADC_CLOCK_DIVIDER.
         common.ccr().write(|w| w.ckmode().sync_div4());
         if !common.ccr().read().ckmode().is_sync_div4() {

@@ -37,13 +37,13 @@ const _: () = assert!(pll_hz(board::HSE_HZ, CRYSTAL_DIVIDER) == board::CLOCK_HZ)
 const _: () = assert!(pll_hz(board::HSI_HZ, INTERNAL_DIVIDER) == board::CLOCK_HZ);
 
 /// Switches on the clock of a peripheral, and waits until the peripheral can be accessed: two bus cycles (ST reads the
-/// enable register back after every enable, `stm32g4xx_ll_bus.h`). `false` if the bit does not stay.
+/// enable register back after every enable, `stm32g4xx_ll_bus.h`). An error if the bit does not stay.
 macro_rules! clock_on {
-    ($register:expr, $bit:ident) => {{
+    ($register:expr, $bit:ident, $name:literal) => {{
         $register.modify(|_, w| w.$bit().set_bit());
         let on = $register.read().$bit().bit();
         cortex_m::asm::dsb();
-        on
+        if on { Ok(()) } else { Err(concat!($name, " has no clock")) }
     }};
 }
 pub(crate) use clock_on;
@@ -56,7 +56,7 @@ pub fn start(
 ) -> (Rcc, Source, Result<(), StartError>) {
     let rcc = rcc.constrain();
     // Off after reset, and the HAL leaves it off: without it no write below has an effect.
-    let powered = clock_on!(rcc.apb1enr1(), pwren);
+    let powered = clock_on!(rcc.apb1enr1(), pwren, "PWR");
     // The range without boost: from there the HAL takes the steps to 170 MHz. A reset may have kept the boost.
     pwr.cr5().modify(|_, w| w.r1mode().set_bit());
     let (source, mux, divider) = if crystal_starts(&rcc) {
@@ -87,9 +87,7 @@ pub fn start(
         // A crystal that stops raises the NMI, and TIM1's break with it.
         rcc.cr().modify(|_, w| w.csson().on());
     }
-    let checked =
-        if powered { read_back(flash) } else { Err("the power controller takes no writes") };
-    (rcc, source, checked)
+    (rcc, source, powered.and_then(|()| read_back(flash)))
 }
 
 /// Reads back the conditions under which the core may run at [`board::CLOCK_HZ`].

@@ -26,9 +26,7 @@ impl DcLink {
     /// # Errors
     /// The timer has no clock.
     pub fn new(timer: pac::TIM8, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Result<Self, StartError> {
-        if !clock_on!(rcc.apb2enr(), tim8en) {
-            return Err("TIM8 has no clock");
-        }
+        clock_on!(rcc.apb2enr(), tim8en, "TIM8")?;
         // Halted by a debugger, the counter stops and the chopper goes off.
         debug.apb2_fz().modify(|_, w| w.dbg_tim8_stop().set_bit());
         timer.arr().write(|w| w.arr().set(u32::from(PERIOD - 1)));

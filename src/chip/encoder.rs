@@ -7,6 +7,7 @@ use stm32g4xx_hal::gpio::{Debugger, PA15, PB3, Pull};
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
+use super::StartError;
 use super::clocks::clock_on;
 use induction_drive::board;
 
@@ -19,16 +20,14 @@ impl Encoder {
     /// Starts counting from 0. Track A is PA15, track B is PB3; A leads when the rotor turns from
     /// phase a towards phase b.
     ///
-    /// `None` if the timer has no clock. Both pins belong to JTAG after reset; the two-wire debug port does not need them.
+    /// Both pins belong to JTAG after reset; the two-wire debug port does not need them.
     pub fn new(
         timer: pac::TIM2,
         a: PA15<Debugger>,
         b: PB3<Debugger>,
         rcc: &mut Rcc,
-    ) -> Option<Self> {
-        if !clock_on!(rcc.apb1enr1(), tim2en) {
-            return None;
-        }
+    ) -> Result<Self, StartError> {
+        clock_on!(rcc.apb1enr1(), tim2en, "TIM2")?;
         // No resistors of the chip: with them on the pins do not stand the 5 V of a push-pull encoder (AN4899), and for an
         // open collector 40 kOhm are too slow. That one needs 1 to 4.7 kOhm to 3.3 V outside.
         a.into_alternate::<{ board::ENCODER_AF }>().set_internal_resistor(Pull::None);
@@ -42,7 +41,7 @@ impl Encoder {
         timer.smcr().write(|w| unsafe { w.sms().bits(3) });
         timer.arr().write(|w| w.arr().set(u32::MAX));
         timer.cr1().write(|w| w.cen().enabled());
-        Some(Self { timer })
+        Ok(Self { timer })
     }
 
     /// The count, four per line.

@@ -26,10 +26,8 @@ pub fn watch(
     pwm: &mut Pwm,
     level: u16,
 ) -> Result<(), StartError> {
-    let clocked = clock_on!(rcc.ahb2enr(), dac3en) && clock_on!(rcc.apb2enr(), syscfgen);
-    if !clocked {
-        return Err("self-test: DAC3 or COMP1 has no clock");
-    }
+    clock_on!(rcc.ahb2enr(), dac3en, "self-test: DAC3")?;
+    clock_on!(rcc.apb2enr(), syscfgen, "self-test: COMP1")?;
     let set = |code: u16| {
         dac.dhr12r1().write(|w| w.daccdhr().set(code));
         asm::delay(board::DAC_START_US * board::CYCLES_PER_US);

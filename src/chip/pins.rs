@@ -42,26 +42,6 @@ pub fn alternate(pin: Pin, function: u8, pull: Option<Level>) {
     mode(pin, ALTERNATE);
 }
 
-/// A pin that software drives.
-pub struct Output(Pin);
-
-impl Output {
-    /// Makes a pin an output at this level.
-    pub fn new(pin: Pin, level: Level) -> Self {
-        let output = Self(pin);
-        output.set(level);
-        mode(pin, OUTPUT);
-        output
-    }
-
-    /// Sets the level.
-    pub fn set(&self, level: Level) {
-        let shift = if level == Level::High { 0 } else { 16 };
-        // SAFETY: sets or resets one pin, which this owns.
-        registers(self.0.port).bsrr().write(|w| unsafe { w.bits(1 << (self.0.number + shift)) });
-    }
-}
-
 /// Makes a pin an analog input, without a resistor.
 pub fn analog(pin: Pin) {
     mode(pin, ANALOG);

@@ -50,9 +50,7 @@ impl Pwm {
         if timer.bdtr().as_ptr() as u32 != board::TIM1_BDTR {
             return Err("TIM1 is not where the fault handler expects it");
         }
-        if !clock_on!(rcc.apb2enr(), tim1en) {
-            return Err("TIM1 has no clock");
-        }
+        clock_on!(rcc.apb2enr(), tim1en, "TIM1")?;
         // Halted by a debugger, the counter stops and the outputs go off. The watchdog runs on and resets the chip, so they
         // do not come back with the core.
         debug.apb2_fz().modify(|_, w| w.dbg_tim1_stop().set_bit());
@@ -96,9 +94,7 @@ impl Pwm {
         // To the break as well, until the next reset: lock-up of the core, supply voltage, and errors of the flash that
         // cannot be corrected. (Not the parity of the RAM, which the factory's option bytes leave off.) The stored pages,
         // which a power failure may have torn, have been read before.
-        if !clock_on!(rcc.apb2enr(), syscfgen) {
-            return Err("TIM1 has no clock");
-        }
+        clock_on!(rcc.apb2enr(), syscfgen, "SYSCFG")?;
         system.cfgr2().modify(|_, w| w.cll().set_bit().pvdl().set_bit().eccl().set_bit());
 
         // The break inputs: the fault output of the power stage; the comparator of the dc link, high trips. One OR gate

@@ -15,7 +15,7 @@ use stm32g4xx_hal::stm32::interrupt;
 
 use crate::chip::pins;
 use crate::chip::serial::PRIORITY;
-use induction_drive::boards::pin::{USART3_RX, USART3_TX};
+use induction_drive::boards::pin::{Pin, USART3_RX, USART3_TX};
 use induction_drive::boards::{Level, Rs485};
 use induction_drive::link::mailbox::{Mailbox, Receiver, Sender};
 use induction_drive::modbus::{self, Frame};
@@ -30,7 +30,7 @@ pub struct Port {
 /// The interrupt's end of the port.
 struct PortInterrupt {
     port: pac::USART3,
-    driver: pins::Output,
+    driver: Pin,
     received: Sender<'static, Frame>,
     to_send: Receiver<'static, Frame>,
     /// The frame that comes in, or goes out.
@@ -71,7 +71,7 @@ impl Port {
         let (to_send, receive_to_send) = to_send.split();
 
         rcc.apb1enr1().modify(|_, w| w.usart3en().enabled());
-        let driver = pins::Output::new(wires.driver, Level::Low);
+        pins::output(wires.driver, Level::Low);
         let (transmit, receive) = (wires.transmit, wires.receive);
         pins::alternate(transmit, transmit.function(&USART3_TX), None);
         // Pulled up: an open input stays idle.
@@ -79,7 +79,7 @@ impl Port {
 
         let end = PortInterrupt {
             port,
-            driver,
+            driver: wires.driver,
             received: send_received,
             to_send: receive_to_send,
             frame: Frame::new(),
@@ -168,7 +168,7 @@ impl PortInterrupt {
         let frame = &mut self.frame;
         if self.to_send.take_with(|message| frame.clone_from(message)).is_some() {
             self.next = Some(0);
-            self.driver.set(Level::High);
+            pins::set(self.driver, Level::High);
             return;
         }
         let wanted = LINE.load(Ordering::Relaxed);
@@ -189,7 +189,7 @@ impl PortInterrupt {
                 self.next = Some(next + 1);
             }
             None if status.tc().bit() => {
-                self.driver.set(Level::Low);
+                pins::set(self.driver, Level::Low);
                 self.frame.clear();
                 self.next = None;
             }

@@ -6,20 +6,22 @@
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
 
+use super::StartError;
 use super::clocks::clock_on;
 
-/// Starts the counter; `false` if it has no clock.
-pub fn start(timer: pac::TIM5, rcc: &mut Rcc, debug: &pac::DBGMCU) -> bool {
-    if !clock_on!(rcc.apb1enr1(), tim5en) {
-        return false;
-    }
+/// Starts the counter.
+///
+/// # Errors
+/// It has no clock.
+pub fn start(timer: pac::TIM5, rcc: &mut Rcc, debug: &pac::DBGMCU) -> Result<(), StartError> {
+    clock_on!(rcc.apb1enr1(), tim5en, "TIM5")?;
     // A debugger may have set it, and only a power cycle clears it.
     debug.apb1l_fz().modify(|_, w| w.dbg_tim5_stop().clear_bit());
     timer.psc().write(|w| w.psc().set(0));
     timer.arr().write(|w| w.arr().set(u32::MAX));
     timer.egr().write(|w| w.ug().update());
     timer.cr1().write(|w| w.cen().enabled());
-    true
+    Ok(())
 }
 
 /// Core clocks since the start, wrapping; 0 before it.

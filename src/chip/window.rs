@@ -34,9 +34,7 @@ impl Window {
     /// # Errors
     /// It has no clock.
     pub fn new(timer: WWDG, rcc: &mut Rcc) -> Result<Self, StartError> {
-        if !clock_on!(rcc.apb1enr1(), wwdgen) {
-            return Err("the window watchdog has no clock");
-        }
+        clock_on!(rcc.apb1enr1(), wwdgen, "the window watchdog")?;
         // Undivided beyond CLOCK, no interrupt.
         timer.cfr().write(|w| w.w().set(RELOAD - CLOSED as u8));
         Ok(Self(timer))

@@ -37,9 +37,10 @@ const CLEAR: u16 = 1 << 1;
 type Refusal = OutputLine<120>;
 
 /// The run command of the bus.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default, PartialEq)]
 enum Order {
     /// None, or a stop.
+    #[default]
     Stop,
     /// A start was taken; the controllers are being designed.
     Starting,
@@ -50,6 +51,7 @@ enum Order {
 }
 
 /// What the console knows of the bus.
+#[derive(Default)]
 pub(super) struct Bus {
     order: Order,
     reverse: bool,
@@ -67,30 +69,12 @@ pub(super) struct Bus {
     faults: FaultLog,
     seconds: u32,
     second_ms: u32,
-    /// The last refusal, and whether it was announced.
+    /// The last refusal, and whether it is still to be announced.
     refusal: Refusal,
-    announced: bool,
+    fresh: bool,
 }
 
 impl Bus {
-    pub(super) const fn new() -> Self {
-        Self {
-            order: Order::Stop,
-            reverse: false,
-            frequency: 0,
-            given: None,
-            has_task: false,
-            late: false,
-            quiet: false,
-            failed: false,
-            faults: FaultLog::new(),
-            seconds: 0,
-            second_ms: 0,
-            refusal: Refusal::new(),
-            announced: true,
-        }
-    }
-
     /// Whether the task of the console is the bus's.
     pub(super) fn has_task(&self) -> bool {
         self.has_task
@@ -103,7 +87,7 @@ impl Bus {
 
     /// The refusal that is to be announced, once.
     pub(super) fn news(&mut self) -> Option<&str> {
-        (!core::mem::replace(&mut self.announced, true)).then_some(self.refusal.as_str())
+        core::mem::take(&mut self.fresh).then_some(self.refusal.as_str())
     }
 
     /// Takes an error of the console, if it is an answer to the bus; whether it was.
@@ -117,10 +101,10 @@ impl Bus {
 
     /// Notes a refusal; a master that repeats itself is announced once.
     fn refused(&mut self, why: &dyn fmt::Display) {
-        let mut text = Refusal::new();
+        let mut text = Refusal::default();
         // What is too long is cut off.
         let _ = write!(text, "{why}");
-        self.announced &= text.as_str() == self.refusal.as_str();
+        self.fresh |= text.as_str() != self.refusal.as_str();
         self.refusal = text;
     }
 

@@ -31,45 +31,9 @@ const LONGEST_TRACE: u16 = board::TRACE_RECORDS as u16;
 const LARGEST_DIVIDER: u16 = 1000;
 
 /// The commands.
-pub const COMMANDS: [&str; 37] = [
-    "help",
-    "status",
-    "start",
-    "commission",
-    "accept",
-    "learn",
-    "stop",
-    "relock",
-    "torque",
-    "speed",
-    "jog",
-    "position",
-    "home",
-    "angle",
-    "get",
-    "describe",
-    "set",
-    "apply",
-    "revert",
-    "save",
-    "defaults",
-    "backup",
-    "learned",
-    "faults",
-    "history",
-    "clear",
-    "trace",
-    "stream",
-    "baud",
-    "log",
-    "echo",
-    "reboot",
-    "board",
-    "confirm",
-    "version",
-    "h",
-    "?",
-];
+pub const COMMANDS: &str = "help status start commission accept learn stop relock torque speed jog position home angle get \
+    describe set apply revert save defaults backup learned faults history clear trace stream baud \
+    log echo reboot board confirm version h ?";
 
 /// The words of a line.
 struct Words<'a>(SplitAsciiWhitespace<'a>);
@@ -220,7 +184,7 @@ pub fn parse(line: &str) -> Result<Request, ParseError<'_>> {
         "confirm" => words.one_of("what to confirm", "board", &[("board", Request::Confirm)])?,
         "version" => Request::Version,
         word => {
-            return Err(ParseError::Command { word, near: nearest(word, COMMANDS.into_iter()) });
+            return Err(ParseError::Command { word, near: nearest(word, COMMANDS.split(' ')) });
         }
     };
     words.optional().map_or(Ok(request), |word| Err(ParseError::TooMuch(word)))

@@ -133,17 +133,13 @@ impl LineReader {
 }
 
 /// Text that goes out. What does not fit is cut off, between characters.
+#[derive(Default)]
 pub struct OutputLine<const N: usize = OUTPUT> {
     text: String<N>,
     muted: bool,
 }
 
 impl<const N: usize> OutputLine<N> {
-    /// No text.
-    pub const fn new() -> Self {
-        Self { text: String::new(), muted: false }
-    }
-
     /// Drops what is added from now on, or no more.
     pub fn mute(&mut self, muted: bool) {
         self.muted = muted;

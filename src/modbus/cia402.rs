@@ -30,15 +30,16 @@ pub enum Power {
 }
 
 impl Power {
-    /// All, in the order of the state machine.
-    pub const ALL: [Self; 7] = [
-        Self::NotReadyToSwitchOn,
-        Self::SwitchOnDisabled,
-        Self::ReadyToSwitchOn,
-        Self::SwitchedOn,
-        Self::OperationEnabled,
-        Self::QuickStopActive,
-        Self::Fault,
+    /// All, in the order of the state machine, each with its name in the standard and bits 0 to 3, 5 and 6 of the status
+    /// word.
+    pub const ALL: [(Self, &str, u16); 7] = [
+        (Self::NotReadyToSwitchOn, "not ready to switch on", 0x00),
+        (Self::SwitchOnDisabled, "switch on disabled", 0x40),
+        (Self::ReadyToSwitchOn, "ready to switch on", 0x21),
+        (Self::SwitchedOn, "switched on", 0x23),
+        (Self::OperationEnabled, "operation enabled", 0x27),
+        (Self::QuickStopActive, "quick stop active", 0x07),
+        (Self::Fault, "fault", 0x08),
     ];
 
     /// The state of a drive; `startable`: see [`bus_may_start`].
@@ -72,28 +73,12 @@ impl Power {
 
     /// Name in the standard.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::NotReadyToSwitchOn => "not ready to switch on",
-            Self::SwitchOnDisabled => "switch on disabled",
-            Self::ReadyToSwitchOn => "ready to switch on",
-            Self::SwitchedOn => "switched on",
-            Self::OperationEnabled => "operation enabled",
-            Self::QuickStopActive => "quick stop active",
-            Self::Fault => "fault",
-        }
+        Self::ALL[self as usize].1
     }
 
     /// Bits 0 to 3, 5 and 6 of the status word.
     pub const fn bits(self) -> u16 {
-        match self {
-            Self::NotReadyToSwitchOn => 0x00,
-            Self::SwitchOnDisabled => 0x40,
-            Self::ReadyToSwitchOn => 0x21,
-            Self::SwitchedOn => 0x23,
-            Self::OperationEnabled => 0x27,
-            Self::QuickStopActive => 0x07,
-            Self::Fault => 0x08,
-        }
+        Self::ALL[self as usize].2
     }
 }
 

@@ -7,6 +7,7 @@ use heapless::Deque;
 pub const KEPT: usize = 8;
 
 /// The last faults.
+#[derive(Default)]
 pub struct FaultLog {
     /// Code and time since the start, s; the newest first.
     entries: Deque<(u8, u32), KEPT>,
@@ -14,11 +15,6 @@ pub struct FaultLog {
 }
 
 impl FaultLog {
-    /// No fault so far.
-    pub const fn new() -> Self {
-        Self { entries: Deque::new(), faulty: false }
-    }
-
     /// Notes a fault when the state becomes one, `seconds` after the start.
     pub fn watch(&mut self, state: State, seconds: u32) {
         let was = core::mem::replace(&mut self.faulty, matches!(state, State::Fault(_)));

@@ -243,8 +243,9 @@ fn settings() -> String {
 
 fn states() -> String {
     let mut text = String::new();
-    for power in Power::ALL {
-        writeln!(text, "| {} | `0x{:02X}` |", power.name(), power.bits()).unwrap();
+    for (place, (power, name, bits)) in Power::ALL.into_iter().enumerate() {
+        assert_eq!((power as usize, power.name(), power.bits()), (place, name, bits));
+        writeln!(text, "| {name} | `0x{bits:02X}` |").unwrap();
     }
     text
 }

@@ -30,33 +30,18 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// All reasons.
-    pub const ALL: [Self; 9] = [
-        Self::Panic,
-        Self::HardFault,
-        Self::NonMaskable,
-        Self::Unexpected,
-        Self::NotFed,
-        Self::Drive,
-        Self::Code,
-        Self::Coefficients,
-        Self::Register,
+    /// All reasons, each with a short text.
+    pub const ALL: [(Self, &str); 9] = [
+        (Self::Panic, "panic"),
+        (Self::HardFault, "processor fault"),
+        (Self::NonMaskable, "clock or flash failure"),
+        (Self::Unexpected, "unexpected interrupt"),
+        (Self::NotFed, "watchdog not fed"),
+        (Self::Drive, "fault of the drive"),
+        (Self::Code, "code of the control changed"),
+        (Self::Coefficients, "coefficients of the control changed"),
+        (Self::Register, "register of the chip changed"),
     ];
-
-    /// A short text.
-    pub const fn meaning(self) -> &'static str {
-        match self {
-            Self::Panic => "panic",
-            Self::HardFault => "processor fault",
-            Self::NonMaskable => "clock or flash failure",
-            Self::Unexpected => "unexpected interrupt",
-            Self::NotFed => "watchdog not fed",
-            Self::Drive => "fault of the drive",
-            Self::Code => "code of the control changed",
-            Self::Coefficients => "coefficients of the control changed",
-            Self::Register => "register of the chip changed",
-        }
-    }
 }
 
 /// The record.
@@ -89,14 +74,16 @@ impl Record {
         if magic != MAGIC || checked != check(&[magic, reason, a, b, c, d]) {
             return None;
         }
-        let reason = Reason::ALL.into_iter().find(|known| *known as u32 == reason)?;
+        let (reason, _) = Reason::ALL.into_iter().find(|known| known.0 as u32 == reason)?;
         Some(Self { reason, details: [a, b, c, d] })
     }
 }
 
 impl fmt::Display for Record {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.reason as u8, self.reason.meaning())?;
+        let meaning =
+            Reason::ALL.iter().find(|known| known.0 == self.reason).map_or("", |known| known.1);
+        write!(f, "{} {meaning}", self.reason as u8)?;
         self.details.iter().try_for_each(|word| write!(f, " {word:#x}"))
     }
 }
@@ -114,7 +101,7 @@ mod tests {
 
     #[test]
     fn numbers_follow_those_of_the_drive_and_never_change() {
-        let codes: Vec<u8> = Reason::ALL.iter().map(|reason| *reason as u8).collect();
+        let codes: Vec<u8> = Reason::ALL.iter().map(|reason| reason.0 as u8).collect();
         assert_eq!(codes, [64, 65, 66, 67, 68, 69, 74, 75, 77]);
         assert!(drive_core::Fault::ALL.iter().all(|fault| fault.code() < 64));
     }
@@ -122,14 +109,14 @@ mod tests {
     proptest! {
         #[test]
         fn a_record_is_read_back(i in 0..Reason::ALL.len(), details: [u32; 4]) {
-            let record = Record { reason: Reason::ALL[i], details };
+            let record = Record { reason: Reason::ALL[i].0, details };
             prop_assert_eq!(Record::from_words(&record.to_words()), Some(record));
         }
 
         #[test]
         fn a_flipped_bit_is_found(i in 0..Reason::ALL.len(), details: [u32; 4],
                                   word in 0..WORDS, bit in 0_u32..32) {
-            let mut words = Record { reason: Reason::ALL[i], details }.to_words();
+            let mut words = Record { reason: Reason::ALL[i].0, details }.to_words();
             words[word] ^= 1 << bit;
             prop_assert_eq!(Record::from_words(&words), None);
         }

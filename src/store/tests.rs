@@ -243,7 +243,7 @@ fn numbers_of_settings_follow_those_of_the_records() {
     let all = [Rejected::Broken, newer, value, Rejected::Refused, Rejected::Board("x")];
     let codes = all.map(Rejected::code);
     assert_eq!(codes, [70, 71, 72, 73, 76]);
-    assert!(Reason::ALL.iter().all(|reason| !codes.contains(&(*reason as u8))));
+    assert!(Reason::ALL.iter().all(|reason| !codes.contains(&(reason.0 as u8))));
     assert!(all.iter().all(|why| why.to_string().starts_with("7")));
 }
 

@@ -104,14 +104,14 @@ pub fn bring_up() -> Result<Board, StartError> {
         if !dual_bank {
             return Err(ONE_BANK);
         }
-        let encoder = encoder.filter(|_| timed).ok_or("a timer has no clock")?;
+        timed?;
         let coefficients = start.build(dead_time_s);
         // After the design, which may have replaced refused settings by the defaults.
         let protection = board::protection(SELECTED, &start.settings.drive);
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
         let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
-        start_control(coefficients, pwm, dc_link?, adc?, encoder, window?, resets)
+        start_control(coefficients, pwm, dc_link?, adc?, encoder?, window?, resets)
     }();
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
