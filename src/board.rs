@@ -20,6 +20,7 @@ use drive_core::Settings;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{CurrentSensors, Inverter, Line, Scales, Sequence};
 
+use crate::boards::converter::REFERENCE_V;
 use crate::boards::pin::{self, Pin, pc};
 use crate::boards::{Board, Currents, SELECTED};
 
@@ -126,6 +127,9 @@ impl SamplingTime {
 pub const CURRENT_SAMPLING: SamplingTime = SamplingTime { code: 3, half_clocks: 49 };
 /// Dc link and heat sink: 47.5 clocks, 1.1 us, for the higher resistance of their dividers.
 pub const SLOW_SAMPLING: SamplingTime = SamplingTime { code: 4, half_clocks: 95 };
+/// The chip's own reference: 247.5 clocks, of which it needs 4 us (datasheet).
+pub const REFERENCE_SAMPLING: SamplingTime = SamplingTime { code: 6, half_clocks: 495 };
+const _: () = assert!(REFERENCE_SAMPLING.ticks() >= 4 * CYCLES_PER_US);
 /// A 12-bit conversion after the sampling: 12.5 clocks.
 const CONVERSION: SamplingTime = SamplingTime { code: 0, half_clocks: 25 };
 
@@ -164,6 +168,39 @@ fn window(line: Line, trip_a: f32) -> (u16, u16) {
     let (negative, positive) = (code(-trip_a), code(trip_a));
     // With a negative gain the positive current has the smaller code.
     (negative.min(positive), negative.max(positive))
+}
+
+// Second opinions -----------------------------------------------------------------------------
+
+/// Periods of the watchdog's oscillator that are timed at once, by the prescaler of the capture.
+const LSI_PERIODS: u32 = 8;
+/// Lowest and highest frequency of it, Hz, beside a core clock that is right, and what the internal oscillator in the place of
+/// the crystal adds on either side: 2 % (datasheet, over all temperatures).
+const LSI_HZ: (u32, u32) = (29_000, 35_000);
+const INTERNAL_HZ: u32 = 700;
+const _: () = assert!(LSI_HZ.0 < WATCHDOG_HZ && LSI_HZ.1 > WATCHDOG_HZ_MAX);
+/// Longest wait for one capture behind another, us.
+pub const LSI_TIMEOUT_US: u32 = 600;
+const _: () = assert!(LSI_TIMEOUT_US > 2 * LSI_PERIODS * 1_000_000 / (LSI_HZ.0 - INTERNAL_HZ));
+
+/// Whether core clock and watchdog's oscillator agree, with so many core clocks in a capture.
+pub fn clocks_agree(clocks: u32, internal: bool) -> bool {
+    let more = if internal { INTERNAL_HZ } else { 0 };
+    let hz = LSI_PERIODS * CLOCK_HZ / clocks.max(1);
+    (LSI_HZ.0 - more..=LSI_HZ.1 + more).contains(&hz)
+}
+
+/// Address of the code that the chip's own reference had in the factory (datasheet, VREFINT_CAL), and the reference of the
+/// converters then, V.
+pub const REFERENCE_CALIBRATION: u32 = 0x1fff_75aa;
+const CALIBRATED_AT_V: f32 = 3.0;
+/// Largest error of the converters' reference. The other, with its calibration, may be wrong by 1 % (datasheet).
+const REFERENCE_ERROR: f32 = 0.03;
+
+/// Whether the reference of the converters is that of the board, with this code of the chip's own.
+pub fn references_agree(code: u16, calibration: u16) -> bool {
+    let right = f32::from(calibration) * (CALIBRATED_AT_V / REFERENCE_V);
+    (f32::from(code) / right - 1.0).abs() <= REFERENCE_ERROR
 }
 
 // Reaction times --------------------------------------------------------------------------------

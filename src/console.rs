@@ -274,11 +274,7 @@ impl Console {
         if matches!(byte, b'\r' | b'\n') && !self.reader.begun() {
             self.heard(Commander::Console, now_ms);
         }
-        let line = match self.reader.push(byte) {
-            Ok(None) => return,
-            Ok(Some(line)) => Ok(line),
-            Err(why) => Err(why),
-        };
+        let Some(line) = self.reader.push(byte).transpose() else { return };
         // The next line has its own time.
         (self.list, self.began_ms) = (None, None);
         let mut line = match line {

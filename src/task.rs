@@ -6,4 +6,5 @@ pub mod clock;
 pub mod control;
 pub mod guard;
 pub mod hours;
+pub mod sources;
 pub mod supervisor;

@@ -301,6 +301,12 @@ faults! {
             "an error in the flash, or a flipped bit in the timer of the chopper",
         ],
         "check the supply of the controller, then clear: the chopper comes back once the cause is gone";
+    WrongClock = 50, "the core clock and the clock of the watchdog do not agree",
+        &["crystal damaged or of another frequency", "a chip far beyond its temperature, or damaged"],
+        "check the crystal of the controller: 24 MHz; if it is right, replace the controller";
+    WrongReference = 51, "the reference voltage of the converters is wrong",
+        &["supply of the controller, or what feeds VREF+, more than 3 % off", "chip damaged"],
+        "measure the 3.3 V at VDDA and VREF+, then clear";
 }
 
 impl Fault {

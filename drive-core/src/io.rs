@@ -60,6 +60,10 @@ bitflags! {
         const CONVERTER_OVERRUN = 1 << 3;
         /// The output of the brake chopper is off, whatever its duty. No fault without a brake resistor.
         const CHOPPER_OFF = 1 << 4;
+        /// The clock of the control and another one of the chip do not agree.
+        const CLOCK = 1 << 5;
+        /// The reference voltage of the converters is wrong.
+        const REFERENCE = 1 << 6;
     }
 }
 

@@ -37,6 +37,9 @@ pub struct AdcEvents {
     pub complete: bool,
 }
 
+/// The channel of the chip's own reference at ADC1.
+const OWN_REFERENCE: u8 = 18;
+
 /// Both converters.
 pub struct Adc {
     one: pac::ADC1,
@@ -64,7 +67,7 @@ impl Adc {
 
         clock_on!(rcc.ahb2enr(), adc12en, "ADC12")?;
         // See board::ADC_CLOCK_DIVIDER.
-        common.ccr().write(|w| w.ckmode().sync_div4());
+        common.ccr().write(|w| w.ckmode().sync_div4().vrefen().enabled());
         if !common.ccr().read().ckmode().is_sync_div4() {
             return Err("the converters have no clock");
         }
@@ -74,6 +77,10 @@ impl Adc {
         };
         prepare(&one, channels(a.pin.adc1(), dc_link.adc1()), protection.window_a)?;
         prepare(&two, channels(b.pin.adc2(), heat_sink.adc2()), protection.window_b)?;
+        // For `own_reference`.
+        one.smpr2().write(|w| w.smp18().set(board::REFERENCE_SAMPLING.code));
+        // SAFETY: five bits, an existing channel; a sequence of one.
+        one.sqr1().write(|w| unsafe { w.sq1().bits(OWN_REFERENCE) });
         // Both sequences take the same time, so one interrupt at their end is enough. The analog watchdogs
         // interrupt earlier, when the current is converted.
         one.ier().write(|w| w.jeosie().enabled().awd1ie().enabled());
@@ -181,6 +188,23 @@ fn prepare(
         w.jextsel().tim1_trgo2().jexten().rising_edge()
     });
     Ok(())
+}
+
+/// The code of the chip's own reference, and the one that it had in the factory; `None` if it is not converted. For the main
+/// loop: a regular conversion, which begins behind a sequence of the control and ends long before the next one. An injected
+/// trigger in the middle of a regular conversion may convert channel 0 (ES0430, 2.7.8).
+pub fn own_reference() -> Option<(u16, u16)> {
+    // SAFETY: both always exist. TIM1 is only read, and the control interrupt has nothing to do with regular conversions.
+    let (adc, timer) = unsafe { (&*pac::ADC1::ptr(), &*pac::TIM1::ptr()) };
+    let behind = u32::from(board::PWM_TOP) - board::SAMPLES_READY_TICKS;
+    wait_for(|| {
+        timer.cr1().read().dir().is_down() && u32::from(timer.cnt().read().cnt().bits()) < behind
+    })?;
+    adc.cr().modify(|_, w| w.adstart().start_conversion());
+    wait_for(|| adc.isr().read().eoc().bit())?;
+    let factory = board::REFERENCE_CALIBRATION as *const u16;
+    // SAFETY: read-only memory of the chip, aligned.
+    Some((adc.dr().read().rdata().bits(), unsafe { factory.read_volatile() }))
 }
 
 /// Waits until `done`, for [`board::ADC_TIMEOUT_US`] at most.

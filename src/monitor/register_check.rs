@@ -37,18 +37,21 @@ const ADC_RUNS: u32 = 1 | 1 << 3 | 1 << 28 | 1 << 29;
 /// The oscillators, the clock security system, and the PLL.
 const CLOCKS: u32 = 1 << 8 | 3 << 16 | 1 << 19 | 3 << 24;
 
+/// The oscillator of the watchdog.
+const LSION: u32 = 1;
+
 /// Addresses of peripherals, with the offsets of their registers (RM0440).
 const CONFIGURED: [(u32, &[u16]); 17] = [
     // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, AF1
     (0x4001_2c00, &[0, 4, 8, 0xc, 0x18, 0x1c, 0x20, 0x28, 0x2c, 0x30, 0x40, 0x44, 0x60]),
     // TIM8: CR1, CCMR1, CCER, ARR, BDTR, AF1
     (0x4001_3400, &[0, 0x18, 0x20, 0x2c, 0x44, 0x60]),
-    // TIM5, the time base: CR1, ARR
-    (0x4000_0c00, &[0, 0x2c]),
+    // TIM5, the time base: CR1, CCMR1, CCER, ARR, TISEL
+    (0x4000_0c00, &[0, 0x18, 0x20, 0x2c, 0x5c]),
     // TIM2, the encoder: CR1, SMCR, CCMR1, CCER, ARR
     (0x4000_0000, &[0, 8, 0x18, 0x20, 0x2c]),
-    // ADC1 and ADC2: IER, CR, CFGR, SMPR1, TR1, JSQR; CCR of both
-    (0x5000_0000, &[4, 8, 0xc, 0x14, 0x20, 0x4c]),
+    // ADC1 and ADC2: IER, CR, CFGR, SMPR1, SMPR2 and SQR1 of ADC1, TR1, JSQR; CCR of both
+    (0x5000_0000, &[4, 8, 0xc, 0x14, 0x18, 0x20, 0x30, 0x4c]),
     (0x5000_0100, &[4, 8, 0xc, 0x14, 0x20, 0x4c]),
     (0x5000_0300, &[8]),
     // DAC3: CR, DHR12R1, MCR
@@ -65,14 +68,14 @@ const CONFIGURED: [(u32, &[u16]); 17] = [
     (0xe000_e000, &[0x100, 0x104, 0x108, 0x410, 0x424, 0x458]),
     // FLASH: ACR
     (0x4002_2000, &[0]),
-    // RCC: CR, CFGR, PLLCFGR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, CCIPR
-    (0x4002_1000, &[0, 8, 0xc, 0x4c, 0x58, 0x5c, 0x60, 0x88]),
+    // RCC: CR, CFGR, PLLCFGR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, CCIPR, CSR
+    (0x4002_1000, &[0, 8, 0xc, 0x4c, 0x58, 0x5c, 0x60, 0x88, 0x94]),
     // PWR: CR1, CR2, CR5
     (0x4000_7000, &[0, 4, 0x80]),
 ];
 
 /// The bits that stay, of registers that hold others as well.
-const PARTS: [(u32, u32); 12] = [
+const PARTS: [(u32, u32); 13] = [
     (0x4001_2c00, !DIR),
     (0x4001_2c44, !MOE),
     (0x4001_3444, !MOE),
@@ -85,6 +88,7 @@ const PARTS: [(u32, u32); 12] = [
     (0xe000_e424, 0xff << 24),
     (0xe000_e458, 0xff << 24),
     (0x4002_1000, CLOCKS),
+    (0x4002_1094, LSION),
 ];
 
 /// Number of these registers.

@@ -32,26 +32,22 @@ static OWN: [Entry<FirmwareSettings>; 9] = [
         "the drive stops when no valid line came for so long; 0: never",
     )
     .from_to(0.0, LONGEST_TIMEOUT_S),
-    yes_or_no(
-        "wiring_checked",
-        |s: &FirmwareSettings| s.command.wiring_checked.place(),
+    word::<bool>(
+        ["wiring_checked", ""],
+        |s| s.command.wiring_checked.place(),
         |s, place| s.command.wiring_checked = bool::at(place),
         "whether a start has checked the wiring since the defaults were set",
     ),
-    yes_or_no(
-        "console.echo",
-        |s: &FirmwareSettings| s.command.echo.place(),
+    word::<bool>(
+        ["console.echo", ""],
+        |s| s.command.echo.place(),
         |s, place| s.command.echo = bool::at(place),
         "whether the console sends typed characters back",
     ),
-    Entry::new(
-        "bus.commands",
-        "",
-        Access::Word {
-            words: Commander::WORDS,
-            get: |s: &FirmwareSettings| s.bus.commander.place(),
-            set: |s, place| s.bus.commander = Commander::at(place),
-        },
+    word::<Commander>(
+        ["bus.commands", ""],
+        |s| s.bus.commander.place(),
+        |s, place| s.bus.commander = Commander::at(place),
         "who starts the drive and gives it references; anybody may stop it",
     ),
     Entry::new(
@@ -64,24 +60,16 @@ static OWN: [Entry<FirmwareSettings>; 9] = [
         "address of the drive on the bus",
     )
     .from_to(1.0, 247.0),
-    Entry::new(
-        "bus.baud",
-        "bit/s",
-        Access::Word {
-            words: Baud::WORDS,
-            get: |s: &FirmwareSettings| s.bus.baud.place(),
-            set: |s, place| s.bus.baud = Baud::at(place),
-        },
+    word::<Baud>(
+        ["bus.baud", "bit/s"],
+        |s| s.bus.baud.place(),
+        |s, place| s.bus.baud = Baud::at(place),
         "rate of the bus",
     ),
-    Entry::new(
-        "bus.parity",
-        "",
-        Access::Word {
-            words: Format::WORDS,
-            get: |s: &FirmwareSettings| s.bus.format.place(),
-            set: |s, place| s.bus.format = Format::at(place),
-        },
+    word::<Format>(
+        ["bus.parity", ""],
+        |s| s.bus.format.place(),
+        |s, place| s.bus.format = Format::at(place),
         "data bits, parity and stop bits of the bus",
     ),
     Entry::new(
@@ -110,13 +98,14 @@ static OWN: [Entry<FirmwareSettings>; 9] = [
     .changed(Change::Board),
 ];
 
-const fn yes_or_no(
-    name: &'static str,
+/// A setting with these words, by name and unit.
+const fn word<T: Words>(
+    [name, unit]: [&'static str; 2],
     get: fn(&FirmwareSettings) -> usize,
     set: fn(&mut FirmwareSettings, usize),
     help: &'static str,
 ) -> Entry<FirmwareSettings> {
-    Entry::new(name, "", Access::Word { words: bool::WORDS, get, set }, help)
+    Entry::new(name, unit, Access::Word { words: T::WORDS, get, set }, help)
 }
 
 /// Number of settings.

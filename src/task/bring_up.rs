@@ -17,6 +17,7 @@ use crate::chip::watchdog::Watchdog;
 use crate::chip::window::Window;
 use crate::chip::{adc, clocks, dc_link, encoder, memory, over_voltage, pwm, rs485, stop, time};
 use crate::task::control;
+use crate::task::sources::Sources;
 use crate::task::supervisor::{Chip, ControlLink, Supervisor};
 use induction_drive::board;
 use induction_drive::boards::SELECTED;
@@ -111,7 +112,10 @@ pub fn bring_up() -> Result<Board, StartError> {
         over_voltage::watch(&chip.DAC3, &chip.COMP, &mut rcc, &mut pwm, protection.over_voltage)?;
         let (one, two) = (chip.ADC1, chip.ADC2);
         let adc = adc::Adc::new(one, two, &chip.ADC12_COMMON, &mut rcc, &protection);
-        start_control(coefficients, pwm, dc_link?, adc?, encoder?, window?, resets)
+        if resets > board::MOST_RESETS {
+            return Err("too many unintended resets; switch the supply off and on");
+        }
+        start_control(coefficients, pwm, dc_link?, adc?, encoder?, window?, source)
     }();
     if let Err(error) = &link {
         defmt::error!("the drive is not started, outputs stay off: {=str}", error);
@@ -232,11 +236,8 @@ fn start_control(
     adc: adc::Adc,
     encoder: encoder::Encoder,
     window: Window,
-    resets: u32,
+    source: clocks::Source,
 ) -> Result<ControlLink, StartError> {
-    if resets > board::MOST_RESETS {
-        return Err("too many unintended resets; switch the supply off and on");
-    }
     let coefficients = coefficients.map_err(|error| {
         defmt::error!("settings: {}", defmt::Display2Format(&error));
         "the design rules refuse the settings"
@@ -281,6 +282,7 @@ fn start_control(
     if !comes_at_its_rate() {
         return Err("the control interrupt does not come at its rate");
     }
-    control::WATCHED.store(true, Ordering::Relaxed);
-    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations })
+    let sources = Sources::new(source)?;
+    control::TOLD.store(control::WATCHED, Ordering::Relaxed);
+    Ok(ControlLink { status, commands, answers, learned, trace, stream, observations, sources })
 }

@@ -8,7 +8,7 @@ mod addresses;
 
 use core::cell::UnsafeCell;
 use core::mem::{MaybeUninit, offset_of};
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
@@ -68,8 +68,11 @@ pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 pub static IS_OFF: AtomicBool = AtomicBool::new(true);
 /// Whether the commissioning is to see what the drive does while it regulates.
 pub static OBSERVED: AtomicBool = AtomicBool::new(false);
-/// Whether the window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
-pub static WATCHED: AtomicBool = AtomicBool::new(false);
+/// From the main loop: [`WATCHED`], and what it has found wrong, as bits of [`Hardware`].
+pub static TOLD: AtomicU8 = AtomicU8::new(0);
+/// The window watchdog is fed, the first time of which starts it: from when the interrupt has come at its rate.
+pub const WATCHED: u8 = 1 << 7;
+const _: () = assert!(Hardware::all().bits() & WATCHED == 0);
 /// Whether a deadline was ever missed.
 pub static MISSED: AtomicBool = AtomicBool::new(false);
 
@@ -195,7 +198,8 @@ impl Running {
         }
 
         // At the beginning, where it comes in equal steps; an interrupt that does not end is not fed again.
-        if WATCHED.load(Ordering::Relaxed) {
+        let told = TOLD.load(Ordering::Relaxed);
+        if told & WATCHED != 0 {
             window.feed();
         }
 
@@ -213,7 +217,7 @@ impl Running {
         {
             self.late = Hardware::DEADLINE_MISS;
         }
-        let mut hardware = self.late | self.over_current;
+        let mut hardware = self.late | self.over_current | Hardware::from_bits_truncate(told);
         self.over_current = Hardware::empty();
         if timer.pulled {
             hardware |= Hardware::BREAK;

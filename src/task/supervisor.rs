@@ -8,7 +8,7 @@ use drive_core::commission::Step;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{Scales, Settings, SettingsError};
-use drive_core::{Accepted, Coefficients, Command, Hardware, State};
+use drive_core::{Accepted, Coefficients, Command, Fault, Hardware, State};
 use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
@@ -19,6 +19,7 @@ use crate::task::clock::Clock;
 use crate::task::control;
 use crate::task::guard::{Guard, extended};
 use crate::task::hours::Hours;
+use crate::task::sources::Sources;
 use induction_drive::board;
 use induction_drive::commissioning::{Action, News, Session};
 use induction_drive::console::grammar::Level;
@@ -54,6 +55,8 @@ pub struct ControlLink {
     pub stream: Sink<'static, { board::STREAM_SAMPLES }>,
     /// Periods for the identification of the rotor time constant, and for the commissioning.
     pub observations: Consumer<'static, Observation, { board::OBSERVED_PERIODS }>,
+    /// The second opinions on clock and reference.
+    pub sources: Sources,
 }
 
 /// The main loop's side of the drive.
@@ -148,6 +151,7 @@ impl Supervisor {
         self.clock.update();
         let (now, off, pages) = (self.clock.ms(), self.is_off(), self.chip.saved.flash());
         self.hours.count(now, off, &mut self.guard, pages);
+        self.link.iter_mut().for_each(|link| link.sources.watch(now));
         self.clock.ms()
     }
 
@@ -231,6 +235,8 @@ impl Supervisor {
                 (Hardware::DEADLINE_MISS, "a control period took too long"),
                 (Hardware::CONVERTER_OVERRUN, "a conversion was lost"),
                 (Hardware::CHOPPER_OFF, "the chip has switched the brake chopper off"),
+                (Hardware::CLOCK, Fault::WrongClock.text()),
+                (Hardware::REFERENCE, Fault::WrongReference.text()),
             ] {
                 if (s.hardware - known).intersects(event) {
                     defmt::warn!("{}", text);

@@ -109,6 +109,8 @@ fn of_hardware(events: Hardware) -> Option<Fault> {
         (Hardware::DEADLINE_MISS, Fault::DeadlineMiss),
         (Hardware::CONVERTER_OVERRUN, Fault::ConverterOverrun),
         (Hardware::CHOPPER_OFF, Fault::ChopperOff),
+        (Hardware::CLOCK, Fault::WrongClock),
+        (Hardware::REFERENCE, Fault::WrongReference),
     ]
     .into_iter()
     .find_map(|(event, fault)| events.intersects(event).then_some(fault))

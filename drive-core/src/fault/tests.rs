@@ -52,6 +52,8 @@ fn codes_never_change() {
         (47, Fault::NotCaught),
         (48, Fault::Stalled),
         (49, Fault::ChopperOff),
+        (50, Fault::WrongClock),
+        (51, Fault::WrongReference),
     ];
     for (code, fault) in table {
         assert_eq!(fault.code(), code);

@@ -24,7 +24,7 @@ pub use motor::Disturbance;
 pub use options::Options;
 
 use crate::addresses::Addresses;
-use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::chip::{Chip, LSI_HZ, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::image::Image;
 use crate::log::Log;
@@ -123,6 +123,8 @@ impl Board {
             preempt_at: None,
         };
         let chip = board.chip();
+        chip.set_clocks(0.0, LSI_HZ);
+        chip.set_reference(0.0);
         if options.confirmed {
             confirmed::save(&options, &mut chip.flash)?;
         }

@@ -40,6 +40,10 @@ use debugger::{Halt, IWDG_STOP, WWDG_STOP};
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
+/// Code that the reference inside the chip had in the factory, beside 3.0 V: 1.212 V (datasheet, typical).
+const OWN_REFERENCE_CODE: u16 = 1655;
+/// Frequency of the LSI oscillator, Hz (datasheet, typical).
+pub const LSI_HZ: f64 = 32_000.0;
 /// Largest code of the analog signals.
 const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.
@@ -106,6 +110,9 @@ pub struct Chip {
     pub(crate) halt: Option<Halt>,
     /// Damage to the over-voltage protection.
     pub damage: Option<Damage>,
+    /// Error of the core clock, as a share, and of the reference of the converters.
+    clock_error: f64,
+    pub(crate) reference_error: f64,
     /// Outputs came back with the core, and are looked at then.
     pub(crate) back_on: Option<u64>,
     /// System and bus clock of the last look at them, and when the system clock rose above 80 MHz.
@@ -184,6 +191,8 @@ impl Default for Chip {
             in_control: false,
             halt: None,
             damage: None,
+            clock_error: 0.0,
+            reference_error: 0.0,
             back_on: None,
             system_hz: 16_000_000,
             bus_hz: 16_000_000,
@@ -229,6 +238,9 @@ impl Chip {
         self.pwr.supply_v = old.pwr.supply_v;
         self.analog = old.analog;
         self.damage = old.damage;
+        (self.clock_error, self.reference_error) = (old.clock_error, old.reference_error);
+        (self.tim5, self.iwdg.clock) = (old.tim5.after_reset(), old.iwdg.clock);
+        self.adc.own_reference = old.adc.own_reference;
         // Only power-on resets the debug support.
         if cause != Reset::Power {
             self.debug = old.debug;
@@ -252,6 +264,26 @@ impl Chip {
         self.usart3.line = old.usart3.line;
         self.gates = old.gates;
         self.look_at_gates();
+    }
+
+    /// The core clock is off by a share, and the LSI oscillator has this frequency, Hz; 0: it stands.
+    pub fn set_clocks(&mut self, error: f64, lsi_hz: f64) {
+        self.clock_error = error;
+        let ticks = self.ticks_per_s() / lsi_hz;
+        self.tim5.set_oscillator(ticks, self.now);
+        self.iwdg.clock = (ticks as u64).min(NEVER >> 32);
+    }
+
+    /// Ticks in a second outside the chip.
+    pub fn ticks_per_s(&self) -> f64 {
+        TICKS_PER_S as f64 * (1.0 + self.clock_error)
+    }
+
+    /// The reference of the converters is off by a share: all voltages have other codes.
+    pub fn set_reference(&mut self, error: f64) {
+        self.reference_error = error;
+        let code = f64::from(OWN_REFERENCE_CODE) * 3.0 / (power_stage::REFERENCE_V * (1.0 + error));
+        self.adc.own_reference = code.round() as u16;
     }
 
     /// The core locks up: to the break of TIM1, if the firmware wants that.
@@ -367,7 +399,11 @@ impl Chip {
         self.attention = false;
         while self.tim1.next_event() <= now {
             match self.tim1.happen() {
-                Event::Trigger(at) => self.adc.trigger(at),
+                Event::Trigger(at) => {
+                    let free = !self.adc.disturbs(at);
+                    self.rules.require(free, Rule::AdcDisturbed, || "TIM1_TRGO2".into());
+                    self.adc.trigger(at);
+                }
                 Event::Crest(at) => return Some(at),
                 Event::Valley => {}
             }

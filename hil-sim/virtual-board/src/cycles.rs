@@ -22,36 +22,20 @@ use crate::pair::Pair;
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
 const BLOCKS: [(&str, &str); 12] = [
-    (
-        "sensing",
-        "drive_core::current::sensing induction_drive::chip::adc \
-         induction_drive::chip::encoder",
-    ),
-    (
-        "protection",
-        "Coefficients>::protect drive_core::protect::plausibility \
-         drive_core::protect::lock_monitor",
-    ),
-    ("injection", "drive_core::carrier::injection drive_core::protect::saliency_check"),
-    (
-        "observer",
-        "Coefficients>::observe_fundamental drive_core::flux::observer drive_core::flux::hand_over",
-    ),
-    ("limits", "drive_core::current::voltage_limit"),
-    ("tracker", "drive_core::flux::tracker"),
+    ("sensing", "current::sensing chip::adc chip::encoder"),
+    ("protection", "Coefficients>::protect protect::plausibility protect::lock_monitor"),
+    ("injection", "carrier::injection protect::saliency_check"),
+    ("observer", "Coefficients>::observe_fundamental flux::observer flux::hand_over"),
+    ("limits", "current::voltage_limit"),
+    ("tracker", "flux::tracker"),
     (
         "estimator",
-        "drive_core::flux::estimator drive_core::carrier::synchronous \
-         drive_core::carrier::demodulator drive_core::flux::schedule \
-         drive_core::flux::indirect",
+        "flux::estimator carrier::synchronous carrier::demodulator flux::schedule flux::indirect",
     ),
-    ("current loop", "drive_core::current::pi"),
-    ("modulation", "drive_core::current::modulation drive_core::current::dead_time"),
-    (
-        "frames, filters",
-        "drive_core::math::frames drive_core::filter::sos drive_core::math::angle idsp::",
-    ),
-    ("identification", "drive_core::identify::online drive_core::identify::rls"),
+    ("current loop", "current::pi"),
+    ("modulation", "current::modulation current::dead_time"),
+    ("frames, filters", "math::frames filter::sos math::angle idsp::"),
+    ("identification", "identify::online identify::rls"),
     ("sequence", "drive_core::drive drive_core::motion"),
 ];
 /// The block of instructions outside all others: the timer.

@@ -6,14 +6,10 @@ use crate::{Board, Image, Options, PowerStage};
 
 /// The registers that the firmware sets up, by peripheral with its address: name and offset of each, and the bits that are
 /// the same after every start where these are not all, in hexadecimal.
-const REGISTERS: [(&str, u32, &str); 21] = [
+const REGISTERS: [(&str, u32, &str); 23] = [
     // Oscillator, PLL and clock security on; the trimming bits are the chip's own.
-    (
-        "RCC",
-        0x4002_1000,
-        "CR 00 1090000, CFGR 08 3fff, PLLCFGR 0c, AHB2ENR 4c, APB1ENR1 58, APB1ENR2 5c, \
-         APB2ENR 60, CCIPR 88",
-    ),
+    ("RCC", 0x4002_1000, "CR 00 1090000, CFGR 08 3fff, PLLCFGR 0c, AHB2ENR 4c, APB1ENR1 58"),
+    ("RCC", 0x4002_1000, "APB1ENR2 5c, APB2ENR 60, CCIPR 88, CSR 94 1"),
     ("PWR", 0x4000_7000, "CR1 00 600, CR2 04 f, CR5 80 100, SR2 14 400"),
     // One or two banks; the other options are the owner's.
     ("FLASH", 0x4002_2000, "ACR 00 70f, CR 14 80000000, OPTR 20 400000"),
@@ -22,15 +18,11 @@ const REGISTERS: [(&str, u32, &str); 21] = [
     ("GPIOB", 0x4800_0400, "MODER 00, PUPDR 0c, AFRL 20"),
     ("GPIOC", 0x4800_0800, "MODER 00, PUPDR 0c, AFRL 20"),
     // Not the direction.
-    (
-        "TIM1",
-        0x4001_2c00,
-        "CR1 00 3ef, CR2 04, CCMR1 18, CCMR2 1c, CCER 20, PSC 28, ARR 2c, RCR 30, \
-         CCR1 34, CCR4 40, BDTR 44, AF1 60",
-    ),
+    ("TIM1", 0x4001_2c00, "CR1 00 3ef, CR2 04, CCMR1 18, CCMR2 1c, CCER 20, PSC 28, ARR 2c"),
+    ("TIM1", 0x4001_2c00, "RCR 30, CCR1 34, CCR4 40, BDTR 44, AF1 60"),
     ("TIM2", 0x4000_0000, "SMCR 08, CCMR1 18, CR1 00 1"),
     ("TIM8", 0x4001_3400, "CR1 00 3ef, CCMR1 18, CCER 20, ARR 2c, BDTR 44, AF1 60"),
-    ("TIM5", 0x4000_0c00, "CR1 00 1, PSC 28 ffff, ARR 2c"),
+    ("TIM5", 0x4000_0c00, "CR1 00 1, CCMR1 18, CCER 20, PSC 28 ffff, ARR 2c, TISEL 5c"),
     ("ADC1", 0x5000_0000, "CR 08 30000009, CFGR 0c, SMPR1 14, TR1 20 fff0fff, JSQR 4c, IER 04"),
     ("ADC2", 0x5000_0100, "CR 08 30000009, CFGR 0c, SMPR1 14, TR1 20 fff0fff, JSQR 4c, IER 04"),
     ("ADC12", 0x5000_0300, "CCR 08"),

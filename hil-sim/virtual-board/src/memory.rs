@@ -54,9 +54,10 @@ pub const BIT_BAND: u32 = 0x4200_0000;
 pub const PERIPHERALS: u32 = 0x4000_0000;
 
 /// All regions but the alias of CCM: first address, bytes, kind.
-pub const MAP: [(u32, u32, Backing); 9] = [
+pub const MAP: [(u32, u32, Backing); 10] = [
     (FLASH, STORED - FLASH, Backing::Flash),
     (STORED, FLASH + FLASH_SIZE - STORED, Backing::Registers),
+    (0x1fff_7000, 0x1000, Backing::Registers),
     (RAM, RAM_SIZE, Backing::Ram),
     (CCM, CCM_SIZE, Backing::Ram),
     (PERIPHERALS, 0x3_0000, Backing::Registers),

@@ -46,6 +46,10 @@ rules! {
     AdcEarly: "RM0440, ADC regulator, calibration, on-off control; DS12288, tADCVREG_STUP",
     /// `ADC_JSQR` is written while injected conversions run, with the queue off: the write is lost.
     JsqrStarted: "RM0440, ADC_JSQR and queue of context, JQDIS = 1",
+    /// The trigger of an injected sequence comes in the middle of a regular conversion: channel 0 may be converted instead.
+    AdcDisturbed: "ES0430, ADC channel 0 converted instead of the required channel",
+    /// The reference inside the chip is sampled for less than 4 us.
+    OwnReference: "DS12288, ts_vrefint",
     /// A register of the watchdog is written while its last value is still on its way: the write is lost.
     IwdgBusy: "RM0440, IWDG_SR; stm32g4xx_hal_iwdg.c: six prescaled clocks",
     /// A pin is not in the mode, or not at the alternate function, that its use needs.

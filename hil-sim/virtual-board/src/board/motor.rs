@@ -10,7 +10,7 @@ use super::{Board, Options};
 use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::power_stage::bridge::{Bridge, Leg};
 use crate::power_stage::shunts::{Amplifiers, Currents, Shunts};
-use crate::power_stage::{Sensors, channel};
+use crate::power_stage::{CODES, Sensors, channel};
 
 /// A change of the samples.
 pub type Disturbance = Box<dyn FnMut(&mut Sample)>;
@@ -179,7 +179,7 @@ impl Board {
             // The plant divides the time that it is given into steps: a period at most.
             let ticks = (to - connection.at).min(TICKS_PER_PERIOD);
             let begin = self.plant.phase_currents();
-            self.plant.advance(&compare, ticks as f64 / TICKS_PER_S as f64);
+            self.plant.advance(&compare, ticks as f64 / self.cpu.chip().ticks_per_s());
             if let Some(reader) = &mut connection.shunts {
                 reader.follow(connection.at, ticks, begin, self.plant.phase_currents());
             }
@@ -235,6 +235,17 @@ impl Board {
         let undisturbed = *sample;
         if let Some(disturb) = &mut self.disturb {
             disturb(sample);
+        }
+        if chip.reference_error != 0.0 {
+            // Half of it is the zero of the currents, and the divider of the thermistor hangs on it.
+            let Sample { current_a, current_b, current_c, dc_link, .. } = &mut *sample;
+            let zero = CODES / 2.0;
+            for (code, zero) in
+                [(current_a, zero), (current_b, zero), (current_c, zero), (dc_link, 0.0)]
+            {
+                let seen = zero + (f64::from(*code) - zero) / (1.0 + chip.reference_error);
+                *code = seen.min(CODES - 1.0) as u16;
+            }
         }
         let of = |s: &Sample| [s.current_a, s.current_b, s.current_c];
         let (now, before) = (of(sample), of(&undisturbed));

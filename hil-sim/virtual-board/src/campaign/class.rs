@@ -2,10 +2,10 @@
 
 use rand::{Rng, RngExt};
 
-use super::faults::{current, flip, flip_register, losing, name, noise, slow_sensor};
+use super::faults::{current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor};
 use super::scene::{Source, Target};
 use crate::board::Board;
-use crate::chip::TICKS_PER_S;
+use crate::chip::{LSI_HZ, TICKS_PER_S};
 use crate::cpu::Register;
 use crate::memory::Region;
 use hil_sim::plant::EncoderFault;
@@ -52,6 +52,12 @@ pub struct Class {
 const fn regulating(name: &'static str, bound: Bound, inject: Inject) -> Class {
     let at_speed = Some(bound);
     Class { name, bound, at_speed, sources: BOTH, run: Run::Regulating(inject), ends: false }
+}
+
+/// A class of faults with the drive off.
+const fn off(name: &'static str, why: &'static str, run: Run) -> Class {
+    let sources = &[Source::Sensorless];
+    Class { name, bound: (0.0, why), at_speed: None, sources, run, ends: false }
 }
 
 impl Class {
@@ -295,6 +301,23 @@ const CLASSES: &[Class] = &[
             format!("{ms:.3} ms")
         },
     ),
+    regulating("LSI off its frequency", SOURCES, |board, _, rng| {
+        let hz = [0.0, rng.random_range(8e3..28e3), rng.random_range(36e3..60e3)];
+        set_clocks(board, 0.0, hz[rng.random_range(0..3_usize)])
+    })
+    .ends(),
+    regulating("crystal off its frequency", SOURCES, |board, _, rng| {
+        let error = rng.random_range(0.12..0.3);
+        set_clocks(board, if rng.random() { error } else { -error }, LSI_HZ)
+    })
+    .ends(),
+    regulating("reference voltage off", SOURCES, |board, _, rng| {
+        let error = rng.random_range(0.035..0.1);
+        let error = if rng.random() { error } else { -error };
+        board.chip().set_reference(error);
+        format!("{:.1} %", 100.0 * error)
+    })
+    .ends(),
     regulating("TIM1 stops", WINDOW, |board, _, _| {
         let cr1 = board.chip().read(TIM1_CR1, 4);
         board.chip().write(TIM1_CR1, 4, cr1 & !1);
@@ -315,22 +338,12 @@ const CLASSES: &[Class] = &[
             format!("room for {room} bytes")
         },
     ),
-    Class {
-        name: "damaged page of the settings",
-        bound: (0.0, "outputs are off; the other page holds"),
-        at_speed: None,
-        sources: &[Source::Sensorless],
-        run: Run::DamagedPage,
-        ends: false,
-    },
-    Class {
-        name: "power lost in an operation of save",
-        bound: (0.0, "outputs are off; the old or the new set holds"),
-        at_speed: None,
-        sources: &[Source::Sensorless],
-        run: Run::Saving,
-        ends: false,
-    },
+    off("damaged page of the settings", "outputs are off; the other page holds", Run::DamagedPage),
+    off(
+        "power lost in an operation of save",
+        "outputs are off; the old or the new set holds",
+        Run::Saving,
+    ),
     Class {
         name: "reset pin at any time",
         bound: RESET,
@@ -376,10 +389,14 @@ const LOCK_AT_SPEED: Bound = (
 const CHECK: Bound =
     (20.0, "the main loop has looked at all of it after 14 ms, later if the console is busy");
 const REGISTERS: Bound =
-    (5.0, "the main loop has looked at all of them after 1.7 ms, later if the console is busy");
+    (5.0, "the main loop has looked at all of them after 1.9 ms, later if the console is busy");
 /// The window watchdog bites 482 us after it was fed at the latest; the truth is compared once in a period.
 const WINDOW_MS: f64 = 0.7;
 const WINDOW: Bound =
     (WINDOW_MS, "the window watchdog, 0.48 ms after it was last fed at the latest");
+const SOURCES: Bound = (
+    1200.0,
+    "compared once a second, and once more when it is wrong; until then off by that share",
+);
 const TIM1_CR1: u32 = 0x4001_2c00;
 const OVERRUN_MS: f64 = 2.0;

@@ -49,6 +49,12 @@ pub fn losing(board: &mut Board, share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
+/// The core clock is off by a share, or the LSI oscillator has another frequency, Hz.
+pub fn set_clocks(board: &mut Board, error: f64, lsi_hz: f64) -> String {
+    board.chip().set_clocks(error, lsi_hz);
+    format!("core clock {:.1} %, {lsi_hz:.0} Hz", 100.0 * error)
+}
+
 /// Gaussian noise of an rms value in codes, added to a code.
 pub fn noise(rng: &mut dyn Rng, rms: f64) -> impl FnMut(&mut u16) + use<> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(rng.random());
@@ -78,12 +84,8 @@ pub fn slow_sensor(
             _ => noise(code),
         }
     }));
-    match kind {
-        0 => format!("stuck at {held}"),
-        1 => "open".into(),
-        2 => "saturated".into(),
-        _ => format!("{rms:.0} codes of noise"),
-    }
+    let noisy = format!("{rms:.0} codes of noise");
+    [format!("stuck at {held}"), "open".into(), "saturated".into(), noisy][kind].clone()
 }
 
 /// Bits that are at the gates at once, before any software. TIM1: clock of the dead time (CR1), polarity (CCER). Ports: the

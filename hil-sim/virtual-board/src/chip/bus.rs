@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Chip;
+use super::{Chip, OWN_REFERENCE_CODE};
 use crate::memory;
 use crate::periph::rcc::On;
 use crate::periph::{Effect, Reset, plain, usart};
@@ -17,6 +17,8 @@ pub(super) const USART3: u32 = 0x4000_4800;
 pub(super) const LPUART1: u32 = 0x4000_8000;
 pub(super) const SYSCFG: u32 = 0x4001_0000;
 pub(super) const TIM8: u32 = 0x4001_3400;
+/// What the factory has measured: the code of the reference inside the chip is at its address 0x1aa (datasheet, VREFINT_CAL).
+const FACTORY: u32 = 0x1fff_7400;
 const BDTR: u32 = 0x4001_2c44;
 const EXTI: u32 = 0x4001_0400;
 pub(super) const TIM1: u32 = 0x4001_2c00;
@@ -153,17 +155,15 @@ impl Chip {
             ADC1 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
             TIM8 => self.tim8.read(offset),
-            TIM5 => self.tim5.read(offset, now),
+            TIM5 => self.tim5.read(offset, now, self.rcc.lsi_on()),
+            FACTORY if offset == 0x1a8 => Some(u32::from(OWN_REFERENCE_CODE) << 16),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH_REGISTERS => self.flash.read(offset, now),
-            LPUART1 => {
-                let value = self.lpuart.read(offset);
-                self.update_lines();
-                value
-            }
-            USART3 => {
-                let value = self.usart3.read(offset);
+            port @ (LPUART1 | USART3) => {
+                let console = port == LPUART1;
+                let value =
+                    if console { self.lpuart.read(offset) } else { self.usart3.read(offset) };
                 self.update_lines();
                 value
             }

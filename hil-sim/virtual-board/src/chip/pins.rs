@@ -132,6 +132,10 @@ impl Chip {
     /// Channels were converted.
     pub(super) fn check_analog_pins(&mut self) {
         for (n, channels) in self.adc.take_converted().into_iter().enumerate() {
+            if n == 0 && channels >> 18 & 1 != 0 {
+                let long = self.adc.own_reference_ticks() >= 4 * 170;
+                self.rules.require(long, Rule::OwnReference, || "ADC1_SMPR2.SMP18".into());
+            }
             for channel in (0..19).filter(|channel| channels >> channel & 1 != 0) {
                 let Some((port, pin)) = analog(n, channel) else { continue };
                 let is_analog = self.gpio[port].pad(pin) == Pad::Analog;

@@ -66,12 +66,12 @@ const BUCKETS: usize = 30_000;
 const FLUX_WB: f64 = 0.05;
 
 /// The record of a session.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Record {
     buckets: Vec<Bucket>,
     open: Bucket,
-    /// Periods in a bucket. One of the carrier at first: its ripple would hide everything else.
-    periods: f64,
+    /// How often a bucket was doubled. It is a period of the carrier at first: its ripple would hide everything else.
+    doubled: u32,
     /// Control interrupts.
     pub interrupts: u64,
     /// Those in which the angle was judged: outputs on, and a flux.
@@ -83,22 +83,6 @@ pub struct Record {
     pub peak_current: f64,
     /// Estimated cycles of the longest control interrupt.
     pub worst_cycles: u32,
-}
-
-impl Default for Record {
-    fn default() -> Self {
-        Self {
-            buckets: Vec::new(),
-            open: Bucket::default(),
-            periods: CARRIER_SAMPLES as f64,
-            interrupts: 0,
-            judged: 0,
-            error_squares: 0.0,
-            largest_error_deg: 0.0,
-            peak_current: 0.0,
-            worst_cycles: 0,
-        }
-    }
 }
 
 impl Record {
@@ -136,11 +120,11 @@ impl Record {
             self.largest_error_deg = self.largest_error_deg.max(degrees.abs());
         }
         self.open.add(&bucket);
-        if self.open.periods >= self.periods {
+        if self.open.periods >= (CARRIER_SAMPLES << self.doubled) as f64 {
             self.buckets.push(std::mem::take(&mut self.open));
         }
         if self.buckets.len() >= BUCKETS {
-            self.periods *= 2.0;
+            self.doubled += 1;
             let pairs = self.buckets.chunks(2).map(|pair| {
                 let mut both = pair[0];
                 pair[1..].iter().for_each(|other| both.add(other));

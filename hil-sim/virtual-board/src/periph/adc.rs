@@ -38,6 +38,7 @@ registers! {
 /// Common control register of both.
 const CCR: u32 = 0x308;
 const CSR: u32 = 0x300;
+const VREFEN: u32 = 1 << 22;
 
 /// Codes at the pins by channel, 0 to 18.
 pub type Inputs = [u16; 19];
@@ -49,6 +50,8 @@ pub struct Adc {
     common: u32,
     /// Codes at their pins.
     pub inputs: [Inputs; 2],
+    /// Code of the reference inside the chip, at channel 18 of the first while CCR connects it.
+    pub own_reference: u16,
     /// Triggers to be lost, for each converter.
     pub lose_triggers: [u32; 2],
     /// Whether RCC gives them a clock of their own.
@@ -84,6 +87,16 @@ impl Adc {
         }
     }
 
+    /// How long the reference inside the chip is sampled, ticks.
+    pub fn own_reference_ticks(&self) -> u64 {
+        self.converters[0].sampling(18) * self.clock().unwrap_or(1) / 2
+    }
+
+    /// Whether a trigger at this time comes in the middle of a regular conversion.
+    pub fn disturbs(&self, at: u64) -> bool {
+        self.converters.iter().any(|one| one.waits_for_tim1() && one.converts_regular(at))
+    }
+
     /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,
     /// else of those that a trigger at this time would start.
     pub fn samplings(&self, trigger: Option<u64>) -> [Vec<(u32, u64)>; 2] {
@@ -99,6 +112,7 @@ impl Adc {
     /// Ends conversions that are due.
     pub fn happen(&mut self, now: u64) {
         let clock = self.clock().unwrap_or(1);
+        self.inputs[0][18] = if self.common & VREFEN != 0 { self.own_reference } else { 0 };
         for (n, one) in self.converters.iter_mut().enumerate() {
             self.converted[n] |= one.happen(now, clock, &self.inputs[n]);
         }

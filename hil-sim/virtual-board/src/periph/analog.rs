@@ -19,7 +19,7 @@ const START: u64 = 5 * 170;
 const HYSTERESIS: u16 = 12;
 
 /// The comparators 1 to 7.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Comparators {
     control: [u32; 7],
     /// Codes at their positive inputs.
@@ -29,22 +29,9 @@ pub struct Comparators {
     /// What the inputs say, without polarity, and since when the output does not say so yet.
     high: [bool; 7],
     output: [bool; 7],
-    follows_at: [u64; 7],
-    started_at: [u64; 7],
-}
-
-impl Default for Comparators {
-    fn default() -> Self {
-        Self {
-            control: [0; 7],
-            inputs: [0; 7],
-            references: [0; 7],
-            high: [false; 7],
-            output: [false; 7],
-            follows_at: [NEVER; 7],
-            started_at: [NEVER; 7],
-        }
-    }
+    follows_at: [Option<u64>; 7],
+    /// When one that is on has started.
+    started_at: [Option<u64>; 7],
 }
 
 impl Comparators {
@@ -72,28 +59,25 @@ impl Comparators {
             let high = input > level;
             if high != self.high[n] {
                 self.high[n] = high;
-                self.follows_at[n] = now + DELAY;
+                self.follows_at[n] = Some(now + DELAY);
             }
-            if self.follows_at[n] <= now {
+            if self.follows_at[n].take_if(|at| *at <= now).is_some() {
                 self.output[n] = self.high[n];
-                self.follows_at[n] = NEVER;
             }
-            if self.started_at[n] <= now {
-                self.started_at[n] = 0;
-            }
+            self.started_at[n] = self.started_at[n].map(|at| if at <= now { 0 } else { at });
         }
     }
 
     /// When an output changes next.
     pub fn next_event(&self) -> u64 {
-        let starts = self.started_at.iter().filter(|at| **at > 0);
-        self.follows_at.iter().chain(starts).copied().min().unwrap_or(NEVER)
+        let starts = self.started_at.iter().flatten().filter(|at| **at > 0);
+        self.follows_at.iter().flatten().chain(starts).copied().min().unwrap_or(NEVER)
     }
 
     /// The output of comparator `n`, counted from 0, with its polarity.
     pub fn output(&self, n: usize) -> bool {
         let control = self.control[n];
-        let valid = control & EN != 0 && self.started_at[n] == 0;
+        let valid = control & EN != 0 && self.started_at[n] == Some(0);
         valid && self.output[n] != (control & POL != 0)
     }
 
@@ -110,8 +94,8 @@ impl Comparators {
         if before & LOCK == 0 {
             self.control[n] = value & MASK;
             match (before & EN, value & EN) {
-                (0, EN) => self.started_at[n] = now + START,
-                (EN, 0) => self.started_at[n] = NEVER,
+                (0, EN) => self.started_at[n] = Some(now + START),
+                (EN, 0) => self.started_at[n] = None,
                 _ => {}
             }
         }

@@ -192,9 +192,7 @@ impl Flash {
         let at = (address - STORED) as usize;
         let new = u64::from(low) | u64::from(high) << 32;
         let Some(place) = self.bytes.get_mut(at..at + 8) else { return };
-        let old = u64::from_le_bytes([
-            place[0], place[1], place[2], place[3], place[4], place[5], place[6], place[7],
-        ]);
+        let old = place.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte));
         // Only erased double words, or all zeros over anything.
         if old != u64::MAX && new != 0 {
             self.status |= PROGERR;

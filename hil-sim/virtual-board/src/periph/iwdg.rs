@@ -1,10 +1,9 @@
-//! The independent watchdog (RM0440, section 42), with the typical 32 kHz.
+//! The independent watchdog (RM0440, section 42).
 
 use super::{Effect, NEVER};
+use crate::chip::{LSI_HZ, TICKS_PER_S};
 use crate::rules::{Rule, Rules};
 
-/// Ticks per cycle of its clock.
-const CLOCK: u64 = 170_000_000 / 32_000;
 /// Clocks until a value written has arrived, at most.
 const ARRIVES: u64 = 6;
 
@@ -17,6 +16,8 @@ pub struct Iwdg {
     unlocked: bool,
     /// Whether these are clocks of the oscillator (RM0440, IWDG_SR) and not prescaled ones, which ST's driver allows for.
     pub quick: bool,
+    /// Ticks per cycle of its clock.
+    pub clock: u64,
     /// Until when the last values of prescaler, reload and window are on their way.
     busy_until: [u64; 3],
     expires: u64,
@@ -30,6 +31,7 @@ impl Default for Iwdg {
             window: 0xfff,
             unlocked: false,
             quick: false,
+            clock: (TICKS_PER_S as f64 / LSI_HZ) as u64,
             busy_until: [0; 3],
             expires: NEVER,
         }
@@ -53,7 +55,7 @@ impl Iwdg {
 
     /// Ticks per prescaled clock.
     fn count(&self) -> u64 {
-        (4 << self.prescaler.min(6)) * CLOCK
+        (4 << self.prescaler.min(6)) * self.clock
     }
 
     /// Its clock stood still for some ticks.
@@ -103,7 +105,7 @@ impl Iwdg {
                 *[&mut self.prescaler, &mut self.reload, &mut self.window][which] =
                     value & [7, 0xfff, 0xfff][which];
                 // With the longer of the two prescalers: the longest time.
-                let clock = if self.quick { CLOCK } else { before.max(self.count()) };
+                let clock = if self.quick { self.clock } else { before.max(self.count()) };
                 self.busy_until[which] = now + ARRIVES * clock;
             }
             (0x04 | 0x08 | 0x10, _) => {}

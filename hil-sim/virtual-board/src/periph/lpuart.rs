@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::usart::{FE, FIFOEN, ORE, RE, RXNE, TC, TE, TXE, UE};
 use super::{Effect, NEVER, Store, registers};
 
 registers! {
@@ -17,17 +18,8 @@ registers! {
     _ = 0x2c, 0, 0xf;
 }
 
-const UE: u32 = 1;
-const RE: u32 = 1 << 2;
-const TE: u32 = 1 << 3;
-const FE: u32 = 1 << 1;
-const ORE: u32 = 1 << 3;
-const RXNE: u32 = 1 << 5;
-const TC: u32 = 1 << 6;
-const TXE: u32 = 1 << 7;
 /// TXFE of ISR; RXFF is never asked for.
 const TXFE: u32 = 1 << 23;
-const FIFOEN: u32 = 1 << 29;
 /// The enable of TXFE in CR1.
 const TXFEIE: u32 = 1 << 30;
 /// Bytes that a FIFO holds.

@@ -147,6 +147,11 @@ impl Rcc {
         Some((bits >> bit & 1 != 0).then_some(on))
     }
 
+    /// Whether the LSI oscillator is on.
+    pub fn lsi_on(&self) -> bool {
+        self.store.get(CSR) & 1 != 0
+    }
+
     /// Whether the converters 1 and 2 have a clock of their own.
     pub fn adc_kernel_clock(&self) -> bool {
         self.store.get(CCIPR) >> 28 & 3 != 0

@@ -1,14 +1,36 @@
-//! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well.
+//! TIM5 as time base (RM0440, section 30): counts core clocks upwards while it is enabled, asleep or halted as well. Channel 1
+//! captures every eighth edge of the LSI oscillator.
 
 use super::{Effect, Store, registers};
 
 const ALL: u32 = u32::MAX;
 registers! {
     CR1 = 0x00, 0, 0x1bff;
+    SR = 0x10, 0, 0;
     EGR = 0x14, 0, 0;
+    CCMR1 = 0x18, 0, 0x0101_ffff;
+    CCER = 0x20, 0, 0x0033_ffff;
     CNT = 0x24, 0, 0;
     _ = 0x28, 0, 0xffff;
     _ = 0x2c, ALL, ALL;
+    CCR1 = 0x34, 0, 0;
+    TISEL = 0x5c, 0, 0x0f0f_0f0f;
+}
+/// Of SR: a capture that was not read, and another one behind it.
+const CC1IF: u32 = 1 << 1;
+const CC1OF: u32 = 1 << 9;
+/// Edges of the oscillator to a capture.
+const EDGES: f64 = 8.0;
+
+/// The captures, as they come while the channel is on.
+#[derive(Clone, Copy, Debug)]
+pub struct Captures {
+    /// Ticks from one to the next.
+    ticks: f64,
+    /// A time, and the captures up to it.
+    from: (u64, f64),
+    /// Captures up to the last one that was read.
+    read: u64,
 }
 
 /// The timer.
@@ -17,11 +39,13 @@ pub struct TimeBase {
     store: Store,
     /// Time at which the counter was 0.
     from: u64,
+    captures: Captures,
 }
 
 impl Default for TimeBase {
     fn default() -> Self {
-        Self { store: Store::new(KNOWN), from: 0 }
+        let captures = Captures { ticks: f64::INFINITY, from: (0, 0.0), read: 0 };
+        Self { store: Store::new(KNOWN), from: 0, captures }
     }
 }
 
@@ -31,9 +55,37 @@ impl TimeBase {
         self.from += ticks;
     }
 
+    /// The same oscillator after a reset.
+    pub fn after_reset(&self) -> Self {
+        Self { captures: self.captures, ..Self::default() }
+    }
+
+    /// From now on it takes so many ticks from one edge of the oscillator to the next; infinite: none comes.
+    pub fn set_oscillator(&mut self, ticks: f64, now: u64) {
+        let captures = &mut self.captures;
+        captures.from = (now, captures.so_far(now));
+        captures.ticks = EDGES * ticks;
+    }
+
     /// Reads a register at the time `now`, ticks.
-    pub fn read(&self, offset: u32, now: u64) -> Option<u32> {
+    pub fn read(&mut self, offset: u32, now: u64, oscillates: bool) -> Option<u32> {
+        // Input 1 on channel 1, every eighth edge; the input is the oscillator.
+        let (mode, input) = (self.store.get(CCMR1) & 0xff, self.store.get(TISEL) & 15);
+        let on = oscillates && self.store.get(CCER) & 1 != 0 && (mode, input) == (0xd, 1);
+        let captures = &mut self.captures;
+        let count = if on { captures.so_far(now) as u64 } else { captures.read };
         match offset {
+            SR => Some(match count.saturating_sub(captures.read) {
+                0 => 0,
+                1 => CC1IF,
+                _ => CC1IF | CC1OF,
+            }),
+            CCR1 => {
+                captures.read = count;
+                let (at, before) = captures.from;
+                let ticks = (count as f64 - before) * captures.ticks;
+                Some((at as f64 + ticks - self.from as f64) as i64 as u32)
+            }
             CNT if self.store.get(CR1) & 1 == 0 => Some(0),
             CNT => Some((now - self.from) as u32),
             _ => self.store.read(offset),
@@ -44,9 +96,18 @@ impl TimeBase {
     pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
         let counts = self.store.get(CR1) & 1 != 0;
         self.store.write(offset, value)?;
+        if offset == SR {
+            self.captures.read = self.captures.so_far(now) as u64;
+        }
         if offset == EGR || (offset == CR1 && !counts) {
             self.from = now;
         }
         Some(Effect::None)
+    }
+}
+
+impl Captures {
+    fn so_far(&self, now: u64) -> f64 {
+        self.from.1 + (now - self.from.0) as f64 / self.ticks
     }
 }

@@ -22,24 +22,25 @@ registers! {
 /// Offset of the register that sends.
 pub const SEND: u32 = TDR;
 
-const UE: u32 = 1;
-const RE: u32 = 1 << 2;
-const TE: u32 = 1 << 3;
+/// Bits of CR1 and ISR that LPUART1 has as well are used by both.
+pub(super) const UE: u32 = 1;
+pub(super) const RE: u32 = 1 << 2;
+pub(super) const TE: u32 = 1 << 3;
 const PCE: u32 = 1 << 10;
 const M0: u32 = 1 << 12;
 const RTOIE: u32 = 1 << 26;
-const FIFOEN: u32 = 1 << 29;
+pub(super) const FIFOEN: u32 = 1 << 29;
 /// Bits of CR1 that can be changed only while the port is off: OVER8, M1, M0, WAKE, PCE, PS.
 const FIXED: u32 = 1 << 28 | 1 << 15 | M0 | 1 << 11 | PCE | 1 << 9;
 const TWO_STOPS: u32 = 2 << 12;
 const RTOEN: u32 = 1 << 23;
 const PE: u32 = 1;
-const FE: u32 = 1 << 1;
+pub(super) const FE: u32 = 1 << 1;
 const NE: u32 = 1 << 2;
-const ORE: u32 = 1 << 3;
-const RXNE: u32 = 1 << 5;
-const TC: u32 = 1 << 6;
-const TXE: u32 = 1 << 7;
+pub(super) const ORE: u32 = 1 << 3;
+pub(super) const RXNE: u32 = 1 << 5;
+pub(super) const TC: u32 = 1 << 6;
+pub(super) const TXE: u32 = 1 << 7;
 const RTOF: u32 = 1 << 11;
 /// PEIE of CR1 asks for PE.
 const PEIE: u32 = 1 << 8;

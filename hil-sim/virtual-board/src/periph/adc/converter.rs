@@ -104,6 +104,12 @@ impl Converter {
         self.control & JADSTART != 0 && idle && self.store.get(JSQR) >> 2 & 0x7f == 1 << 5 | 8
     }
 
+    /// Whether a regular conversion runs at this time.
+    pub fn converts_regular(&self, at: u64) -> bool {
+        let done_at = self.running[Sequence::Regular as usize].done_at;
+        done_at != NEVER && at < done_at
+    }
+
     /// Starts a sequence.
     pub fn begin(&mut self, sequence: Sequence, at: u64, clock: u64) {
         let done_at = at + self.conversion(sequence, 0) * clock / 2;
@@ -158,9 +164,13 @@ impl Converter {
 
     /// Sampling and conversion of a rank, halves of a clock.
     fn conversion(&self, sequence: Sequence, rank: u32) -> u64 {
-        let channel = self.channel(sequence, rank);
+        self.sampling(self.channel(sequence, rank)) + CONVERSION
+    }
+
+    /// Sampling of a channel, halves of a clock.
+    pub fn sampling(&self, channel: u32) -> u64 {
         let register = self.store.get(SMPR1 + 4 * (channel / 10).min(1));
-        SAMPLING[(register >> (3 * (channel % 10)) & 7) as usize] + CONVERSION
+        SAMPLING[(register >> (3 * (channel % 10)) & 7) as usize]
     }
 
     /// Ends what is due; the channels converted, as bits.

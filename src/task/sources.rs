@@ -1,0 +1,64 @@
+//! Second opinions on what the drive rests on: core clock against the watchdog's oscillator, the reference of the converters
+//! against the chip's own. A crystal or a supply that is off falsifies currents, voltages, times and their limits alike.
+
+use core::sync::atomic::Ordering;
+
+use drive_core::{Fault, Hardware};
+
+use crate::chip::clocks::Source;
+use crate::chip::{StartError, adc, time};
+use crate::task::control::{TOLD, WATCHED};
+use induction_drive::board;
+
+/// Time between two measurements, ms, and to one that repeats a suspicion.
+const PAUSE_MS: [u32; 2] = [1000, 1];
+
+/// The measurements.
+pub struct Sources {
+    internal: bool,
+    /// What the last one found.
+    suspected: Hardware,
+    measured_ms: u32,
+    pause_ms: u32,
+}
+
+impl Sources {
+    /// Measures for the first time, with the control running.
+    ///
+    /// # Errors
+    /// What is wrong twice.
+    pub fn new(source: Source) -> Result<Self, StartError> {
+        let (internal, suspected) = (source == Source::Internal, Hardware::empty());
+        let mut new = Self { internal, suspected, measured_ms: 0, pause_ms: PAUSE_MS[0] };
+        new.measure();
+        let wrong = new.measure();
+        if wrong.contains(Hardware::CLOCK) {
+            Err(Fault::WrongClock.text())
+        } else if wrong.contains(Hardware::REFERENCE) {
+            Err(Fault::WrongReference.text())
+        } else {
+            Ok(new)
+        }
+    }
+
+    /// Measures once a second, for less than a millisecond, and tells the control what is wrong.
+    pub fn watch(&mut self, now_ms: u32) {
+        if now_ms.wrapping_sub(self.measured_ms) >= self.pause_ms {
+            self.measured_ms = now_ms;
+            TOLD.store(WATCHED | self.measure().bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// What is wrong now and was at the last time.
+    fn measure(&mut self) -> Hardware {
+        let clocks = time::lsi_clocks().is_some_and(|n| board::clocks_agree(n, self.internal));
+        let own = adc::own_reference();
+        let references = own.is_some_and(|(code, then)| board::references_agree(code, then));
+        let mut found = Hardware::empty();
+        found.set(Hardware::CLOCK, !clocks);
+        found.set(Hardware::REFERENCE, !references);
+        let before = core::mem::replace(&mut self.suspected, found);
+        self.pause_ms = PAUSE_MS[usize::from(!before.contains(found))];
+        before & found
+    }
+}
