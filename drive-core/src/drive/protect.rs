@@ -21,7 +21,10 @@ impl Coefficients {
     ) -> Result<(), Fault> {
         let unused =
             if self.dc_link.has_chopper() { Hardware::empty() } else { Hardware::CHOPPER_OFF };
-        if let Some(fault) = of_hardware(sample.hardware - unused) {
+        let events = sample.hardware - unused;
+        if !events.is_empty()
+            && let Some(fault) = of_hardware(events)
+        {
             return Err(fault);
         }
         self.sensing.check(sensing, sample)?;
