@@ -104,7 +104,7 @@ fn a_session() {
     talk.drive.sample = Sample { dc_link: 2827, heat_sink: 1200, ..Sample::default() };
     let status = talk.ask("status");
     assert!(status.starts_with("calibrating; switched on; i_d 0.00 A"), "{status}");
-    assert!(status.contains("dc link 311 V, heat sink 22 degC;"), "{status}");
+    assert!(status.contains("dc link 311.0 V, heat sink 22 degC;"), "{status}");
     assert_eq!(talk.ask("stop"), "ok");
     assert_eq!(talk.ask("save"), "ok");
     assert_eq!(talk.drive.saved.unwrap().drive.motor.r_s, 5.5);
