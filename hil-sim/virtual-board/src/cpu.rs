@@ -120,7 +120,7 @@ impl Cpu {
         )?;
 
         // Main loop and slow interrupts run from the flash: a cycle per instruction.
-        let flash = (u64::from(memory::FLASH), u64::from(memory::BANK_2 - 1));
+        let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
         if counting.every_instruction {
             uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
                 if !stopped(uc, address) {
@@ -128,8 +128,8 @@ impl Cpu {
                 }
             })?;
         } else {
-            let mut lengths = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |_| 1);
-            let mut costs = Costs::new(memory::FLASH, memory::FLASH_SIZE / 2, |i| i.cycles);
+            let mut lengths = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |_| 1);
+            let mut costs = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |i| i.cycles);
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
                 if stopped(uc, address) {
                     return;

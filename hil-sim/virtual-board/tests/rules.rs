@@ -397,3 +397,42 @@ fn a_level_is_set_up_in_order_and_waited_for() {
     chip.now += 3 * US;
     assert!(high(&mut chip, 2000), "settled");
 }
+
+/// A converter that waits for TIM1, and its reference inside the chip as a regular channel, sampled for a code of the
+/// sampling time.
+fn regular_beside_injected(sampling: u32) -> Vec<Step> {
+    let triggered = 1 << 7 | 8 << 2;
+    let converter = [
+        Write(CCR, 3 << 16 | 1 << 22),
+        Write(ADC1 + 0x0c, 1 << 31),
+        Write(ADC1 + 0x4c, triggered | 1 << 9),
+        Write(ADC1 + 0x18, sampling << 24),
+        Write(ADC1 + 0x30, 18 << 6),
+        Write(ADC1 + 8, REGULATOR | START_INJECTED),
+    ];
+    let timer = [
+        Write(APB2ENR, 1 << 11),
+        Write(TIM1 + 0x2c, 14_167),
+        Write(TIM1 + 0x40, 14_000),
+        Write(TIM1 + 0x1c, 7 << 12),
+        Write(TIM1 + 4, 7 << 20),
+        Write(TIM1 + 0x14, 1),
+        Write(TIM1, 1 << 5 | 1),
+    ];
+    [ADC_ON, CALIBRATED, READY, &converter, &timer].concat()
+}
+
+#[test]
+fn a_trigger_finds_no_regular_conversion() {
+    let begun = regular_beside_injected(6);
+    let convert = |after| [Wait(after), Write(ADC1 + 8, REGULATOR | 1 << 2), Wait(10_000)];
+    // 260 clocks of the converter are 1040 ticks.
+    twins(Rule::AdcDisturbed, &[&begun, &convert(13_300)], &[&begun, &convert(12_000)]);
+}
+
+#[test]
+fn the_reference_inside_is_sampled_for_long() {
+    let [short, long] = [5, 6].map(regular_beside_injected);
+    let convert = [Write(ADC1 + 8, REGULATOR | 1 << 2), Wait(5000)];
+    twins(Rule::OwnReference, &[&short, &convert], &[&long, &convert]);
+}

@@ -94,7 +94,7 @@ impl Adc {
 
     /// Whether a trigger at this time comes in the middle of a regular conversion.
     pub fn disturbs(&self, at: u64) -> bool {
-        self.converters.iter().any(|one| one.waits_for_tim1() && one.converts_regular(at))
+        self.converters.iter().any(|one| one.disturbs(at))
     }
 
     /// When the conversions of each converter sample, in order: channel and time, ticks. Of the sequences in progress,

@@ -27,13 +27,12 @@ pub struct EncoderTimer {
     held: u32,
 }
 
-impl Default for EncoderTimer {
-    fn default() -> Self {
+impl EncoderTimer {
+    /// After a reset, with the encoder at 0.
+    pub fn at_reset() -> Self {
         Self { store: Store::new(KNOWN), position: 0, from: 0, held: 0 }
     }
-}
 
-impl EncoderTimer {
     /// Whether it counts the encoder.
     pub fn counting(&self) -> bool {
         self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3

@@ -25,13 +25,12 @@ const MOE: u32 = 1 << 15;
 #[derive(Clone, Debug)]
 pub struct Tim8(Store);
 
-impl Default for Tim8 {
-    fn default() -> Self {
+impl Tim8 {
+    /// After a reset.
+    pub fn at_reset() -> Self {
         Self(Store::new(KNOWN))
     }
-}
 
-impl Tim8 {
     /// Share of a period in which its first output is high. A new compare value counts at once, not from the next period on.
     pub fn duty(&self) -> f64 {
         let get = |offset| self.0.get(offset);

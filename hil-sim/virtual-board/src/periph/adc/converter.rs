@@ -104,10 +104,10 @@ impl Converter {
         self.control & JADSTART != 0 && idle && self.store.get(JSQR) >> 2 & 0x7f == 1 << 5 | 8
     }
 
-    /// Whether a regular conversion runs at this time.
-    pub fn converts_regular(&self, at: u64) -> bool {
+    /// Whether a trigger at this time comes in the middle of a regular conversion.
+    pub fn disturbs(&self, at: u64) -> bool {
         let done_at = self.running[Sequence::Regular as usize].done_at;
-        done_at != NEVER && at < done_at
+        self.waits_for_tim1() && (at + 1..NEVER).contains(&done_at)
     }
 
     /// Starts a sequence.
