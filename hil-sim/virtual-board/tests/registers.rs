@@ -62,6 +62,8 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
     ("TIM1_PSC", 0xffff, "not modelled: a prescaler is refused as unknown"),
     ("TIM1_BDTR", 0x8000, "MOE: the pin of the break is low at first, so the break clears it"),
     ("TIM2_SR", 0xf0_1e5f, FLAGS),
+    ("TIM5_SR", 0xf0_1e5f, FLAGS),
+    ("TIM5_CCR1", u32::MAX, "a capture is read-only"),
     ("TIM5_CNT", u32::MAX, "not modelled: the counter is set by UG alone"),
     ("IWDG_PR", 7, KEY),
     ("IWDG_RLR", 0xfff, KEY),
