@@ -89,3 +89,31 @@ fn the_analog_watchdogs_trip_between_the_software_and_the_end_of_the_range() {
 fn the_drive_accepts_the_board() {
     assert!(settings().build().is_ok());
 }
+
+/// The oscillator of the watchdog at the ends of the data sheet's range is sound, beside a crystal and beside the internal
+/// oscillator with its error; beyond 29 and 35 kHz it is not.
+#[test]
+fn clocks_agree_over_the_range_of_the_oscillator() {
+    let clocks = |hz: f64, error: f64| (8.0 * f64::from(CLOCK_HZ) * (1.0 + error) / hz) as u32;
+    for hz in [29.5e3, 32e3, 34e3] {
+        assert!(clocks_agree(clocks(hz, 0.0), false), "{hz}");
+        assert!([-0.02, 0.02].iter().all(|error| clocks_agree(clocks(hz, *error), true)), "{hz}");
+    }
+    for hz in [0.5, 16e3, 28.2e3, 35.8e3, 64e3] {
+        assert!(!clocks_agree(clocks(hz, 0.0), false) && !clocks_agree(clocks(hz, 0.0), true));
+    }
+    assert!(!clocks_agree(0, true));
+}
+
+/// The factory has measured the reference of the chip beside 3.0 V.
+#[test]
+fn references_agree_within_three_per_cent() {
+    let code = |volts: f32| (1655.0 * 3.0 / volts) as u16;
+    for (volts, right) in
+        [(3.3, true), (3.22, true), (3.38, true), (3.18, false), (3.42, false), (3.0, false)]
+    {
+        assert_eq!(references_agree(code(volts), 1655), right, "{volts} V");
+    }
+    assert!(!references_agree(0, 1655) && !references_agree(1504, u16::MAX));
+    assert!(!references_agree(1504, 0));
+}
