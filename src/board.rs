@@ -2,7 +2,7 @@
 //! for.
 //!
 //! Pins, polarities, sensors and limits of the power stages are in [`boards`](crate::boards). Derived numbers are
-//! computed here; relations between numbers are asserted when compiling.
+//! computed here; relations between numbers are asserted when compiling. The file is long because every number says why.
 //!
 //! | pin of every board | signal | peripheral |
 //! |---|---|---|

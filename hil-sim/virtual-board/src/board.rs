@@ -24,12 +24,13 @@ pub use motor::Disturbance;
 pub use options::Options;
 
 use crate::addresses::Addresses;
-use crate::chip::{Chip, LSI_HZ, TICKS_PER_PERIOD, TICKS_PER_S};
+use crate::chip::{Chip, TICKS_PER_PERIOD, TICKS_PER_S};
 use crate::cpu::Cpu;
 use crate::image::Image;
 use crate::log::Log;
 use crate::memory;
 use crate::periph::Reset;
+use crate::periph::iwdg::LSI_HZ;
 use crate::power_stage::watch::GateWatch;
 use crate::rules::Violation;
 use control::RunningInterrupt;

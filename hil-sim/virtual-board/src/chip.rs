@@ -1,7 +1,7 @@
 //! The chip around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
-//! its PLL.
+//! its PLL. The file is long because what all peripherals share meets here.
 
 mod bus;
 mod clocked;
@@ -42,8 +42,6 @@ const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
 /// Code that the reference inside the chip had in the factory, beside 3.0 V: 1.212 V (datasheet, typical).
 const OWN_REFERENCE_CODE: u16 = 1655;
-/// Frequency of the LSI oscillator, Hz (datasheet, typical).
-pub const LSI_HZ: f64 = 32_000.0;
 /// Largest code of the analog signals.
 const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.

@@ -1,5 +1,5 @@
 //! The rules of the chip: for each a script of register accesses that breaks it and one that keeps it, through the bus
-//! and without firmware.
+//! and without firmware. One table, which makes the file long.
 
 use virtual_board::chip::Chip;
 use virtual_board::periph::Reset;

@@ -6,8 +6,9 @@ mod common;
 use anyhow::{Result, bail};
 use drive_core::{Fault, State};
 use hil_sim::Config;
-use virtual_board::chip::{LSI_HZ, TICKS_PER_S};
+use virtual_board::chip::TICKS_PER_S;
 use virtual_board::periph::Reset;
+use virtual_board::periph::iwdg::LSI_HZ;
 use virtual_board::rules::Rule;
 use virtual_board::{Board, Image, Options};
 

@@ -1,13 +1,15 @@
-//! The classes of faults: each with its injection, and the longest time of wrong control with the outputs on.
+//! The classes of faults: each with its injection, and the longest time of wrong control with the outputs on. One table, which makes
+//! the file long.
 
 use rand::{Rng, RngExt};
 
 use super::faults::{current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor};
 use super::scene::{Source, Target};
 use crate::board::Board;
-use crate::chip::{LSI_HZ, TICKS_PER_S};
+use crate::chip::TICKS_PER_S;
 use crate::cpu::Register;
 use crate::memory::Region;
+use crate::periph::iwdg::LSI_HZ;
 use hil_sim::plant::EncoderFault;
 use induction_drive::board as firmware_board;
 

@@ -1,9 +1,11 @@
 //! The independent watchdog (RM0440, section 42).
 
 use super::{Effect, NEVER};
-use crate::chip::{LSI_HZ, TICKS_PER_S};
 use crate::rules::{Rule, Rules};
+use crate::time::TICKS_PER_S;
 
+/// Frequency of the LSI oscillator, its clock, Hz (datasheet, typical).
+pub const LSI_HZ: f64 = 32_000.0;
 /// Clocks until a value written has arrived, at most.
 const ARRIVES: u64 = 6;
 
