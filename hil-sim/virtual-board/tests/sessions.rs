@@ -70,10 +70,10 @@ fn frames_of_a_stream_are_no_text_of_the_session() {
 #[test]
 fn an_error_in_a_script_ends_it_with_its_line() {
     let folder = folder("strict");
-    let script = "at 1: torqe 1\nwait 0.5: status\n";
+    let script = "at 3: torqe 1\nwait 0.5: status\n";
     let (code, shown) = play(&folder, script, &[]);
     assert_eq!(code, Some(1), "{shown}");
-    assert!(shown.contains("line 1: `at 1: torqe 1`: answered `error:"), "{shown}");
+    assert!(shown.contains("line 1: `at 3: torqe 1`: answered `error:"), "{shown}");
     assert!(!shown.contains("> status"), "it has ended: {shown}");
     let (code, shown) = play(&folder, script, &["--lenient"]);
     assert_eq!(code, Some(0), "{shown}");
