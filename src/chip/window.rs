@@ -6,24 +6,23 @@ use stm32g4xx_hal::rcc::Rcc;
 
 use super::StartError;
 use super::clocks::clock_on;
-use induction_drive::board;
+use induction_drive::board::{self, LONGEST_INTERRUPT_CYCLES};
 
 /// Core cycles per count.
 const CLOCK: u32 = 4096;
 /// Cycles of a control period.
 const PERIOD: u32 = 2 * board::PWM_TOP as u32;
-/// Longest control interrupt, cycles, rounded up: one that takes a start command, 11 357 on the virtual board. The next
-/// interrupt may be late by so much, and the one after it early.
-const LONGEST: u32 = 12_000;
 /// The last value before a reset.
 const LAST: u32 = 0x40;
 /// Counts from feeding to the reset; the first may be cut short.
 const COUNTS: u32 = 3 * PERIOD / CLOCK;
 /// Counts from feeding within which feeding again is too early.
-const CLOSED: u32 = (PERIOD - LONGEST) / CLOCK;
+const CLOSED: u32 = (PERIOD - LONGEST_INTERRUPT_CYCLES) / CLOCK;
 const RELOAD: u8 = (LAST + COUNTS - 1) as u8;
 // It fits seven bits; a period late by the longest interrupt is no reason for a reset.
-const _: () = assert!(RELOAD < 0x80 && (COUNTS - 1) * CLOCK > PERIOD + LONGEST && CLOSED > 0);
+const _: () = assert!(
+    RELOAD < 0x80 && (COUNTS - 1) * CLOCK > PERIOD + LONGEST_INTERRUPT_CYCLES && CLOSED > 0
+);
 
 /// The watchdog.
 pub struct Window(WWDG);

@@ -101,15 +101,20 @@ pub const COUNT: usize = {
     count
 };
 
+fn addresses() -> impl Iterator<Item = u32> {
+    CONFIGURED
+        .iter()
+        .flat_map(|(base, offsets)| offsets.iter().map(move |offset| base + u32::from(*offset)))
+}
+
+fn register(address: u32) -> Register {
+    let part = PARTS.iter().find(|part| part.0 == address);
+    Register { address, mask: part.map_or(u32::MAX, |part| part.1) }
+}
+
 /// The registers on which the control depends.
 pub fn control() -> impl Iterator<Item = Register> {
-    let addresses = CONFIGURED
-        .iter()
-        .flat_map(|(base, offsets)| offsets.iter().map(move |offset| base + u32::from(*offset)));
-    addresses.map(|address| {
-        let part = PARTS.iter().find(|part| part.0 == address);
-        Register { address, mask: part.map_or(u32::MAX, |part| part.1) }
-    })
+    addresses().map(register)
 }
 
 /// The check and its progress.
@@ -133,8 +138,9 @@ impl RegisterCheck {
     /// # Errors
     /// A register has changed.
     pub fn slice(&mut self, read: impl Fn(u32) -> u32) -> Result<(), Changed> {
-        let both = control().zip(self.expected.iter());
-        for (Register { address, mask }, &expected) in both.skip(self.next).take(SLICE) {
+        let both = addresses().zip(self.expected.iter());
+        for (address, &expected) in both.skip(self.next).take(SLICE) {
+            let Register { mask, .. } = register(address);
             let found = read(address) & mask;
             if found != expected {
                 return Err(Changed { address, found, expected });

@@ -12,6 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use drive_core::State;
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
+use induction_drive::board::LONGEST_INTERRUPT_CYCLES;
 
 use crate::board::{Board, LongestPath, Options};
 use crate::chip::{TICKS_PER_PERIOD, Watched};
@@ -45,9 +46,8 @@ const OVERHEAD: [&str; 3] = ["exception", "bus", "flash"];
 
 /// Core cycles in a control period.
 const PERIOD: u32 = TICKS_PER_PERIOD as u32;
-/// Most cycles of an interrupt in the states that run from the flash, a start among them: half of the period. The compare
-/// values must be there at its end.
-const COLD: u32 = PERIOD / 2;
+/// Most cycles of an interrupt in the states that run from the flash, a start among them: what the window watchdog allows.
+const COLD: u32 = LONGEST_INTERRUPT_CYCLES;
 
 /// The function of the main loop that takes a control period into the identification.
 const IDENTIFICATION: &str = "drive_core::identify::online::Online::sample";
@@ -262,7 +262,7 @@ fn block_of(image: &Image, address: u32) -> (&'static str, String) {
 }
 
 /// Checks the rows against these budgets of the control interrupt, cycles: to the last compare value, and whole. A state that runs
-/// from the flash may take half of the period.
+/// from the flash may take what the window watchdog allows.
 ///
 /// # Errors
 /// The row that is above a budget, and the budget.

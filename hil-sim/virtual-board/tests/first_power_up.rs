@@ -342,8 +342,8 @@ fn power_stage(bench: &mut Bench) -> Result<()> {
     let heard = bench.line(29, 3.0)?;
     ensure!((30.0..90.0).contains(&rpm(bench)), "{} rpm", rpm(bench));
     let status = heard + &bench.line(29, 0.3)?;
-    ensure!(word_before(&status, " cycles, ") < 14_000.0, "{status}");
-    ensure!(word_before(&status, " with a command") < 14_000.0, "{status}");
+    ensure!(word_before(&status, " cycles, ") < 12_000.0, "{status}");
+    ensure!(word_before(&status, " with a command") < 12_000.0, "{status}");
     bench.done(29, &status)?;
     bench.step(30, 4.0)?;
     ensure!((-90.0..-30.0).contains(&rpm(bench)), "{} rpm", rpm(bench));
