@@ -277,6 +277,11 @@ pub const COMP_HYSTERESIS: u8 = 1;
 pub const DAC_START_US: u32 = 10;
 /// Start-up time of the comparator, us (datasheet: 5 at most).
 pub const COMP_START_US: u32 = 5;
+/// Longest until the chip's pull-up has lifted the pin of the dc link above the offsets of DAC and comparator, us: 100 nF and
+/// 9.31 kOhm take 0.8 ms for nine tenths.
+pub const LIFT_US: u32 = 5000;
+/// Code of the dc link, a tenth of the range, from which on its own comparator can be tested by it.
+pub const COMPARABLE: u16 = 410;
 
 // Dc link ---------------------------------------------------------------------------------------
 
@@ -303,14 +308,14 @@ pub const SERIAL_BAUD: u32 = 115_200;
 /// Highest rate that `baud` takes, bits per second: a byte is 850 core cycles, so that the FIFO of eight bytes outlasts the
 /// longest control interrupt.
 pub const SERIAL_BAUD_MAX: u32 = 2_000_000;
-/// Clock ticks of LPUART1 per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
-pub const fn serial_divider(baud: u32) -> u32 {
-    ((256 * CLOCK_HZ as u64 + baud as u64 / 2) / baud as u64) as u32
+/// Ticks of LPUART1's clock, Hz, per bit, in 1/256 (RM0440, LPUART_BRR), rounded.
+pub const fn serial_divider(clock_hz: u32, baud: u32) -> u32 {
+    ((256 * clock_hz as u64 + baud as u64 / 2) / baud as u64) as u32
 }
 // Range of the register.
 const _: () = {
-    assert!(serial_divider(SERIAL_BAUD) <= 0xf_ffff);
-    assert!(serial_divider(SERIAL_BAUD_MAX) >= 0x300);
+    assert!(serial_divider(CLOCK_HZ, SERIAL_BAUD) <= 0xf_ffff);
+    assert!(serial_divider(HSI_HZ, SERIAL_BAUD_MAX) >= 0x300);
 };
 /// Without a valid line for so long the port goes back to [`SERIAL_BAUD`], ms.
 pub const SERIAL_FALL_BACK_MS: u32 = 1000;

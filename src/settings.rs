@@ -3,6 +3,7 @@
 
 pub mod bus;
 pub mod keys;
+mod own;
 pub mod staging;
 #[cfg(test)]
 mod tests;
@@ -70,7 +71,9 @@ impl FirmwareSettings {
 
     fn confirmation(&self) -> u32 {
         let hardware = keys::all().filter(|key| key.hardware()).map(|key| key.to_bits(self));
-        self.board.confirmation(hardware.chain([u32::from(self.boot_pin_counts)]))
+        // The trip in effect: its rule follows the nameplate, which anybody may set.
+        let trip = self.drive.trip_a().to_bits();
+        self.board.confirmation(hardware.chain([trip, u32::from(self.boot_pin_counts)]))
     }
 
     /// Takes the result of a learning, if it was accepted: instead of what was learned before, or, where it was learned `again`

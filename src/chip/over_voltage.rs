@@ -4,6 +4,8 @@
 //! The dc link is the only measured signal with a comparator of its own: the pins of both currents reach comparator 3
 //! alone.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use cortex_m::asm;
 use stm32g4xx_hal::pac;
 use stm32g4xx_hal::rcc::Rcc;
@@ -14,8 +16,14 @@ use super::{StartError, pins};
 use induction_drive::board;
 use induction_drive::boards::{Level, SELECTED};
 
-/// Starts the comparator, proves that it pulls the break of the timer at the level zero and does not at the converter
-/// code `level`, and locks it there until the next reset. The outputs are off.
+/// The comparator has tripped by a voltage at its pin.
+static PROVED: AtomicBool = AtomicBool::new(false);
+/// The reason why no motor is switched on before it has.
+pub const UNPROVED: StartError = "self-test: the over-voltage comparator has not tripped yet: a dc link above a tenth of its range tests it";
+
+/// Starts the comparator, proves that it pulls the break of the timer and does not at the converter code `level`, and locks it
+/// there until the next reset. The outputs are off. It has to trip at the level zero as well; where a sensor drives the pin to
+/// ground against the chip's resistor, [`prove`] shows that with a dc link.
 ///
 /// # Errors
 /// The first step of the proof that fails.
@@ -57,27 +65,63 @@ pub fn watch(
     });
     asm::delay(board::COMP_START_US * board::CYCLES_PER_US);
 
-    // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it.
+    let csr = comparators.c1csr();
+    let filtered = || {
+        asm::delay(board::BREAK_FILTER_NS * board::CYCLES_PER_US / 1000 + board::CYCLES_PER_US);
+    };
+    // Without a dc link its pin is at ground, as the level zero is: the resistor of the chip lifts it, and a capacitor there.
     pins::pulled_input(SELECTED.dc_link.pin, Level::High);
     // An earlier break, of the fault input for example, does not count.
     pwm.take_break();
     set(0);
-    let (trips, broken) = (comparators.c1csr().read().value().bit(), pwm.take_break());
+    let trips = (0..board::LIFT_US).any(|_| {
+        asm::delay(board::CYCLES_PER_US);
+        csr.read().value().bit()
+    });
+    filtered();
+    let mut broken = pwm.take_break();
     pins::analog(SELECTED.dc_link.pin);
     set(level);
-    pwm.take_break();
-    asm::delay(board::BREAK_FILTER_NS * board::CYCLES_PER_US / 1000 + board::CYCLES_PER_US);
-    let trips_again = comparators.c1csr().read().value().bit();
-    comparators.c1csr().modify(|_, w| w.lock().set_bit());
     if !trips {
-        Err("self-test: the over-voltage comparator does not trip at the level zero")
-    } else if !broken {
+        // The other polarity shows the way to the break.
+        pwm.take_break();
+        csr.modify(|_, w| w.pol().set_bit());
+        filtered();
+        broken = pwm.take_break();
+        csr.modify(|_, w| w.pol().clear_bit());
+        filtered();
+    }
+    pwm.take_break();
+    filtered();
+    let trips_again = csr.read().value().bit();
+    csr.modify(|_, w| w.lock().set_bit());
+    if !broken {
         Err("self-test: the over-voltage comparator does not reach the break of TIM1")
     } else if trips_again {
         Err(
             "self-test: the over-voltage comparator trips at its own level: dc link too high, its wire off, or no level",
         )
     } else {
+        PROVED.store(trips, Ordering::Relaxed);
         Ok(())
     }
+}
+
+/// Whether the comparator has tripped; if not, it has to at half of the dc link, of this code, and not at its own level behind it.
+/// For a drive that is off.
+pub fn prove(dc_link: u16) -> bool {
+    if dc_link < board::COMPARABLE || PROVED.load(Ordering::Relaxed) {
+        return PROVED.load(Ordering::Relaxed);
+    }
+    // SAFETY: both always exist. The level is this function's alone since `watch`; it only reads the comparator.
+    let (dac, comparators) = unsafe { (&*pac::DAC3::ptr(), &*pac::COMP::ptr()) };
+    let level = dac.dhr12r1().read().daccdhr().bits();
+    let trips_at = |code: u16| {
+        dac.dhr12r1().write(|w| w.daccdhr().set(code));
+        asm::delay(board::DAC_START_US * board::CYCLES_PER_US);
+        comparators.c1csr().read().value().bit()
+    };
+    let proved = trips_at(dc_link / 2) & !trips_at(level);
+    PROVED.store(proved, Ordering::Relaxed);
+    proved
 }

@@ -28,6 +28,8 @@ pub const PRIORITY: u8 = 0xf0;
 pub struct Port {
     received: Consumer<'static, u8, { board::SERIAL_RECEIVE }>,
     to_send: Producer<'static, u8, { board::SERIAL_TRANSMIT }>,
+    /// Clock of the port, Hz.
+    clock_hz: u32,
 }
 
 /// The interrupt's end of the port.
@@ -51,17 +53,17 @@ static INTERRUPT_END: Owned = Owned(UnsafeCell::new(None));
 /// Bytes were damaged on the wire, or came faster than they were read.
 static DAMAGED: AtomicBool = AtomicBool::new(false);
 /// The BRR register wanted, and in force.
-static DIVIDER: AtomicU32 = AtomicU32::new(INITIAL);
-static IN_FORCE: AtomicU32 = AtomicU32::new(INITIAL);
-const INITIAL: u32 = board::serial_divider(board::SERIAL_BAUD);
+static DIVIDER: AtomicU32 = AtomicU32::new(0);
+static IN_FORCE: AtomicU32 = AtomicU32::new(0);
 
 impl Port {
-    /// Sets the port up; `None` on a second call.
+    /// Sets the port up, with its clock in Hz; `None` on a second call.
     pub fn new(
         port: pac::LPUART1,
         (transmit, receive): (PA2<Analog>, PA3<Analog>),
         nvic: &mut NVIC,
         rcc: &mut Rcc,
+        clock_hz: u32,
     ) -> Option<Self> {
         let received = cortex_m::singleton!(: ReceiveQueue = Queue::new())?;
         let to_send = cortex_m::singleton!(: TransmitQueue = Queue::new())?;
@@ -75,12 +77,10 @@ impl Port {
 
         // The interrupt also at damaged bytes.
         port.cr3().write(|w| w.eie().enabled());
-        let end = PortInterrupt {
-            port,
-            received: write_received,
-            to_send: read_to_send,
-            divider: INITIAL,
-        };
+        let divider = board::serial_divider(clock_hz, board::SERIAL_BAUD);
+        DIVIDER.store(divider, Ordering::Relaxed);
+        IN_FORCE.store(divider, Ordering::Relaxed);
+        let end = PortInterrupt { port, received: write_received, to_send: read_to_send, divider };
         end.enable();
         // SAFETY: see `Owned`.
         unsafe { *INTERRUPT_END.0.get() = Some(end) };
@@ -89,7 +89,7 @@ impl Port {
             nvic.set_priority(Interrupt::LPUART, PRIORITY);
             NVIC::unmask(Interrupt::LPUART);
         }
-        Some(Self { received, to_send })
+        Some(Self { received, to_send, clock_hz })
     }
 }
 
@@ -116,7 +116,7 @@ impl handle::Port for Port {
     }
 
     fn change_rate(&mut self, baud: u32) -> bool {
-        let divider = board::serial_divider(baud);
+        let divider = board::serial_divider(self.clock_hz, baud);
         DIVIDER.store(divider, Ordering::Relaxed);
         NVIC::pend(Interrupt::LPUART);
         IN_FORCE.load(Ordering::Relaxed) == divider

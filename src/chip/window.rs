@@ -28,15 +28,21 @@ const _: () = assert!(
 pub struct Window(WWDG);
 
 impl Window {
-    /// Sets its window; the first [`feed`](Self::feed) starts it.
+    /// The first [`feed`](Self::feed) starts it, with the window open.
     ///
     /// # Errors
     /// It has no clock.
     pub fn new(timer: WWDG, rcc: &mut Rcc) -> Result<Self, StartError> {
         clock_on!(rcc.apb1enr1(), wwdgen, "the window watchdog")?;
+        Ok(Self(timer))
+    }
+
+    /// Closes the window of one that is fed. (Before the first feeding, its counter may be anywhere, and that feeding early.)
+    pub fn close() {
+        // SAFETY: the register is this function's alone.
+        let timer = unsafe { &*WWDG::ptr() };
         // Undivided beyond CLOCK, no interrupt.
         timer.cfr().write(|w| w.w().set(RELOAD - CLOSED as u8));
-        Ok(Self(timer))
     }
 
     /// Feeds it.

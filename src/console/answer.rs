@@ -352,12 +352,17 @@ impl Console {
     }
 
     fn trace(&mut self, mut plan: Plan, drive: &mut impl DriveHandle) {
-        if let Trigger::Level { signal, level, .. } = &mut plan.trigger
+        if let Trigger::Level { signal, level, above } = &mut plan.trigger
             && let Some(signal) = SIGNALS.get(usize::from(*signal))
         {
             let drive_core::settings::Line { gain, offset } =
                 signal.line(&self.settings.in_force().drive);
+            if gain == 0.0 {
+                return self.error(&"this board has no such sensor");
+            }
             *level = (*level - offset) / gain;
+            // A larger current has a smaller code.
+            *above ^= gain < 0.0;
         }
         if !drive.begin_trace(&plan) {
             return self.error(&"a trace is being recorded; `trace off` ends it");

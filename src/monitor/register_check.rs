@@ -41,18 +41,19 @@ const CLOCKS: u32 = 1 << 8 | 3 << 16 | 1 << 19 | 3 << 24;
 const LSION: u32 = 1;
 
 /// Addresses of peripherals, with the offsets of their registers (RM0440).
-const CONFIGURED: [(u32, &[u16]); 17] = [
-    // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, AF1
-    (0x4001_2c00, &[0, 4, 8, 0xc, 0x18, 0x1c, 0x20, 0x28, 0x2c, 0x30, 0x40, 0x44, 0x60]),
+const CONFIGURED: [(u32, &[u16]); 21] = [
+    // TIM1: CR1, CR2, SMCR, DIER, CCMR1, CCMR2, CCER, PSC, ARR, RCR, CCR4, BDTR, CCR5, DTR2, AF1, AF2
+    (0x4001_2c00, &[0, 4, 8, 0xc, 0x18, 0x1c, 0x20, 0x28, 0x2c, 0x30, 0x40, 0x44]),
+    (0x4001_2c00, &[0x48, 0x54, 0x60, 0x64]),
     // TIM8: CR1, CCMR1, CCER, ARR, BDTR, AF1
     (0x4001_3400, &[0, 0x18, 0x20, 0x2c, 0x44, 0x60]),
     // TIM5, the time base: CR1, CCMR1, CCER, ARR, TISEL
     (0x4000_0c00, &[0, 0x18, 0x20, 0x2c, 0x5c]),
     // TIM2, the encoder: CR1, SMCR, CCMR1, CCER, ARR
     (0x4000_0000, &[0, 8, 0x18, 0x20, 0x2c]),
-    // ADC1 and ADC2: IER, CR, CFGR, SMPR1, SMPR2 and SQR1 of ADC1, TR1, JSQR; CCR of both
-    (0x5000_0000, &[4, 8, 0xc, 0x14, 0x18, 0x20, 0x30, 0x4c]),
-    (0x5000_0100, &[4, 8, 0xc, 0x14, 0x20, 0x4c]),
+    // ADC1 and ADC2: IER, CR, CFGR, CFGR2, SMPR1, SMPR2 and SQR1 of ADC1, TR1, JSQR, DIFSEL, CALFACT; CCR of both
+    (0x5000_0000, &[4, 8, 0xc, 0x10, 0x14, 0x18, 0x20, 0x30, 0x4c, 0xb0, 0xb4]),
+    (0x5000_0100, &[4, 8, 0xc, 0x10, 0x14, 0x20, 0x4c, 0xb0, 0xb4]),
     (0x5000_0300, &[8]),
     // DAC3: CR, DHR12R1, MCR
     (0x5000_1000, &[0, 8, 0x3c]),
@@ -64,12 +65,17 @@ const CONFIGURED: [(u32, &[u16]); 17] = [
     (0x4800_0000, &[0, 4, 0xc, 0x20, 0x24]),
     (0x4800_0400, &[0, 4, 0xc, 0x20, 0x24]),
     (0x4800_0800, &[0, 4, 0xc, 0x20, 0x24]),
+    // The window watchdog: CFR
+    (0x4000_2c00, &[4]),
+    // Of the core: VTOR, CPACR, MPU_CTRL
+    (0xe000_ed00, &[8, 0x88, 0x94]),
     // NVIC: enabled interrupts 0 to 95; priorities of ADC1_2, USART3, LPUART
     (0xe000_e000, &[0x100, 0x104, 0x108, 0x410, 0x424, 0x458]),
     // FLASH: ACR
     (0x4002_2000, &[0]),
-    // RCC: CR, CFGR, PLLCFGR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, CCIPR, CSR
-    (0x4002_1000, &[0, 8, 0xc, 0x4c, 0x58, 0x5c, 0x60, 0x88, 0x94]),
+    // RCC: CR, CFGR, PLLCFGR, AHB1ENR, AHB2ENR, APB1ENR1, APB1ENR2, APB2ENR, the same while the core sleeps, CCIPR, CSR
+    (0x4002_1000, &[0, 8, 0xc, 0x48, 0x4c, 0x58, 0x5c, 0x60]),
+    (0x4002_1000, &[0x68, 0x6c, 0x78, 0x7c, 0x80, 0x88, 0x94]),
     // PWR: CR1, CR2, CR5
     (0x4000_7000, &[0, 4, 0x80]),
 ];

@@ -3,110 +3,18 @@
 use core::fmt;
 
 use drive_core::Settings;
-use drive_core::settings::entry::{Access, Change, Entry};
-use drive_core::settings::value::{Value, ValueError, Words};
+use drive_core::settings::entry::{Change, Entry};
+use drive_core::settings::value::{Value, ValueError};
 use drive_core::settings::{SETTINGS, SettingsError};
 
 use super::FirmwareSettings;
-use super::bus::{Baud, Commander, Format};
-use crate::boards::{self, Board};
+pub use super::own::BOARD;
+use super::own::OWN;
+use crate::boards::Board;
 use crate::hash;
 
-/// Longest time-out of commands, s.
-const LONGEST_TIMEOUT_S: f32 = 3600.0;
 /// Bits of `auto` in the flash: not a number, as no value of a setting is.
 const AUTO_BITS: u32 = 0x7fc0_0000;
-
-/// The setting that names the board.
-pub const BOARD: &str = "board";
-
-/// The firmware's own settings, in the order in which they are shown.
-static OWN: [Entry<FirmwareSettings>; 9] = [
-    Entry::new(
-        "command.timeout_s",
-        "s",
-        Access::Number {
-            get: |s: &FirmwareSettings| s.command.timeout_s,
-            set: |s, value| s.command.timeout_s = value,
-        },
-        "the drive stops when no valid line came for so long; 0: never",
-    )
-    .from_to(0.0, LONGEST_TIMEOUT_S),
-    word::<bool>(
-        ["wiring_checked", ""],
-        |s| s.command.wiring_checked.place(),
-        |s, place| s.command.wiring_checked = bool::at(place),
-        "whether a start has checked the wiring since the defaults were set",
-    ),
-    word::<bool>(
-        ["console.echo", ""],
-        |s| s.command.echo.place(),
-        |s, place| s.command.echo = bool::at(place),
-        "whether the console sends typed characters back",
-    ),
-    word::<Commander>(
-        ["bus.commands", ""],
-        |s| s.bus.commander.place(),
-        |s, place| s.bus.commander = Commander::at(place),
-        "who starts the drive and gives it references; anybody may stop it",
-    ),
-    Entry::new(
-        "bus.address",
-        "",
-        Access::Whole {
-            get: |s: &FirmwareSettings| s.bus.address,
-            set: |s, value| s.bus.address = value,
-        },
-        "address of the drive on the bus",
-    )
-    .from_to(1.0, 247.0),
-    word::<Baud>(
-        ["bus.baud", "bit/s"],
-        |s| s.bus.baud.place(),
-        |s, place| s.bus.baud = Baud::at(place),
-        "rate of the bus",
-    ),
-    word::<Format>(
-        ["bus.parity", ""],
-        |s| s.bus.format.place(),
-        |s, place| s.bus.format = Format::at(place),
-        "data bits, parity and stop bits of the bus",
-    ),
-    Entry::new(
-        BOARD,
-        "",
-        Access::Word {
-            words: &boards::NAMES,
-            get: |s: &FirmwareSettings| {
-                boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0)
-            },
-            set: |s, place| s.board = boards::ALL[place % boards::ALL.len()],
-        },
-        "board that the firmware is built for",
-    )
-    .changed(Change::Board),
-    Entry::new(
-        "board.confirmed",
-        "",
-        Access::Whole {
-            get: |s: &FirmwareSettings| s.command.confirmed,
-            set: |s, value| s.command.confirmed = value,
-        },
-        "number of the board whose bench steps were done; `confirm board` sets it",
-    )
-    .from_to(0.0, 16_777_215.0)
-    .changed(Change::Board),
-];
-
-/// A setting with these words, by name and unit.
-const fn word<T: Words>(
-    [name, unit]: [&'static str; 2],
-    get: fn(&FirmwareSettings) -> usize,
-    set: fn(&mut FirmwareSettings, usize),
-    help: &'static str,
-) -> Entry<FirmwareSettings> {
-    Entry::new(name, unit, Access::Word { words: T::WORDS, get, set }, help)
-}
 
 /// Number of settings.
 pub const COUNT: usize = SETTINGS.len() + OWN.len();

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use cortex_m::singleton;
+use cortex_m::{asm, singleton};
 use drive_core::identify::learning::Learned;
 use drive_core::settings::SettingsError;
 use drive_core::{Accepted, Coefficients, Command, Drive, Stop};
@@ -91,7 +91,9 @@ pub fn bring_up() -> Result<Board, StartError> {
     // First, because the drivers are switched off from here on.
     let pwm = pwm::Pwm::new(chip.TIM1, &mut rcc, &chip.DBGMCU, &chip.SYSCFG, dead_time_code);
     let dc_link = dc_link::DcLink::new(chip.TIM8, &mut rcc, &chip.DBGMCU);
-    let port = Port::new(chip.LPUART1, (a.pa2, a.pa3), &mut core.NVIC, &mut rcc).ok_or(TWICE)?;
+    let clock_hz = if clocked.is_ok() { board::CLOCK_HZ } else { board::HSI_HZ };
+    let pins = (a.pa2, a.pa3);
+    let port = Port::new(chip.LPUART1, pins, &mut core.NVIC, &mut rcc, clock_hz).ok_or(TWICE)?;
     let bus = SELECTED
         .bus
         .and_then(|wires| rs485::Port::new(chip.USART3, &wires, &mut core.NVIC, &mut rcc));
@@ -284,5 +286,7 @@ fn start_control(
     }
     let sources = Sources::new(source)?;
     control::TOLD.store(control::WATCHED, Ordering::Relaxed);
+    asm::delay(1000 * board::CYCLES_PER_US);
+    Window::close();
     Ok(ControlLink { status, commands, answers, learned, trace, stream, observations, sources })
 }

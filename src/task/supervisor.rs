@@ -13,7 +13,7 @@ use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
 use crate::chip::watchdog::Watchdog;
-use crate::chip::{memory, pwm, stop, time};
+use crate::chip::{memory, over_voltage, pwm, stop, time};
 use crate::task::check::Check;
 use crate::task::clock::Clock;
 use crate::task::control;
@@ -265,6 +265,11 @@ impl DriveHandle for Supervisor {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         let not_started = self.no_control();
         let link = self.link.as_mut().ok_or(not_started)?;
+        let dc_link = self.status.map_or(0, |status| status.sample.dc_link);
+        let starts = matches!(command, Command::Start(_) | Command::Excite(_));
+        if starts && self.is_off() && !over_voltage::prove(dc_link) {
+            return Err(CommandError::NotStarted(over_voltage::UNPROVED));
+        }
         // Discards an answer that came too late for its command.
         link.answers.take();
         if !link.commands.send(command) {

@@ -233,6 +233,10 @@ impl<S> Entry<S> {
     }
 }
 
+// The rows of a table. `Settings` is the type of this name where the table is.
+
+#[doc(hidden)]
+#[macro_export]
 macro_rules! number {
     ($name:literal, $($path:ident).+, $unit:literal, $help:literal) => {
         Entry::new($name, $unit, Access::Number {
@@ -242,6 +246,8 @@ macro_rules! number {
     };
 }
 
+#[doc(hidden)]
+#[macro_export]
 macro_rules! auto {
     ($name:literal, $($path:ident).+, $effective:expr, $unit:literal, $help:literal) => {
         Entry::new($name, $unit, Access::Auto {
@@ -252,6 +258,8 @@ macro_rules! auto {
     };
 }
 
+#[doc(hidden)]
+#[macro_export]
 macro_rules! whole {
     ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
         Entry::new($name, "", Access::Whole {
@@ -262,6 +270,8 @@ macro_rules! whole {
     };
 }
 
+#[doc(hidden)]
+#[macro_export]
 macro_rules! word {
     ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
         Entry::new($name, "", Access::Word {
@@ -272,4 +282,4 @@ macro_rules! word {
     };
 }
 
-pub(super) use {auto, number, whole, word};
+pub(super) use crate::{auto, number, whole, word};
