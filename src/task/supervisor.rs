@@ -264,10 +264,10 @@ impl Supervisor {
 impl DriveHandle for Supervisor {
     fn command(&mut self, command: Command) -> Result<Accepted, CommandError> {
         let not_started = self.no_control();
-        let link = self.link.as_mut().ok_or(not_started)?;
         let dc_link = self.status.map_or(0, |status| status.sample.dc_link);
-        let starts = matches!(command, Command::Start(_) | Command::Excite(_));
-        if starts && self.is_off() && !over_voltage::prove(dc_link) {
+        let starts = matches!(command, Command::Start(_) | Command::Excite(_)) && self.is_off();
+        let link = self.link.as_mut().ok_or(not_started)?;
+        if starts && !over_voltage::prove(dc_link) {
             return Err(CommandError::NotStarted(over_voltage::UNPROVED));
         }
         // Discards an answer that came too late for its command.
