@@ -62,6 +62,8 @@ const CARRIER_OF_ROOM: f32 = 0.75;
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Band of the heat sink in which the current limit falls, K.
 const DERATING_C: f32 = 15.0;
+/// Rules end this far within the limits of the power stage and of other settings, since they round to four digits.
+const WITHIN: f32 = 0.998;
 /// Frequency of the carrier, Hz.
 pub(crate) const CARRIER_HZ: f32 = 600.0;
 
@@ -69,10 +71,8 @@ pub(crate) const CARRIER_HZ: f32 = 600.0;
 fn or_rule(set: Option<f32>, rule: impl FnOnce() -> f32) -> f32 {
     set.unwrap_or_else(|| {
         let value = f64::from(rule());
-        if value == 0.0 {
-            return 0.0;
-        }
-        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs())) - 3.0);
+        // Zero has no first digit.
+        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs().max(1e-30))) - 3.0);
         (libm::round(value / last) * last) as f32
     })
 }
@@ -139,9 +139,7 @@ impl Settings {
     pub fn i_d(&self) -> f32 {
         let plate = &self.nameplate;
         let rule = || match self.sequence.flux {
-            Flux::Low => {
-                f32::min(self.share_of_rated(0.7), dc_link::WITHIN * self.current_limit_a())
-            }
+            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
             Flux::High => {
                 let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
                 let of_flux = rated_flux / self.motor.l_m;
