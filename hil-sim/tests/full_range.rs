@@ -121,13 +121,16 @@ fn one_run_is_repeated_and_recorded() {
     assert_eq!((all.figures.len(), one.figures[0].panels.len()), (0, 6));
 }
 
-/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 1.93 Nm at 1.4 A and the 3 A of the limit, motoring and generating,
-/// while the dc link allows it; at the top the link decides.
+/// At full flux the torque is `3/2 P L_m^2/L_r i_d i_q`, 2.06 Nm at 1.4 A and the 3.21 A that 3.5 A leave beside it, motoring and
+/// generating, while the dc link allows it; at the top the link decides. The limit in Nm and that in percent are one.
 #[test]
 fn the_torque_envelope_is_that_of_the_currents_and_of_the_link() {
     let outcome = outcome("torque-envelope", &[ENCODER]);
-    let limit = 1.5 * 2.0 * 0.1771 * 0.1771 / 0.2047 * 1.4 * 3.0;
+    let limit = 1.5 * 2.0 * 0.1771 * 0.1771 / 0.2047 * 1.4 * (3.5_f64.powi(2) - 1.4 * 1.4).sqrt();
     assert!((get(&outcome, "torque_limit_nm") / limit - 1.0).abs() < 0.01);
+    assert!(
+        (get(&outcome, "torque_limit_pct_of_rated") / (100.0 * limit / 6.107) - 1.0).abs() < 0.01
+    );
     for word in ["motoring", "generating"] {
         let torque =
             |volts: u32, rpm: u32| get(&outcome, &format!("torque_{word}_{volts}_v_{rpm}_rpm_nm"));
@@ -164,6 +167,9 @@ fn a_turning_shaft_is_caught_with_the_current_loop_of_a_commissioned_drive() {
     for region in ["550_750", "750_1200", "1200_1800", "1800_2700"] {
         assert_eq!(get(&outcome, &format!("turning_start_{region}_refused_runs")), 0.0, "{region}");
     }
+    // A shaft that is too fast is a number of the table, and no failure.
+    assert!(get(&outcome, "turning_start_2700_3600_refused_runs") > 20.0);
+    assert_eq!(outcome.faults, [""; 0]);
     assert_eq!((get(&outcome, "lost_runs"), get(&outcome, "silent_runs")), (0.0, 0.0));
 }
 

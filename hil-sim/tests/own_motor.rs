@@ -117,9 +117,9 @@ fn errors_name_what_was_set_and_all_that_is_missing() {
         assert!(missing.contains(key), "{key}: {missing}");
     }
     assert!(missing.contains("inverter.dc_link_v") && !missing.contains("motor.l_m"), "{missing}");
-    // A rule whose value another setting leaves no room for.
-    let rule = told("m.toml", LARGE, &["--set", "limits.current_a=1"]);
-    assert!(rule.contains("braking.flux_a") && rule.contains("was not set"), "{rule}");
+    // A rule whose value has no room.
+    let rule = told("m.toml", LARGE, &["--set", "motor.r_r=0.01"]);
+    assert!(rule.contains("sequence.magnetise_s") && rule.contains("was not set"), "{rule}");
     let low = told("m.toml", LARGE, &["--set", "limits.dc_under_v=594"]);
     assert!(low.contains("limits.dc_under_v = 594") && !low.contains("not set"), "{low}");
     let set = told("m.toml", LARGE, &["--set", "sequence.i_d=9"]);

@@ -34,15 +34,35 @@ fn full_torque_is_held_at_zero_stator_frequency() {
     }
 }
 
-/// With an encoder and a rotor resistance believed twice too large the drive imposes twice the slip, 220 rpm, and the flux
-/// stands at atan(i_q/i_d) - atan(2 i_q/i_d) = -6.48 degrees from where the drive believes it, held or not.
+/// Where the flux stands, a warm rotor and stator look like gains of the sensors that drift. The follower of that drift must not take them
+/// for one: from the first to the last minute of eight the angle moves by 0.14°. It moved by 1.19° while noise of the frequency passed
+/// for a turning flux.
+#[test]
+fn the_angle_does_not_creep_at_zero_stator_frequency() {
+    let metrics = record(&[
+        "plant=r",
+        "flux_level=high",
+        "sequence.flux=high",
+        "record.minutes=8",
+        "record.reversal_s=1",
+        "record.flux_deg=75",
+        "after.motor.r_r=1.43",
+        "after.motor.r_s=6.48",
+    ]);
+    let drift = metrics.get("hold_drift_deg").expect("a drift");
+    assert_eq!(metrics.get("hold_lost"), Some(0.0));
+    assert!(drift < 0.5, "{drift}");
+}
+
+/// With an encoder and a rotor resistance believed twice too large the drive imposes twice the slip, 251 rpm with the 3.43 A that
+/// 3.5 A leave beside 0.7 A, and the flux stands at atan(i_q/i_d) - atan(2 i_q/i_d) = -5.72 degrees from where the drive believes it, held or not.
 #[test]
 fn a_wrong_slip_shows_as_speed_and_angle() {
     let metrics = record(&["angle_source=encoder", "drive.motor.r_r=2.2"]);
     let get = |name: &str| metrics.get(name).expect(name);
-    assert!((get("hold_speed_rpm") - 219.9).abs() < 2.0, "{}", get("hold_speed_rpm"));
+    assert!((get("hold_speed_rpm") - 251.4).abs() < 2.0, "{}", get("hold_speed_rpm"));
     for name in ["hold_error_mean_deg", "reversal_error_mean_deg"] {
-        assert!((get(name) - 6.48).abs() < 0.4, "{name}: {}", get(name));
+        assert!((get(name) - 5.72).abs() < 0.4, "{name}: {}", get(name));
     }
     assert!(get("hold_drift_deg") < 0.2, "{}", get("hold_drift_deg"));
 }

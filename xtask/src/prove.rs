@@ -96,7 +96,7 @@ const PROOFS: [Proof; 7] = [
     },
     Proof {
         name: "standstill",
-        about: "full torque of either sign at zero stator frequency for 40 minutes, rotor resistance +30 %, stator +20 %",
+        about: "the drive's whole torque of either sign at zero stator frequency for 40 minutes, rotor resistance +30 %, stator +20 %",
         shards: 3,
         command: |shard| {
             let family = ["r", "g7", "m4b"][shard as usize];

@@ -22,10 +22,8 @@ impl Coefficients {
         let unused =
             if self.dc_link.has_chopper() { Hardware::empty() } else { Hardware::CHOPPER_OFF };
         let events = sample.hardware - unused;
-        if !events.is_empty()
-            && let Some(fault) = of_hardware(events)
-        {
-            return Err(fault);
+        if !events.is_empty() {
+            return Err(of_hardware(events));
         }
         self.sensing.check(sensing, sample)?;
         let (limits, phases) = (&self.protection, &measured.phases);
@@ -104,8 +102,8 @@ impl Drive {
     }
 }
 
-/// The fault of the most telling event: the one that switched off first comes first.
-fn of_hardware(events: Hardware) -> Option<Fault> {
+/// The fault of the most telling event: the one that switched off first comes first. An event without a name is one of the converters.
+fn of_hardware(events: Hardware) -> Fault {
     [
         (Hardware::BREAK, Fault::Break),
         (Hardware::ANALOG_WATCHDOG, Fault::AnalogWatchdog),
@@ -117,6 +115,7 @@ fn of_hardware(events: Hardware) -> Option<Fault> {
     ]
     .into_iter()
     .find_map(|(event, fault)| events.intersects(event).then_some(fault))
+    .unwrap_or(Fault::ConverterOverrun)
 }
 
 #[cfg(test)]
@@ -151,6 +150,13 @@ mod tests {
             assert_eq!(at(half, half), Ok(()));
             assert_eq!(at(half, half * 1.002), Err(Fault::OverCurrentC));
         }
+        // An event that has no name is a fault, too.
+        let hardware = Hardware::from_bits_retain(1 << 7);
+        let measured =
+            Measured { phases: Abc::new(0.0, 0.0, 0.0), current: AlphaBeta::ZERO, dc_link: 311.0 };
+        let unknown = Sample { hardware, ..sample };
+        let found = coefficients.protect(&SensingState::default(), &unknown, &measured);
+        assert_eq!(found, Err(Fault::ConverterOverrun));
         assert_eq!(check(0.0, 0.0, dc_over_v), Ok(()));
         assert_eq!(check(0.0, 0.0, dc_over_v + 0.1), Err(Fault::DcLinkOverVoltage));
         assert_eq!(check(0.0, 0.0, dc_under_v), Ok(()));

@@ -19,14 +19,14 @@
 //! | `injection.full_reference_iq_a` | 1 A | rated current |
 //! | `injection.current_saliency` | 0.0338 1/A | inverse of the rated current |
 //! | `injection.tracked_rpm` | 700 rpm | inverse of the pole pairs |
-//! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed |
+//! | `speed.limit_rpm` | 1720 rpm with the observer | rated speed; at most 0.998 of `limits.speed_rpm` |
 //! | `speed.limit_rpm` without it, `speed.ramp_rpm_per_s` | 300 rpm, 300 rpm/s | inverse of the pole pairs |
 //! | `speed.quick_rpm_per_s` | 900 rpm/s | `speed.ramp_rpm_per_s` |
 //! | `limits.speed_rpm` | 2000 rpm | rated speed |
 //! | `current_plant.d`, `.q` | Eq. 3.41, 3.42 | the plants computed from the parameters |
 //! | `limits.dc_over_v`, `limits.dc_under_v` | 400 V, 200 V | nominal dc link; at most 0.95 of the sensor's range, and what the power stage stands |
 //! | `braking.high_v`, `braking.low_v` | 390 V, 260 V | nominal dc link; between the voltages that trip |
-//! | `braking.flux_a` | 1 A | rated current |
+//! | `braking.flux_a` | 1 A | rated current; at most 0.998 of `limits.current_a` |
 //! | `limits.unexplained_v` | 12 V | see [`Settings::unexplained_v`] |
 //! | `vf.volts_per_hz` | 6.333 V/Hz | rated voltage and frequency |
 //! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
@@ -62,6 +62,8 @@ const CARRIER_OF_ROOM: f32 = 0.75;
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
 /// Band of the heat sink in which the current limit falls, K.
 const DERATING_C: f32 = 15.0;
+/// Rules end this far within the limits of the power stage and of other settings, since they round to four digits.
+const WITHIN: f32 = 0.998;
 /// Frequency of the carrier, Hz.
 pub(crate) const CARRIER_HZ: f32 = 600.0;
 
@@ -69,7 +71,8 @@ pub(crate) const CARRIER_HZ: f32 = 600.0;
 fn or_rule(set: Option<f32>, rule: impl FnOnce() -> f32) -> f32 {
     set.unwrap_or_else(|| {
         let value = f64::from(rule());
-        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs())) - 3.0);
+        // Zero has no first digit.
+        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs().max(1e-30))) - 3.0);
         (libm::round(value / last) * last) as f32
     })
 }
@@ -136,7 +139,7 @@ impl Settings {
     pub fn i_d(&self) -> f32 {
         let plate = &self.nameplate;
         let rule = || match self.sequence.flux {
-            Flux::Low => f32::min(self.share_of_rated(0.7), self.current_limit_a()),
+            Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
             Flux::High => {
                 let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
                 let of_flux = rated_flux / self.motor.l_m;
@@ -370,6 +373,30 @@ mod tests {
         near(s.unexplained_v(), 1.848);
         near(s.magnetise_s(), 5.0 * 0.186_09);
         assert!(s.check().is_ok());
+    }
+
+    /// A limit that is set leaves room for the rules that follow from it, with any number of digits.
+    #[test]
+    fn rules_stay_within_the_limits_that_are_set() {
+        for amperes in [0.9, 0.123_456, 0.123_444] {
+            let mut s = Settings::default();
+            s.limits.current_a = Some(amperes);
+            assert_eq!(s.check(), Ok(()), "{amperes}");
+        }
+        for (rpm, observer) in [(1000.0, true), (1234.56, true), (200.0, false), (300.02, false)] {
+            let mut s = Settings::default();
+            (s.limits.speed_rpm, s.observer.enabled) = (Some(rpm), observer);
+            assert_eq!(s.check(), Ok(()), "{rpm}");
+        }
+    }
+
+    /// A rule whose value is zero has no digits to round to.
+    #[test]
+    fn a_rule_of_zero_is_zero() {
+        let mut s = Settings::default();
+        s.limits.heat_sink_c = DERATING_C;
+        assert_eq!(s.derate_c(), 0.0);
+        assert_eq!(s.check(), Ok(()));
     }
 
     #[test]

@@ -122,6 +122,11 @@ mod tests {
         for part in ["Refused: dc link too low", "0.625", "fault 12: the flux angle is lost"] {
             assert!(page.contains(part), "{part}");
         }
+        // The results first, and of them those that failed.
+        let place = |part: &str| page.find(part).unwrap_or_else(|| panic!("no {part}"));
+        let rows = ["refused", "lost", "sound"].map(|name| place(&format!("href=\"#{name}\"")));
+        assert!(place("<h2>Results</h2>") < rows[0] && rows.is_sorted(), "{rows:?}");
+        assert!(rows[2] < place("<section"));
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

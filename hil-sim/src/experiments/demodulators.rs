@@ -229,8 +229,8 @@ fn tracked_table(found: &[DemodulationResults]) -> Table {
     }
     let mut table = Table { columns: heads, ..Table::new("Angle error without a position sensor", &[]) }
         .note(format!(
-            "Steps: 1 A to 2 A, shaft locked. Speeds: a dynamometer holds them, iq = {RUN_IQ_A} A, one \
-             second. lost: beyond 45°, or stopped. constant: the printed 10 mA and the printed k_s, both \
+            "Steps: 1 A to 2 A, shaft locked. Speeds: a dynamometer brings the shaft there without torque, \
+             then a step to iq = {RUN_IQ_A} A, one second. lost: beyond 45°, or stopped. constant: the printed 10 mA and the printed k_s, both \
              by the gain of the detector, and the printed z_s; Ha and Sul compare with zero. learned: a \
              table over iq instead. retuned: the same, k_s = 0.1 rad/A, z_s = 0.995; the synchronous \
              demodulation has its own loop. Delay: from a change of the motor's saliency to the signal, \
@@ -296,7 +296,8 @@ const REMARKS: [&str; 3] = [
          has delayed, and so sees how fast the axis turns: a damping (with the rotation put before the \
          band-pass it loses the angle). Envelope and rms-impedance rotate first, which spares them the \
          compensation of that delay, and oscillate or lose the angle with z_s = 0.90; with z_s = 0.995 \
-         both track like the rest. A learned reference takes the bias out of whatever sees the \
+         both track. The rectified chain, retuned, loses the angle where the shaft gets up to speed without torque, \
+         as at 150 rpm here; it keeps it where the torque is there before the speed. A learned reference takes the bias out of whatever sees the \
          saliency.",
     "Fritsch et al. take neighbouring samples; here they are two apart (72°). The source found the \
          envelope promising but for spurious oscillations: they are the leak of the fundamental, at \

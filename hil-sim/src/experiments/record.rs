@@ -8,12 +8,12 @@ use drive_core::Command;
 
 use self::held::{Held, Standstill, reversing};
 use self::step::{CurrentLoop, PARTS, Response, measured};
-use super::battery::{allowed_a, nominal_limit_a};
+use super::battery::allowed_a;
 use super::steady::{bring_up, prepared};
 use super::torque::assumptions;
-use super::torque_limit::TorqueLimit;
+use super::torque_limit::{BEYOND_A, TorqueLimit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP};
-use crate::config::{Config, plant_settings};
+use crate::config::{Config, open_phase, plant_settings};
 use crate::error::Error;
 use crate::outcome::{Cell, Figure, Outcome, Panel, Series, Table};
 use crate::plant::Plant;
@@ -73,9 +73,9 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     if plant_settings(&after) != plant_settings(&config) {
         // The drive is off, and the motor at rest without flux: another one takes its place.
         rig.plant = Plant::new(&plant_settings(&after), context.seed).map_err(Error::refused)?;
+        rig.plant.set_open_phase(open_phase(&after)).map_err(Error::refused)?;
     }
-    let nominal = nominal_limit_a(&config);
-    let limit = allowed_a(&rig.drive, nominal)?;
+    let limit = allowed_a(&rig.drive, config.amperes(BEYOND_A))?;
     let torque = TorqueLimit::new(&config, limit);
     let held = context.in_parallel("record", &COURSES, |_, &(course, sign)| {
         hold(&after, rig.clone(), course, sign * limit)
@@ -83,7 +83,6 @@ fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let m = &mut outcome.metrics;
     m.set("limit_a", limit);
-    m.set("limit_pct", 100.0 * limit / nominal);
     m.set("limit_nm", torque.nm);
     m.set("limit_pct_of_rated_torque", torque.percent);
     for course in [Course::Standstill, Course::Reversal] {
@@ -151,7 +150,7 @@ fn hold(config: &Config, mut rig: Rig, course: Course, i_q: f64) -> Result<Held,
 
 fn held_table(all: &[Held], torque: &TorqueLimit) -> Table {
     let mut table = Table::new("The torque limit held", &[]).note(
-        "First and last: means over the first and the last tenth of the time. Torque: mean in relation to that of the \
+        "First and last: means over the first and the last minute, or tenth of a shorter time than ten minutes. Torque: mean in relation to that of the \
          current; it includes the shape of the error.",
     );
     for ((course, sign), held) in COURSES.iter().zip(all) {

@@ -91,6 +91,7 @@ struct Run {
     points: Vec<Point>,
     demodulator: DemodulatorKind,
     fault: Option<String>,
+    learned: bool,
     notes: Vec<String>,
 }
 
@@ -126,7 +127,7 @@ impl Run {
             notes.insert(0, format!("The drive limited the torque reference to {a:.3} A."));
         }
         let (demodulator, fault) = (context.config.drive.injection.demodulator, rig.fault());
-        Ok(Self { points, demodulator, fault, notes })
+        Ok(Self { points, demodulator, fault, learned: context.config.prepare.learn, notes })
     }
 
     fn after(&self, from: f64, to: f64) -> impl Iterator<Item = &Point> {
@@ -159,7 +160,9 @@ impl Run {
         m.set("torque_minus_eq_4_4_rms_nm", difference.rms());
 
         if let Some(fault) = &self.fault {
-            outcome.remarks.push(format!("The drive stopped itself with {fault}."));
+            let unlearned =
+                if self.learned { "" } else { ", and had not learned (`prepare.learn`)" };
+            outcome.remarks.push(format!("The drive stopped itself with {fault}{unlearned}."));
             outcome.faults.push(fault.clone());
         }
         outcome.remarks.extend(self.notes.iter().cloned());

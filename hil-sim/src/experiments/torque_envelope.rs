@@ -2,10 +2,10 @@
 
 use drive_core::{Command, Drive, Mode};
 
-use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up, nominal_limit_a, torque_nm};
+use super::battery::{Bench, LONGEST_START_S, Shaft, bring_up};
 use super::full_range::{I_D_A, for_the_range};
 use super::torque::assumptions;
-use super::torque_limit::{TorqueLimit, learned_limit};
+use super::torque_limit::{BEYOND_A, TorqueLimit, learned_limit};
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT};
 use crate::config::{Config, plant_settings};
 use crate::error::Error;
@@ -71,8 +71,7 @@ fn measure(config: &Config, drive: &Drive, point: Point, seed: u64) -> Result<Me
     }
     let volts = config.inverter.dc_link_v * point.link;
     bench.rig.plant.set_dc_link(volts).map_err(Error::refused)?;
-    let most = point.sign * nominal_limit_a(config);
-    bench.torque(most as f32)?;
+    bench.torque((point.sign * config.amperes(BEYOND_A)) as f32)?;
     bench.counted_from = Some(bench.time() + SETTLING_S);
     let still = bench.watch(SETTLING_S + MEAN_S);
     Ok(still.then(|| (point.sign * bench.torque.mean(), bench.peak_a)))
@@ -91,7 +90,6 @@ fn outcome(
     let at = |sign: f64, link: f64| {
         points.iter().zip(measured).filter(move |(p, _)| p.sign == sign && p.link == link)
     };
-    let of_currents = torque_nm(config, nominal_limit_a(config));
     for (sign, word) in [(1.0, "motoring"), (-1.0, "generating")] {
         let mut panel = Panel::new("speed (rpm)", format!("torque, {word} (Nm)"));
         for link in LINKS {
@@ -99,8 +97,8 @@ fn outcome(
             panel = panel.with(Series::line(volts(link), curve.collect()));
         }
         let ends = [0.0, config.rpm(STEP_RPM * f64::from(STEPS))];
-        let line = ends.map(|rpm| (rpm, of_currents)).to_vec();
-        figure = figure.panel(panel.with(Series::limit("current limit at full flux", line)));
+        let line = ends.map(|rpm| (rpm, limit.nm)).to_vec();
+        figure = figure.panel(panel.with(Series::limit("torque limit at rest", line)));
     }
     for n in 0..=STEPS {
         let rpm = f64::from(n) * STEP_RPM;
@@ -119,7 +117,7 @@ fn outcome(
         table.record(row);
     }
     let m = &mut outcome.metrics;
-    m.set("torque_limit_nm", of_currents);
+    m.set("torque_limit_nm", limit.nm);
     m.set("torque_limit_pct_of_rated", limit.percent);
     m.set("torque_rated_nm", config.rated_nm());
     for (point, nm) in points.iter().zip(measured).filter_map(|(p, m)| Some((p, (*m)?.0))) {

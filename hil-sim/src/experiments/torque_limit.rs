@@ -4,6 +4,7 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use drive_core::Drive;
 use drive_core::settings::Flux;
+use drive_core::settings::table::Grid;
 
 use super::battery::{allowed_a, torque_nm};
 use super::full_range::learned_drive;
@@ -14,9 +15,8 @@ use crate::error::Error;
 const SAME: f64 = 2e-3;
 /// A direct current below this share of the most useful one is the first thing to raise.
 const LOW_FLUX: f64 = 0.9;
-
-/// What binds where no setting does.
-const LEARNED: &str = "the last learned torque current, or that up to which the learned slope of the saliency is large enough";
+/// A torque current beyond all limits, A on the dissertation's motor: the drive takes as much as it can.
+pub const BEYOND_A: f64 = 100.0;
 
 /// A torque limit.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub fn learned_limit(config: &Config, seed: u64) -> Result<(Drive, TorqueLimit),
     let drive = learned_drive(config, seed)?;
     let drive = drive
         .map_err(|fault| Error::Refused(format!("the drive does not learn: fault {fault}")))?;
-    let limit = TorqueLimit::new(config, allowed_a(&drive, config.amperes(100.0))?);
+    let limit = TorqueLimit::new(config, allowed_a(&drive, config.amperes(BEYOND_A))?);
     Ok((drive, limit))
 }
 
@@ -49,9 +49,8 @@ impl TorqueLimit {
     /// That of a drive which takes at most this torque current, A peak.
     pub fn new(config: &Config, i_q: f64) -> Self {
         let nm = torque_nm(config, i_q);
-        let binds = binding(config, i_q);
-        let more = more(config, binds.is_none());
-        let binds = binds.unwrap_or_else(|| LEARNED.to_owned());
+        let (binds, by_current) = binding(config, i_q);
+        let more = more(config, by_current);
         Self { i_q, nm, percent: 100.0 * nm / config.rated_nm(), binds, more }
     }
 
@@ -67,33 +66,38 @@ impl TorqueLimit {
     }
 }
 
-/// The setting that binds; none where it is what the drive has learned.
-fn binding(config: &Config, i_q: f64) -> Option<String> {
+/// What binds, and whether a larger `limits.current_a` raises that.
+fn binding(config: &Config, i_q: f64) -> (String, bool) {
     let drive = &config.drive;
     let (limit, i_d) = (f64::from(drive.current_limit_a()), f64::from(drive.i_d()));
     let is = |other: f64| (i_q / other - 1.0).abs() < SAME;
-    if is((limit * limit - i_d * i_d).max(0.0).sqrt()) {
+    let largest = (limit * limit - i_d * i_d).max(0.0).sqrt();
+    let step = f64::from(Grid::for_current(limit as f32).step_a());
+    if is(largest) {
         let range = f64::from(drive.sensor_range_a());
         let by_range = limit < (1.0 - SAME) * f64::from(drive.share_of_rated(3.5));
-        Some(match drive.limits.current_a {
+        let what = match drive.limits.current_a {
             None if by_range => format!(
                 "the current limit of {limit:.2} A, which is that of the sensors (`measurement.range_a` = {range:.2} A)"
             ),
             _ => format!("the current limit of {limit:.2} A (`limits.current_a`)"),
-        })
+        };
+        (what, true)
+    } else if is((largest / step).floor() * step) {
+        ("the last learned torque current, by `limits.current_a`".to_owned(), true)
     } else {
-        is(drive.i_q_limit_a().into()).then(|| "`speed.i_q_limit_a`".to_owned())
+        ("the learned slope of the saliency, which is too small beyond".to_owned(), false)
     }
 }
 
-fn more(config: &Config, is_learned: bool) -> String {
+fn more(config: &Config, by_current: bool) -> String {
     let (drive, plate) = (&config.drive, &config.drive.nameplate);
     let i_d = f64::from(drive.i_d());
     let rated_flux =
         f64::from(plate.voltage_v) * (2.0_f64 / 3.0).sqrt() / (TAU * f64::from(plate.frequency_hz));
     let of_rated_flux = rated_flux / config.motor.l_m;
     let is_low = i_d < LOW_FLUX * of_rated_flux.min(f64::from(drive.rated_a()) / SQRT_2);
-    if !is_low && !is_learned {
+    if !is_low && by_current {
         return "More: a larger `limits.current_a`, and current sensors of a larger range."
             .to_owned();
     }

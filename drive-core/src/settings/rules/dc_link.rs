@@ -1,6 +1,6 @@
 //! The rules for the voltages of the dc link.
 
-use super::or_rule;
+use super::{WITHIN, or_rule};
 use crate::dc_link::{ChopperSettings, DcLinkSettings};
 use crate::io::{CONVERTER_CODES, periods};
 use crate::settings::Settings;
@@ -10,8 +10,6 @@ use crate::supply::Relay;
 pub const OVER_OF_HIGHEST: f32 = 1.05;
 /// Highest dc link in operation, in relation to the highest nominal one: generating torque has a band between them.
 pub const HIGHEST_OF_NOMINAL: f32 = 1.06;
-/// Rules end this far within the limits of the power stage, since they round to four digits.
-const WITHIN: f32 = 0.998;
 /// Band in which generating torque is limited, in relation to the distance from the nominal voltage: widened by 1.4 at
 /// speed it stays clear of that.
 const BAND: f32 = 0.64;
@@ -66,7 +64,8 @@ impl Settings {
 
     /// Direct current that is added while generating torque is limited, A.
     pub fn braking_flux_a(&self) -> f32 {
-        or_rule(self.braking.flux_a, || self.share_of_rated(1.0))
+        let rule = || f32::min(self.share_of_rated(1.0), WITHIN * self.current_limit_a());
+        or_rule(self.braking.flux_a, rule)
     }
 
     /// The precharge relay, which opens where the drive trips.

@@ -1,6 +1,6 @@
 //! The rules of the speed and the position loop.
 
-use super::or_rule;
+use super::{WITHIN, or_rule};
 use crate::settings::Settings;
 
 impl Settings {
@@ -9,12 +9,12 @@ impl Settings {
         or_rule(self.speed.i_q_limit_a, || 3.0 / 3.5 * self.current_limit_a())
     }
 
-    /// Largest speed that is asked for, rpm: the rated speed with the observer. The injection alone is good to 300 rpm on
-    /// four poles; with an encoder it may be larger.
+    /// Largest speed that is asked for, rpm, below that which trips: the rated speed with the observer. The injection alone is good
+    /// to 300 rpm on four poles; with an encoder it may be larger.
     pub fn speed_limit_rpm(&self) -> f32 {
-        or_rule(self.speed.limit_rpm, || {
-            if self.uses_observer() { self.nameplate.speed_rpm } else { self.share_of_poles(300.0) }
-        })
+        let rated = self.nameplate.speed_rpm;
+        let rpm = if self.uses_observer() { rated } else { self.share_of_poles(300.0) };
+        or_rule(self.speed.limit_rpm, || f32::min(rpm, WITHIN * self.speed_trip_rpm()))
     }
 
     /// Largest acceleration that is asked for, rpm/s. Without a sensor the angle lags by 5.7 degrees while the speed

@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::disturbed::Asymmetry;
-use crate::config::{BatteryRuns, Config};
+use crate::config::{BatteryRuns, Config, PlantModel};
 use crate::error::Error;
 
 /// A kind of run. Currents, speeds and torques are those of the dissertation's motor; on others they are in proportion.
@@ -69,6 +69,7 @@ const RESTLESS: [Kind; 6] = [
     Kind::Restless { hz: 600, forced: true },
     Kind::Restless { hz: 6000, forced: true },
 ];
+/// The last two need a motor of iron.
 const DRAGGED: [Kind; 7] = [
     Kind::Dragged(Asymmetry::None),
     Kind::Dragged(Asymmetry::Gains(10)),
@@ -89,7 +90,11 @@ pub fn chosen(config: &Config) -> (Vec<Kind>, usize) {
         BatteryRuns::Hold => (vec![Kind::Hold], 64),
         BatteryRuns::Forced => (FORCED.to_vec(), 90 * FORCED.len()),
         BatteryRuns::Restless => (RESTLESS.to_vec(), 16 * RESTLESS.len()),
-        BatteryRuns::Dragged => (DRAGGED.to_vec(), 24 * DRAGGED.len()),
+        BatteryRuns::Dragged => {
+            // Model A has no saliency that is fixed to the stator.
+            let ends = if config.model.plant == PlantModel::A { 5 } else { DRAGGED.len() };
+            (DRAGGED[..ends].to_vec(), 24 * ends)
+        }
     }
 }
 
@@ -356,6 +361,21 @@ mod tests {
             parts.iter().map(|part| part.load.newton_metres(&config).abs()).collect();
         assert_eq!((loads[0], loads[2]), (0.0, 0.0));
         assert!((loads[1] - 1.637).abs() < 2e-3, "{loads:?}");
+    }
+
+    /// A stator-fixed saliency changes nothing on model A, so that it is none of its kinds.
+    #[test]
+    fn a_kind_that_changes_nothing_is_left_out() {
+        let mut config = Config::default();
+        config.battery.runs = BatteryRuns::Dragged;
+        let fixed = |config: &Config| {
+            let (kinds, runs) = chosen(config);
+            let is_fixed = |kind: &&Kind| matches!(kind, Kind::Dragged(Asymmetry::StatorFixed(_)));
+            (kinds.iter().filter(is_fixed).count(), kinds.len(), runs)
+        };
+        assert_eq!(fixed(&config), (0, 5, 120));
+        config.set("plant", &Value::Word("r".into())).unwrap();
+        assert_eq!(fixed(&config), (2, 7, 168));
     }
 
     /// A current that never rests changes as often as it says, by more than noise, for the whole run, and the flux is

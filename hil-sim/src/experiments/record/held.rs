@@ -23,7 +23,7 @@ const ACCELERATION: f64 = 42.0;
 /// What is seen while torque is held.
 #[derive(Default)]
 pub struct Held {
-    /// Angle error, electrical degrees; in the mean of the first and of the last tenth of the time.
+    /// Angle error, electrical degrees; in the mean of the first and of the last minute, or tenth of a shorter time than ten.
     pub error: Stats,
     /// See `error`.
     pub first: Stats,
@@ -49,7 +49,7 @@ impl Held {
         self.fault.is_some() || self.error.largest() > LOST_DEG
     }
 
-    /// How far the mean of the last tenth is from that of the first, degrees.
+    /// How far the mean of the last minute, or tenth, is from that of the first, degrees.
     pub fn drift_deg(&self) -> f64 {
         self.last.mean() - self.first.mean()
     }
@@ -65,7 +65,7 @@ impl Held {
         at: f64,
         mut speed: impl FnMut(f64, &Plant) -> f64,
     ) -> Result<Self, Error> {
-        let (mut held, start) = (Self::default(), rig.time());
+        let (mut held, start, end) = (Self::default(), rig.time(), f64::min(60.0, 0.1 * seconds));
         let mut shown = [Stats::default(), Stats::default(), Stats::default()];
         let steps = (seconds / PACE_S).round() as u64;
         let each = (SHOWN_S / PACE_S).min(seconds / PACE_S / 50.0).max(1.0) as u64;
@@ -76,9 +76,9 @@ impl Held {
             rig.set_load(Load::Speed { speed: turns })?;
             rig.run(PACE_S, |point| {
                 held.error.push(point.angle_error_deg);
-                if t < 0.1 * seconds {
+                if t < end {
                     held.first.push(point.angle_error_deg);
-                } else if t >= 0.9 * seconds {
+                } else if t >= seconds - end {
                     held.last.push(point.angle_error_deg);
                 }
                 held.torque.push(point.torque);

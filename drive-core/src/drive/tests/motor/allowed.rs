@@ -16,6 +16,16 @@ const MODES: [Mode; 6] = [
     Mode::Commissioning,
 ];
 
+/// The states of a start.
+const STARTING: [State; 6] = [
+    State::Calibrating,
+    State::Precharge,
+    State::CheckingWiring,
+    State::Catching,
+    State::Magnetising,
+    State::Verifying,
+];
+
 /// Columns of the table.
 fn columns() -> Vec<(&'static str, Vec<Command>)> {
     use Command::*;
@@ -24,7 +34,7 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
     let current = Excitation::Current { amperes, regulator, carrier, binary: false };
     let settings = motor_settings(AngleSource::Injection).build().unwrap();
     vec![
-        ("start, learn", MODES[..5].iter().map(|mode| Start(*mode)).collect()),
+        ("start, learn", MODES.map(Start).into()),
         ("check of the wiring", vec![CheckWiring]),
         ("commission", vec![Excite(current), Excite(pulses())]),
         ("stop", [super::Stop::Coast, super::Stop::Ramp, super::Stop::Quick].map(Stop).into()),
@@ -42,7 +52,7 @@ fn columns() -> Vec<(&'static str, Vec<Command>)> {
                 Magnetising(0.7),
                 TurnInjection(1.0),
                 TestVoltage(Dq::new(1.0, 1.0)),
-                RotorTimeConstant(0.1),
+                RotorTimeConstant(0.2),
             ],
         ),
     ]
@@ -59,7 +69,12 @@ fn pulses() -> Excitation {
 
 /// A drive in this state that was started in this mode; none where no start of the mode comes by.
 fn bench(state: State, mode: Mode) -> Option<Bench> {
-    let mut bench = Bench::new(&motor_settings(AngleSource::Injection));
+    bench_of(&motor_settings(AngleSource::Injection), state, mode)
+}
+
+/// The same with these settings.
+fn bench_of(settings: &Settings, state: State, mode: Mode) -> Option<Bench> {
+    let mut bench = Bench::new(settings);
     if mode == Mode::Learning {
         bench.motor.load = None;
     }
@@ -103,19 +118,8 @@ fn turning(mode: Mode) -> Bench {
 
 /// The rows of the table, and the drives that must all agree with them.
 fn rows() -> Vec<(&'static str, Vec<Bench>)> {
-    let starting = |mode: Mode| -> Vec<Bench> {
-        [
-            State::Calibrating,
-            State::Precharge,
-            State::CheckingWiring,
-            State::Catching,
-            State::Magnetising,
-            State::Verifying,
-        ]
-        .into_iter()
-        .filter_map(|state| bench(state, mode))
-        .collect()
-    };
+    let starting =
+        |mode| -> Vec<Bench> { STARTING.iter().filter_map(|state| bench(*state, mode)).collect() };
     let then = |mut bench: Bench, stop: Stop| {
         bench.drive.command(&Command::Stop(stop)).unwrap();
         bench.step();
@@ -206,6 +210,32 @@ fn every_command_is_taken_or_refused_in_every_state() {
     let manual = include_str!("../../../../../docs/control-law.md").replace('`', "");
     for line in table.lines() {
         assert!(manual.contains(line), "not in docs/control-law.md: {line}\n{table}");
+    }
+}
+
+/// The table says where a command is taken whatever its value. Those of the last column need the encoder, a rotor time constant that
+/// is tracked, or a flux without tables: with these each is taken and done in each state where the table says yes.
+#[test]
+fn commands_that_need_the_encoder_are_taken_where_the_table_says() {
+    let mut settings = motor_settings(AngleSource::Encoder);
+    settings.track_rotor = true;
+    let (name, commands) = columns().pop().unwrap();
+    assert_eq!((name, commands.len()), ("flux, test voltage", 4));
+    for mode in [Mode::Torque, Mode::Speed, Mode::Position] {
+        let states = STARTING.into_iter().chain([State::of_mode(mode)]);
+        let benches: Vec<_> = states.filter_map(|state| bench_of(&settings, state, mode)).collect();
+        // With the encoder no start looks for a turning shaft or verifies a lock.
+        assert_eq!(benches.len(), 5, "{mode:?}");
+        for (bench, command) in
+            benches.iter().flat_map(|bench| commands.iter().map(move |command| (bench, command)))
+        {
+            let (mut after, state) = (bench.clone(), bench.drive.state());
+            let answer = after.drive.command(command);
+            assert!(answer.is_ok(), "{command:?} while {state}, {mode:?}: {answer:?}");
+            after.run(0.2);
+            let now = after.drive.state();
+            assert!(!matches!(now, State::Fault(_)), "{command:?} while {state}, {mode:?}: {now}");
+        }
     }
 }
 
