@@ -53,8 +53,6 @@ pub struct Board {
     connection: Connection,
     sleeping: bool,
     hung: bool,
-    /// The core executes nothing before this.
-    stalled_until: u64,
     entered: Option<RunningInterrupt>,
     periods: VecDeque<Period>,
     addresses: Option<Addresses>,
@@ -108,7 +106,6 @@ impl Board {
             connection: Connection::new(&options),
             sleeping: false,
             hung: false,
-            stalled_until: 0,
             entered: None,
             periods: VecDeque::new(),
             addresses,
@@ -131,12 +128,14 @@ impl Board {
         }
         chip.gates = GateWatch::new(options.power_stage, &chip.gpio, &chip.tim1);
         chip.look_at_gates();
+        chip.dc_link.source = options.dc_link_pin;
+        chip.fault_pull_ohm = options.fault_pull_ohm;
         board.show_sample();
         // The dc link is there before the first period. (A copy, so that the noise of the periods is the same.)
         let dc_link = board.plant.clone().sample().dc_link;
         board.chip().compare(0, 0, dc_link);
         board.cpu.chip_mut().keep_blocks = options.counting.cycles;
-        board.cpu.chip_mut().rules.exact = options.counting.every_instruction;
+        board.cpu.chip_mut().rules.coarse = !options.counting.every_instruction;
         board.cpu.reset(memory::FLASH);
         Ok(board)
     }
@@ -221,7 +220,6 @@ impl Board {
         }
         self.sleeping = false;
         self.hung = false;
-        self.stalled_until = 0;
         self.entered = None;
         self.follow_outputs();
         self.cpu.reset(memory::FLASH);
@@ -261,7 +259,8 @@ impl Board {
                 self.preempt_at = None;
                 return Ok(());
             }
-            if !self.cpu.chip().is_halted() {
+            let chip = self.cpu.chip();
+            if !chip.is_halted() && chip.stalled_until <= chip.now {
                 self.exceptions()?;
             }
             self.go(end)?;
@@ -276,7 +275,8 @@ impl Board {
             self.crest(at)?;
         }
         self.follow_outputs();
-        self.cpu.follow_guard().map_err(|e| anyhow!("emulator: {e:?}"))?;
+        let followed = self.cpu.follow_guard().and_then(|()| self.cpu.follow_flash());
+        followed.map_err(|e| anyhow!("emulator: {e:?}"))?;
         let chip = self.cpu.chip_mut();
         if let Some(unknown) = chip.unknown.take() {
             bail!("{unknown} at {}", self.image.location(unknown.at));

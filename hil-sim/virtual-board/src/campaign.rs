@@ -22,6 +22,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::board::Board;
 use crate::chip::TICKS_PER_PERIOD;
 use crate::image::Image;
 use crate::periph::Reset;
@@ -52,6 +53,9 @@ struct Tally {
     failures: Vec<(u64, String)>,
 }
 
+/// Changes a board before each fault, given its class and nothing, and after it, given its description too.
+pub type Without = fn(&mut Board, &str, &str);
+
 /// The faults of a campaign.
 #[derive(Clone, Debug)]
 pub struct Selection {
@@ -59,13 +63,15 @@ pub struct Selection {
     pub count: u64,
     /// Seed of the first; each has the next one that is chosen.
     pub seed: u64,
-    /// Only of the classes whose name contains this.
+    /// Only of the classes whose name contains this, or one of several texts with `|` between them.
     pub class: String,
     /// Speed of the shaft, rpm on four poles: 850 to 3500, where the observer alone gives the angle. None: the shaft is
     /// locked without the encoder, and at 300 and 900 rpm with it.
     pub rpm: Option<f64>,
     /// The power stage that the image was built for.
     pub stage: &'static PowerStage,
+    /// Takes a protection out, to see that a class fails.
+    pub without: Without,
 }
 
 /// A campaign of faults; `open` opens the image. Gives the table.
@@ -73,12 +79,13 @@ pub struct Selection {
 /// # Errors
 /// The table with the failures; no class has that name.
 pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Result<String> {
-    let Selection { count, seed, ref class, rpm, stage } = *selection;
+    let Selection { count, seed, ref class, rpm, stage, without } = *selection;
     let all = Class::all(rpm.is_some());
     let classes = all.len() as u64;
-    let is_chosen = |seed: &u64| all[(seed % classes) as usize].name.contains(class);
+    let chosen = |one: &Class| class.split('|').any(|part| one.name.contains(part));
+    let is_chosen = |seed: &u64| chosen(&all[(seed % classes) as usize]);
     ensure!(
-        all.iter().any(|c| c.name.contains(class)),
+        all.iter().any(chosen),
         "no class of faults has {class:?} in its name: {}",
         all.iter().map(|c| c.name).collect::<Vec<_>>().join("; ")
     );
@@ -99,7 +106,7 @@ pub fn run(open: impl Fn() -> Result<Image> + Sync, selection: &Selection) -> Re
             let taken = seeds.lock().map_err(|_| anyhow!("another worker has failed"))?.next();
             let Some(seed) = taken else { return Ok(()) };
             let which = (seed % classes) as usize;
-            let outcome = one(&mut scene, &all[which], seed / classes, seed);
+            let outcome = one(&mut scene, &all[which], seed / classes, seed, without);
             let outcome = outcome.and_then(|outcome| {
                 // A damaged program may break the chip's rules; one that is whole may not.
                 let whole = !matches!(all[which].run, Run::Regulating(_));
@@ -150,16 +157,18 @@ fn add(tally: &mut Tally, class: &Class, seed: u64, outcome: Result<Outcome>) {
 }
 
 /// One fault.
-fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64) -> Result<Outcome> {
+fn one(scene: &mut Scene, class: &Class, turn: u64, seed: u64, cut: Without) -> Result<Outcome> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let source = class.sources[(turn % class.sources.len() as u64) as usize];
     let whole_start = rng.random_range(0..WHOLE_STARTS) == 0;
     match class.run {
         Run::Regulating(inject) => {
             scene.regulating(source, turn)?;
+            cut(&mut scene.board, class.name, "");
             // Whole periods, for the truth is compared once in each, and a part of one for the fault.
             scene.board.run_periods(rng.random_range(0..LATEST) / TICKS_PER_PERIOD)?;
             let what = inject(&mut scene.board, &scene.target, &mut rng);
+            cut(&mut scene.board, class.name, &what);
             let (promised, bound) = (class.bound.0.is_finite(), class.bound.0);
             let trip_a = scene.target.settings.trip_a().into();
             let ms = AFTER_MS + if promised { bound } else { 0.0 };

@@ -7,6 +7,7 @@ mod bus;
 mod clocked;
 pub mod debugger;
 mod execution;
+mod nets;
 pub mod pins;
 mod supply;
 
@@ -22,13 +23,12 @@ use crate::periph::encoder::EncoderTimer;
 use crate::periph::flash::Flash;
 use crate::periph::gpio::Gpio;
 use crate::periph::iwdg::Iwdg;
-use crate::periph::lpuart::Lpuart;
 use crate::periph::pwr::Pwr;
 use crate::periph::rcc::Rcc;
 use crate::periph::tim1::{Event, Tim1};
 use crate::periph::tim8::Tim8;
 use crate::periph::time_base::TimeBase;
-use crate::periph::usart::Usart;
+use crate::periph::uart::{self, Uart};
 use crate::periph::wwdg::Wwdg;
 use crate::periph::{NEVER, Reset, Store, plain};
 use crate::power_stage::{self, watch::GateWatch};
@@ -36,14 +36,13 @@ use crate::rules::{Rule, Rules};
 use crate::scs::{self, Scs};
 pub use crate::time::{TICKS_PER_PERIOD, TICKS_PER_S};
 use debugger::{Halt, IWDG_STOP, WWDG_STOP};
+use nets::DcLinkNet;
 
 /// Longest time that the core runs on without being looked at, ticks.
 const PATIENCE: u64 = 2 * TICKS_PER_PERIOD;
 
 /// Code that the reference inside the chip had in the factory, beside 3.0 V: 1.212 V (datasheet, typical).
 const OWN_REFERENCE_CODE: u16 = 1655;
-/// Largest code of the analog signals.
-const FULL_SCALE: u16 = 4095;
 /// Positions in the vector table, from the first peripheral.
 const IRQ_ADC1_2: u16 = 18;
 const IRQ_USART3: u16 = 39;
@@ -57,7 +56,9 @@ pub const CONTROL_INTERRUPT: u16 = 16 + IRQ_ADC1_2;
 pub enum Damage {
     /// DAC3 gives this code whatever it is told.
     Level(u16),
-    /// The output of the comparator stays low.
+    /// The comparator does not see its pin.
+    Input,
+    /// The output of the comparator stays low, whatever its polarity.
     Comparator,
     /// The break sees no comparator.
     Break,
@@ -76,6 +77,8 @@ pub struct Chip {
     pub attention: bool,
     /// The first access that the model does not know.
     pub unknown: Option<Unknown>,
+    /// The core executes nothing before this.
+    pub stalled_until: u64,
     /// A reset that is due.
     pub reset: Option<Reset>,
     /// Where the core was last seen.
@@ -119,6 +122,10 @@ pub struct Chip {
     system_rose: u64,
     /// Codes at the pins of current a, current b, dc link.
     analog: [u16; 3],
+    pub(crate) dc_link: DcLinkNet,
+    /// Resistor from the fault input to the supply, ohm, and whether the power stage pulls the input low.
+    pub(crate) fault_pull_ohm: f64,
+    pub(crate) fault_low: bool,
     last_block: Option<(u32, u32)>,
     /// Core-private registers.
     pub scs: Scs,
@@ -149,9 +156,9 @@ pub struct Chip {
     /// Reference voltages of the comparators.
     pub dac: Dacs,
     /// Console.
-    pub lpuart: Lpuart,
+    pub lpuart: Uart,
     /// Field bus.
-    pub usart3: Usart,
+    pub usart3: Uart,
     /// Watchdog.
     pub iwdg: Iwdg,
     /// Window watchdog.
@@ -173,6 +180,7 @@ impl Default for Chip {
             first: false,
             attention: false,
             unknown: None,
+            stalled_until: 0,
             reset: None,
             at: 0,
             accesses: 0,
@@ -182,7 +190,7 @@ impl Default for Chip {
             compared: (0, 0),
             watched: None,
             forgiving: false,
-            rules: Rules::new(),
+            rules: Rules::default(),
             core_runs: false,
             guard_hit: None,
             flash_cycles: 1,
@@ -196,6 +204,9 @@ impl Default for Chip {
             bus_hz: 16_000_000,
             system_rose: 0,
             analog: [0; 3],
+            dc_link: DcLinkNet::new(power_stage::REFERENCE.dc_link_pin),
+            fault_pull_ohm: power_stage::REFERENCE.fault_pull_ohm,
+            fault_low: false,
             last_block: None,
             scs: Scs::default(),
             rcc: Rcc::new(Reset::Power),
@@ -211,8 +222,8 @@ impl Default for Chip {
             adc: Adc::default(),
             comp: Comparators::default(),
             dac: Dacs::default(),
-            lpuart: Lpuart::default(),
-            usart3: Usart::default(),
+            lpuart: Uart::new(&uart::LPUART1),
+            usart3: Uart::new(&uart::USART3),
             iwdg: Iwdg::default(),
             wwdg: Wwdg::default(),
             debug: Store::new(plain::DEBUG),
@@ -234,7 +245,8 @@ impl Chip {
         self.rules = old.rules;
         self.flash_cycles = old.flash_cycles;
         self.pwr.supply_v = old.pwr.supply_v;
-        self.analog = old.analog;
+        (self.analog, self.dc_link) = (old.analog, old.dc_link);
+        (self.fault_pull_ohm, self.fault_low) = (old.fault_pull_ohm, old.fault_low);
         self.damage = old.damage;
         (self.clock_error, self.reference_error) = (old.clock_error, old.reference_error);
         (self.tim5, self.iwdg.clock) = (old.tim5.after_reset(), old.iwdg.clock);
@@ -244,21 +256,19 @@ impl Chip {
             self.debug = old.debug;
             self.halt = old.halt;
         }
-        let mut flags = old.rcc.reset_flags();
-        if cause == Reset::Power {
-            flags = 0;
-        }
         self.rcc = Rcc::new(cause);
-        self.rcc.add_reset_flags(flags);
+        if cause != Reset::Power {
+            self.rcc.flags |= old.rcc.flags;
+        }
         self.rcc.crystal_lives = old.rcc.crystal_lives;
         self.rcc.pll_locks = old.rcc.pll_locks;
         self.flash = old.flash.after_reset();
-        self.tim1.fault_pin_high = old.tim1.fault_pin_high;
+        self.follow_fault_pin();
         self.tim1.drop_update = old.tim1.drop_update;
-        self.tim2.set_position(old.tim2.position());
+        self.tim2.position = old.tim2.position;
         self.adc.inputs = old.adc.inputs;
         self.adc.lose_triggers = old.adc.lose_triggers;
-        self.lpuart.wire = old.lpuart.wire;
+        self.lpuart.line = old.lpuart.line;
         self.usart3.line = old.usart3.line;
         self.gates = old.gates;
         self.look_at_gates();
@@ -299,12 +309,9 @@ impl Chip {
 
     /// Interrupt requests that are levels.
     pub fn update_lines(&mut self) {
-        let adc = self.adc.requests();
-        self.scs.set_line(IRQ_ADC1_2, adc);
-        let serial = self.lpuart.requests();
-        self.scs.set_line(IRQ_LPUART, serial);
-        let bus = self.usart3.requests();
-        self.scs.set_line(IRQ_USART3, bus);
+        self.scs.set_line(IRQ_ADC1_2, self.adc.requests());
+        self.scs.set_line(IRQ_LPUART, self.lpuart.requests());
+        self.scs.set_line(IRQ_USART3, self.usart3.requests());
     }
 
     /// Time of the next event.
@@ -320,6 +327,7 @@ impl Chip {
             self.rcc.next_event(),
             self.comp.next_event(),
             self.dac.next_event(self.now),
+            self.dc_link.next_event(),
             self.back_on.unwrap_or(NEVER),
             self.now.saturating_add(PATIENCE),
         ]
@@ -331,63 +339,6 @@ impl Chip {
     /// Looks at the gates: whenever a pin or the timer's outputs may have changed.
     pub fn look_at_gates(&mut self) {
         self.gates.look(&self.gpio, &self.tim1, self.at, self.now);
-    }
-
-    /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
-    /// dc link here, comparator 3 PA0 or PC1.
-    pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
-        self.analog = [current_a, current_b, dc_link];
-        self.compare_now();
-    }
-
-    /// The converter and channel whose level comparator 1 or 3, counted from 0, looks at.
-    fn level_of(&self, n: usize) -> Option<(usize, usize)> {
-        // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
-        match self.comp.reference_of(n) {
-            4 => Some((1, 1)),
-            5 => Some((0, 1)),
-            _ => None,
-        }
-    }
-
-    fn compare_now(&mut self) {
-        let [current_a, current_b, dc_link] = self.analog;
-        // A pull of the chip moves the pin: 40 kOhm against the 10 kOhm of a divider.
-        self.comp.inputs[0] = match self.gpio[0].pull(1) {
-            Some(true) => dc_link + (FULL_SCALE - dc_link.min(FULL_SCALE)) / 5,
-            Some(false) => dc_link - dc_link / 5,
-            None => dc_link,
-        };
-        self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
-        for n in [0, 2] {
-            let level = self.level_of(n);
-            let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
-            self.comp.references[n] = code.unwrap_or(u16::MAX);
-        }
-        match self.damage {
-            Some(Damage::Level(code)) => self.comp.references[0] = code,
-            Some(Damage::Comparator) => self.comp.inputs[0] = 0,
-            Some(Damage::Break) | None => {}
-        }
-        self.comp.look(self.now);
-        let reaches = self.damage != Some(Damage::Break);
-        self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp.output(n)));
-    }
-
-    /// A comparator was written: the level it looks at must have been seen ready.
-    fn check_reference(&mut self, offset: u32) {
-        let n = ((offset - 0x200) / 4) as usize;
-        let on = self.comp.is_on(n);
-        if let (true, Some((which, channel))) = (on, self.level_of(n)) {
-            let ready = self.dac.seen_ready(which, channel);
-            self.rules.require(ready, Rule::DacReady, || {
-                format!(
-                    "COMP{} is on, but DAC{}_SR.DAC{channel}RDY was never read as set",
-                    n + 1,
-                    [1, 3][which]
-                )
-            });
-        }
     }
 
     /// Lets events happen that are due by now, up to the top of the PWM counter: the time of the top, if it was
@@ -410,16 +361,16 @@ impl Chip {
             self.system_break();
             self.scs.pend(scs::NMI);
         }
+        self.compare_now();
         self.adc.happen(now);
         (self.rules.now, self.rules.at) = (now, self.at);
         self.check_analog_pins();
         self.check_outputs_back();
-        self.compare_now();
-        self.lpuart.happen(now);
+        self.lpuart.happen(now, None);
         let driver = self.drives_bus();
-        let lost = self.usart3.happen(now, driver);
+        let lost = self.usart3.happen(now, Some(driver));
         self.rules.require(!lost, Rule::BusDriver, || "a byte ended with PC12 not high".to_owned());
-        if !self.stops(IWDG_STOP) && self.iwdg.expired(now) {
+        if !self.stops(IWDG_STOP) && self.iwdg.next_event() <= now {
             self.reset = Some(Reset::Watchdog);
         }
         if !self.stops(WWDG_STOP) && self.wwdg.next_event() <= now {

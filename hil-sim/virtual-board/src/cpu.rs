@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 pub use unicorn_engine::RegisterARM as Register;
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, Permission, uc_error};
-use unicorn_engine::{Context, Unicorn};
+use unicorn_engine::{Context, UcHookId, Unicorn};
 
 use crate::chip::Chip;
 use crate::cost::{self, Costs};
@@ -63,6 +63,8 @@ pub struct Cpu {
     faulted: Rc<Cell<Option<u32>>>,
     trapped: Rc<Cell<bool>>,
     guard: Option<guard::Guard>,
+    /// The hook of reads from the flash of the code.
+    flash_reads: Option<UcHookId>,
 }
 
 /// Registers and memories of a stopped core.
@@ -73,6 +75,8 @@ pub struct CoreState {
 
 /// Size of the pieces, bytes, that are compared before they are written: written code is translated anew.
 const PIECE: usize = 256;
+/// After an operation of the flash the next may come within this time, ticks: 100 ms.
+const WRITES: u64 = 100 * 170_000;
 /// Exceptions of the emulator that are a branch to EXC_RETURN: the documented one, and a fetch from there.
 const EXCEPTION_EXIT: [u32; 2] = [8, 3];
 
@@ -122,8 +126,8 @@ impl Cpu {
         // Main loop and slow interrupts run from the flash: a cycle per instruction.
         let flash = (u64::from(memory::FLASH), u64::from(memory::STORED - 1));
         if counting.every_instruction {
-            uc.add_code_hook(flash.0, flash.1, |uc, address, _| {
-                if !stopped(uc, address) {
+            uc.add_code_hook(flash.0, flash.1, |uc, address, size| {
+                if !fetched(uc, address, size) {
                     uc.get_data_mut().instructions(1);
                 }
             })?;
@@ -131,7 +135,7 @@ impl Cpu {
             let mut lengths = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |_| 1);
             let mut costs = Costs::new(memory::FLASH, memory::STORED - memory::FLASH, |i| i.cycles);
             uc.add_block_hook(flash.0, flash.1, move |uc, address, size| {
-                if stopped(uc, address) {
+                if fetched(uc, address, size) {
                     return;
                 }
                 if uc.get_data().in_control {
@@ -182,7 +186,35 @@ impl Cpu {
             note.set(Some(address as u32));
             false
         })?;
-        Ok(Self { uc, faulted, trapped, guard: None })
+        Ok(Self { uc, faulted, trapped, guard: None, flash_reads: None })
+    }
+
+    /// Follows the flash: reads of data from the part of the code are looked at only while it is written or has a bad word, since
+    /// all memory is slower meanwhile.
+    ///
+    /// # Errors
+    /// An error of the emulator.
+    pub fn follow_flash(&mut self) -> Result<(), uc_error> {
+        let chip = self.chip();
+        let wanted =
+            chip.flash.bad_code.is_some() || chip.flash.is_busy(chip.now.saturating_sub(WRITES));
+        if wanted == self.flash_reads.is_some() {
+            return Ok(());
+        }
+        self.flash_reads = match self.flash_reads.take() {
+            Some(hook) => self.uc.remove_hook(hook).map(|()| None)?,
+            None => Some(self.uc.add_mem_hook(
+                HookType::MEM_READ,
+                memory::FLASH.into(),
+                u64::from(memory::STORED - 1),
+                |uc, _, address, size, _| {
+                    uc.get_data_mut().fetch(address as u32, size as u32);
+                    true
+                },
+            )?),
+        };
+        // Whether memory is looked at is decided where code is translated.
+        self.uc.ctl_flush_tb()
     }
 
     /// Keeps registers and memories; the flash of the code is not changed by anything.
@@ -319,6 +351,16 @@ fn stopped(uc: &mut Unicorn<Chip>, address: u64) -> bool {
         uc.emu_stop().ok();
     }
     stops
+}
+
+/// The same of code in the flash, which may have to wait for the flash.
+#[inline]
+fn fetched(uc: &mut Unicorn<Chip>, address: u64, size: u32) -> bool {
+    if uc.get_data_mut().fetch(address as u32, size) {
+        uc.emu_stop().ok();
+        return true;
+    }
+    stopped(uc, address)
 }
 
 /// Cycles of a block.

@@ -73,7 +73,8 @@ fn run(arguments: Arguments) -> Result<()> {
     match arguments.task {
         Task::Campaign { elf, count, seed, class, rpm, board } => {
             let stage = PowerStage::named(&board)?;
-            let selection = campaign::Selection { count, seed, class, rpm, stage };
+            let without = |_: &mut _, _: &_, _: &_| ();
+            let selection = campaign::Selection { count, seed, class, rpm, stage, without };
             println!("{}", campaign::bounds(rpm.is_some()));
             println!("{}", campaign::run(|| Image::open(&elf), &selection)?);
         }

@@ -7,14 +7,13 @@ pub mod encoder;
 pub mod flash;
 pub mod gpio;
 pub mod iwdg;
-pub mod lpuart;
 pub mod plain;
 pub mod pwr;
 pub mod rcc;
 pub mod tim1;
 pub mod tim8;
 pub mod time_base;
-pub mod usart;
+pub mod uart;
 pub mod wwdg;
 
 use std::fmt;
@@ -59,8 +58,6 @@ pub enum Effect {
     Look,
     /// A reset is asked for.
     Reset,
-    /// A non-maskable interrupt is raised.
-    Nmi,
 }
 
 /// A register without behaviour: offset, value after reset, bits that can be written.

@@ -78,6 +78,20 @@ pub enum Sensors {
     LowSide(Shunts),
 }
 
+/// What the pin of the dc link is connected to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DcLinkPin {
+    /// A divider with this resistance, seen from the pin, and a capacitor to ground.
+    Divider {
+        /// Ohm.
+        ohm: f64,
+        /// Farad.
+        farad: f64,
+    },
+    /// An amplifier or an isolated sensor drives it: a pull of the chip does not move it.
+    Driven,
+}
+
 /// A power stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerStage {
@@ -89,6 +103,8 @@ pub struct PowerStage {
     pub limits: GateLimits,
     /// The voltage that they stand.
     pub switches: Switches,
+    /// The pin of the dc link.
+    pub dc_link_pin: DcLinkPin,
     /// Resistor from the fault input to the supply of the chip, ohm.
     pub fault_pull_ohm: f64,
     /// Pins, as in [`GATE_PINS`], that it ties to nets of others: they stay analog.

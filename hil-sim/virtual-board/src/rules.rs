@@ -66,12 +66,6 @@ rules! {
     DacReady: "RM0440, DAC_SR.DAC1RDY; DS12288, tWAKEUP",
 }
 
-impl fmt::Display for Rule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self:?}")
-    }
-}
-
 /// A rule that was broken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
@@ -91,7 +85,7 @@ impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ms = self.now as f64 / 170e3;
         let Self { rule, text, at, .. } = self;
-        write!(f, "{rule}: {text} ({}) at {at:#010x}, {ms:.3} ms", rule.source())
+        write!(f, "{rule:?}: {text} ({}) at {at:#010x}, {ms:.3} ms", rule.source())
     }
 }
 
@@ -104,18 +98,13 @@ pub struct Rules {
     pub at: u32,
     /// Time, ticks.
     pub now: u64,
-    /// Whether time is known at every instruction.
-    pub exact: bool,
+    /// Whether time is not known at every instruction.
+    pub coarse: bool,
     /// Whether violations are only recorded and do not end a run.
     pub collecting: bool,
 }
 
 impl Rules {
-    /// No violation yet; time is known at every instruction.
-    pub fn new() -> Self {
-        Self { exact: true, ..Self::default() }
-    }
-
     /// Records a violation; one with the same text is counted.
     pub fn note(&mut self, rule: Rule, text: impl Into<String>) {
         let (text, at, now) = (text.into(), self.at, self.now);

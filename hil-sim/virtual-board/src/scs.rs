@@ -233,8 +233,8 @@ impl Scs {
 
     /// Reads a register; `None` if it is not known.
     pub fn read(&self, address: u32, now: u64) -> Option<u32> {
-        let bits = |flags: &[bool; EXCEPTIONS], from: u32| {
-            let first = 16 + 8 * (address - from) as usize;
+        let bits = |flags: &[bool; EXCEPTIONS]| {
+            let first = 16 + 8 * (address & 0x7f) as usize;
             (0..32).fold(0, |word, n| word | u32::from(flags.get(first + n) == Some(&true)) << n)
         };
         Some(match address {
@@ -245,10 +245,8 @@ impl Scs {
                 (left / self.systick.cycle.max(1)) as u32 & 0xff_ffff
             }
             0xe000_e01c => 0,
-            0xe000_e100..0xe000_e110 => bits(&self.enabled, 0xe000_e100),
-            0xe000_e180..0xe000_e190 => bits(&self.enabled, 0xe000_e180),
-            0xe000_e200..0xe000_e210 => bits(&self.pending, 0xe000_e200),
-            0xe000_e280..0xe000_e290 => bits(&self.pending, 0xe000_e280),
+            0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => bits(&self.enabled),
+            0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => bits(&self.pending),
             0xe000_e300..0xe000_e310 => {
                 let first = 16 + 8 * (address - 0xe000_e300) as u16;
                 (0..32).fold(0, |w, n| w | u32::from(self.active.contains(&(first + n))) << n)
@@ -286,8 +284,9 @@ impl Scs {
 
     /// Writes a register; `None` if it is not known.
     pub fn write(&mut self, address: u32, value: u32, now: u64) -> Option<Effect> {
-        let set = |flags: &mut [bool; EXCEPTIONS], from: u32, to: bool| {
-            let first = 16 + 8 * (address - from) as usize;
+        // The upper of two registers clears.
+        let set = |flags: &mut [bool; EXCEPTIONS]| {
+            let (first, to) = (16 + 8 * (address & 0x7f) as usize, address & 0x80 == 0);
             for n in (0..32).filter(|n| value & 1 << n != 0) {
                 if let Some(flag) = flags.get_mut(first + n) {
                     *flag = to;
@@ -304,10 +303,8 @@ impl Scs {
             }
             0xe000_e014 => self.systick.reload = value & 0xff_ffff,
             0xe000_e018 => self.systick.expires = now + self.systick.period(),
-            0xe000_e100..0xe000_e110 => set(&mut self.enabled, 0xe000_e100, true),
-            0xe000_e180..0xe000_e190 => set(&mut self.enabled, 0xe000_e180, false),
-            0xe000_e200..0xe000_e210 => set(&mut self.pending, 0xe000_e200, true),
-            0xe000_e280..0xe000_e290 => set(&mut self.pending, 0xe000_e280, false),
+            0xe000_e100..0xe000_e110 | 0xe000_e180..0xe000_e190 => set(&mut self.enabled),
+            0xe000_e200..0xe000_e210 | 0xe000_e280..0xe000_e290 => set(&mut self.pending),
             0xe000_e400..0xe000_e468 => {
                 self.set_priorities(16 + (address - 0xe000_e400) as usize, value)
             }

@@ -129,7 +129,7 @@ fn run(program: &Program) -> Result<String> {
     }
     ensure!(broken == known, "{report}    known: {known:?}");
     for (rule, reason) in program.breaks {
-        report += &format!("    {rule}: {reason}\n");
+        report += &format!("    {rule:?}: {reason}\n");
     }
     (program.done)(&mut board).with_context(|| report.clone())?;
     Ok(report)

@@ -5,6 +5,7 @@ use drive_core::{Fault, State};
 use hil_sim::Config;
 use hil_sim::config::LoadMode;
 use virtual_board::board::rom::{N_BOOT0, N_SWBOOT0};
+use virtual_board::chip::TICKS_PER_PERIOD;
 use virtual_board::periph::Reset;
 use virtual_board::power_stage::driver::Request;
 use virtual_board::power_stage::{ALL, PowerStage, REFERENCE};
@@ -161,14 +162,83 @@ fn the_option_bytes_are_part_of_what_is_confirmed() -> Result<()> {
 }
 
 /// Against the strongest pull of the chip, which the image sets towards a trip, the resistor of the stage makes a level that
-/// is sure.
+/// is sure. A weaker one does not, and is taken for a fault of the power stage: the drive stays off.
 #[test]
 fn the_fault_input_rests_at_a_sure_level() -> Result<()> {
-    for stage in ALL {
-        let mut board = board(stage)?;
-        assert_eq!(board.chip().gpio[0].pull(6), Some(false), "{}", stage.name);
-        let volts = 3.3 * 25e3 / (25e3 + stage.fault_pull_ohm);
-        assert!(volts > 2.6, "{}: {volts} V", stage.name);
+    const PULLED: &str = "the power stage pulls the break input";
+    for (ohm, sure) in [(4700.0, true), (12e3, false), (100e3, false)] {
+        let mut options = Options::on(&REFERENCE, &REFERENCE.config()?, 5);
+        options.fault_pull_ohm = ohm;
+        let mut board = Board::new(Image::built()?, options)?;
+        said(&mut board, "last run: ")?;
+        let log = board.take_log()?;
+        assert_eq!(log.iter().any(|line| line.contains(PULLED)), !sure, "{ohm}: {log:#?}");
+        assert_eq!(board.chip().gpio[0].pull(6), Some(false));
+        board.type_line("start torque");
+        board.run_periods(1200)?;
+        assert_eq!(board.gates().any_on(), sure, "{ohm}: {}", board.take_console());
+    }
+    Ok(())
+}
+
+/// The window watchdog is fed too early when the control interrupt comes three times as often as it should. (Up to some 2.3 times
+/// it may come: after a long interrupt the next begins as early.)
+#[test]
+fn a_counter_at_a_third_of_its_top_is_reset() -> Result<()> {
+    const TIM1_ARR: u32 = 0x4001_2c2c;
+    const TIM1_CCR4: u32 = 0x4001_2c40;
+    let mut board = board(&REFERENCE)?;
+    board.forgive();
+    ask(&mut board, "start torque", "ok")?;
+    board.run_periods(1200)?;
+    assert!(board.gates().any_on());
+    let began = board.chip().now;
+    // And the compare value that triggers the converters, which the counter would not reach.
+    for register in [TIM1_ARR, TIM1_CCR4] {
+        let value = board.chip().read(register, 4);
+        board.chip().write(register, 4, value / 3);
+    }
+    while board.resets.is_empty() && board.chip().now < began + 4 * TICKS_PER_PERIOD {
+        board.run_ticks(100)?;
+    }
+    let (at, cause) = *board.resets.first().context("no reset")?;
+    let periods = (at - began) as f64 / TICKS_PER_PERIOD as f64;
+    println!("{cause} after {periods:.2} periods");
+    assert!(cause == Reset::Window && periods < 2.0, "{cause} after {periods} periods");
+    assert!(!board.chip().tim1.outputs_on());
+    Ok(())
+}
+
+/// A double word of the flash that its check code cannot correct: read as an instruction of the main loop, or as data by the
+/// check of the control's code. The outputs go off at once, by the break and without software; the image starts again.
+#[test]
+fn a_bad_word_in_the_code_switches_off() -> Result<()> {
+    let mut board = board(&REFERENCE)?;
+    ask(&mut board, "start torque", "ok")?;
+    board.run_periods(1200)?;
+    let regulating = board.keep()?;
+    let main = board.image().symbol("induction_drive::__cortex_m_rt_main")?;
+    let in_main = |at: u32| (main.address..main.end()).contains(&at);
+    while !in_main(board.chip().at) {
+        board.run_ticks(1)?;
+    }
+    // Behind vectors and checksums of the copy.
+    for (what, bad) in [("code", board.chip().at & !7), ("data", 0x0804_1000)] {
+        board.go_back(&regulating)?;
+        assert!(board.gates().any_on());
+        board.chip().flash.bad_code = Some(bad);
+        let began = board.chip().now;
+        while board.chip().tim1.outputs_on() {
+            board.run_ticks(20)?;
+            assert!(board.chip().now < began + 130 * TICKS_PER_PERIOD, "{what}: still on");
+        }
+        let ms = (board.chip().now - began) as f64 / 170e3;
+        board.run_periods(400)?;
+        println!("{what} at {bad:#x}: off after {ms:.3} ms, {:?}", board.resets);
+        assert_eq!(board.resets.len(), 1, "{what}");
+        let log = board.take_log()?;
+        let told = |line: &String| line.contains("clock or flash failure");
+        assert!(log.iter().any(told), "{what}: {log:#?}");
     }
     Ok(())
 }

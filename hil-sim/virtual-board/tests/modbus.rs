@@ -234,7 +234,7 @@ fn rate_format_and_address_follow_the_settings() -> Result<()> {
     let chip = master.board.chip();
     let request: Vec<_> = framed(&[1, 3, 0x20, 0, 0, 1]).into_iter().map(u16::from).collect();
     chip.usart3.line.to_chip.extend(&request);
-    chip.usart3.line.to_chip[3] |= virtual_board::periph::usart::WRONG_PARITY;
+    chip.usart3.line.to_chip[3] |= virtual_board::periph::uart::WRONG_PARITY;
     chip.usart3.wake(chip.now);
     assert!(master.send(&[])?.is_empty());
     // The next is.

@@ -70,7 +70,6 @@ const READ_ONLY: &[(&str, u32, &str)] = &[
     ("IWDG_WINR", 0xfff, KEY),
     ("WWDG_SR", 1, FLAGS),
     ("LPUART1_TDR", 0x1ff, "write-only"),
-    ("USART3_CR1", u32::MAX, "FIFOEN is not modelled: the write is refused as unknown"),
     ("USART3_TDR", 0x1ff, "write-only"),
     ("SYSCFG_CFGR2", 0x100, FLAGS),
     ("EXTI_PR1", 0x7b_ffff, FLAGS),

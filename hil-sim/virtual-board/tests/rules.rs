@@ -106,8 +106,8 @@ fn broken(script: &[Step]) -> Vec<Rule> {
 
 /// One script breaks exactly this rule, the other none.
 fn twins(rule: Rule, breaks: &[&[Step]], keeps: &[&[Step]]) {
-    assert_eq!(broken(&breaks.concat()), [rule], "breaks {rule}");
-    assert_eq!(broken(&keeps.concat()), [], "keeps {rule}");
+    assert_eq!(broken(&breaks.concat()), [rule], "breaks {rule:?}");
+    assert_eq!(broken(&keeps.concat()), [], "keeps {rule:?}");
 }
 
 /// Converters 1 and 2 on the synchronous clock / 4, with their regulator.

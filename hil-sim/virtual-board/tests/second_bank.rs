@@ -1,13 +1,15 @@
 //! The second bank of the flash while it is written: a fetch or a read from it would stop the core, interrupts and all. No
-//! interrupt needs anything of it, nothing of it runs meanwhile, and no control period is missed or late.
+//! interrupt needs anything of it, nothing of it runs meanwhile, and no control period is missed or late. An interrupt that did
+//! need it would be late by the whole operation.
 
 use std::ops::Range;
 
 use anyhow::{Result, ensure};
 use drive_core::Hardware;
 use hil_sim::Config;
-use virtual_board::chip::TICKS_PER_PERIOD;
+use virtual_board::chip::{CONTROL_INTERRUPT, TICKS_PER_PERIOD};
 use virtual_board::memory::{BANK_2, FLASH, STORED};
+use virtual_board::periph::Reset;
 use virtual_board::{Board, Image, Options};
 
 /// Code of the second bank. Behind it lies what is stored.
@@ -35,13 +37,17 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
     let mut sound = vec![0; (place.end - place.start) as usize];
     board.read(place.start, &mut sound);
     let rubbish = vec![0xde; sound.len()];
-    let mut seen = Vec::new();
-    let lines = ["start torque", "torque 1", "torque -1", "stop", "start vf", "speed 300", "stop"];
+    let (mut seen, mut answered) = (Vec::new(), 0);
+    let lines =
+        ["start torque", "torque 1", "torque -1", "stop", "start vf", "speed 300", "stop", "learn"];
     for line in lines {
         board.type_line(line);
+        // Read the state word and the speed, of the slave with the address 1.
+        board.send_bus(&[1, 3, 0, 0, 0, 2, 0xc4, 0x0b]);
         let (end, mut is_spoilt) = (board.chip().now + 400 * TICKS_PER_PERIOD, false);
         while board.chip().now < end || is_spoilt {
-            board.run_ticks(STEP)?;
+            // The end of an interrupt is met exactly: what it preempted needs the bank.
+            board.run_ticks(if is_spoilt { 1 } else { STEP })?;
             let interrupts = !board.chip().scs.active.is_empty();
             if interrupts != is_spoilt {
                 board.cpu().write(place.start, if interrupts { &rubbish } else { &sound });
@@ -52,7 +58,10 @@ fn compares(spoilt: Option<Range<u32>>) -> Result<Vec<String>> {
             seen.push(format!("{:?} {:?}", period.sample, period.compare));
         }
         ensure!(board.resets.is_empty(), "{line}: {:?}", board.resets);
+        answered += usize::from(!board.take_bus().is_empty());
     }
+    // A start designs before it reads the bus.
+    ensure!(answered >= lines.len() - 2, "{answered} answers on the bus");
     Ok(seen)
 }
 
@@ -120,5 +129,43 @@ fn no_control_period_waits_for_the_flash() -> Result<()> {
     // At other times the second bank is in use.
     println!("{in_first} blocks in the first bank while busy, {in_second} in the second while not");
     assert!(in_first > 10_000 && in_second > 100 && board.resets.is_empty(), "{:?}", board.resets);
+    Ok(())
+}
+
+/// Where nothing of the image lies, in the first bank and in the second.
+const FREE: [u32; 2] = [0x0803_ff00, 0x0805_ff00];
+
+/// Puts a piece of code before the control interrupt, as if the linker had left a part of it there: in the second bank, or in
+/// the first with a word of the second that it reads.
+fn before_the_control(board: &mut Board, reads: bool) {
+    let vector = board.chip().scs.vector(CONTROL_INTERRUPT);
+    let handler = board.word(vector).unwrap();
+    let place = FREE[usize::from(!reads)];
+    // ldr r0, [pc, #4]; ldr r0, [r0]; ldr pc, [pc, #4]; a word of the second bank; the handler. Or: ldr pc, [pc, #0]; the handler.
+    let words: &[u32] = if reads {
+        &[0x6800_4801, 0xf004_f8df, SECOND.start, handler]
+    } else {
+        &[0xf000_f8df, handler]
+    };
+    let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    board.cpu().write(place, &bytes);
+    board.cpu().write(vector, &(place | 1).to_le_bytes());
+}
+
+/// The control interrupt with a piece of code or a word in the second bank: as good as ever until the flash is written; then
+/// it does not come until the window watchdog ends the run.
+#[test]
+fn an_interrupt_that_needs_the_second_bank_waits_for_the_flash() -> Result<()> {
+    for reads in [false, true] {
+        let mut board = greeted(43)?;
+        before_the_control(&mut board, reads);
+        board.run_periods(600)?;
+        let periods = std::iter::from_fn(|| board.next_period()).count();
+        assert!(periods >= 599 && board.resets.is_empty(), "{periods}, {:?}", board.resets);
+        board.type_line("save");
+        board.run_periods(400)?;
+        let ended = board.resets.first().map(|reset| reset.1);
+        assert_eq!(ended, Some(Reset::Window), "data: {reads}: {}", board.take_console());
+    }
     Ok(())
 }

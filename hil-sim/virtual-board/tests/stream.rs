@@ -24,7 +24,7 @@ struct Ear {
 
 impl Ear {
     fn hear(&mut self, pair: &mut Pair) {
-        let bytes = std::mem::take(&mut pair.board.chip().lpuart.wire.from_chip);
+        let bytes = pair.board.chip().lpuart.line.take();
         for byte in bytes {
             match self.splitter.push(byte) {
                 Piece::Nothing => {}

@@ -217,7 +217,7 @@ fn the_old_image_is_caught() -> Result<()> {
         ("F7", &level),
     ] {
         for rule in rules {
-            assert!(broken(&board, *rule), "{finding}: {rule}");
+            assert!(broken(&board, *rule), "{finding}: {rule:?}");
         }
     }
     // Without the distance of two accesses its converters start, and the rest can be seen.

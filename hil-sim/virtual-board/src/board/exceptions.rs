@@ -68,8 +68,8 @@ impl Board {
     pub(super) fn go(&mut self, end: u64) -> Result<()> {
         let chip = self.cpu.chip_mut();
         chip.deadline = chip.next_event().min(end);
-        if self.stalled_until > chip.now {
-            chip.now = chip.now.max(chip.deadline.min(self.stalled_until));
+        if chip.stalled_until > chip.now {
+            chip.now = chip.now.max(chip.deadline.min(chip.stalled_until));
             return Ok(());
         }
         if self.hung || self.sleeping || chip.is_halted() || chip.browned_out() {

@@ -260,11 +260,10 @@ impl Board {
             for (channel, code) in channel::CURRENTS.into_iter().zip(currents) {
                 inputs[channel] = code;
             }
-            inputs[channel::DC_LINK] = sample.dc_link;
             inputs[channel::HEAT_SINK] = sample.heat_sink;
         }
         let s = *sample;
-        chip.tim2.set_position(s.encoder);
+        chip.tim2.position = s.encoder;
         chip.compare(s.current_a, s.current_b, s.dc_link);
     }
 }

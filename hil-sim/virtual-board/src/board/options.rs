@@ -7,7 +7,7 @@ use hil_sim::config::{Config, current_lines};
 use hil_sim::plant::{MeasurementSettings, PlantSettings};
 
 use crate::cpu::Counting;
-use crate::power_stage::{self, CODES, PowerStage, REFERENCE_V, Sensors};
+use crate::power_stage::{self, CODES, DcLinkPin, PowerStage, REFERENCE_V, Sensors};
 use induction_drive::board as firmware_board;
 
 /// Options of a board.
@@ -25,6 +25,10 @@ pub struct Options {
     pub saved: Settings,
     /// The power stage at the pins.
     pub power_stage: &'static PowerStage,
+    /// The pin of the dc link: by default as the power stage has it.
+    pub dc_link_pin: DcLinkPin,
+    /// Resistor of the fault input, ohm: by default that of the power stage.
+    pub fault_pull_ohm: f64,
 }
 
 impl Options {
@@ -112,6 +116,8 @@ impl Options {
             confirmed: true,
             saved,
             power_stage,
+            dc_link_pin: power_stage.dc_link_pin,
+            fault_pull_ohm: power_stage.fault_pull_ohm,
         }
     }
 }

@@ -17,7 +17,7 @@ impl Board {
     /// Puts bytes on the wire to the console.
     pub fn send(&mut self, bytes: &[u8]) {
         let chip = self.chip();
-        chip.lpuart.wire.to_chip.extend(bytes);
+        chip.lpuart.line.to_chip.extend(bytes.iter().map(|byte| u16::from(*byte)));
         chip.lpuart.wake(chip.now);
     }
 
@@ -30,13 +30,12 @@ impl Board {
 
     /// The bytes that the board sent on the field bus since the last call.
     pub fn take_bus(&mut self) -> Vec<u8> {
-        let sent = std::mem::take(&mut self.chip().usart3.line.from_chip);
-        sent.into_iter().map(|(_, byte)| byte).collect()
+        self.chip().usart3.line.take()
     }
 
     /// The output of the console since the last call.
     pub fn take_console(&mut self) -> String {
-        let bytes = std::mem::take(&mut self.chip().lpuart.wire.from_chip);
+        let bytes = self.chip().lpuart.line.take();
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
@@ -80,9 +79,11 @@ impl Board {
         Ok(())
     }
 
-    /// Level of the break pin: low trips.
+    /// The power stage lets go of the fault input, or pulls it low, which trips.
     pub fn set_fault_pin(&mut self, high: bool) {
-        self.chip().tim1.set_fault_pin(high);
+        let chip = self.chip();
+        chip.fault_low = !high;
+        chip.follow_fault_pin();
     }
 
     /// The crystal stops, or lives again.
@@ -97,7 +98,8 @@ impl Board {
 
     /// The core executes nothing for some ticks, as if the bus were taken.
     pub fn stall(&mut self, ticks: u64) {
-        self.stalled_until = self.cpu.chip().now + ticks;
+        let chip = self.chip();
+        chip.stalled_until = chip.now + ticks;
     }
 
     /// From now on accesses that the model does not know behave as on the chip: reserved registers read as 0,

@@ -13,27 +13,24 @@ const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0c;
 const BSRR: u32 = 0x18;
 
-/// The loader's hold of a pin.
-enum Held {
-    /// Driven, idle at a high level.
-    High,
-    /// An input that the chip pulls up.
-    Up,
-    /// An input that the chip pulls down.
-    Down,
-}
+/// The loader's hold of a pin, as its fields of MODER and PUPDR: driven, idle at a high level; an input that the chip pulls up;
+/// one that it pulls down.
+type Held = (u32, u32);
+const HIGH: Held = (1, 1);
+const UP: Held = (0, 1);
+const DOWN: Held = (0, 2);
 
 /// Port, 0 is A, and number of the pins of its serial ports, SPI and I2C that a power stage has (AN2606, table of the
 /// configuration of STM32G47x in system memory boot).
 const PINS: [(usize, u32, Held); 8] = [
-    (0, 6, Held::High),
-    (0, 7, Held::Down),
-    (0, 8, Held::Up),
-    (0, 9, Held::High),
-    (0, 10, Held::Up),
-    (1, 14, Held::High),
-    (2, 6, Held::Up),
-    (2, 8, Held::Up),
+    (0, 6, HIGH),
+    (0, 7, DOWN),
+    (0, 8, UP),
+    (0, 9, HIGH),
+    (0, 10, UP),
+    (1, 14, HIGH),
+    (2, 6, UP),
+    (2, 8, UP),
 ];
 
 /// Whether these option bytes and this level at PB8 start the loader (RM0440, boot configuration).
@@ -49,13 +46,8 @@ impl Board {
         if !starts(chip.flash.options, high) {
             return false;
         }
-        for (port, pin, held) in PINS {
+        for (port, pin, (mode, pull)) in PINS {
             let gpio = &mut chip.gpio[port];
-            let (mode, pull) = match held {
-                Held::High => (1, 1),
-                Held::Up => (0, 1),
-                Held::Down => (0, 2),
-            };
             gpio.write(BSRR, 1 << pin);
             for (register, field) in [(PUPDR, pull), (MODER, mode)] {
                 let others = gpio.read(register).unwrap_or(0) & !(3 << (2 * pin));

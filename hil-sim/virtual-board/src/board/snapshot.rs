@@ -53,7 +53,6 @@ impl Board {
         self.sleeping = to.sleeping;
         self.resets = to.resets.clone();
         self.hung = false;
-        self.stalled_until = 0;
         self.entered = None;
         self.disturb = None;
         self.preempt_at = None;

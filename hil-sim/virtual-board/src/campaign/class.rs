@@ -3,7 +3,9 @@
 
 use rand::{Rng, RngExt};
 
-use super::faults::{current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor};
+use super::faults::{
+    bad_code, current, flip, flip_register, losing, name, noise, set_clocks, slow_sensor,
+};
 use super::scene::{Source, Target};
 use crate::board::Board;
 use crate::chip::TICKS_PER_S;
@@ -224,6 +226,10 @@ const CLASSES: &[Class] = &[
         board.set_crystal(false);
         String::new()
     }),
+    regulating("flash ECC in code", (0.01, "the break; no software"), |board, _, rng| {
+        bad_code(board, rng)
+    })
+    .ends(),
     regulating("bit flip in the coefficients", CHECK, |board, target, rng| {
         flip(board, rng, target.coefficients)
     }),

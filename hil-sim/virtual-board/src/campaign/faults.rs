@@ -9,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::scene::Target;
 use crate::board::Board;
-use crate::memory::Region;
+use crate::memory::{FLASH, Region, STORED};
 use drive_core::Sample;
 use drive_core::settings::{CurrentSensors, Line};
 
@@ -116,6 +116,17 @@ pub fn flip_register(board: &mut Board, rng: &mut dyn Rng) -> String {
             return format!("bit {bit} of {address:#010x}");
         }
     }
+}
+
+/// The check code of the next instructions of the main loop in the flash, or of some behind them, is wrong.
+pub fn bad_code(board: &mut Board, rng: &mut dyn Rng) -> String {
+    let (mut left, mut steps) = (rng.random_range(1..300), 0..100_000);
+    while left > 0 && steps.next().is_some() && board.run_ticks(1).is_ok() {
+        left -= u32::from((FLASH..STORED).contains(&board.chip().at));
+    }
+    let address = board.chip().at & !7;
+    board.chip().flash.bad_code = Some(address);
+    format!("{address:#010x}")
 }
 
 /// Flips a bit of a region.

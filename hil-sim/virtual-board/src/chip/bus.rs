@@ -2,11 +2,10 @@
 
 use std::fmt;
 
-use super::{Chip, OWN_REFERENCE_CODE};
+use super::{Chip, OWN_REFERENCE_CODE, pins};
 use crate::memory;
 use crate::periph::rcc::On;
-use crate::periph::{Effect, Reset, plain, usart};
-use crate::scs;
+use crate::periph::{Effect, Reset, uart};
 
 pub(super) const TIM2: u32 = 0x4000_0000;
 pub(super) const TIM5: u32 = 0x4000_0c00;
@@ -131,13 +130,10 @@ impl Chip {
             };
         }
         if (memory::STORED..memory::FLASH + memory::FLASH_SIZE).contains(&address) {
+            self.fetch(address, 4);
             let (value, torn) = self.flash.load(address);
             if torn {
-                if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
-                    self.system_break();
-                }
-                self.scs.pend(scs::NMI);
-                self.attention = true;
+                self.flash_error();
             }
             return Some(value);
         }
@@ -154,16 +150,15 @@ impl Chip {
             TIM1 => self.tim1.read(offset, now),
             ADC1 => self.adc.read(offset, now),
             TIM2 => self.tim2.read(offset),
-            TIM8 => self.tim8.read(offset),
+            TIM8 => self.tim8.0.read(offset),
             TIM5 => self.tim5.read(offset, now, self.rcc.lsi_on()),
             FACTORY if offset == 0x1a8 => Some(u32::from(OWN_REFERENCE_CODE) << 16),
             RCC => self.rcc.read(offset),
             PWR => self.pwr.read(offset),
             FLASH_REGISTERS => self.flash.read(offset, now),
             port @ (LPUART1 | USART3) => {
-                let console = port == LPUART1;
-                let value =
-                    if console { self.lpuart.read(offset) } else { self.usart3.read(offset) };
+                let port = if port == LPUART1 { &mut self.lpuart } else { &mut self.usart3 };
+                let value = port.read(offset);
                 self.update_lines();
                 value
             }
@@ -198,17 +193,16 @@ impl Chip {
         if !self.is_clocked(address) {
             return Some(());
         }
+        let locked = self.monitor_is_locked();
         let rules = &mut self.rules;
         let effect = match address & !0x3ff {
             TIM1 => self.tim1.write(offset, value, rules)?,
             ADC1 => self.adc.write(offset, value, rules)?,
             TIM2 => self.tim2.write(offset, value)?,
-            TIM8 => self.tim8.write(offset, value)?,
+            TIM8 => self.tim8.0.write(offset, value)?,
             TIM5 => self.tim5.write(offset, value, now)?,
             RCC => self.rcc.write(offset, value, On { at: now, accesses: self.accesses })?,
-            PWR => {
-                self.pwr.write(offset, value, self.syscfg.get(plain::CFGR2) & plain::PVDL != 0)?
-            }
+            PWR => self.pwr.write(offset, value, locked)?,
             FLASH_REGISTERS => self.flash.write(offset, value, rules)?,
             LPUART1 => self.lpuart.write(offset, value, now)?,
             USART3 => self.usart3.write(offset, value, now)?,
@@ -226,6 +220,7 @@ impl Chip {
         };
         self.check_rules(address, value);
         if moves_gates(address) {
+            self.follow_fault_pin();
             self.look_at_gates();
         }
         self.follow(effect)
@@ -233,13 +228,16 @@ impl Chip {
 
     /// What a write means for other parts of the chip.
     fn check_rules(&mut self, address: u32, value: u32) {
+        let offset = address & 0x3ff;
         match address & !0x3ff {
             TIM1 if address == BDTR && value & 1 << 15 != 0 && self.tim1.main_output() => {
                 self.check_gate_pins();
             }
             TIM2 => self.check_encoder_pins(),
-            LPUART1 if address & 0x3ff == 0x28 => self.check_serial_pin(),
-            USART3 if address & 0x3ff == usart::SEND => self.check_bus_pins(),
+            LPUART1 if offset == uart::TDR => {
+                self.require_pin(pins::SERIAL[0], "LPUART1_TDR is written");
+            }
+            USART3 if offset == uart::TDR => self.check_bus_pins(),
             RCC | FLASH_REGISTERS => {
                 self.adc.kernel_clock = self.rcc.adc_kernel_clock();
                 self.scs.systick.cycle = self.rcc.ticks_per_cycle();
@@ -249,7 +247,7 @@ impl Chip {
                 self.check_clocks();
                 self.monitor_supply();
             }
-            SYSCFG if address & 0x3ff >= 0x200 => self.check_reference(address & 0x3ff),
+            SYSCFG if offset >= 0x200 => self.check_reference(offset),
             // A break that lasts takes MOE away again.
             SYSCFG | TIM8 => self.monitor_supply(),
             _ => {}
@@ -265,10 +263,6 @@ impl Chip {
             }
             Effect::Reset => {
                 self.reset = Some(Reset::Software);
-                self.attention = true;
-            }
-            Effect::Nmi => {
-                self.scs.pend(scs::NMI);
                 self.attention = true;
             }
         }

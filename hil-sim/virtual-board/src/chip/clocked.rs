@@ -51,7 +51,7 @@ impl Chip {
                 .note(Rule::ClockGate, format!("{name} at {address:#010x} without its clock"));
             return false;
         };
-        let Some(on) = on.filter(|_| self.rules.exact) else { return true };
+        let Some(on) = on.filter(|_| !self.rules.coarse) else { return true };
         let cycles = (self.now - on.at) / self.rcc.ticks_per_cycle();
         // This access itself is counted.
         let accesses = self.accesses.saturating_sub(on.accesses + 1);

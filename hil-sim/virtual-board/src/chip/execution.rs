@@ -3,6 +3,7 @@
 use super::Chip;
 use crate::cost::{self, Block};
 use crate::memory::Region;
+use crate::periph::plain;
 use crate::scs;
 
 /// A function of the main loop whose calls are counted as if its memory had no wait states.
@@ -73,6 +74,29 @@ impl Chip {
     #[inline]
     pub fn wants_attention(&self) -> bool {
         self.attention || self.now >= self.deadline
+    }
+
+    /// A fetch or a read of some bytes of the flash: raises what their check code says. Whether the core waits before it goes on.
+    #[inline]
+    pub fn fetch(&mut self, address: u32, size: u32) -> bool {
+        if self.flash.bad_code.is_some() && self.flash.is_bad(address, size) {
+            self.flash_error();
+        }
+        let waits = self.flash.delays(address, self.now);
+        if waits {
+            self.stalled_until = self.flash.busy_until;
+            self.attention = true;
+        }
+        waits
+    }
+
+    /// The flash has read a double word that its check code cannot correct.
+    pub(super) fn flash_error(&mut self) {
+        if self.syscfg.get(plain::CFGR2) & plain::ECCL != 0 {
+            self.system_break();
+        }
+        self.scs.pend(scs::NMI);
+        self.attention = true;
     }
 
     /// Instructions from the flash are about to be executed.

@@ -64,7 +64,7 @@ impl Chip {
         pins_of(signal).any(|((port, pin), af)| self.gpio[port].pad(pin) == Pad::Alternate(af))
     }
 
-    fn require_pin(&mut self, signal: Signal, use_: &str) {
+    pub(super) fn require_pin(&mut self, signal: Signal, use_: &str) {
         let reaches = self.reaches(signal);
         self.rules.require(reaches, Rule::PinMode, || {
             format!("{use_}, but no pin is at the alternate function of {}", signal.0)
@@ -108,11 +108,6 @@ impl Chip {
         }
     }
 
-    /// A byte was given to the port.
-    pub(super) fn check_serial_pin(&mut self) {
-        self.require_pin(SERIAL[0], "LPUART1_TDR is written");
-    }
-
     /// Whether the transceiver of the bus drives the line.
     pub(super) fn drives_bus(&self) -> bool {
         self.gpio[BUS_DRIVER.0].pad(BUS_DRIVER.1) == Pad::Output(true)
@@ -138,8 +133,10 @@ impl Chip {
             }
             for channel in (0..19).filter(|channel| channels >> channel & 1 != 0) {
                 let Some((port, pin)) = analog(n, channel) else { continue };
-                let is_analog = self.gpio[port].pad(pin) == Pad::Analog;
-                self.rules.require(is_analog, Rule::PinMode, || {
+                // Or an input on purpose: the port's own resistor against what is connected.
+                let (pad, pulled) = (self.gpio[port].pad(pin), self.gpio[port].pull(pin).is_some());
+                let reads = pad == Pad::Analog || pad == Pad::Input && pulled;
+                self.rules.require(reads, Rule::PinMode, || {
                     let (adc, port) = (n + 1, char::from(b'A' + port as u8));
                     format!("ADC{adc} converts channel {channel}, but P{port}{pin} is not analog")
                 });

@@ -281,7 +281,7 @@ impl Session {
             // A frame that the reset cut short takes no text with it.
             self.wire = Splitter::default();
         }
-        let bytes = std::mem::take(&mut self.board.chip().lpuart.wire.from_chip);
+        let bytes = self.board.chip().lpuart.line.take();
         let text = |byte: &u8| match self.wire.push(*byte) {
             Piece::Text(byte) => Some(byte),
             _ => None,

@@ -24,6 +24,8 @@ pub struct Comparators {
     control: [u32; 7],
     /// Codes at their positive inputs.
     pub inputs: [u16; 7],
+    /// The output of the first stays low.
+    pub stuck_low: bool,
     /// Codes at their negative inputs.
     pub references: [u16; 7],
     /// What the inputs say, without polarity, and since when the output does not say so yet.
@@ -78,6 +80,7 @@ impl Comparators {
     pub fn output(&self, n: usize) -> bool {
         let control = self.control[n];
         let valid = control & EN != 0 && self.started_at[n] == Some(0);
+        let valid = valid && !(self.stuck_low && n == 0);
         valid && self.output[n] != (control & POL != 0)
     }
 

@@ -55,11 +55,6 @@ impl Channel {
     }
 }
 
-/// The code in a data register; that for double data mode lies above it.
-fn data(register: u32) -> u16 {
-    (register & 0xfff) as u16
-}
-
 /// One converter.
 #[derive(Clone, Debug)]
 struct Dac {
@@ -142,14 +137,16 @@ impl Dacs {
         store.write(offset, value)?;
         for n in 0..2 {
             let channel = &mut channels[n];
+            // The code for double data mode lies above it.
+            let data = (store.get(DHR[n]) & 0xfff) as u16;
             if offset == DHR[n] {
                 channel.has_data = true;
                 if was[n] {
-                    channel.go_to(data(store.get(offset)), now, SETTLING);
+                    channel.go_to(data, now, SETTLING);
                 }
             } else if on(store, n) && !was[n] {
                 channel.ready_at = now + WAKE_UP;
-                channel.go_to(data(store.get(DHR[n])), now, WAKE_UP);
+                channel.go_to(data, now, WAKE_UP);
             } else if was[n] && !on(store, n) {
                 *channel = Channel { has_data: channel.has_data, ..OFF };
             }

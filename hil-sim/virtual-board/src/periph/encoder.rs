@@ -22,7 +22,8 @@ registers! {
 #[derive(Clone, Debug)]
 pub struct EncoderTimer {
     store: Store,
-    position: u32,
+    /// Where the encoder is, counts.
+    pub position: u32,
     from: u32,
     held: u32,
 }
@@ -36,16 +37,6 @@ impl EncoderTimer {
     /// Whether it counts the encoder.
     pub fn counting(&self) -> bool {
         self.store.get(CR1) & 1 != 0 && self.store.get(SMCR) & 7 == 3
-    }
-
-    /// The encoder is here, counts.
-    pub fn set_position(&mut self, position: u32) {
-        self.position = position;
-    }
-
-    /// Where the encoder is.
-    pub fn position(&self) -> u32 {
-        self.position
     }
 
     /// The counter.

@@ -2,7 +2,9 @@
 //!
 //! Only the part behind the code ([`STORED`]) can be written. A double word that was being written
 //! when the power went has a wrong check code: reading it raises the NMI. A page whose erasure was cut
-//! short holds such words too.
+//! short holds such words too. So does, until a reset, the double word of the code that a test damages.
+//!
+//! A fetch or a read from a bank that is being written waits for the end of the operation.
 
 use std::ops::Range;
 
@@ -59,12 +61,15 @@ pub struct Flash {
     status: u32,
     eccr: u32,
     keys: usize,
-    busy_until: u64,
+    /// End of the last operation.
+    pub busy_until: u64,
     /// Lower half of a double word that is being programmed.
     half: Option<(u32, u32)>,
     bytes: Vec<u8>,
     /// Double words whose check code is wrong.
     torn: Vec<bool>,
+    /// Address of a double word of the code whose check code is wrong.
+    pub bad_code: Option<u32>,
     /// Double words of the last operation.
     changing: Range<usize>,
     /// Operations since the beginning: double words programmed, pages erased.
@@ -89,6 +94,7 @@ impl Default for Flash {
             half: None,
             bytes: vec![0xff; size],
             torn: vec![false; size / 8],
+            bad_code: None,
             changing: 0..0,
             operations: 0,
             power_loss_at: None,
@@ -142,6 +148,22 @@ impl Flash {
         now < self.busy_until
     }
 
+    /// Whether an access to this address waits for the end of an operation: both can be only in the part that is stored.
+    pub fn delays(&self, address: u32, now: u64) -> bool {
+        self.is_busy(now) && (address >= BANK_2 || self.options & DBANK == 0)
+    }
+
+    /// A read or a fetch of some bytes: whether their check code is wrong.
+    pub fn is_bad(&mut self, address: u32, size: u32) -> bool {
+        let bad = self.bad_code.filter(|bad| *bad < address + size && address < bad + 8);
+        bad.inspect(|bad| self.note_error(*bad)).is_some()
+    }
+
+    fn note_error(&mut self, address: u32) {
+        let bank = u32::from(address >= BANK_2);
+        self.eccr = ECCD | bank << 21 | ((address - FLASH) % (FLASH_SIZE / 2) / 8);
+    }
+
     /// The power goes: an operation in progress leaves its double words torn.
     pub fn cut(&mut self, now: u64) {
         if self.is_busy(now) {
@@ -156,7 +178,7 @@ impl Flash {
             self.bytes.get(at..at + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let torn = self.torn.get(at / 8) == Some(&true);
         if torn {
-            self.eccr = ECCD | 1 << 21 | ((address - BANK_2) / 8) & 0x7_ffff;
+            self.note_error(address);
         }
         (word, torn)
     }
@@ -185,7 +207,8 @@ impl Flash {
             Some((at, low)) if address == at + 4 => self.program(at, low, value, now),
             _ => self.status |= PGSERR | SIZERR,
         }
-        Some(if self.power_lost { Effect::Look } else { Effect::None })
+        // Others may have to wait from now on.
+        Some(Effect::Look)
     }
 
     fn program(&mut self, address: u32, low: u32, high: u32, now: u64) {
@@ -270,6 +293,6 @@ impl Flash {
             }
             _ => return self.store.write(offset, value),
         }
-        Some(if self.power_lost { Effect::Look } else { Effect::None })
+        Some(Effect::Look)
     }
 }

@@ -46,11 +46,6 @@ impl Iwdg {
         self.expires
     }
 
-    /// Whether it does now.
-    pub fn expired(&self, now: u64) -> bool {
-        now >= self.expires
-    }
-
     fn period(&self) -> u64 {
         u64::from(self.reload + 1) * self.count()
     }

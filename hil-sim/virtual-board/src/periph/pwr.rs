@@ -33,23 +33,23 @@ pub enum Range {
 }
 
 impl Range {
+    /// Largest system clock, and bus clock for each wait state of the flash and one more, Hz.
+    fn clocks_hz(self) -> (u64, u64) {
+        match self {
+            Self::Boost => (170_000_000, 34_000_000),
+            Self::Normal => (150_000_000, 30_000_000),
+            Self::Low => (26_000_000, 12_000_000),
+        }
+    }
+
     /// Largest system clock, Hz.
     pub fn limit_hz(self) -> u64 {
-        match self {
-            Self::Boost => 170_000_000,
-            Self::Normal => 150_000_000,
-            Self::Low => 26_000_000,
-        }
+        self.clocks_hz().0
     }
 
     /// Wait states of the flash that a bus clock in Hz needs.
     pub fn wait_states(self, bus_hz: u64) -> u32 {
-        let step = match self {
-            Self::Boost => 34_000_000,
-            Self::Normal => 30_000_000,
-            Self::Low => 12_000_000,
-        };
-        (bus_hz.div_ceil(step) as u32).saturating_sub(1)
+        (bus_hz.div_ceil(self.clocks_hz().1) as u32).saturating_sub(1)
     }
 }
 

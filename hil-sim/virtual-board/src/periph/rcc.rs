@@ -71,7 +71,8 @@ pub struct On {
 #[derive(Clone, Debug)]
 pub struct Rcc {
     store: Store,
-    flags: u32,
+    /// Flags of resets, which stay until they are cleared.
+    pub flags: u32,
     cifr: u32,
     /// Whether the crystal oscillates when it is on.
     pub crystal_lives: bool,
@@ -103,16 +104,6 @@ impl Rcc {
             on: [(0, On::default()); 7],
             ticks_per_cycle: HSI_TICKS,
         }
-    }
-
-    /// Flags of earlier resets stay until they are cleared.
-    pub fn add_reset_flags(&mut self, flags: u32) {
-        self.flags |= flags;
-    }
-
-    /// The flags.
-    pub fn reset_flags(&self) -> u32 {
-        self.flags
     }
 
     /// Ticks of 170 MHz per cycle of the core.

@@ -72,8 +72,8 @@ pub struct Tim1 {
     next_end: u64,
     at_top_next: bool,
     trigger_at: u64,
-    /// Level of the break pin.
-    pub fault_pin_high: bool,
+    /// Level of the break pin; `None` is not sure.
+    fault_pin: Option<bool>,
     /// Outputs of the comparators.
     comparators: [bool; 7],
     /// LOCK of the first write to BDTR.
@@ -97,7 +97,7 @@ impl Default for Tim1 {
             next_end: NEVER,
             at_top_next: true,
             trigger_at: NEVER,
-            fault_pin_high: true,
+            fault_pin: Some(true),
             comparators: [false; 7],
             first_lock: None,
             frozen: None,
@@ -234,9 +234,9 @@ impl Tim1 {
         self.update_break();
     }
 
-    /// Level of the break pin, from now on.
-    pub fn set_fault_pin(&mut self, high: bool) {
-        self.fault_pin_high = high;
+    /// Level of the break pin, from now on; `None` is not sure, and taken for the one that breaks.
+    pub fn set_fault_pin(&mut self, level: Option<bool>) {
+        self.fault_pin = level;
         self.update_break();
     }
 
@@ -245,7 +245,7 @@ impl Tim1 {
     fn update_break(&mut self) {
         let (af1, bdtr) = (self.store.get(AF1), self.store.get(BDTR));
         let bit = |n: usize| af1 >> n & 1 != 0;
-        let pin = bit(0) && self.fault_pin_high != bit(9);
+        let pin = bit(0) && self.fault_pin.map_or(bdtr & BKP != 0, |high| high != bit(9));
         // BKCMP1E is bit 1, BKCMP1P bit 10; comparators 5 to 7 have no polarity.
         let comparator =
             (0..7).any(|n| bit(1 + n) && self.comparators[n] != (n < 4 && bit(10 + n)));

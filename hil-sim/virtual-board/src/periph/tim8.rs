@@ -1,6 +1,6 @@
 //! TIM8 with the brake chopper at its first channel (RM0440, section 28): PWM mode 1, upwards. Other modes are off here.
 
-use super::{Effect, Store, registers};
+use super::{Store, registers};
 
 registers! {
     CR1 = 0x00, 0, 0x1bff;
@@ -23,7 +23,7 @@ const MOE: u32 = 1 << 15;
 
 /// The timer.
 #[derive(Clone, Debug)]
-pub struct Tim8(Store);
+pub struct Tim8(pub Store);
 
 impl Tim8 {
     /// After a reset.
@@ -52,15 +52,5 @@ impl Tim8 {
         if bdtr & BKE != 0 {
             self.0.write(BDTR, bdtr & !MOE);
         }
-    }
-
-    /// Reads a register.
-    pub fn read(&self, offset: u32) -> Option<u32> {
-        self.0.read(offset)
-    }
-
-    /// Writes a register.
-    pub fn write(&mut self, offset: u32, value: u32) -> Option<Effect> {
-        self.0.write(offset, value)
     }
 }

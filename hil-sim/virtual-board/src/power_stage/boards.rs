@@ -4,7 +4,7 @@ use drive_core::settings::Ntc;
 
 use super::driver::{Driver, Input, Pull};
 use super::shunts::Shunts;
-use super::{GateLimits, PowerStage, Sensors, Switches};
+use super::{DcLinkPin, GateLimits, PowerStage, Sensors, Switches};
 
 /// All of them.
 pub const ALL: [&PowerStage; 3] = [&REFERENCE, &IHM08M1, &IHM023V3];
@@ -15,6 +15,8 @@ const TTL: (f64, f64) = (0.8, 2.0);
 const L639X: (f64, f64) = (0.8, 2.25);
 /// Ringing at a turn-off: 20 nH of the loop, and a current that falls in 40 ns (assumed).
 const RINGING: f64 = 20e-9 / 40e-9;
+/// Divider of the dc link without a capacitor (assumed).
+const DIVIDER: DcLinkPin = DcLinkPin::Divider { ohm: 10e3, farad: 0.0 };
 /// Pull-up of the fault input that the documentation asks for (assumed on all boards).
 const FAULT_PULL_OHM: f64 = 4700.0;
 
@@ -62,6 +64,7 @@ pub const REFERENCE: PowerStage = PowerStage {
     limits: GateLimits { dead_time_s: 2.2e-6, pulse_s: 168.0 / 170e6 },
     // Those of a drive for 230 V (assumed).
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
+    dc_link_pin: DIVIDER,
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[],
     ntc: Ntc::DEFAULT,
@@ -85,6 +88,8 @@ const IHM08M1: PowerStage = PowerStage {
     // Assumed: the MOSFETs switch in less than 100 ns, so the driver's own dead time is enough.
     limits: GateLimits { dead_time_s: 300e-9, pulse_s: 300e-9 },
     switches: Switches { rated_v: 60.0, ringing_v_per_a: RINGING },
+    // 169 kOhm beside 9.31 kOhm. Whether there is a capacitor is not known.
+    dc_link_pin: DcLinkPin::Divider { ohm: 8.82e3, farad: 0.0 },
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[(0, 11), (1, 14), (1, 15)],
     ntc: Ntc::DEFAULT,
@@ -106,6 +111,7 @@ const IHM023V3: PowerStage = PowerStage {
     // Assumed: an IGBT is off within 0.5 us.
     limits: GateLimits { dead_time_s: 0.5e-6, pulse_s: 0.5e-6 },
     switches: Switches { rated_v: 600.0, ringing_v_per_a: RINGING },
+    dc_link_pin: DIVIDER,
     fault_pull_ohm: FAULT_PULL_OHM,
     analog_only: &[],
     ntc: Ntc { divider_ohm: 3600.0, ..Ntc::DEFAULT },

@@ -4,9 +4,10 @@ use super::{GATE_FUNCTION, GATE_PINS};
 use crate::periph::gpio::{Gpio, Pad};
 use crate::periph::tim1::{Output, Tim1, Wave};
 
-/// The chip's own resistors, ohm (datasheet: 25 to 55 kOhm), and its supply, V.
-const CHIP_PULL_OHM: f64 = 40e3;
-const CHIP_V: f64 = 3.3;
+/// The chip's own resistors, ohm (datasheet: 25 to 55 kOhm).
+pub const CHIP_PULL_OHM: f64 = 40e3;
+/// Supply of the chip, V.
+pub const CHIP_V: f64 = 3.3;
 
 /// A resistor to a voltage.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,20 +61,24 @@ impl Request {
     }
 }
 
+/// The level that resistors make, below the first threshold low, above the second high; none between.
+pub fn level(pulls: impl Iterator<Item = Pull> + Clone, thresholds: (f64, f64)) -> Option<bool> {
+    let conductance: f64 = pulls.clone().map(|pull| 1.0 / pull.ohm).sum();
+    let volts = pulls.map(|pull| pull.volts / pull.ohm).sum::<f64>() / conductance;
+    // Without any resistor not a number, which is neither.
+    match thresholds {
+        (low, _) if volts < low => Some(false),
+        (_, high) if volts > high => Some(true),
+        _ => None,
+    }
+}
+
 impl Input {
     /// The level of a pin that nothing drives, beside the chip's own resistor.
     pub fn level(&self, chip_pull: Option<bool>) -> Option<bool> {
         let chip =
             chip_pull.map(|up| Pull { volts: if up { CHIP_V } else { 0.0 }, ohm: CHIP_PULL_OHM });
-        let pulls = || self.pull.into_iter().chain(chip);
-        let conductance: f64 = pulls().map(|pull| 1.0 / pull.ohm).sum();
-        let volts = pulls().map(|pull| pull.volts / pull.ohm).sum::<f64>() / conductance;
-        // Without any resistor not a number, which is neither.
-        match self.thresholds {
-            (low, _) if volts < low => Some(false),
-            (_, high) if volts > high => Some(true),
-            _ => None,
-        }
+        level(self.pull.into_iter().chain(chip), self.thresholds)
     }
 
     fn request(&self, pin: (usize, u32), output: Output, gpio: &[Gpio], period: u32) -> Request {

@@ -1,0 +1,134 @@
+//! The nets at two pins of the chip, and what looks at them: that of the dc link with the comparators, and that of the fault
+//! input with the break of TIM1.
+
+use super::{Chip, Damage};
+use crate::periph::NEVER;
+use crate::power_stage::driver::{self, CHIP_PULL_OHM, CHIP_V, Pull};
+use crate::power_stage::{CODES, DcLinkPin, channel};
+use crate::rules::Rule;
+use crate::time::TICKS_PER_S;
+
+/// The strongest of the chip's own resistors, ohm (datasheet, RPU and RPD: 25 to 55 kOhm).
+const STRONGEST_PULL_OHM: f64 = 25e3;
+/// Largest code of the analog signals.
+const FULL_SCALE: f64 = CODES - 1.0;
+/// Looks at a pin that moves in a time constant.
+const LOOKS: f64 = 50.0;
+
+/// The net of the dc link at its pin (PA1).
+#[derive(Clone, Debug)]
+pub struct DcLinkNet {
+    /// What the pin is connected to.
+    pub source: DcLinkPin,
+    /// Voltage at the pin, codes, at a time, ticks.
+    code: f64,
+    at: u64,
+    /// Where it goes, codes, and its time constant, ticks.
+    towards: (f64, f64),
+}
+
+impl DcLinkNet {
+    pub fn new(source: DcLinkPin) -> Self {
+        Self { source, code: 0.0, at: 0, towards: (0.0, 0.0) }
+    }
+
+    /// The code at the pin now, where the dc link alone would give `open` and the port pulls.
+    fn follow(&mut self, open: u16, pull: Option<bool>, now: u64) -> u16 {
+        let (end, tau) = self.towards;
+        let left = if tau > 0.0 { (-((now - self.at) as f64) / tau).exp() } else { 0.0 };
+        self.code = end + (self.code - end) * left;
+        self.at = now;
+        let open = f64::from(open);
+        self.towards = match self.source {
+            DcLinkPin::Driven => (open, 0.0),
+            DcLinkPin::Divider { ohm, farad } => {
+                let share = pull.map_or(0.0, |_| ohm / (ohm + CHIP_PULL_OHM));
+                let pulled = if pull == Some(true) { FULL_SCALE } else { 0.0 };
+                let tau = ohm * (1.0 - share) * farad * TICKS_PER_S as f64;
+                (open + share * (pulled - open), tau)
+            }
+        };
+        // Before power-on the capacitor had time.
+        if self.towards.1 == 0.0 || now == 0 {
+            self.code = self.towards.0;
+        }
+        self.code.round() as u16
+    }
+
+    /// When to look at it again.
+    pub fn next_event(&self) -> u64 {
+        let (end, tau) = self.towards;
+        let moves = tau > 0.0 && (self.code - end).abs() > 0.5;
+        if moves { self.at + (tau / LOOKS).max(1.0) as u64 } else { NEVER }
+    }
+}
+
+impl Chip {
+    /// The comparators see the analog signals: comparator 1 has PA1 at its positive input, which is the
+    /// dc link here, comparator 3 PA0 or PC1.
+    pub fn compare(&mut self, current_a: u16, current_b: u16, dc_link: u16) {
+        self.analog = [current_a, current_b, dc_link];
+        self.compare_now();
+    }
+
+    /// The converter and channel whose level comparator 1 or 3, counted from 0, looks at.
+    fn level_of(&self, n: usize) -> Option<(usize, usize)> {
+        // INMSEL 4 is DAC3, 5 is DAC1, channel 1 of either; the others are not modelled.
+        match self.comp.reference_of(n) {
+            4 => Some((1, 1)),
+            5 => Some((0, 1)),
+            _ => None,
+        }
+    }
+
+    /// The converters and the comparators see the pins as they are now.
+    pub(super) fn compare_now(&mut self) {
+        let [current_a, current_b, open] = self.analog;
+        let dc_link = self.dc_link.follow(open, self.gpio[0].pull(1), self.now);
+        for inputs in &mut self.adc.inputs {
+            inputs[channel::DC_LINK] = dc_link;
+        }
+        self.comp.inputs[0] = dc_link;
+        self.comp.inputs[2] = if self.comp.input_of(2) == 0 { current_a } else { current_b };
+        for n in [0, 2] {
+            let level = self.level_of(n);
+            let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
+            self.comp.references[n] = code.unwrap_or(u16::MAX);
+        }
+        match self.damage {
+            Some(Damage::Level(code)) => self.comp.references[0] = code,
+            Some(Damage::Input) => self.comp.inputs[0] = 0,
+            Some(Damage::Comparator | Damage::Break) | None => {}
+        }
+        self.comp.stuck_low = self.damage == Some(Damage::Comparator);
+        self.comp.look(self.now);
+        let reaches = self.damage != Some(Damage::Break);
+        self.tim1.set_comparators(std::array::from_fn(|n| reaches && self.comp.output(n)));
+    }
+
+    /// A comparator was written: the level it looks at must have been seen ready.
+    pub(super) fn check_reference(&mut self, offset: u32) {
+        let n = ((offset - 0x200) / 4) as usize;
+        let on = self.comp.is_on(n);
+        if let (true, Some((which, channel))) = (on, self.level_of(n)) {
+            let ready = self.dac.seen_ready(which, channel);
+            self.rules.require(ready, Rule::DacReady, || {
+                format!(
+                    "COMP{} is on, but DAC{}_SR.DAC{channel}RDY was never read as set",
+                    n + 1,
+                    [1, 3][which]
+                )
+            });
+        }
+    }
+
+    /// The level of the fault input (PA6) follows from the resistors of the board and of the port; it is sure below 0.3 and above 0.7 of
+    /// the supply (datasheet, VIL and VIH).
+    pub(crate) fn follow_fault_pin(&mut self) {
+        let port = self.gpio[0].pull(6).map(|up| (up, STRONGEST_PULL_OHM));
+        let pulls = [(true, self.fault_pull_ohm)].into_iter().chain(port);
+        let pulls = pulls.map(|(up, ohm)| Pull { volts: if up { CHIP_V } else { 0.0 }, ohm });
+        let released = driver::level(pulls, (0.3 * CHIP_V, 0.7 * CHIP_V));
+        self.tim1.set_fault_pin(if self.fault_low { Some(false) } else { released });
+    }
+}

@@ -1,0 +1,286 @@
+//! Serial ports with their FIFOs: LPUART1 (RM0440, section 38), the console, and USART3 (section 37), the field bus behind an
+//! RS-485 transceiver. They have most registers in common.
+
+use std::collections::VecDeque;
+
+use super::{Effect, NEVER, Plain, Store};
+
+const CR1: u32 = 0x00;
+const CR2: u32 = 0x04;
+const CR3: u32 = 0x08;
+const BRR: u32 = 0x0c;
+const RTOR: u32 = 0x14;
+const ISR: u32 = 0x1c;
+const ICR: u32 = 0x20;
+const RDR: u32 = 0x24;
+/// Offset of the register that sends.
+pub const TDR: u32 = 0x28;
+
+/// What the two differ in.
+#[derive(Debug)]
+pub struct Kind {
+    known: &'static [Plain],
+    /// Least value of BRR, and its units in a tick.
+    least: u32,
+    units: u64,
+}
+
+/// Registers with what can be written to the first four; those that USART3 alone has come last.
+const fn known(cr1: u32, cr2: u32, cr3: u32, brr: u32) -> [Plain; 12] {
+    [
+        (CR1, 0, cr1),
+        (CR2, 0, cr2),
+        (CR3, 0, cr3),
+        (BRR, 0, brr),
+        (0x18, 0, 0),
+        (ISR, 0, 0),
+        (ICR, 0, 0),
+        (RDR, 0, 0),
+        (TDR, 0, 0),
+        (0x2c, 0, 0xf),
+        (0x10, 0, 0xffff),
+        (RTOR, 0, u32::MAX),
+    ]
+}
+const OF_LPUART1: [Plain; 12] = known(0xf3ff_7fff, 0xff0f_b010, 0xfef0_f7c9, 0xf_ffff);
+const OF_USART3: [Plain; 12] = known(u32::MAX, 0xffff_ff79, 0xfffe_ffff, 0xffff);
+
+/// LPUART1.
+pub const LPUART1: Kind = Kind { known: OF_LPUART1.split_at(10).0, least: 0x300, units: 256 };
+/// USART3.
+pub const USART3: Kind = Kind { known: &OF_USART3, least: 16, units: 1 };
+
+const UE: u32 = 1;
+const RE: u32 = 1 << 2;
+const TE: u32 = 1 << 3;
+const PCE: u32 = 1 << 10;
+const M0: u32 = 1 << 12;
+const RTOIE: u32 = 1 << 26;
+const FIFOEN: u32 = 1 << 29;
+/// Bits of CR1 that can be changed only while the port is off: FIFOEN, OVER8, M1, M0, WAKE, PCE, PS.
+const FIXED: u32 = FIFOEN | 1 << 28 | 1 << 15 | M0 | 1 << 11 | PCE | 1 << 9;
+const TWO_STOPS: u32 = 2 << 12;
+const RTOEN: u32 = 1 << 23;
+const PE: u32 = 1;
+const FE: u32 = 1 << 1;
+const NE: u32 = 1 << 2;
+const ORE: u32 = 1 << 3;
+const RXNE: u32 = 1 << 5;
+const TC: u32 = 1 << 6;
+const TXE: u32 = 1 << 7;
+const RTOF: u32 = 1 << 11;
+/// PEIE of CR1 asks for PE.
+const PEIE: u32 = 1 << 8;
+/// TXFE of ISR, and its enable in CR1; RXFF is never asked for.
+const TXFE: u32 = 1 << 23;
+const TXFEIE: u32 = 1 << 30;
+/// Bytes that a FIFO holds.
+const FIFO: usize = 8;
+
+/// A byte of the line whose parity is wrong has this bit beside its eight.
+pub const WRONG_PARITY: u16 = 1 << 8;
+
+/// Bytes between the port and the line.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// To the chip, without gaps between them.
+    pub to_chip: VecDeque<u16>,
+    /// From the chip, each with the time of its end, ticks.
+    pub from_chip: Vec<(u64, u8)>,
+}
+
+impl Line {
+    /// The bytes from the chip since the last call.
+    pub fn take(&mut self) -> Vec<u8> {
+        self.from_chip.drain(..).map(|(_, byte)| byte).collect()
+    }
+}
+
+/// A port.
+#[derive(Clone, Debug)]
+pub struct Uart {
+    kind: &'static Kind,
+    store: Store,
+    /// ISR but for the flags that follow from the FIFOs.
+    status: u32,
+    received: VecDeque<u8>,
+    to_send: VecDeque<u8>,
+    shifting: Option<u8>,
+    sent_at: u64,
+    arrives_at: u64,
+    silent_at: u64,
+    /// Its other end.
+    pub line: Line,
+}
+
+impl Uart {
+    /// A port after a reset.
+    pub fn new(kind: &'static Kind) -> Self {
+        Self {
+            kind,
+            store: Store::new(kind.known),
+            status: TC,
+            received: VecDeque::new(),
+            to_send: VecDeque::new(),
+            shifting: None,
+            sent_at: NEVER,
+            arrives_at: NEVER,
+            silent_at: NEVER,
+            line: Line::default(),
+        }
+    }
+
+    fn on(&self, which: u32) -> bool {
+        self.store.get(CR1) & (UE | which) == UE | which
+    }
+
+    /// Bytes that the receiver and the transmitter hold beside their shift registers.
+    fn depth(&self) -> usize {
+        if self.store.get(CR1) & FIFOEN != 0 { FIFO } else { 1 }
+    }
+
+    /// ISR but for the acknowledges.
+    fn flags(&self) -> u32 {
+        let rxne = if self.received.is_empty() { 0 } else { RXNE };
+        let txe = if self.to_send.len() < self.depth() { TXE } else { 0 };
+        let txfe = if self.depth() == FIFO && self.to_send.is_empty() { TXFE } else { 0 };
+        self.status | rxne | txe | txfe
+    }
+
+    /// Ticks of some bits.
+    fn bits(&self, count: u64) -> u64 {
+        count * u64::from(self.store.get(BRR).max(self.kind.least)) / self.kind.units
+    }
+
+    /// Ticks of a byte: start bit, data with parity, stop bits.
+    pub fn byte(&self) -> u64 {
+        let parity = u64::from(self.store.get(CR1) & M0 != 0);
+        let stops = if self.store.get(CR2) & 3 << 12 == TWO_STOPS { 2 } else { 1 };
+        self.bits(9 + parity + stops)
+    }
+
+    /// Bytes were put on the line.
+    pub fn wake(&mut self, now: u64) {
+        if self.arrives_at == NEVER && !self.line.to_chip.is_empty() {
+            self.arrives_at = now + self.byte();
+            self.silent_at = NEVER;
+        }
+    }
+
+    /// When a byte has arrived or left, or the line was silent for long enough.
+    pub fn next_event(&self) -> u64 {
+        self.sent_at.min(self.arrives_at).min(self.silent_at)
+    }
+
+    /// Lets bytes arrive and leave. `driver`: whether the transceiver drives the line, and does not listen; without one the port
+    /// does both. Whether a byte was lost because it does not.
+    pub fn happen(&mut self, now: u64, driver: Option<bool>) -> bool {
+        if self.arrives_at <= now {
+            self.arrives_at = NEVER;
+            if let Some(byte) = self.line.to_chip.pop_front()
+                && self.on(RE)
+                && driver != Some(true)
+            {
+                self.arrive(byte, now);
+            }
+            self.wake(now);
+        }
+        if self.silent_at <= now {
+            self.silent_at = NEVER;
+            self.status |= RTOF;
+        }
+        let mut lost = false;
+        if self.sent_at <= now {
+            let byte = self.shifting.take().map(|byte| (self.sent_at, byte));
+            self.sent_at = NEVER;
+            lost = byte.is_some() && driver == Some(false);
+            self.line.from_chip.extend(byte.filter(|_| !lost));
+            self.shift(now);
+        }
+        lost
+    }
+
+    fn arrive(&mut self, byte: u16, now: u64) {
+        if self.received.len() >= self.depth() {
+            self.status |= ORE;
+        } else {
+            self.received.push_back(byte as u8);
+        }
+        if byte & WRONG_PARITY != 0 && self.store.get(CR1) & PCE != 0 {
+            self.status |= PE;
+        }
+        if self.store.get(CR2) & RTOEN != 0 {
+            self.silent_at = now + self.bits(u64::from(self.store.get(RTOR) & 0xff_ffff));
+        }
+    }
+
+    fn shift(&mut self, now: u64) {
+        if self.shifting.is_some() {
+            return;
+        }
+        self.shifting = self.to_send.pop_front();
+        if self.shifting.is_some() {
+            self.status &= !TC;
+            self.sent_at = now + self.byte();
+        } else {
+            self.status |= TC;
+        }
+    }
+
+    /// Whether any enabled event asks for the interrupt.
+    pub fn requests(&self) -> bool {
+        let (cr1, cr3) = (self.store.get(CR1), self.store.get(CR3));
+        let mut asked = cr1 & (RXNE | TC | TXE);
+        for (enabled, flags) in [
+            (cr1 & RXNE, ORE),
+            (cr1 & PEIE, PE),
+            (cr1 & RTOIE, RTOF),
+            (cr1 & TXFEIE, TXFE),
+            // EIE.
+            (cr3 & 1, FE | NE | ORE),
+        ] {
+            asked |= if enabled != 0 { flags } else { 0 };
+        }
+        cr1 & UE != 0 && self.flags() & asked != 0
+    }
+
+    /// Reads a register, with its side effects.
+    pub fn read(&mut self, offset: u32) -> Option<u32> {
+        match offset {
+            // REACK and TEACK follow RE and TE.
+            ISR => Some(self.flags() | self.store.get(CR1) << 18 & 3 << 21),
+            RDR => Some(u32::from(self.received.pop_front().unwrap_or_default())),
+            _ => self.store.read(offset),
+        }
+    }
+
+    /// Writes a register. Unknown is what the port takes only while it is off.
+    pub fn write(&mut self, offset: u32, value: u32, now: u64) -> Option<Effect> {
+        let changed = self.store.get(offset) ^ value;
+        match offset {
+            CR1 if self.on(0) && value & UE != 0 && changed & FIXED != 0 => return None,
+            BRR | CR2 if self.on(0) && changed != 0 => return None,
+            CR1 if value & UE == 0 => {
+                self.store.write(offset, value)?;
+                let (store, line) = (self.store.clone(), std::mem::take(&mut self.line));
+                *self = Self { store, line, ..Self::new(self.kind) };
+                self.wake(now);
+            }
+            ICR => self.status &= !(value & (PE | FE | NE | ORE | TC | RTOF)),
+            TDR if self.on(TE) => {
+                if self.to_send.len() < self.depth() {
+                    self.to_send.push_back(value as u8);
+                } else if let Some(last) = self.to_send.back_mut() {
+                    *last = value as u8;
+                }
+                self.status &= !TC;
+                self.shift(now);
+            }
+            TDR => {}
+            _ => {
+                self.store.write(offset, value)?;
+            }
+        }
+        Some(Effect::Look)
+    }
+}

@@ -1,0 +1,124 @@
+//! The campaign of faults: each class that looks at a protection of its own fails without that protection, and passes with it;
+//! and the page of its results lists every class.
+
+use anyhow::{Context, Result};
+use induction_drive::monitor::register_check::control;
+use virtual_board::campaign::{self, Selection, Without};
+use virtual_board::power_stage::REFERENCE;
+use virtual_board::{Board, Image};
+
+const PAGE: &str = include_str!("../../../docs/campaign.md");
+/// `movs r0, #0; bx lr`: a function that finds nothing.
+const FINDS_NOTHING: [u8; 4] = [0x00, 0x20, 0x70, 0x47];
+const SYSCFG_CFGR2: u32 = 0x4001_001c;
+const ECCL: u32 = 1 << 3;
+const WWDG_CFR: u32 = 0x4000_2c04;
+
+/// The classes, each with its protection.
+const PROTECTED: [(&str, Protection); 7] = [
+    ("TIM1 stops", Protection::Window),
+    ("core hangs", Protection::Window),
+    ("LSI off its frequency", Protection::Sources),
+    ("crystal off its frequency", Protection::Sources),
+    ("reference voltage off", Protection::Sources),
+    ("bit flip in a register", Protection::Registers),
+    ("flash ECC in code", Protection::Flash),
+];
+
+#[derive(Clone, Copy, PartialEq)]
+enum Protection {
+    Window,
+    Sources,
+    Registers,
+    Flash,
+}
+
+/// A function finds nothing from now on, or it is as in the image again.
+fn cut(board: &mut Board, function: &str, is_cut: bool) {
+    let address = board.image().symbol(function).expect("it is in the image").address;
+    let sound = board.image().segments().iter().find_map(|segment| {
+        let at = address.checked_sub(segment.address)? as usize;
+        segment.bytes.get(at..at + FINDS_NOTHING.len())
+    });
+    let sound = sound.expect("code of the image").to_vec();
+    board.cpu().write(address, if is_cut { &FINDS_NOTHING } else { &sound });
+}
+
+/// The check of registers expects of one what it holds.
+fn expect_as_it_is(board: &mut Board, address: u32) {
+    let table = "induction_drive::task::check::Check::new::{closure#0}::VAR";
+    let table = board.image().symbol(table).expect("it is in the image").address;
+    for (n, register) in control().enumerate().filter(|(_, r)| r.address == address) {
+        let value = board.chip().read(address, 4) & register.mask;
+        board.cpu().write(table + 4 * n as u32, &value.to_le_bytes());
+    }
+}
+
+/// Takes the protection of a class out, and no other.
+fn without(board: &mut Board, class: &str, fault: &str) {
+    let (_, protection) = PROTECTED.into_iter().find(|(name, _)| *name == class).expect(class);
+    // The comparison of clocks and references; the interrupt by which an error of the flash ends the run.
+    let sources = "induction_drive::task::sources::Sources::measure";
+    cut(board, sources, protection == Protection::Sources);
+    cut(board, "NonMaskableInt", protection == Protection::Flash);
+    match protection {
+        Protection::Window if fault.is_empty() => {
+            // 128 times slower.
+            let config = board.chip().read(WWDG_CFR, 4);
+            board.chip().write(WWDG_CFR, 4, config | 7 << 11);
+            expect_as_it_is(board, WWDG_CFR);
+            board.run_periods(2).expect("it goes on");
+        }
+        Protection::Registers if !fault.is_empty() => {
+            let (_, address) = fault.split_once(" of 0x").expect("a place");
+            expect_as_it_is(board, u32::from_str_radix(address, 16).expect("an address"));
+        }
+        // And the break by an error of the flash.
+        Protection::Flash if !fault.is_empty() => {
+            let breaks = board.chip().read(SYSCFG_CFGR2, 4);
+            board.chip().write(SYSCFG_CFGR2, 4, breaks & !ECCL);
+        }
+        _ => {}
+    }
+}
+
+fn run(without: Without) -> Result<String> {
+    let class = PROTECTED.map(|(name, _)| name).join("|");
+    // Four of each class: some bits matter to nothing, and without the encoder another protection finds a wrong crystal.
+    let count = 4 * PROTECTED.len() as u64;
+    let selection = Selection { count, seed: 7000, class, rpm: None, stage: &REFERENCE, without };
+    campaign::run(Image::built, &selection)
+}
+
+#[test]
+fn a_class_fails_without_its_protection() -> Result<()> {
+    run(|_, _, _| ())?;
+    let why = run(without).expect_err("nothing fails without protection").to_string();
+    for (class, _) in PROTECTED {
+        let failure = why.lines().find(|line| line.starts_with(&format!("{class}, seed ")));
+        println!("{}", failure.with_context(|| format!("{class} passes without protection"))?);
+    }
+    Ok(())
+}
+
+/// The tables of the page have a row for every class, at rest and at speed, and no other.
+#[test]
+fn the_page_lists_every_class() {
+    let classes = |at_speed: bool| -> Vec<String> {
+        let table = campaign::bounds(at_speed);
+        let rows = table.lines().skip(2).filter_map(|line| line.split_once(" | "));
+        rows.map(|(name, _)| name.to_owned()).collect()
+    };
+    let mut tables: Vec<Vec<&str>> = Vec::new();
+    for line in PAGE.lines() {
+        match line.strip_prefix("| ").and_then(|line| line.split_once(" |")) {
+            Some(("class", _)) => tables.push(Vec::new()),
+            Some((name, _)) => tables.last_mut().expect("a table").push(name),
+            None => {}
+        }
+    }
+    assert_eq!(tables.len(), 4);
+    for (n, table) in tables.iter().enumerate() {
+        assert_eq!(*table, classes(n > 0), "table {n}");
+    }
+}
