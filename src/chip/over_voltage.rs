@@ -19,7 +19,7 @@ use induction_drive::boards::{Level, SELECTED};
 /// The comparator has tripped by a voltage at its pin.
 static PROVED: AtomicBool = AtomicBool::new(false);
 /// The reason why no motor is switched on before it has.
-pub const UNPROVED: StartError = "self-test: the over-voltage comparator has not tripped yet: a dc link above a tenth of its range tests it";
+pub const UNPROVED: StartError = "self-test: the over-voltage comparator does not trip at the level zero; with a sensor that drives its pin: dc link above a tenth of the range first";
 
 /// Starts the comparator, proves that it pulls the break of the timer and does not at the converter code `level`, and locks it
 /// there until the next reset. The outputs are off. It has to trip at the level zero as well; where a sensor drives the pin to
