@@ -288,14 +288,14 @@ fn after_power(scene: &mut Scene, whole_start: bool) -> Result<Outcome> {
 
 fn table(all: &[Class], tallies: &BTreeMap<usize, Tally>) -> String {
     let mut text = String::from(
-        "class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed\n\
-         ---|---|---|---|---|---|---|---|---\n",
+        "| class | bound, ms | runs | off | carried on | latest off, ms | longest wrong, ms | peak, A | failed |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
     );
     for (which, f) in tallies {
         let class = &all[*which];
         let _ = writeln!(
             text,
-            "{} | {:.3} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {}",
+            "| {} | {:.3} | {} | {} | {} | {:.3} | {:.2} | {:.2} | {} |",
             class.name,
             class.bound.0,
             f.runs,
