@@ -48,8 +48,7 @@ fn run(mut options: Options) -> Result<()> {
     let script = options.script.as_deref().map(Script::open).transpose()?;
     let script = script.map(|script| if options.lenient { script } else { script.strict() });
     let image = image(stage, options.elf.as_deref())?;
-    let pty = Pty::open()?;
-    let bus = Pty::open()?;
+    let (pty, bus) = (Pty::open()?, Pty::open()?);
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register(signal, stop.clone()).context("cannot listen for Ctrl-C")?;
