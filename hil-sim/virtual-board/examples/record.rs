@@ -1,4 +1,4 @@
-//! Records the runs of the board that `tests/replay.rs` gives to a host drive: `tests/recorded/NAME.samples` and
+//! Records the runs of the board that `tests/replay/` gives to a host drive: `tests/recorded/NAME.samples` and
 //! `NAME.orders`; see the README there.
 //!
 //! `cargo run --release -p virtual-board --example record`, after `cargo firmware` and with the path that it prints in
