@@ -1,7 +1,7 @@
 //! The chip around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
-//! its PLL. The file is long because what all peripherals share meets here.
+//! its PLL.
 
 mod bus;
 mod clocked;
