@@ -1,7 +1,7 @@
 //! The chip around the core: time, registers, events.
 //!
 //! Time is counted in ticks of 170 MHz, the clock of core and timers once the firmware has started
-//! its PLL. The file is long because what all peripherals share meets here.
+//! its PLL.
 
 mod bus;
 mod clocked;
@@ -123,6 +123,8 @@ pub struct Chip {
     /// Codes at the pins of current a, current b, dc link.
     analog: [u16; 3],
     pub(crate) dc_link: DcLinkNet,
+    /// Codes that an input must be above the level of a comparator: offset of this part, and zero error of its DAC.
+    pub comparator_offset: u16,
     /// Resistor from the fault input to the supply, ohm, and whether the power stage pulls the input low.
     pub(crate) fault_pull_ohm: f64,
     pub(crate) fault_low: bool,
@@ -204,6 +206,7 @@ impl Default for Chip {
             bus_hz: 16_000_000,
             system_rose: 0,
             analog: [0; 3],
+            comparator_offset: 0,
             dc_link: DcLinkNet::new(power_stage::REFERENCE.dc_link_pin),
             fault_pull_ohm: power_stage::REFERENCE.fault_pull_ohm,
             fault_low: false,
@@ -246,6 +249,7 @@ impl Chip {
         self.flash_cycles = old.flash_cycles;
         self.pwr.supply_v = old.pwr.supply_v;
         (self.analog, self.dc_link) = (old.analog, old.dc_link);
+        self.comparator_offset = old.comparator_offset;
         (self.fault_pull_ohm, self.fault_low) = (old.fault_pull_ohm, old.fault_low);
         self.damage = old.damage;
         (self.clock_error, self.reference_error) = (old.clock_error, old.reference_error);

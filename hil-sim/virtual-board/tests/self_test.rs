@@ -5,7 +5,7 @@ use anyhow::{Result, bail, ensure};
 use induction_drive::board::protection;
 use virtual_board::chip::{Damage, TICKS_PER_S};
 use virtual_board::periph::Reset;
-use virtual_board::power_stage::{ALL, REFERENCE};
+use virtual_board::power_stage::{ALL, DcLinkPin, REFERENCE};
 use virtual_board::{Board, Image, Options, PowerStage};
 
 /// Longest from a reset to the greeting, and from an order to its effect, periods.
@@ -147,4 +147,77 @@ fn a_comparator_that_does_not_reach_the_timer_is_not_started() -> Result<()> {
         board.run_ticks(TICKS_PER_S / 4).expect("it starts");
         board.set_fault_pin(true);
     })
+}
+
+/// The worst part, codes: 9 mV of the comparator, and five codes of the DAC at its zero (datasheet, V_offset and the error at
+/// code 1 without buffer).
+const OFFSET: u16 = 16;
+
+/// What the pin of the dc link of a stage may be connected to beside a bare divider: a capacitor of the usual size and of twice
+/// that, or an amplifier or an isolated sensor, which a pull of the chip does not move.
+fn pins(stage: &PowerStage) -> [DcLinkPin; 3] {
+    let DcLinkPin::Divider { ohm, .. } = stage.dc_link_pin else { panic!("{}", stage.name) };
+    let capacitor = |farad| DcLinkPin::Divider { ohm, farad };
+    [capacitor(100e-9), capacitor(220e-9), DcLinkPin::Driven]
+}
+
+/// A board with such a pin, before its dc link is there, and what it says as it starts.
+fn without_link(
+    stage: &'static PowerStage,
+    pin: DcLinkPin,
+    damage: Option<Damage>,
+) -> Result<(Board, String)> {
+    let mut options = Options::on(stage, &stage.config()?, 23);
+    options.dc_link_pin = pin;
+    let mut board = Board::new(Image::built_for(stage.name)?, options)?;
+    board.chip().damage = damage;
+    board.chip().comparator_offset = OFFSET;
+    board.plant.set_dc_link(0.0)?;
+    board.chip().compare(0, 0, 0);
+    let heard = hear_off(&mut board, "last run: ")?;
+    Ok((board, heard))
+}
+
+/// Without a dc link the self-test passes with a capacitor at the pin, which the chip's resistor charges in milliseconds, and
+/// with a pin that it cannot lift; with the dc link there the drive switches on. No pin is read in a mode that it must not have.
+#[test]
+fn a_capacitor_or_a_driven_sensor_is_no_reason_to_refuse() -> Result<()> {
+    for stage in ALL {
+        for pin in pins(stage) {
+            let (mut board, heard) = without_link(stage, pin, None)?;
+            assert!(!heard.contains("not started"), "{}, {pin:?}: {heard}", stage.name);
+            board.plant.set_dc_link(stage.config()?.inverter.dc_link_v)?;
+            off_for(&mut board, 3000)?;
+            board.type_line("start torque");
+            let mut on = false;
+            for _ in 0..START / 10 {
+                board.run_periods(10)?;
+                on |= board.gates().any_on();
+            }
+            assert!(on, "{}, {pin:?}: {}", stage.name, board.take_console());
+            assert!(board.violations().is_empty() && board.resets.is_empty());
+        }
+    }
+    Ok(())
+}
+
+/// A dead comparator is refused with either, without a dc link as well: its output stays low whatever its polarity, the break
+/// does not see it, and, where the pin can be lifted, it does not see its pin.
+#[test]
+fn a_dead_comparator_behind_a_capacitor_or_a_driven_sensor_is_refused() -> Result<()> {
+    let [_, capacitor, driven] = pins(&REFERENCE);
+    for (pin, damage) in [
+        (capacitor, Damage::Comparator),
+        (capacitor, Damage::Input),
+        (capacitor, Damage::Break),
+        (driven, Damage::Comparator),
+        (driven, Damage::Break),
+    ] {
+        let (mut board, heard) = without_link(&REFERENCE, pin, Some(damage))?;
+        let refused = heard.contains("not started: self-test: the over-voltage comparator");
+        assert!(refused, "{pin:?}, {damage:?}: {heard}");
+        board.type_line("start torque");
+        off_for(&mut board, 1200)?;
+    }
+    Ok(())
 }

@@ -93,7 +93,7 @@ impl Chip {
         for n in [0, 2] {
             let level = self.level_of(n);
             let code = level.map(|(which, channel)| self.dac.code(which, channel, self.now));
-            self.comp.references[n] = code.unwrap_or(u16::MAX);
+            self.comp.references[n] = code.map_or(u16::MAX, |code| code + self.comparator_offset);
         }
         match self.damage {
             Some(Damage::Level(code)) => self.comp.references[0] = code,
