@@ -11,6 +11,7 @@ use virtual_board::{Board, Image, Options, PowerStage};
 /// Longest from a reset to the greeting, and from an order to its effect, periods.
 const START: u64 = 30_000;
 
+const NEVER_TRIPS: &str = "the over-voltage comparator does not trip at the level zero";
 const TRIPS_ALWAYS: &str = "the over-voltage comparator trips at its own level";
 
 /// Goes on for some periods, in which no gate is on at their ends. Between them a violation at the gates fails the run.
@@ -124,15 +125,18 @@ fn a_comparator_whose_output_stays_low_is_not_started() -> Result<()> {
     )
 }
 
-/// A level that stays at the top: the comparator would never trip. It could be a sensor that drives the pin to ground: a start finds
-/// out by the dc link.
+/// A comparator that does not see its pin, or whose level stays at the top: it would never trip. It could be a sensor that drives the
+/// pin to ground: a start finds out by the dc link.
 #[test]
 fn a_comparator_that_does_not_trip_is_not_started() -> Result<()> {
-    let why = "the over-voltage comparator does not trip at the level zero";
-    let broken = |board: &mut Board, broken: bool| {
-        board.chip().damage = broken.then_some(Damage::Level(4095));
-    };
-    mended(&mut refuses(&REFERENCE, why, &broken, false)?, broken)
+    let damages = ALL.map(|stage| (stage, Damage::Input));
+    for (stage, damage) in damages.into_iter().chain([(&REFERENCE, Damage::Level(4095))]) {
+        let broken = |board: &mut Board, broken: bool| {
+            board.chip().damage = broken.then_some(damage);
+        };
+        mended(&mut refuses(stage, NEVER_TRIPS, &broken, false)?, broken)?;
+    }
+    Ok(())
 }
 
 /// The comparator trips, and the timer does not see it; a break flag that the fault input left at start does not hide it.
@@ -201,14 +205,13 @@ fn a_capacitor_or_a_driven_sensor_is_no_reason_to_refuse() -> Result<()> {
     Ok(())
 }
 
-/// A dead comparator is refused with either, without a dc link as well: its output stays low whatever its polarity, the break
-/// does not see it, and, where the pin can be lifted, it does not see its pin.
+/// A dead comparator is refused with either, without a dc link as well: its output stays low whatever its polarity, or the break
+/// does not see it. One that does not see its pin is refused by the start, with and without a dc link.
 #[test]
 fn a_dead_comparator_behind_a_capacitor_or_a_driven_sensor_is_refused() -> Result<()> {
     let [_, capacitor, driven] = pins(&REFERENCE);
     for (pin, damage) in [
         (capacitor, Damage::Comparator),
-        (capacitor, Damage::Input),
         (capacitor, Damage::Break),
         (driven, Damage::Comparator),
         (driven, Damage::Break),
@@ -218,6 +221,18 @@ fn a_dead_comparator_behind_a_capacitor_or_a_driven_sensor_is_refused() -> Resul
         assert!(refused, "{pin:?}, {damage:?}: {heard}");
         board.type_line("start torque");
         off_for(&mut board, 1200)?;
+    }
+    for pin in [capacitor, driven] {
+        let (mut board, heard) = without_link(&REFERENCE, pin, Some(Damage::Input))?;
+        assert!(!heard.contains("not started"), "{pin:?}: {heard}");
+        for volts in [0.0, 311.0] {
+            board.plant.set_dc_link(volts)?;
+            off_for(&mut board, 3000)?;
+            board.type_line("start torque");
+            let heard = hear_off(&mut board, "error: ")?;
+            assert!(heard.contains(NEVER_TRIPS), "{pin:?}, {volts} V: {heard}");
+            off_for(&mut board, 1200)?;
+        }
     }
     Ok(())
 }

@@ -109,15 +109,10 @@ impl Chip {
     /// A comparator was written: the level it looks at must have been seen ready.
     pub(super) fn check_reference(&mut self, offset: u32) {
         let n = ((offset - 0x200) / 4) as usize;
-        let on = self.comp.is_on(n);
-        if let (true, Some((which, channel))) = (on, self.level_of(n)) {
-            let ready = self.dac.seen_ready(which, channel);
+        if let (true, Some((which, channel))) = (self.comp.is_on(n), self.level_of(n)) {
+            let (ready, comp, dac) = (self.dac.seen_ready(which, channel), n + 1, [1, 3][which]);
             self.rules.require(ready, Rule::DacReady, || {
-                format!(
-                    "COMP{} is on, but DAC{}_SR.DAC{channel}RDY was never read as set",
-                    n + 1,
-                    [1, 3][which]
-                )
+                format!("COMP{comp} is on, but DAC{dac}_SR.DAC{channel}RDY was never read as set")
             });
         }
     }
