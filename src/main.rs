@@ -9,9 +9,10 @@
 //! * the interrupts of the serial port (`chip/serial.rs`) and of the field bus (`chip/rs485.rs`): a byte in, a byte out.
 //! * the loop at the end of `main`, between interrupts: console (`console.rs`), the log ten times a second, the
 //!   tracking of the rotor time constant (`task/supervisor.rs`), and the check of the control's memory and registers
-//!   (`task/check.rs`).
+//!   (`task/check.rs`), and the second opinions on clock and reference (`task/sources.rs`).
 //! * `chip/stop.rs`, when the firmware cannot go on: outputs off, the reason kept for the next boot, reset.
-//! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls.
+//! * the watchdog (`monitor/watchdog.rs`, `chip/watchdog.rs`), when the loop or the control interrupt stalls, and the window
+//!   watchdog (`chip/window.rs`), when the control interrupt stays away for three periods.
 //!
 //! The drive starts off; `start` at the console switches the outputs on.
 //!
