@@ -60,6 +60,24 @@ fn a_trace_with_a_trigger_is_announced_and_printed_when_asked_for() {
     assert_eq!(talk.ask("trace"), "error: no trace was recorded");
 }
 
+/// A sensor with a negative gain has a smaller code for a larger current; one that the board does not have is told.
+#[test]
+fn a_trigger_on_a_current_sensor_is_one_on_its_codes() {
+    for board in [boards::ALL[0], boards::ALL[1]] {
+        let mut settings = FirmwareSettings::of(board);
+        settings.confirm_board();
+        let line = settings.drive.scales.current_b;
+        let mut talk = Talk::with(settings);
+        assert_eq!(talk.ask("trace 4 i_b_a on i_b_a above 1.5"), "ok: recording until the trigger");
+        let plan = talk.drive.plan.as_ref().unwrap();
+        let Trigger::Level { level, above, .. } = plan.trigger else { panic!() };
+        assert!((line.gain * level + line.offset - 1.5).abs() < 1e-4, "{level}");
+        assert_eq!(above, line.gain > 0.0, "{}", board.name);
+    }
+    let mut talk = Talk::new();
+    assert_eq!(talk.ask("trace 4 on i_c_a above 1"), "error: this board has no such sensor");
+}
+
 /// The object of a line of `describe`: names and texts of its values. They hold no commas between quotes but in help,
 /// which comes last.
 fn object(line: &str) -> std::collections::BTreeMap<String, String> {

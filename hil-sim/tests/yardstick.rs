@@ -1,0 +1,67 @@
+//! Statistics of the drive as recorded: the same JSON as ever, to the last digit.
+//!
+//! A change that keeps the control keeps these. They are those of one mathematics library, so only who changes the control asks for them:
+//!
+//! ```text
+//! cargo test --release -p hil-sim --test yardstick -- --ignored
+//! ```
+//!
+//! `YARDSTICK=write` records them anew; the commit that does so says why.
+
+use std::path::Path;
+use std::process::Command;
+use std::{env, fs};
+
+const HIGH_FLUX: [&str; 6] =
+    ["--set", "flux_level=high", "--set", "sequence.flux=high", "--set", "prepare.learn=yes"];
+
+/// The recorded file, and the arguments of the run.
+fn runs() -> Vec<(String, Vec<String>)> {
+    let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    let mut runs = Vec::new();
+    for seed in 1..=3 {
+        let line = format!("full-range --set runs=2 --seed {seed}");
+        runs.push((format!("full-range-{seed}"), words(&line)));
+    }
+    runs.push(("monte-carlo".into(), words("monte-carlo --set runs=24 --seed 1")));
+    for plant in ["r", "g7", "m4b"] {
+        let mut all = words(&format!("battery --plant {plant} --set runs=48 --seed 4"));
+        all.extend(HIGH_FLUX.map(str::to_owned));
+        runs.push((format!("battery-{plant}"), all));
+    }
+    runs
+}
+
+#[test]
+#[ignore = "its digits are those of one mathematics library"]
+fn statistics_are_as_recorded() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recorded");
+    let writes = env::var("YARDSTICK").is_ok_and(|value| value == "write");
+    for (name, arguments) in runs() {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+        let output = command.args(["run", "--json", "--quiet"]).args(&arguments).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.len() > 500, "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let file = folder.join(format!("{name}.json"));
+        if writes {
+            fs::write(&file, &text).unwrap();
+        }
+        // Not `assert_eq`: the texts are long.
+        let recorded = fs::read_to_string(&file).unwrap();
+        let differs = text.bytes().zip(recorded.bytes()).position(|(now, then)| now != then);
+        let near = |text: &str, at: usize| {
+            String::from_utf8_lossy(
+                &text.as_bytes()[at.saturating_sub(80)..text.len().min(at + 40)],
+            )
+            .into_owned()
+        };
+        if let Some(at) = differs {
+            panic!(
+                "{name}, at byte {at}:\n{}\ninstead of\n{}",
+                near(&text, at),
+                near(&recorded, at)
+            );
+        }
+        assert_eq!(text.len(), recorded.len(), "{name}");
+    }
+}
