@@ -238,6 +238,23 @@ pub const SCENES: &[Scene] = &[
         },
     },
     Scene {
+        name: "stopped_learning",
+        keys: &[],
+        learned: false,
+        script: |bench| {
+            bench.load(Load::Locked);
+            bench.start("learn", State::Learning);
+            bench.run(3.0);
+            bench.order("stop");
+            bench.until_state(State::Off);
+            // Within the magnetising before it.
+            bench.order("learn");
+            bench.run(1.0);
+            bench.order("stop");
+            bench.until_state(State::Off);
+        },
+    },
+    Scene {
         name: "faults",
         keys: &[],
         learned: false,
