@@ -116,17 +116,19 @@ impl Bench {
 
     /// Waits until the console answers after a reset.
     fn starts(&mut self) -> Result<String> {
-        let mut heard = String::new();
+        // Console and log apart: either may stop within a line.
+        let (mut console, mut log) = (String::new(), String::new());
         for _ in 0..60 {
             self.run(0.1)?;
             self.is_off()?;
-            heard += &self.heard()?;
-            if heard.contains("last run: ") {
+            console += &self.board.take_console();
+            log += &(self.board.take_log()?.join("\n") + "\n");
+            if console.contains("last run: ") {
                 self.run(0.3)?;
-                return Ok(heard + &self.heard()?);
+                return Ok(console + &log + &self.heard()?);
             }
         }
-        anyhow::bail!("it does not start: {heard}")
+        anyhow::bail!("it does not start: {console}")
     }
 }
 
