@@ -21,6 +21,7 @@ mod state;
 mod stopping;
 #[cfg(test)]
 mod tests;
+mod trust;
 
 use core::mem::offset_of;
 use core::ops::Range;
@@ -63,7 +64,6 @@ pub use layout::Layout;
 use observed::Observed;
 pub use observed::{Room, Telemetry};
 use reference::References;
-use starting::FluxStage;
 pub use state::{Mode, State};
 
 /// The drive: coefficients, state, and the references it was given.
@@ -224,8 +224,7 @@ impl Drive {
             s.seen.rotor_count = sample.encoder;
         }
         let wanted = self.reference()?;
-        let stage = self.flux_stage();
-        let alone = self.injection_alone();
+        let trust = self.trust();
         let counts = self.counts();
         let (c, s) = (&self.c, &mut self.control);
         let index = s.carrier.advance();
@@ -281,7 +280,7 @@ impl Drive {
             s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
         }
 
-        if stage == FluxStage::Held {
+        if trust.drop {
             let sample = DropSample {
                 current,
                 voltage,
@@ -308,14 +307,14 @@ impl Drive {
             // By the reference: the measured current would feed the angle error back.
             c.indirect.slip(&mut s.indirect, reference.q);
             let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, stage, seen, phi);
+            let turning = c.observe_fundamental(s, index, &trust, seen, phi);
             if c.observer.is_some() {
                 let carrier =
                     AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
                 s.observer.put_out(modulated.realised - carrier);
             }
             let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if stage.turns() && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
                 return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
             }
             s.estimator.rotor_freq
@@ -339,9 +338,7 @@ impl Drive {
             flux_axis,
             flux_freq: flux.freq,
             rotor_freq,
-            stage,
-            alone,
-            learning: self.mode == Mode::Learning,
+            trust,
         };
         c.in_turn(s, index, &results)?;
         Ok(Compare::on(modulated.compare))

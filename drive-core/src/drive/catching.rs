@@ -190,11 +190,4 @@ impl Drive {
             _ => off,
         }
     }
-
-    /// Whether the observer is still to keep its hands off the angle.
-    pub(super) fn injection_alone(&self) -> bool {
-        let since = |found| self.elapsed.wrapping_sub(found);
-        let alone = |c: Catching| self.control.catching.found.is_some_and(|f| since(f) < c.alone);
-        self.state == State::Catching && self.c.catching.is_some_and(alone)
-    }
 }

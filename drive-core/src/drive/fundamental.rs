@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use super::ControlState;
 use super::in_turn::StepResults;
-use super::starting::FluxStage;
+use super::trust::Trust;
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Turning;
 use crate::math::angle::UnitVector;
@@ -22,7 +22,7 @@ impl Coefficients {
         &self,
         s: &mut ControlState,
         index: usize,
-        stage: FluxStage,
+        trust: &Trust,
         current: AlphaBeta,
         phi: UnitVector,
     ) -> Turning {
@@ -35,9 +35,7 @@ impl Coefficients {
         } else {
             observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
         }
-        // A flux that builds up does not show the resistance.
-        let ready = stage == FluxStage::Ready;
-        if weight == 0.0 && ready && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
+        if weight == 0.0 && trust.resistance && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
             observer.track_resistance(state);
         }
         const PER_RADIAN: f32 = 1.0 / TAU;
@@ -51,8 +49,7 @@ impl Coefficients {
         let Some(observer) = &self.observer else { return };
         let weight = s.hand_over.weight;
         observer.update(&mut s.observer, step.rotor_freq);
-        let ready = step.stage == FluxStage::Ready;
-        if weight > COMPARED_FROM && s.hand_over.demodulates() && ready {
+        if weight > COMPARED_FROM && s.hand_over.demodulates() && step.trust.resistance {
             let error = s.estimator.angle_error;
             observer.compare_with_injection(&mut s.observer, error, weight, step.flux_freq);
         }

@@ -19,7 +19,7 @@
 //! averages of sample 9.
 
 use super::ControlState;
-use super::starting::FluxStage;
+use super::trust::{Judged, Lock, Source, Trust};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
 use crate::current::voltage_limit::Operation;
@@ -50,11 +50,7 @@ pub(super) struct StepResults<'a> {
     pub flux_freq: f32,
     /// Electrical speed of the rotor.
     pub rotor_freq: f32,
-    pub stage: FluxStage,
-    /// Whether the observer keeps its hands off the angle.
-    pub alone: bool,
-    /// Whether the drive learns: nothing is tracked then, and there is no reference yet.
-    pub learning: bool,
+    pub trust: Trust,
 }
 
 impl Coefficients {
@@ -94,12 +90,12 @@ impl Coefficients {
             4 => self.check_lock(s, step),
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.i_q);
-                if self.observer.is_some() && !step.learning {
+                if self.observer.is_some() && step.trust.observes() {
                     s.hand_over.update(step.flux_freq);
-                    if step.stage == FluxStage::Sought {
-                        s.hand_over.silence();
-                    } else if step.alone {
-                        s.hand_over.weight = 0.0;
+                    match step.trust.source {
+                        Source::Nothing => s.hand_over.silence(),
+                        Source::Injection => s.hand_over.weight = 0.0,
+                        Source::Both | Source::Slip => {}
                     }
                 }
                 let silent = s.hand_over.silent;
@@ -143,7 +139,7 @@ impl Coefficients {
     fn predict(&self, s: &mut ControlState, step: &StepResults) {
         // On iron a weakened flux is larger than the current model says: the observer measures it.
         let magnetising = match &self.observer {
-            Some(observer) if !step.learning => observer.magnetising(&s.observer),
+            Some(observer) if step.trust.observes() => observer.magnetising(&s.observer),
             _ => s.indirect.magnetising,
         };
         let flux = RotorFlux {
@@ -192,16 +188,16 @@ impl Coefficients {
 
     /// Judges the current by the voltage.
     fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        if step.stage != FluxStage::Ready {
+        let trust = &step.trust;
+        if !trust.mean {
             // The drop of the inverter may not be known either.
             s.prediction.forget_mean();
         }
-        let tracked = self.observer.is_some() && !step.learning;
-        let building = step.stage == FluxStage::BuildingUp;
+        let tracked = self.observer.is_some() && trust.observes();
+        let building = trust.current != Judged::Strictly;
         let known = Known { deviation: s.observer.resistance, tracked, building };
         let judged = self.prediction.judge(&mut s.prediction, step.measured.current, known);
-        // Flux that was left turns beside that which builds up.
-        if step.stage == FluxStage::Sought || step.alone {
+        if trust.current == Judged::No {
             s.prediction.forget();
             return Ok(());
         }
@@ -210,28 +206,24 @@ impl Coefficients {
 
     /// Checks that the tracked angle is that of the flux.
     fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
-        match &self.lock_monitor {
-            Some(monitor)
-                if self.injects(s)
-                    && s.carrier.is_settled()
-                    && (step.stage == FluxStage::Held || !step.learning)
-                    // A flux that builds up makes a poor baseline: that of the last start is better.
-                    && !(step.stage == FluxStage::BuildingUp && s.lock.is_of_last_start()) =>
-            {
-                let seen = s.estimator.synchronous.saliency;
-                // A drift of the gains since the start is not in what the start measured.
-                let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
-                // The baseline of the monitor is measured while the angle does not come from the injection. Once it is
-                // there, the monitor also watches the observer.
-                let led = step.stage != FluxStage::Ready
-                    || s.hand_over.weight >= 1.0 && !s.lock.is_measured();
-                if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, led)? {
-                    self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
-                }
-                Ok(())
-            }
-            _ => Ok(()),
+        let Some(monitor) = &self.lock_monitor else { return Ok(()) };
+        let baseline = match step.trust.lock {
+            Lock::Off => return Ok(()),
+            Lock::OwnBaseline if s.lock.is_of_last_start() => return Ok(()),
+            Lock::Baseline | Lock::OwnBaseline => true,
+            // Once it is there, the monitor also watches the observer.
+            Lock::Watch => s.hand_over.weight >= 1.0 && !s.lock.is_measured(),
+        };
+        if !(self.injects(s) && s.carrier.is_settled()) {
+            return Ok(());
         }
+        let seen = s.estimator.synchronous.saliency;
+        // A drift of the gains since the start is not in what the start measured.
+        let scale = s.carrier.per_share_squared * s.estimator.drift.at_start();
+        if let Some(deviation) = monitor.step(&mut s.lock, &seen, scale, baseline)? {
+            self.estimator.follow_gains(&mut s.estimator, deviation, step.flux_freq);
+        }
+        Ok(())
     }
 
     /// Checks that both current sensors see the carrier.

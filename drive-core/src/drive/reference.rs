@@ -9,7 +9,7 @@ use crate::math::limited;
 use crate::motion::Goal;
 
 /// References of the running mode.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct References {
     pub(super) current: Dq,
     /// Mechanical turns/s.
@@ -27,22 +27,6 @@ pub(super) struct References {
     /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
     pub(super) lead: Angle,
     pub(super) lead_axis: UnitVector,
-}
-
-impl Default for References {
-    fn default() -> Self {
-        Self {
-            current: Dq::ZERO,
-            speed: 0.0,
-            jog: 0,
-            turns: None,
-            press: None,
-            test_voltage: Dq::ZERO,
-            injection_axis: UnitVector { cos: 0.0, sin: 1.0 },
-            lead: Angle::ZERO,
-            lead_axis: UnitVector::default(),
-        }
-    }
 }
 
 impl References {

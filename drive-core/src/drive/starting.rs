@@ -18,37 +18,7 @@ const LOW_SIDES_ON_FROM: u32 = 4;
 /// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
 const STANDING_FREQ: f32 = PERIOD_S;
 
-/// How far a start is with the flux.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FluxStage {
-    /// It builds up at an angle that is held.
-    Held,
-    /// A turning shaft is looked for: nothing is judged.
-    Sought,
-    /// It builds up with the turning shaft.
-    BuildingUp,
-    /// It is there.
-    Ready,
-}
-
-impl FluxStage {
-    /// Whether the flux turns with the rotor.
-    pub fn turns(self) -> bool {
-        matches!(self, Self::BuildingUp | Self::Ready)
-    }
-}
-
 impl Drive {
-    /// How far the start is with the flux.
-    pub(super) fn flux_stage(&self) -> FluxStage {
-        match self.state {
-            State::Magnetising => FluxStage::Held,
-            State::Catching if self.control.catching.found.is_none() => FluxStage::Sought,
-            State::Catching => FluxStage::BuildingUp,
-            _ => FluxStage::Ready,
-        }
-    }
-
     /// A step without current control: off, in fault, or on the way to it.
     #[cold]
     pub(super) fn prepare(&mut self, sample: &Sample) -> Result<Compare, State> {

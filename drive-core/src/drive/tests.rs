@@ -4,6 +4,7 @@
 mod excitation;
 mod motor;
 mod protections;
+mod trust;
 
 use super::*;
 use crate::math::frames::Abc;

@@ -1,0 +1,86 @@
+//! What may be used and judged, by the phase of the flux: one table, a row a phase. `docs/control-law.md` prints it.
+
+use Judged::{No, Strictly, Tolerantly};
+use Lock::{Baseline, Off, OwnBaseline, Watch};
+use Source::{Both, Injection, Nothing, Slip};
+
+use super::Drive;
+use crate::drive::state::{Mode, State};
+
+/// What turns the frame of a drive without an encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// The slip alone: the shaft is locked.
+    Slip,
+    /// Nothing, and the carrier is off.
+    Nothing,
+    /// The injection, whatever the frequency.
+    Injection,
+    /// Injection and observer, by the hand-over.
+    Both,
+}
+
+/// How strictly the measured current is compared with that which voltage and flux explain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Judged {
+    No,
+    /// Residual flux turns relative to the new one.
+    Tolerantly,
+    Strictly,
+}
+
+/// What the lock monitor does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lock {
+    Off,
+    /// It measures its baseline.
+    Baseline,
+    /// The same, unless there is one of the last start: flux that builds up on a turning shaft makes a poor one.
+    OwnBaseline,
+    Watch,
+}
+
+/// What may be used and judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Trust {
+    pub source: Source,
+    /// Whether the frame turns with the rotor.
+    pub turns: bool,
+    pub lock: Lock,
+    pub current: Judged,
+    /// Whether the mean of the unexplained voltage is kept and judged; otherwise it begins anew.
+    pub mean: bool,
+    /// Whether flux and injection show the stator resistance.
+    pub resistance: bool,
+    /// Whether the drop of the inverter is measured, and with it the resistance.
+    pub drop: bool,
+}
+
+impl Trust {
+    /// Whether the observer has a part in the angle, or follows it.
+    pub fn observes(&self) -> bool {
+        self.source != Slip
+    }
+}
+
+impl Drive {
+    /// What may be used and judged now.
+    #[rustfmt::skip] // A phase, a row.
+    pub(super) fn trust(&self) -> Trust {
+        let found = (self.control.catching.found, self.c.catching);
+        match (self.state, self.mode) {
+            (State::Magnetising, Mode::Learning) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
+            (State::Magnetising, _) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
+            (State::Catching, _) => match found {
+                // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
+                (None, _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+                (Some(n), Some(c)) if self.elapsed.wrapping_sub(n) < c.alone => Trust { source: Injection, turns: true, lock: OwnBaseline, current: No, mean: false, resistance: false, drop: false },
+                (Some(_), _) => Trust { source: Both, turns: true, lock: OwnBaseline, current: Tolerantly, mean: false, resistance: false, drop: false },
+            },
+            (State::Learning, _) | (State::Stopping, Mode::Learning) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
+            (State::Verifying | State::Torque | State::Speed | State::Position | State::Braking | State::Stopping, _) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
+            // They regulate no current in the frame of the flux.
+            (State::Off | State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting | State::VoltsPerHertz | State::BrakingByFrequency | State::Fault(_), _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+        }
+    }
+}
