@@ -16,6 +16,15 @@ use crate::settings::Line;
 use crate::settings::{IdentifiedPlant, Settings};
 use proptest::prelude::*;
 
+const MODES: [Mode; 6] = [
+    Mode::Torque,
+    Mode::Speed,
+    Mode::Position,
+    Mode::VoltsPerHertz,
+    Mode::Learning,
+    Mode::Commissioning,
+];
+
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
 struct Load {
     current: AlphaBeta,

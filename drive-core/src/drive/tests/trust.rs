@@ -3,15 +3,6 @@
 use super::*;
 use crate::drive::trust::{Judged, Lock, Source, Trust};
 
-const MODES: [Mode; 6] = [
-    Mode::Torque,
-    Mode::Speed,
-    Mode::Position,
-    Mode::VoltsPerHertz,
-    Mode::Learning,
-    Mode::Commissioning,
-];
-
 const STATES: [State; 17] = [
     State::Off,
     State::Calibrating,

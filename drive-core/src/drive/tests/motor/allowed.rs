@@ -7,15 +7,6 @@ use super::*;
 use crate::drive::excitation::{Excitation, Regulator};
 use crate::protect::wiring_check::WiringSettings;
 
-const MODES: [Mode; 6] = [
-    Mode::Torque,
-    Mode::Speed,
-    Mode::Position,
-    Mode::VoltsPerHertz,
-    Mode::Learning,
-    Mode::Commissioning,
-];
-
 /// The states of a start.
 const STARTING: [State; 6] = [
     State::Calibrating,
