@@ -57,8 +57,8 @@ impl Hashes {
         self.outputs.compare(compare);
         self.outputs.push(&[u8::from(relay)]);
         self.outputs.numbers(&[drive.brake_duty()]);
-        let Telemetry { reference, current, voltage, realised, .. } = drive.telemetry();
         let t = drive.telemetry();
+        let Telemetry { reference, current, voltage, realised, .. } = t;
         let b = &mut self.beliefs;
         b.push(drive.state().to_string().as_bytes());
         b.push(&t.phi.to_bits().to_le_bytes());

@@ -1,4 +1,5 @@
-//! What may be used and judged, by the phase of the flux: one table, a row a phase. `docs/control-law.md` prints it.
+//! Quantities that may be used and checks that may act, by the phase of the flux: one table, a row a phase. `docs/control-law.md`
+//! prints it.
 
 use Judged::{No, Strictly, Tolerantly};
 use Lock::{Baseline, Off, OwnBaseline, Watch};
@@ -7,7 +8,7 @@ use Source::{Both, Injection, Nothing, Slip};
 use super::Drive;
 use crate::drive::state::{Mode, State};
 
-/// What turns the frame of a drive without an encoder.
+/// Sources that turn the frame of a drive without an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// The slip alone: the shaft is locked.
@@ -29,7 +30,7 @@ pub(super) enum Judged {
     Strictly,
 }
 
-/// What the lock monitor does.
+/// Task of the lock monitor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Lock {
     Off,
@@ -40,7 +41,7 @@ pub(super) enum Lock {
     Watch,
 }
 
-/// What may be used and judged.
+/// Quantities that may be used and checks that may act in a control period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Trust {
     pub source: Source,
@@ -64,7 +65,7 @@ impl Trust {
 }
 
 impl Drive {
-    /// What may be used and judged now.
+    /// The row of the present state.
     #[rustfmt::skip] // A phase, a row.
     pub(super) fn trust(&self) -> Trust {
         let found = (self.control.catching.found, self.c.catching);

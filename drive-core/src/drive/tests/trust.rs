@@ -1,4 +1,4 @@
-//! The table of what may be used and judged, in every state and mode.
+//! The table of [`Trust`] in every state and mode.
 
 use super::*;
 use crate::drive::trust::{Judged, Lock, Source, Trust};
