@@ -27,7 +27,6 @@ mod tests;
 
 use core::fmt;
 
-use drive_core::State;
 use drive_core::homing::{Failure, Homing};
 use drive_core::identify::learning::Learned;
 
@@ -254,12 +253,8 @@ impl Console {
     /// Notes when the drive has passed the check of the wiring: it need not be repeated.
     fn watch_wiring(&mut self, drive: &impl DriveHandle) {
         let (Some(began), Some(status)) = (self.checking, drive.status()) else { return };
-        let past = matches!(
-            status.state,
-            State::Magnetising | State::Torque | State::Speed | State::Position
-        );
         // A report from before the start does not count.
-        if past && status.periods != began {
+        if status.state.has_current() && status.periods != began {
             self.settings.note(|settings| settings.command.wiring_checked = true);
             self.unsaved = true;
             self.checking = None;

@@ -8,17 +8,18 @@ mod command;
 mod commands;
 mod excitation;
 mod excite;
+mod field;
 mod fundamental;
 mod in_turn;
 mod layout;
 mod learn;
-mod observed;
+mod limits;
+mod prepare;
 mod protect;
-mod reference;
 mod scalar;
-mod starting;
 mod state;
 mod stopping;
+mod telemetry;
 #[cfg(test)]
 mod tests;
 mod trust;
@@ -26,47 +27,29 @@ mod trust;
 use core::mem::offset_of;
 use core::ops::Range;
 
-use crate::carrier::CarrierSample;
-use crate::carrier::injection::{Carrier, CarrierPeriod};
-use crate::current::inverter_drop::{DropSample, InverterDropState};
-use crate::current::pi::{DqPiState, ReferenceState};
 use crate::current::sensing::SensingState;
-use crate::current::voltage_limit::VoltageLimitState;
-use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::fault::Fault;
-use crate::filter::dissertation::{LPF, LpfState};
-use crate::flux::estimator::EstimatorState;
-use crate::flux::hand_over::HandOver;
-use crate::flux::indirect::IndirectState;
-use crate::flux::observer::{Induced, ObserverState};
-use crate::flux::volts_per_hertz::VoltsPerHertzState;
-use crate::identify::learning::{Learned, LearningState};
+use crate::identify::learning::Learned;
 use crate::io::{Compare, Sample};
-use crate::math::frames::{AlphaBeta, Dq};
-use crate::motion::{MotionState, RotorCount};
-use crate::protect::lock_monitor::LockMonitorState;
-use crate::protect::noise_watch::NoiseWatchState;
-use crate::protect::plausibility::{CarrierWatch, PredictionState};
-use crate::protect::saliency_check::SaliencyCheckState;
+use crate::math::angle::UnitVector;
+use crate::math::frames::Dq;
 use crate::protect::thermal::ThermalLoads;
-use crate::protect::wiring_check::WiringCheckState;
-use crate::settings::AngleSource;
 use crate::supply::RelayState;
 
-use axes::Axes;
-use catching::CatchingState;
+use catching::Residual;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
-use excite::ExcitationState;
-use in_turn::StepResults;
+use excite::Excite;
+use field::Field;
 pub use layout::Layout;
-use observed::Observed;
-pub use observed::{Room, Telemetry};
-use reference::References;
-pub use state::{Mode, State};
+use limits::Limits;
+use prepare::Prepare;
+use scalar::Scalar;
+pub use state::{Mode, Stage, State};
+pub use telemetry::{Room, Telemetry};
 
-/// The drive: coefficients, state, and the references it was given.
+/// The drive: coefficients, the phase that it is in, and that which outlives a phase.
 ///
 /// ```
 /// use drive_core::settings::{AngleSource, Settings};
@@ -84,73 +67,92 @@ pub use state::{Mode, State};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Drive {
     c: Coefficients,
     /// Changes of `c`, counted, wrapping.
     changes: u32,
-    control: ControlState,
-    state: State,
-    mode: Mode,
+    kept: Kept,
+    phase: Phase,
+}
+
+/// State that every phase uses, or that outlives a run.
+#[derive(Clone, Debug, Default)]
+#[repr(C)]
+struct Kept {
     /// Control periods spent in this state.
     elapsed: u32,
+    sensing: SensingState,
+    /// Of the last step with the outputs on.
+    seen: Telemetry,
+    rotor_count: u32,
+    references: References,
+    limits: Limits,
     /// Whether the next start checks the wiring.
     wiring_unchecked: bool,
-    wiring: WiringCheckState,
     /// Starts so far, wrapping.
     starts: u32,
     /// Count of the encoder at position 0, where that was set.
     home: Option<u32>,
-    learned: Option<Learned>,
     thermal: ThermalLoads,
     relay: RelayState,
+    learned: Option<Learned>,
 }
 
-/// State of the control, fresh at every start.
-// In this order: the fields of every step lie within the 1020 bytes that a floating-point load of the core
-// reaches from one base address; otherwise every sixth instruction of a step computes an address.
+/// References that every goal has; fresh at every start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct References {
+    /// A. The quadrature component is that of the goal, or was asked for.
+    current: Dq,
+    /// Added to the voltage of the current loop, V.
+    test_voltage: Dq,
+    /// Injection axis seen from the frame.
+    injection_axis: UnitVector,
+}
+
+/// The phase of a drive. A phase owns the state that only it uses.
+// The large one is the one that matters; the others share its memory.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug)]
+enum Phase {
+    Off(Left),
+    Fault(Fault, Left),
+    /// On the way to one of the next three.
+    Prepare(Prepare),
+    /// Excitation of the motor at rest.
+    Excite(Excite),
+    /// Turning by voltage and frequency.
+    Scalar(Scalar),
+    /// Current in a frame of the flux.
+    Field(Field),
+}
+
+/// The end of the outputs' work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Stopped,
+    /// A learning has measured all its points.
+    Measured,
+    Fault(Fault),
+}
+
+impl From<Fault> for End {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+/// Measured in a run, for the next one that does not measure it again.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C)]
-struct ControlState {
-    references: References,
-    sensing: SensingState,
-    seen: Observed,
-    low_pass: LpfState,
-    indirect: IndirectState,
-    observer: ObserverState,
-    hand_over: HandOver,
-    /// What flux and leakage induce, and the observer's share in the angle, by which it is fed forward.
-    induced: Induced,
-    induced_share: f32,
-    carrier: Carrier,
-    axes: Axes,
-    reference: [ReferenceState; 2],
-    current_loop: DqPiState,
-    rotor: RotorCount,
-    prediction: PredictionState,
-    motion: MotionState,
-    /// Whether it brakes by the ramp of a quick stop.
-    quick_stop: bool,
-    voltage_limit: VoltageLimitState,
-    dc_link: DcLinkState,
-    /// Present limits by the dc link.
-    limits: DcLinkLimits,
-    limiting: Limiting,
-    /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
-    too_hot_for: f32,
-    too_hot: Limiting,
-    carrier_watch: CarrierWatch,
-    saliency_check: SaliencyCheckState,
-    lock: LockMonitorState,
-    noise: NoiseWatchState,
-    inverter_drop: InverterDropState,
-    catching: CatchingState,
-    /// Large: it holds the state of the alternative demodulations.
-    estimator: EstimatorState,
-    learning: LearningState,
-    /// Whether a learning has measured all its points.
-    all_measured: bool,
-    excitation: ExcitationState,
-    turning: VoltsPerHertzState,
+struct Left {
+    /// Stator resistance relative to the settings, less one.
+    resistance: f32,
+    /// Voltage per phase that the inverter drops beyond its dead time, V.
+    inverter_drop: f32,
+    /// Baseline of the lock monitor, A^2.
+    baseline: f32,
+    /// Flux in the motor; `None` before the first run.
+    residual: Option<Residual>,
 }
 
 impl Drive {
@@ -163,31 +165,43 @@ impl Drive {
 
     /// A drive that is off.
     pub fn new(coefficients: Coefficients) -> Self {
-        Self {
-            c: coefficients,
-            changes: 0,
-            state: State::Off,
-            mode: Mode::Torque,
-            elapsed: 0,
-            control: ControlState::default(),
-            wiring_unchecked: false,
-            wiring: WiringCheckState::default(),
-            starts: 0,
-            home: None,
-            learned: None,
-            thermal: ThermalLoads::default(),
-            relay: RelayState::default(),
-        }
+        let phase = Phase::Off(Left::default());
+        let kept = Kept { seen: Telemetry::still(), ..Kept::default() };
+        Self { c: coefficients, changes: 0, kept, phase }
     }
 
     /// The present state.
     pub fn state(&self) -> State {
-        self.state
+        match &self.phase {
+            Phase::Off(_) => State::Off,
+            Phase::Fault(fault, _) => State::Fault(*fault),
+            Phase::Prepare(prepare) => prepare.state(),
+            Phase::Excite(excite) => excite.state(),
+            Phase::Scalar(scalar) => scalar.state(),
+            Phase::Field(field) => field.state(),
+        }
     }
 
     /// Whether [`online`](crate::identify::online) is to be given what the last step saw.
     pub fn tracks_rotor(&self) -> bool {
-        self.c.track_rotor && self.state.regulates()
+        self.c.track_rotor && matches!(&self.phase, Phase::Field(field) if field.regulates())
+    }
+
+    /// Whether the outputs are off, and stay off until the next command.
+    pub fn is_off(&self) -> bool {
+        match self.phase {
+            Phase::Off(_) | Phase::Fault(..) => true,
+            Phase::Prepare(_) | Phase::Excite(_) | Phase::Scalar(_) | Phase::Field(_) => false,
+        }
+    }
+
+    /// Whether the outputs drive a current, for whatever purpose; the pulses of a wiring check do not count.
+    fn is_energised(&self) -> bool {
+        match &self.phase {
+            Phase::Off(_) | Phase::Fault(..) | Phase::Prepare(_) => false,
+            Phase::Excite(excite) => excite.state() == State::Exciting,
+            Phase::Scalar(_) | Phase::Field(_) => true,
+        }
     }
 
     /// One PWM period: from the sample of instant `k T` to the compare values of the period that
@@ -197,168 +211,72 @@ impl Drive {
     /// with the outputs off in the same step.
     #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
     pub fn step(&mut self, sample: &Sample) -> Compare {
-        let regulates = self.state.has_current();
-        let result = if regulates { self.regulate(sample) } else { self.prepare(sample) };
-        self.elapsed = self.elapsed.wrapping_add(1);
+        let result = match &mut self.phase {
+            Phase::Field(field) => field.step(&self.c, &mut self.kept, sample),
+            Phase::Off(_) | Phase::Fault(..) => Ok(Compare::OFF),
+            Phase::Prepare(_) | Phase::Excite(_) | Phase::Scalar(_) => {
+                self.step_without_flux(sample)
+            }
+        };
+        self.kept.elapsed = self.kept.elapsed.wrapping_add(1);
         let result = result.and_then(|compare| self.watch_load().map(|()| compare));
-        let compare = result.unwrap_or_else(|off| {
-            let off = self.why_not_caught(off);
-            let measured = off == State::Off && self.control.all_measured;
-            let off = if measured { self.evaluate_learning() } else { off };
-            self.enter(off);
+        let compare = result.unwrap_or_else(|end| {
+            self.end(end);
             Compare::OFF
         });
-        self.c.sensing.applied(&mut self.control.sensing, &compare);
+        self.c.sensing.applied(&mut self.kept.sensing, &compare);
         compare
     }
 
-    /// Regulates the current: the control law, top to bottom.
-    ///
-    /// # Errors
-    /// The state to go to with the outputs off: a fault, or off where it has stopped.
-    fn regulate(&mut self, sample: &Sample) -> Result<Compare, State> {
-        let (c, s) = (&self.c, &mut self.control);
-        let measured = c.sensing.step(&mut s.sensing, sample);
-        c.protect(&s.sensing, sample, &measured)?;
-        if c.source == AngleSource::Encoder {
-            s.seen.rotor_count = sample.encoder;
+    /// A step without current control in a frame of the flux.
+    #[cold]
+    fn step_without_flux(&mut self, sample: &Sample) -> Result<Compare, End> {
+        let (c, k) = (&self.c, &mut self.kept);
+        let measured = c.sensing.step(&mut k.sensing, sample);
+        c.protect(&k.sensing, sample, &measured)?;
+        match &mut self.phase {
+            Phase::Prepare(_) => Ok(self.prepare(sample, &measured)?),
+            Phase::Excite(excite) => Ok(excite.step(c, k, &measured)?),
+            Phase::Scalar(scalar) => scalar.step(c, k, &measured),
+            Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(Compare::OFF),
         }
-        let wanted = self.reference()?;
-        let trust = self.trust();
-        let counts = self.counts();
-        let (c, s) = (&self.c, &mut self.control);
-        let index = s.carrier.advance();
-        let reference = Dq {
-            d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
-            q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
-        };
-        s.seen.reference = reference;
-
-        // Flux angle at the sample.
-        let flux = if counts {
-            // While it learns, the shaft is locked, and the flux may lead the frame.
-            let count = if self.mode == Mode::Learning { 0 } else { sample.encoder };
-            let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
-            flux.less(s.references.lead)
-        } else {
-            s.estimator.flux()
-        };
-        (s.seen.phi, s.seen.flux_freq) = (flux.phi, flux.freq);
-        let phi = flux.phi.unit_vector();
-        let axes = &s.axes;
-
-        // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
-        // alone it would let the sidebands of a turning carrier through.)
-        let silent = !c.inject || s.hand_over.silent;
-        let carrier =
-            if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
-        let carrier_axis = phi.turned_by(axes.carrier);
-        let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
-        let filtered = LPF.step(&mut s.low_pass, rest);
-        let seen = if s.hand_over.silent { measured.current } else { filtered };
-
-        // Current loop.
-        let flux_axis = phi.turned_by(axes.seen);
-        let current = seen.to_dq(flux_axis);
-        let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
-            + s.induced.at(reference) * s.induced_share
-            + s.references.test_voltage;
-        (s.seen.current, s.seen.voltage) = (current, voltage);
-
-        // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
-        let applied = phi.turned_by(axes.applied);
-        let total = (voltage + axes.injection * carrier.voltage).to_alpha_beta(applied);
-
-        // Dead-time compensation, by the signs of the currents that will flow.
-        let expected = (current + axes.injection * carrier.mean_current).to_alpha_beta(applied);
-        let signs = c.dead_time.signs(expected.to_abc());
-        let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
-        let modulated = c.modulator.step(total, compensation, measured.dc_link);
-        (s.seen.measured, s.seen.realised) = (measured.current, modulated.realised);
-        s.seen.dc_link = measured.dc_link;
-        if modulated.limited {
-            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
-        }
-
-        if trust.drop {
-            let sample = DropSample {
-                current,
-                voltage,
-                magnetising: s.indirect.magnetising,
-                signs: signs.to_abc().to_alpha_beta().to_dq(applied),
-                dc_link: measured.dc_link,
-            };
-            if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, self.elapsed, &sample) {
-                s.observer.resistance = ratio - 1.0;
-            }
-        }
-
-        // Angles for the next sample.
-        if c.demodulate {
-            let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
-            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
-        }
-        let flux_current =
-            if counts { current.seen_from(s.references.lead_axis) } else { reference };
-        let rotor_freq = if counts {
-            c.indirect.slip(&mut s.indirect, flux_current.q);
-            s.indirect.rotor_freq
-        } else {
-            // By the reference: the measured current would feed the angle error back.
-            c.indirect.slip(&mut s.indirect, reference.q);
-            let slip_freq = s.indirect.slip_freq;
-            let turning = c.observe_fundamental(s, index, &trust, seen, phi);
-            if c.observer.is_some() {
-                let carrier =
-                    AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
-                s.observer.put_out(modulated.realised - carrier);
-            }
-            let (estimator, i_q) = (&mut s.estimator, reference.q);
-            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
-                return Err(self.not_finite().unwrap_or(Fault::LostAngle).into());
-            }
-            s.estimator.rotor_freq
-        };
-
-        // No output from a state that is not finite. (The voltage contains current and reference of the step
-        // before, the speed contains the demodulated signal.)
-        if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
-            return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
-        }
-
-        // Checks and slow tasks, one a sample.
-        s.prediction.collect(measured.current, modulated.realised);
-        let results = StepResults {
-            sample,
-            measured: &measured,
-            flux_current,
-            i_q: reference.q,
-            voltage,
-            carrier_axis,
-            flux_axis,
-            flux_freq: flux.freq,
-            rotor_freq,
-            trust,
-        };
-        c.in_turn(s, index, &results)?;
-        Ok(Compare::on(modulated.compare))
     }
 
-    /// Whether the flux angle is the counted rotor angle plus the slip: with the encoder, or while the drive
-    /// learns with the shaft locked.
-    fn counts(&self) -> bool {
-        self.c.source == AngleSource::Encoder || self.mode == Mode::Learning
+    /// Goes on in this phase.
+    #[inline(always)] // a small phase is written, not the memory that it shares
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.kept.elapsed = 0;
     }
 
-    fn enter(&mut self, state: State) {
-        self.state = state;
-        self.elapsed = 0;
+    /// Switches off.
+    #[cold]
+    fn end(&mut self, end: End) {
+        let fault = match (end, &self.phase) {
+            (End::Stopped, _) => None,
+            (End::Measured, _) => self.evaluate_learning(),
+            (End::Fault(fault), Phase::Field(field)) => Some(field.why_not_caught(fault)),
+            (End::Fault(fault), _) => Some(fault),
+        };
+        let left = self.left();
+        match fault {
+            None => self.enter(Phase::Off(left)),
+            Some(fault) => self.enter(Phase::Fault(fault, left)),
+        }
     }
-}
 
-impl ControlState {
-    /// Angle of the rotor, flux less slip, counted as by an encoder.
-    fn count_by_flux(&mut self) -> u32 {
-        self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
+    /// That which a run leaves to the next one.
+    fn left(&self) -> Left {
+        match &self.phase {
+            Phase::Off(left) | Phase::Fault(_, left) => *left,
+            Phase::Prepare(Prepare { left, .. }) | Phase::Excite(Excite { left, .. }) => {
+                Left { residual: left.residual.or(Some(Residual::of(0.0))), ..*left }
+            }
+            Phase::Scalar(scalar) => {
+                let volts = self.kept.seen.voltage.q.abs();
+                Left { residual: Some(Residual::of(volts)), ..scalar.left }
+            }
+            Phase::Field(field) => field.left(),
+        }
     }
 }

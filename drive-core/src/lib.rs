@@ -67,7 +67,7 @@ pub mod tuning;
 
 pub use drive::{
     Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    Room, State, Stop, Telemetry,
+    Room, Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
 pub use io::{Compare, Hardware, Sample};

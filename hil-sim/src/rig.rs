@@ -245,10 +245,7 @@ impl Rig {
 
     /// The fault with which the drive has stopped itself, with its number.
     pub fn fault(&self) -> Option<String> {
-        match self.drive.state() {
-            State::Fault(fault) => Some(format!("fault {}: {fault}", fault.code())),
-            _ => None,
-        }
+        self.drive.state().fault().map(|fault| format!("fault {}: {fault}", fault.code()))
     }
 
     /// Couples another load.

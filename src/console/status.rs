@@ -68,7 +68,7 @@ fn line(
         write!(f, "torque {torque:.2} Nm, speed {rpm:.1} rpm, position {:.3} turns, ", t.turns)?;
         write!(f, "shaft {shaft_w:.1} W, electrical {electrical_w:.1} W, ")?;
     }
-    if matches!(s.state, State::Off | State::Fault(_)) {
+    if s.state.is_off() {
         let (a, b) =
             (scales.current_a.at(s.sample.current_a), scales.current_b.at(s.sample.current_b));
         write!(f, "sensors a {a:.2} A, b {b:.2} A, ")?;

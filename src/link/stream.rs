@@ -65,13 +65,7 @@ impl<const N: usize> Queue<N> {
 impl<const N: usize> Source<'_, N> {
     /// Takes a sample of the present control period, if one is due. In a `busy` period, which does other work, it waits for
     /// the next, two periods at most: the longest control periods get no longer, and the rate stays.
-    pub fn step(
-        &mut self,
-        period: u32,
-        busy: bool,
-        codes: &CurrentCodes,
-        telemetry: impl FnOnce() -> Telemetry,
-    ) {
+    pub fn step(&mut self, period: u32, busy: bool, codes: &CurrentCodes, telemetry: &Telemetry) {
         let divider = self.divider.load(Ordering::Relaxed);
         if divider == 0 {
             return;
@@ -89,14 +83,14 @@ impl<const N: usize> Source<'_, N> {
         self.take(period, codes, telemetry);
     }
 
-    fn take(&mut self, period: u32, codes: &CurrentCodes, telemetry: impl FnOnce() -> Telemetry) {
+    fn take(&mut self, period: u32, codes: &CurrentCodes, telemetry: &Telemetry) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         // Without room the sample is missing, which the receiver sees by the sequence number.
         let sent = self.boxes.get_mut(self.next).is_some_and(|place| {
             place.send_with(|sample| {
                 (sample.sequence, sample.period) = (sequence, period);
-                sample.telemetry = telemetry();
+                sample.telemetry = *telemetry;
                 sample.codes = *codes;
             })
         });
@@ -132,7 +126,7 @@ mod tests {
         let mut period = 0;
         let mut run = |source: &mut Source<7>, periods: u32| {
             for _ in 0..periods {
-                source.step(period, false, &[0; 3], Telemetry::default);
+                source.step(period, false, &[0; 3], &Telemetry::default());
                 period += 1;
             }
         };
@@ -159,7 +153,7 @@ mod tests {
         let (mut source, mut sink) = queue.split();
         sink.ask(3);
         (0..periods)
-            .for_each(|period| source.step(period, busy(period), &[0; 3], Telemetry::default));
+            .for_each(|period| source.step(period, busy(period), &[0; 3], &Telemetry::default()));
         core::iter::from_fn(|| sink.fetch()).map(|sample| sample.period).collect()
     }
 

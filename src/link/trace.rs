@@ -141,21 +141,11 @@ impl<const N: usize> Inner<N> {
 impl<const N: usize> Recorder<'_, N> {
     /// Records the present control period, if one is due, and tells whether it was; `fault` says whether the drive is in a
     /// fault.
-    pub fn step(
-        &mut self,
-        fault: bool,
-        codes: &CurrentCodes,
-        telemetry: impl FnOnce() -> Telemetry,
-    ) -> bool {
-        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, codes, telemetry)
+    pub fn step(&mut self, fault: bool, codes: &CurrentCodes, t: &Telemetry) -> bool {
+        self.0.stage.load(Ordering::Acquire) == RECORDING && self.record(fault, codes, t)
     }
 
-    fn record(
-        &mut self,
-        fault: bool,
-        codes: &CurrentCodes,
-        telemetry: impl FnOnce() -> Telemetry,
-    ) -> bool {
+    fn record(&mut self, fault: bool, codes: &CurrentCodes, t: &Telemetry) -> bool {
         // SAFETY: the memory is the interrupt's while recording; `&mut self` excludes others.
         let inner = unsafe { &mut *self.0.inner.get() };
         // A fault is recorded at once: what follows it stands still.
@@ -164,17 +154,16 @@ impl<const N: usize> Recorder<'_, N> {
             return false;
         }
         inner.wait = inner.plan.divider.saturating_sub(1);
-        let t = telemetry();
         let size = inner.size();
         if let Some(place) = inner.records.get_mut(inner.next) {
-            inner.plan.choice.record(place, &t, codes);
+            inner.plan.choice.record(place, t, codes);
             inner.next = if inner.next + 1 < size { inner.next + 1 } else { 0 };
             inner.written = size.min(inner.written + 1);
         }
         match inner.left {
             Some(left) => inner.left = Some(left.saturating_sub(1)),
             None => {
-                inner.left = inner.triggered(&t, codes, fault);
+                inner.left = inner.triggered(t, codes, fault);
                 inner.behind = inner.left.unwrap_or(0);
             }
         }

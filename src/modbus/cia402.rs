@@ -1,6 +1,6 @@
 //! The state of the drive under the names of CiA 402 (IEC 61800-7-201), and its status word.
 
-use drive_core::{State, Stop};
+use drive_core::{Stage, State, Stop};
 
 use crate::settings::FirmwareSettings;
 use crate::settings::bus::Commander;
@@ -44,30 +44,14 @@ impl Power {
 
     /// The state of a drive; `startable`: see [`bus_may_start`].
     pub fn of(state: Option<State>, startable: bool) -> Self {
-        match state {
+        match state.map(State::stage) {
             None => Self::NotReadyToSwitchOn,
-            Some(State::Off) if startable => Self::ReadyToSwitchOn,
-            Some(State::Off) => Self::SwitchOnDisabled,
-            Some(
-                State::Calibrating
-                | State::Precharge
-                | State::CheckingWiring
-                | State::Catching
-                | State::Magnetising
-                | State::Verifying,
-            ) => Self::SwitchedOn,
-            Some(
-                State::Torque
-                | State::Speed
-                | State::Position
-                | State::VoltsPerHertz
-                | State::Learning
-                | State::Exciting,
-            ) => Self::OperationEnabled,
-            Some(State::Braking | State::BrakingByFrequency | State::Stopping) => {
-                Self::QuickStopActive
-            }
-            Some(State::Fault(_)) => Self::Fault,
+            Some(Stage::Off) if startable => Self::ReadyToSwitchOn,
+            Some(Stage::Off) => Self::SwitchOnDisabled,
+            Some(Stage::Starting) => Self::SwitchedOn,
+            Some(Stage::Running) => Self::OperationEnabled,
+            Some(Stage::Stopping) => Self::QuickStopActive,
+            Some(Stage::Fault) => Self::Fault,
         }
     }
 

@@ -17,8 +17,8 @@ pub struct FaultLog {
 impl FaultLog {
     /// Notes a fault when the state becomes one, `seconds` after the start.
     pub fn watch(&mut self, state: State, seconds: u32) {
-        let was = core::mem::replace(&mut self.faulty, matches!(state, State::Fault(_)));
-        if let State::Fault(fault) = state
+        let was = core::mem::replace(&mut self.faulty, state.fault().is_some());
+        if let Some(fault) = state.fault()
             && !was
         {
             if self.entries.is_full() {

@@ -163,11 +163,6 @@ fn ADC1_2() {
     asm::dsb();
 }
 
-/// Whether the outputs are off, and stay off until the next command.
-fn is_off(drive: &Drive) -> bool {
-    matches!(drive.state(), State::Off | State::Fault(_))
-}
-
 impl Running {
     fn period(&mut self) {
         let began = DWT::cycle_count();
@@ -225,7 +220,7 @@ impl Running {
         if !converters.complete {
             hardware |= Hardware::CONVERTER_OVERRUN;
         }
-        let was_off = is_off(drive);
+        let was_off = drive.is_off();
         if dc_link.is_off() {
             if was_off {
                 dc_link.restore();
@@ -270,24 +265,24 @@ impl Running {
         let answered = commands
             .take_with(|command| answers.send_with(|answer| *answer = drive.command(command)));
         let commanded = answered.is_some();
-        IS_OFF.store(is_off(drive), Ordering::Relaxed);
-        let fault = matches!(drive.state(), State::Fault(_));
+        IS_OFF.store(drive.is_off(), Ordering::Relaxed);
+        let state = drive.state();
         let codes = [codes.current_a, codes.current_b, codes.current_c];
-        let traced = trace.step(fault, &codes, || drive.telemetry());
-        let commissioned = OBSERVED.load(Ordering::Relaxed) && drive.state().regulates();
+        let traced = trace.step(state.fault().is_some(), &codes, drive.telemetry());
+        let commissioned = OBSERVED.load(Ordering::Relaxed) && state.regulates();
         if drive.tracks_rotor() || drive.excites() || commissioned {
             // Without room the period is missing, which the main loop detects by its number.
-            let _ = observations.enqueue(Observation::new(self.periods, &drive.telemetry()));
+            let _ = observations.enqueue(Observation::new(self.periods, drive.telemetry()));
         }
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
         // A new state is reported immediately, but not in the period of a command, which takes long enough.
-        self.report_due |= self.reported != Some(drive.state())
-            || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
+        self.report_due |=
+            self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
         let reports = self.report_due && !commanded;
         let busy = reports || traced || commanded;
-        stream.step(self.periods, busy, &codes, || drive.telemetry());
+        stream.step(self.periods, busy, &codes, drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);
         let cycles = DWT::cycle_count().wrapping_sub(began);
         let [without, with] = &mut self.worst_cycles;
@@ -295,14 +290,13 @@ impl Running {
         *worst = cycles.max(*worst);
         if reports {
             self.report_due = false;
-            self.report(sample, cycles);
+            self.report(state, sample, cycles);
         }
     }
 
     /// Reports to the main loop. If it is slow or hangs, this report is lost, but not its events.
-    fn report(&mut self, sample: Sample, cycles: u32) {
+    fn report(&mut self, state: State, sample: Sample, cycles: u32) {
         let Control { drive, status, learned, .. } = &mut self.control;
-        let state = drive.state();
         if self.reported == Some(State::Learning)
             && let Some(result) = drive.learned()
         {
@@ -313,7 +307,7 @@ impl Running {
             report.periods = self.periods;
             report.state = state;
             report.sample = sample;
-            report.telemetry = drive.telemetry();
+            report.telemetry = *drive.telemetry();
             report.worst_cycles = self.worst_cycles;
             report.last_cycles = cycles;
             report.worst_latency = self.worst_latency;

@@ -41,12 +41,12 @@ impl Hours {
 
     /// Notes a new state of the drive: starts and faults.
     pub fn entered(&mut self, state: State, guard: &mut Guard, pages: &mut Pages) {
-        let off = matches!(state, State::Off | State::Fault(_));
+        let off = state.is_off();
         if self.was_off && !off {
             self.history.started();
         }
         self.was_off = off;
-        if let State::Fault(fault) = state {
+        if let Some(fault) = state.fault() {
             self.write(guard, pages, |history, pages| history.fault(pages, fault.code()));
         }
     }

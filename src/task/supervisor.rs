@@ -8,7 +8,7 @@ use drive_core::commission::Step;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::{Scales, Settings, SettingsError};
-use drive_core::{Accepted, Coefficients, Command, Fault, Hardware, State};
+use drive_core::{Accepted, Coefficients, Command, Fault, Hardware};
 use heapless::spsc::Consumer;
 
 use crate::chip::flash::Pages;
@@ -215,7 +215,7 @@ impl Supervisor {
     fn log(&mut self, s: Status) {
         let before = self.status.replace(s);
         if before.map(|status| status.state) != Some(s.state) {
-            if let State::Fault(fault) = s.state {
+            if let Some(fault) = s.state.fault() {
                 stop::keep(Reason::Drive, [u32::from(fault.code()), 0, 0, 0]);
                 if self.level >= Level::Error {
                     defmt::error!("fault {}: {}", fault.code(), fault.text());

@@ -2,9 +2,10 @@
 
 use core::f32::consts::TAU;
 
-use super::Drive;
+use super::Kept;
+use super::field::{Field, FluxPhase};
 use crate::current::pi::ReferenceState;
-use crate::drive::state::{Mode, State};
+use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::flux::catch::{self, CatchState, Caught, Path};
 use crate::flux::hand_over::HandOver;
@@ -67,127 +68,131 @@ impl Settings {
     }
 }
 
-/// State of such a start.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CatchingState {
-    search: CatchState,
-    /// Period in which the speed was found; until then the frame stands, and nothing is judged.
-    pub found: Option<u32>,
-    /// Flux from a run before, until the search has ended.
-    pub flux_left: Option<FluxLeft>,
+/// State of the search for a turning shaft.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    speed: CatchState,
+    /// Flux from a run before.
+    pub residual: Option<Residual>,
+}
+
+impl Search {
+    pub fn new(residual: Option<Residual>) -> Self {
+        Self { speed: CatchState::default(), residual }
+    }
 }
 
 /// Flux of a run before.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FluxLeft {
+pub(super) struct Residual {
     /// Voltage that it induced when that run ended, V.
-    pub volts: f32,
-    /// Control periods from then to this start.
-    pub ago: u32,
+    volts: f32,
+    /// Control periods since then, of those that count.
+    ago: u32,
 }
 
-impl Drive {
-    /// The flux that a run left which has ended lately.
-    pub(super) fn flux_left(&self) -> Option<FluxLeft> {
-        let (s, ago) = (&self.control, self.elapsed);
-        let freq = s.estimator.rotor_freq.abs() * (TAU / PERIOD_S);
-        let left = match s.catching.flux_left {
-            // A start that found no speed knows no more than this.
-            Some(left) => FluxLeft { ago: left.ago + ago, ..left },
-            None if self.mode == Mode::VoltsPerHertz => {
-                FluxLeft { volts: s.seen.voltage.q.abs(), ago }
-            }
-            None => FluxLeft { volts: freq * s.observer.flux, ago },
-        };
-        let recent = self.c.catching.is_some_and(|c| left.ago < c.flux_gone);
-        (self.starts > 0 && recent).then_some(left)
+impl Residual {
+    /// Flux that induces this voltage now, V.
+    pub fn of(volts: f32) -> Self {
+        Self { volts, ago: 0 }
     }
 
-    /// Whether flux that was left would drive too much current yet.
-    pub(super) fn waits_for_flux(&self) -> bool {
-        let Some((c, left)) = self.c.catching.zip(self.control.catching.flux_left) else {
-            return false;
-        };
-        let x = (left.ago + self.elapsed) as f32 * c.decay;
+    /// Flux of a rotor that turns with `freq`, electrical turns per period.
+    pub fn turning(freq: f32, flux: f32) -> Self {
+        Self::of(freq.abs() * (TAU / PERIOD_S) * flux)
+    }
+
+    /// The same so many periods later.
+    pub fn after(self, periods: u32) -> Self {
+        Self { ago: self.ago.saturating_add(periods), ..self }
+    }
+
+    /// Whether there may be some of it left.
+    pub fn is_recent(&self, c: &Coefficients) -> bool {
+        c.catching.is_some_and(|catching| self.ago < catching.flux_gone)
+    }
+
+    /// Whether it would drive too much current yet, `elapsed` periods later.
+    pub fn waits(&self, c: &Coefficients, elapsed: u32) -> bool {
+        let Some(catching) = &c.catching else { return false };
+        let x = self.ago.saturating_add(elapsed) as f32 * catching.decay;
         // It decays by e^x, which is more than this.
-        left.volts > c.left_v * (1.0 + x * (1.0 + 0.5 * x))
+        self.volts > catching.left_v * (1.0 + x * (1.0 + 0.5 * x))
     }
+}
 
-    pub(super) fn catch_from_here(&mut self) {
-        self.control.hand_over.silence();
-        self.enter(State::Catching);
-    }
-
-    /// The current while a turning shaft is looked for and magnetised, A.
+impl Field {
+    /// The current while a turning shaft is looked for, A.
     ///
     /// # Errors
     /// [`Fault::NotCaught`] for a shaft that turns too fast.
     #[cold]
-    pub(super) fn catch(&mut self) -> Result<Dq, Fault> {
-        let Some(c) = self.c.catching else {
-            self.magnetising_from_here(0);
+    pub(super) fn search(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+        let (Some(catching), FluxPhase::Search(search)) = (&c.catching, &mut self.flux) else {
+            self.hold(c, k, 0);
             return Ok(Dq::ZERO);
         };
-        let (s, elapsed) = (&mut self.control, self.elapsed);
-        let Some(found) = s.catching.found else {
-            // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
-            let Some(n) = elapsed.checked_sub(self.c.sequence.precharge) else {
-                return Ok(Dq::ZERO);
-            };
-            let drives = s.catching.flux_left.is_some_and(|left| left.volts > LITTLE_V);
-            if n == 0 && !drives {
-                s.reference[0] = ReferenceState::at_rest(AT_ONCE * c.current);
-            }
-            let d = if drives { WITH_FLUX * c.current } else { c.current };
-            if n > catch::FROM {
-                self.c.current_loop.hold(&mut s.current_loop);
-            }
-            match s.catching.search.step(n, s.observer.change) {
-                Caught::Searching => {}
-                Caught::Standing => {
-                    s.catching.flux_left = None;
-                    s.hand_over = HandOver::default();
-                    self.magnetising_from_here(0);
-                }
-                Caught::Turning(flux_freq) => {
-                    let freq = c.path.rotor(flux_freq);
-                    if freq.abs() > HIGHEST {
-                        return Err(Fault::NotCaught);
-                    }
-                    s.catching.found = Some(elapsed);
-                    s.catching.flux_left = None;
-                    s.estimator.turn_with(freq);
-                    s.indirect = IndirectState::default();
-                    if let Some(observer) = &self.c.observer {
-                        observer.start(&mut s.observer);
-                    }
-                }
-            }
-            return Ok(Dq { d, q: 0.0 });
+        // Without current first: the bootstrap capacitors charge, and what flux there is meets no short circuit.
+        let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
+            return Ok(Dq::ZERO);
         };
-        // As much flux as the voltage bears, and with all current until it has built up.
-        let most = s.voltage_limit.most.d;
-        let missing = most - self.c.observer.as_ref().map_or(most, |o| o.magnetising(&s.observer));
-        let d = within(most + FORCED * missing, (0.0, c.current));
-        if elapsed.wrapping_sub(found) >= c.built {
-            self.c.motion.start(&mut s.motion, s.seen.rotor_count);
-            self.enter(State::of_mode(self.mode));
+        let drives = search.residual.is_some_and(|residual| residual.volts > LITTLE_V);
+        if n == 0 && !drives {
+            self.reference[0] = ReferenceState::at_rest(AT_ONCE * catching.current);
+        }
+        let d = if drives { WITH_FLUX * catching.current } else { catching.current };
+        if n > catch::FROM {
+            c.current_loop.hold(&mut self.current_loop);
+        }
+        match search.speed.step(n, self.observer.change) {
+            Caught::Searching => {}
+            Caught::Standing => {
+                self.hand_over = HandOver::default();
+                self.hold(c, k, 0);
+            }
+            Caught::Turning(flux_freq) => {
+                let freq = catching.path.rotor(flux_freq);
+                if freq.abs() > HIGHEST {
+                    return Err(Fault::NotCaught);
+                }
+                self.flux = FluxPhase::Build { from: k.elapsed };
+                self.estimator.turn_with(freq);
+                self.indirect = IndirectState::default();
+                if let Some(observer) = &c.observer {
+                    observer.start(&mut self.observer);
+                }
+            }
         }
         Ok(Dq { d, q: 0.0 })
     }
 
-    /// The state to go to when the start on a turning shaft ends so: a wrong speed shows as a voltage or a current that it does
-    /// not explain.
+    /// The current while the flux of a turning rotor builds up, from period `from` on: as much flux as the voltage bears,
+    /// and with all current until it has built up.
     #[cold]
-    pub(super) fn why_not_caught(&self, off: State) -> State {
+    pub(super) fn build(&mut self, c: &Coefficients, k: &mut Kept, from: u32) -> Dq {
+        let most = k.limits.voltage.most.d;
+        let missing = most - c.observer.as_ref().map_or(most, |o| o.magnetising(&self.observer));
+        let (current, built) =
+            c.catching.map_or((most, 0), |catching| (catching.current, catching.built));
+        let d = within(most + FORCED * missing, (0.0, current));
+        if k.elapsed.wrapping_sub(from) >= built {
+            c.motion.start(&mut self.motion, k.rotor_count);
+            self.enter(k, FluxPhase::Ready);
+        }
+        Dq { d, q: 0.0 }
+    }
+
+    /// The fault of a drive that ends with this one: where a turning shaft is looked for or magnetised, a wrong speed shows as a
+    /// voltage or a current that it does not explain.
+    #[cold]
+    pub(super) fn why_not_caught(&self, fault: Fault) -> Fault {
         use Fault::{CurrentNotAsPredicted, FluxNotAsPredicted, LostLock, NotCaught};
-        match off {
-            State::Fault(CurrentNotAsPredicted | FluxNotAsPredicted | LostLock)
-                if self.state == State::Catching =>
-            {
-                NotCaught.into()
-            }
-            _ => off,
+        match (fault, &self.flux) {
+            (
+                CurrentNotAsPredicted | FluxNotAsPredicted | LostLock,
+                FluxPhase::Search(_) | FluxPhase::Build { .. },
+            ) => NotCaught,
+            _ => fault,
         }
     }
 }

@@ -1,14 +1,14 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use super::reference::References;
-use super::{ControlState, Drive};
+use super::field::{Field, FluxPhase, Frame, Goal};
+use super::prepare::{Job, Prepare};
+use super::scalar::Scalar;
+use super::{Drive, Phase};
 
 use crate::drive::allowed::allowed;
-use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Command, Refused};
-use crate::drive::state::{Mode, State};
+use crate::drive::state::Mode;
 use crate::math::angle::Angle;
-use crate::math::frames::Dq;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
 use crate::settings::AngleSource;
@@ -27,43 +27,38 @@ impl Drive {
     // Not inlined: it stays in the flash.
     #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
-        allowed(command, self.state, self.mode)?;
+        allowed(command, self.state(), self.mode())?;
         match *command {
-            Command::Start(mode) => self.start(mode),
-            Command::Relock => self.relock(),
-            Command::CheckWiring => {
-                self.wiring_unchecked = true;
-                Ok(Accepted::AsGiven)
-            }
-            Command::Excite(excitation) => self.take_excitation(excitation),
-            Command::Stop(stop) => {
-                self.stop(stop);
-                Ok(Accepted::AsGiven)
-            }
+            Command::Start(mode) => return self.start(Job::of_mode(mode)),
+            Command::Relock => self.relock()?,
+            Command::CheckWiring => self.kept.wiring_unchecked = true,
+            Command::Excite(excitation) => return self.take_excitation(excitation),
+            Command::Stop(stop) => self.stop(stop),
             Command::Clear => {
-                if let State::Fault(_) = self.state {
-                    self.enter(State::Off);
+                if let Phase::Fault(_, left) = self.phase {
+                    self.enter(Phase::Off(left));
                 }
-                Ok(Accepted::AsGiven)
             }
             Command::Torque(i_q) => {
                 finite(i_q)?;
-                let i_d = self.control.references.current.d;
-                let largest = libm::sqrtf(self.c.protection.current_squared - i_d * i_d);
-                let taken = limited(limited(i_q, largest), self.c.protection.i_q);
-                self.control.references.current.q = taken;
-                Ok(accepted(i_q, taken))
+                let current = &mut self.kept.references.current;
+                let largest =
+                    libm::sqrtf(self.c.protection.current_squared - current.d * current.d);
+                current.q = limited(limited(i_q, largest), self.c.protection.i_q);
+                return Ok(accepted(i_q, current.q));
             }
-            Command::Speed(rpm) => self.turn_at(rpm, 0),
-            Command::Jog(rpm) => self.turn_at(rpm, JOG),
-            Command::Position(turns) => {
-                finite(turns)?;
-                let taken = limited(turns, self.c.motion.position_limit);
-                if self.control.references.press.is_some() {
+            Command::Speed(rpm) => return self.turn_at(rpm, 0),
+            Command::Jog(rpm) => return self.turn_at(rpm, JOG),
+            Command::Position(to) => {
+                finite(to)?;
+                let taken = limited(to, self.c.motion.position_limit);
+                if let Some(Goal::Position { press: Some(_), .. }) = self.goal() {
                     self.rest_here();
                 }
-                self.control.references.turns = Some(taken);
-                Ok(accepted(turns, taken))
+                if let Some(Goal::Position { turns, .. }) = self.goal() {
+                    *turns = Some(taken);
+                }
+                return Ok(accepted(to, taken));
             }
             Command::Press(rpm, i_q) => {
                 finite(rpm)?;
@@ -73,22 +68,23 @@ impl Drive {
                 }
                 self.rest_here();
                 let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
-                let r = &mut self.control.references;
-                (r.speed, r.press) = (taken / 60.0, Some(i_q));
-                Ok(accepted(rpm, taken))
+                if let Some(Goal::Position { press, .. }) = self.goal() {
+                    *press = Some((taken / 60.0, i_q));
+                }
+                return Ok(accepted(rpm, taken));
             }
-            Command::Home(turns) => {
-                finite(turns)?;
+            Command::Home(here) => {
+                finite(here)?;
                 let max = self.c.motion.position_limit;
-                if turns.abs() > max {
+                if here.abs() > max {
                     return Err(Refused::OutOfRange { min: -max, max });
                 }
                 self.rest_here();
-                let s = &mut self.control;
-                let origin = self.c.motion.shift_origin(&mut s.motion, turns);
-                s.references.turns = Some(0.0);
-                self.home = (self.c.source == AngleSource::Encoder).then_some(origin);
-                Ok(Accepted::AsGiven)
+                if let Phase::Field(field) = &mut self.phase {
+                    let origin = self.c.motion.shift_origin(&mut field.motion, here);
+                    field.goal = Goal::Position { turns: Some(0.0), press: None };
+                    self.kept.home = (self.c.source == AngleSource::Encoder).then_some(origin);
+                }
             }
             Command::Magnetising(i_d) => {
                 finite(i_d)?;
@@ -96,15 +92,14 @@ impl Drive {
                 if self.c.lock_monitor.is_some() {
                     return Err(Refused::FluxIsFixed);
                 }
-                let i_q = self.control.references.current.q;
+                let current = &mut self.kept.references.current;
                 let min = 0.2 * self.c.sequence.i_d;
-                let max = libm::sqrtf(self.c.protection.current_squared - i_q * i_q);
+                let max = libm::sqrtf(self.c.protection.current_squared - current.q * current.q);
                 if i_d < min {
                     return Err(Refused::OutOfRange { min, max });
                 }
-                let taken = limited(i_d, max);
-                self.control.references.current.d = taken;
-                Ok(accepted(i_d, taken))
+                current.d = limited(i_d, max);
+                return Ok(accepted(i_d, current.d));
             }
             Command::TurnInjection(degrees) => {
                 finite(degrees)?;
@@ -112,8 +107,7 @@ impl Drive {
                     return Err(Refused::NeedsEncoder);
                 }
                 let turn = self.c.injection_turn + Angle::from_degrees(degrees);
-                self.control.references.injection_axis = turn.unit_vector();
-                Ok(Accepted::AsGiven)
+                self.kept.references.injection_axis = turn.unit_vector();
             }
             Command::TestVoltage(voltage) => {
                 finite(voltage.d + voltage.q)?;
@@ -122,115 +116,111 @@ impl Drive {
                 if !(inside(voltage.d) && inside(voltage.q)) {
                     return Err(Refused::OutOfRange { min: -max, max });
                 }
-                self.control.references.test_voltage = voltage;
-                Ok(Accepted::AsGiven)
+                self.kept.references.test_voltage = voltage;
             }
             Command::RotorTimeConstant(tau_r) => {
                 if !self.c.track_rotor {
                     return Err(Refused::RotorNotTracked);
                 }
                 finite(tau_r)?;
-                let taken = self
-                    .c
-                    .indirect
-                    .track_tau_r(tau_r)
-                    .map_err(|[min, max]| Refused::OutOfRange { min, max })?;
+                let taken = self.c.indirect.track_tau_r(tau_r);
+                let taken = taken.map_err(|[min, max]| Refused::OutOfRange { min, max })?;
                 self.changes = self.changes.wrapping_add(1);
-                Ok(accepted(tau_r, taken))
+                return Ok(accepted(tau_r, taken));
             }
             Command::Configure(ref coefficients) => {
-                self.configure(coefficients);
-                Ok(Accepted::AsGiven)
+                self.c = *coefficients;
+                self.kept.home = None;
+                self.changes = self.changes.wrapping_add(1);
             }
+        }
+        Ok(Accepted::AsGiven)
+    }
+
+    /// The mode that the drive was started in; of one that is off or stops, none is asked for.
+    pub(super) fn mode(&self) -> Mode {
+        match &self.phase {
+            Phase::Off(_) | Phase::Fault(..) => Mode::Torque,
+            Phase::Prepare(prepare) => prepare.job.mode(),
+            Phase::Excite(_) => Mode::Commissioning,
+            Phase::Scalar(_) => Mode::VoltsPerHertz,
+            Phase::Field(field) => field.goal.mode(),
+        }
+    }
+
+    /// The goal of the current, with its reference.
+    fn goal(&mut self) -> Option<&mut Goal> {
+        match &mut self.phase {
+            Phase::Prepare(Prepare { job: Job::Field(goal), .. })
+            | Phase::Field(Field { goal, .. }) => Some(goal),
+            Phase::Off(_) | Phase::Fault(..) | Phase::Excite(_) => None,
+            Phase::Prepare(_) | Phase::Scalar(_) => None,
         }
     }
 
     /// Takes the speed, for so many periods where it is a jog.
-    fn turn_at(&mut self, rpm: f32, jog: u32) -> Result<Accepted, Refused> {
+    fn turn_at(&mut self, rpm: f32, periods: u32) -> Result<Accepted, Refused> {
         finite(rpm)?;
         let taken = limited(rpm, self.c.motion.speed_limit * 60.0);
-        let r = &mut self.control.references;
-        (r.speed, r.jog) = (taken / 60.0, jog);
+        match &mut self.phase {
+            Phase::Prepare(Prepare { job: Job::Scalar { speed }, .. })
+            | Phase::Scalar(Scalar { speed, .. }) => *speed = taken / 60.0,
+            _ => {
+                if let Some(Goal::Speed { speed, jog }) = self.goal() {
+                    (*speed, *jog) = (taken / 60.0, periods);
+                }
+            }
+        }
         Ok(accepted(rpm, taken))
     }
 
     /// Lets the position loop begin anew where the shaft is, without torque.
     fn rest_here(&mut self) {
-        let s = &mut self.control;
-        self.c.motion.take_over(&mut s.motion, s.seen.rotor_count, 0.0, 0.0);
-        s.references.press = None;
+        if let Phase::Field(field) = &mut self.phase {
+            let count = self.kept.rotor_count;
+            self.c.motion.take_over(&mut field.motion, count, 0.0, 0.0);
+        }
+        if let Some(Goal::Position { press, .. }) = self.goal() {
+            *press = None;
+        }
     }
 
-    fn configure(&mut self, coefficients: &Coefficients) {
-        self.c = *coefficients;
-        self.home = None;
-        self.changes = self.changes.wrapping_add(1);
-    }
-
-    pub(super) fn start(&mut self, mode: Mode) -> Result<Accepted, Refused> {
-        match mode {
+    pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
+        match &job {
             _ if !self.is_charged() => return Err(Refused::NotCharged),
-            Mode::Learning if !self.can_learn() => return Err(Refused::NeedsInjection),
-            Mode::VoltsPerHertz if self.c.volts_per_hertz.is_none() => {
+            Job::Field(Goal::Learn) if !self.can_learn() => return Err(Refused::NeedsInjection),
+            Job::Scalar { .. } if self.c.volts_per_hertz.is_none() => {
                 return Err(Refused::Nameplate);
             }
-            Mode::Torque | Mode::Speed | Mode::Position if self.c.unlearned => {
+            Job::Field(goal) if goal.regulates() && self.c.unlearned => {
                 return Err(Refused::NotLearned);
             }
-            Mode::Torque | Mode::Speed | Mode::Position => {}
-            Mode::Learning | Mode::Commissioning | Mode::VoltsPerHertz => {}
+            Job::Field(_) | Job::Scalar { .. } | Job::Excite(_) => {}
         }
-        let flux_left = self.flux_left();
-        self.mode = mode;
-        self.starts = self.starts.wrapping_add(1);
-        if mode == Mode::Learning {
-            self.learned = None;
-        }
-        // The brake resistor stays hot; a start on a turning shaft measures neither drop nor carrier.
-        let ControlState { dc_link, inverter_drop, observer, lock, .. } = self.control;
-        self.control = ControlState { dc_link, ..ControlState::default() };
-        self.control.inverter_drop.volts = inverter_drop.volts;
-        self.control.observer.resistance = observer.resistance;
-        self.control.lock.baseline = lock.baseline;
-        self.control.catching.flux_left = flux_left.filter(|_| self.can_catch());
-        let by_voltage = self.c.volts_per_hertz.filter(|_| mode == Mode::VoltsPerHertz);
-        let i_d = by_voltage.map_or(self.c.sequence.i_d, |turning| turning.boost_a);
-        self.control.references = self.no_torque(i_d);
-        self.c.turn(&mut self.control.axes, 0.0, self.c.injection_axis, false);
-        self.c.sensing.start(&mut self.control.sensing);
-        self.c.estimator.start(&mut self.control.estimator);
-        self.control.voltage_limit = self.c.voltage_limit.start();
-        let most = self.control.voltage_limit.most.q;
-        self.control.limits.i_q = (-most, most);
-        if let Some(observer) = &self.c.observer {
-            observer.start(&mut self.control.observer);
-        }
-        self.enter(State::Calibrating);
+        self.prepare_for(job);
         Ok(Accepted::AsGiven)
     }
 
     /// Magnetises again along phase a, as a start at rest does, with the current flowing on.
-    fn relock(&mut self) -> Result<Accepted, Refused> {
-        if self.c.source != AngleSource::Injection {
+    fn relock(&mut self) -> Result<(), Refused> {
+        let (c, k) = (&self.c, &mut self.kept);
+        let Phase::Field(field) = &mut self.phase else { return Ok(()) };
+        if field.frame != Frame::Tracked {
             return Err(Refused::NeedsInjection);
         }
-        if !self.stands() {
+        if !k.stands() {
             return Err(Refused::Turning);
         }
-        self.control.references = self.no_torque(self.control.references.current.d);
-        self.c.estimator.start(&mut self.control.estimator);
-        self.control.lock = LockMonitorState::default();
-        self.enter(State::Magnetising);
-        Ok(Accepted::AsGiven)
-    }
-
-    /// References of nothing but this direct current, A.
-    fn no_torque(&self, i_d: f32) -> References {
-        References {
-            current: Dq::new(i_d, 0.0),
-            injection_axis: self.c.injection_axis,
-            ..References::default()
+        k.no_torque(k.references.current.d, c.injection_axis);
+        match &mut field.goal {
+            goal @ Goal::Speed { .. } => *goal = Goal::SPEED,
+            goal @ Goal::Position { .. } => *goal = Goal::POSITION,
+            Goal::Torque | Goal::Learn | Goal::Brake { .. } | Goal::Release => {}
         }
+        c.estimator.start(&mut field.estimator);
+        field.lock = LockMonitorState::default();
+        field.enter(k, FluxPhase::Hold);
+        Ok(())
     }
 }
 

@@ -3,15 +3,17 @@
 //! The current along phase a is regulated by one controller, with an optional carrier; the voltage across it is the
 //! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
 
-use super::Drive;
+use super::prepare::{Job, pulse};
+use super::{Drive, Kept, Left, Phase};
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
 use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
 use crate::current::sensing::Measured;
+use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Refused};
 use crate::drive::excitation::{Excitation, Excited, Regulator};
-use crate::drive::state::{Mode, State};
+use crate::drive::state::State;
 use crate::fault::Fault;
-use crate::filter::dissertation::LPF;
+use crate::filter::dissertation::{LPF, LpfState};
 use crate::io::Compare;
 use crate::math::frames::{Abc, AlphaBeta, Dq};
 use crate::math::limited;
@@ -20,10 +22,21 @@ use crate::protect::wiring_check::{WiringCheck, WiringCheckState};
 /// Control periods in which the carrier rises to its amplitude: twenty of its own.
 const RAMP: f32 = 20.0 * CARRIER_SAMPLES as f32;
 
-/// State of the excitation.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ExcitationState {
+/// A drive that excites.
+#[derive(Clone, Debug)]
+pub(super) struct Excite {
     wanted: Excitation,
+    low_pass: LpfState,
+    control: Control,
+    /// Pulse trains that have ended.
+    trains: u32,
+    pulses: WiringCheckState,
+    pub left: Left,
+}
+
+/// State of the current along phase a and its carrier.
+#[derive(Clone, Copy, Debug, Default)]
+struct Control {
     regulator: PiState,
     reference: ReferenceState,
     /// Present amplitude of the carrier, V.
@@ -32,8 +45,6 @@ pub(super) struct ExcitationState {
     index: usize,
     /// Register of the binary sequence; zero before its first sample.
     register: u8,
-    /// Pulse trains that have ended.
-    trains: u32,
 }
 
 /// The next sample, plus or minus one, of the sequence of largest length by x^8 + x^6 + x^5 + x^4 + 1.
@@ -43,20 +54,105 @@ fn next_bit(register: &mut u8) -> f32 {
     if r & 1 == 1 { 1.0 } else { -1.0 }
 }
 
+impl Excite {
+    pub fn new(wanted: Excitation, left: Left) -> Self {
+        Self {
+            wanted,
+            low_pass: LpfState::default(),
+            control: Control::default(),
+            trains: 0,
+            pulses: WiringCheckState::default(),
+            left,
+        }
+    }
+
+    pub fn state(&self) -> State {
+        match self.wanted {
+            Excitation::Pulses(_) => State::CheckingWiring,
+            Excitation::Rest | Excitation::Current { .. } => State::Exciting,
+        }
+    }
+
+    /// A step of the excitation.
+    #[cold]
+    pub fn step(
+        &mut self,
+        c: &Coefficients,
+        k: &mut Kept,
+        measured: &Measured,
+    ) -> Result<Compare, Fault> {
+        let mut realised = AlphaBeta::ZERO;
+        let mut compare = Compare::LOW_SIDES_ON;
+        match self.wanted {
+            Excitation::Pulses(pulses) => {
+                return Ok(
+                    match pulse(c, &WiringCheck::new(&pulses), &mut self.pulses, measured)? {
+                        Some(compare) => compare,
+                        None => {
+                            self.trains = self.trains.wrapping_add(1);
+                            (self.control, self.wanted) = (Control::default(), Excitation::Rest);
+                            k.elapsed = 0;
+                            Compare::LOW_SIDES_ON
+                        }
+                    },
+                );
+            }
+            Excitation::Rest => {
+                LPF.step(&mut self.low_pass, measured.current);
+            }
+            Excitation::Current { amperes, regulator, carrier, binary } => {
+                let s = &mut self.control;
+                let Regulator { k_c, z_c, direct, filtered } = regulator;
+                let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
+                let reference = filter.step(&mut s.reference, amperes);
+                let behind = LPF.step(&mut self.low_pass, measured.current);
+                let current = if filtered { behind } else { measured.current };
+                let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - current.alpha);
+                let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
+                s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
+                s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);
+                let cos = CARRIER_COS.get(s.index).copied().unwrap_or(0.0);
+                s.index = if s.index + 1 < CARRIER_SAMPLES { s.index + 1 } else { 0 };
+                let factor = if binary { next_bit(&mut s.register) } else { cos };
+                let wanted = AlphaBeta::new(along, 0.0) + s.carrier * factor;
+                if !(wanted.alpha + wanted.beta).is_finite() {
+                    return Err(k.not_finite(c, true).unwrap_or(Fault::NonFiniteState));
+                }
+                let modulated = c.modulator.step(wanted, Abc::ZERO, measured.dc_link);
+                if modulated.limited {
+                    s.regulator.back_calculate(modulated.realised.alpha - wanted.alpha);
+                }
+                realised = modulated.realised;
+                compare = Compare::on(modulated.compare);
+            }
+        }
+        let seen = &mut k.seen;
+        (seen.measured, seen.realised) = (measured.current, realised);
+        seen.dc_link = measured.dc_link;
+        // For the thermal loads.
+        seen.current = Dq::new(measured.current.alpha, measured.current.beta);
+        Ok(compare)
+    }
+}
+
 impl Drive {
     /// Whether [`Collector`](crate::commission::Collector) is to be given what the last step saw.
     pub fn excites(&self) -> bool {
-        self.state == State::Exciting
+        matches!(&self.phase, Phase::Excite(excite) if excite.state() == State::Exciting)
     }
 
     /// What the commissioning needs of this drive.
     pub fn excited(&self) -> Excited {
+        let (trains, answers) = match &self.phase {
+            Phase::Excite(excite) => (excite.trains, excite.pulses.answers()),
+            _ => Default::default(),
+        };
         Excited {
-            state: self.state,
-            starts: self.starts,
-            offsets: self.c.sensing.offsets(&self.control.sensing),
-            trains: self.control.excitation.trains,
-            answers: self.wiring.answers(),
+            state: self.state(),
+            starts: self.kept.starts,
+            offsets: self.c.sensing.offsets(&self.kept.sensing),
+            trains,
+            answers,
         }
     }
 
@@ -71,75 +167,13 @@ impl Drive {
                 return Err(Refused::OutOfRange { min: -max, max });
             }
         }
-        if self.excites() {
-            self.control.excitation.wanted = wanted;
-            self.excite_from_here();
-        } else {
-            self.start(Mode::Commissioning)?;
-            self.control.excitation.wanted = wanted;
-        }
-        Ok(Accepted::AsGiven)
-    }
-
-    /// Begins the wanted excitation.
-    pub(super) fn excite_from_here(&mut self) {
-        let pulses = matches!(self.control.excitation.wanted, Excitation::Pulses(_));
-        if pulses {
-            self.wiring = WiringCheckState::default();
-        }
-        self.enter(if pulses { State::CheckingWiring } else { State::Exciting });
-    }
-
-    /// The pulses in force: of the commissioning, or of a start.
-    pub(super) fn pulses(&self) -> WiringCheck {
-        match &self.control.excitation.wanted {
-            Excitation::Pulses(pulses) => WiringCheck::new(pulses),
-            _ => self.c.wiring,
-        }
-    }
-
-    /// Rests after a pulse train.
-    pub(super) fn end_train(&mut self) {
-        let s = &mut self.control.excitation;
-        *s = ExcitationState { trains: s.trains.wrapping_add(1), ..ExcitationState::default() };
-        self.enter(State::Exciting);
-    }
-
-    /// A step of the excitation.
-    #[cold]
-    pub(super) fn excite(&mut self, measured: &Measured) -> Result<Compare, Fault> {
-        let s = &mut self.control.excitation;
-        let mut realised = AlphaBeta::ZERO;
-        let mut compare = Compare::LOW_SIDES_ON;
-        let filtered = LPF.step(&mut self.control.low_pass, measured.current);
-        if let Excitation::Current { amperes, regulator, carrier, binary } = s.wanted {
-            let Regulator { k_c, z_c, direct, filtered: is_filtered } = regulator;
-            let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
-            let reference = filter.step(&mut s.reference, amperes);
-            let current = if is_filtered { filtered } else { measured.current };
-            let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - current.alpha);
-            let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
-            s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
-            s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);
-            let cos = CARRIER_COS.get(s.index).copied().unwrap_or(0.0);
-            s.index = if s.index + 1 < CARRIER_SAMPLES { s.index + 1 } else { 0 };
-            let factor = if binary { next_bit(&mut s.register) } else { cos };
-            let wanted = AlphaBeta::new(along, 0.0) + s.carrier * factor;
-            if !(wanted.alpha + wanted.beta).is_finite() {
-                return Err(self.not_finite().unwrap_or(Fault::NonFiniteState));
+        if let Phase::Excite(excite) = &mut self.phase {
+            (excite.wanted, self.kept.elapsed) = (wanted, 0);
+            if let Excitation::Pulses(_) = wanted {
+                excite.pulses = WiringCheckState::default();
             }
-            let modulated = self.c.modulator.step(wanted, Abc::ZERO, measured.dc_link);
-            if modulated.limited {
-                s.regulator.back_calculate(modulated.realised.alpha - wanted.alpha);
-            }
-            realised = modulated.realised;
-            compare = Compare::on(modulated.compare);
+            return Ok(Accepted::AsGiven);
         }
-        let seen = &mut self.control.seen;
-        (seen.measured, seen.realised) = (measured.current, realised);
-        seen.dc_link = measured.dc_link;
-        // For the thermal loads.
-        seen.current = Dq::new(measured.current.alpha, measured.current.beta);
-        Ok(compare)
+        self.start(Job::Excite(wanted))
     }
 }

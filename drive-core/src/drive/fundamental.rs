@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::ControlState;
+use super::field::Field;
 use super::in_turn::StepResults;
 use super::trust::Trust;
 use crate::drive::coefficients::Coefficients;
@@ -20,9 +20,10 @@ impl Coefficients {
     /// axis of the flux at the sample.
     pub(super) fn observe_fundamental(
         &self,
-        s: &mut ControlState,
+        s: &mut Field,
         index: usize,
         trust: &Trust,
+        flux_freq: f32,
         current: AlphaBeta,
         phi: UnitVector,
     ) -> Turning {
@@ -35,7 +36,7 @@ impl Coefficients {
         } else {
             observer.step(state, current, phi.turned_by(s.axes.before), filtered, weight);
         }
-        if weight == 0.0 && trust.resistance && s.seen.flux_freq.abs() < RESISTANCE_UP_TO {
+        if weight == 0.0 && trust.resistance && flux_freq.abs() < RESISTANCE_UP_TO {
             observer.track_resistance(state);
         }
         const PER_RADIAN: f32 = 1.0 / TAU;
@@ -45,7 +46,7 @@ impl Coefficients {
     }
 
     /// The slow part of the observer.
-    pub(super) fn update_observer(&self, s: &mut ControlState, step: &StepResults) {
+    pub(super) fn update_observer(&self, s: &mut Field, step: &StepResults) {
         let Some(observer) = &self.observer else { return };
         let weight = s.hand_over.weight;
         observer.update(&mut s.observer, step.rotor_freq);
@@ -55,7 +56,7 @@ impl Coefficients {
         }
         s.induced = observer.induced(&s.observer, step.flux_freq);
         // What another share changes, the controllers have been putting out.
-        let induced = s.induced.at(s.seen.reference);
+        let induced = s.induced.at(step.reference);
         s.current_loop.back_calculate(induced * (s.induced_share - weight));
         s.induced_share = weight;
     }

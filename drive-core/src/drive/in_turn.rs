@@ -18,11 +18,12 @@
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
 //! averages of sample 9.
 
-use super::ControlState;
+use super::Kept;
+use super::field::Field;
 use super::trust::{Judged, Lock, Source, Trust};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
-use crate::current::voltage_limit::Operation;
+use crate::current::voltage_limit::{Operation, VoltageLimitState};
 use crate::dc_link::Limiting;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
@@ -38,8 +39,8 @@ pub(super) struct StepResults<'a> {
     pub measured: &'a Measured,
     /// Current that makes flux and slip, A.
     pub flux_current: Dq,
-    /// Filtered reference of the quadrature current, A.
-    pub i_q: f32,
+    /// Filtered reference of the current, A.
+    pub reference: Dq,
     /// Voltage without the carrier, V.
     pub voltage: Dq,
     /// Injection axis when the carrier current flowed that is sampled now.
@@ -60,7 +61,8 @@ impl Coefficients {
     /// The fault that a check finds.
     pub(super) fn in_turn(
         &self,
-        s: &mut ControlState,
+        s: &mut Field,
+        k: &mut Kept,
         index: usize,
         step: &StepResults,
     ) -> Result<(), Fault> {
@@ -69,7 +71,7 @@ impl Coefficients {
                 self.estimator.update_saliency(&mut s.estimator, step.carrier_axis, step.flux_freq);
                 self.indirect.magnetise(&mut s.indirect, step.flux_current.d);
                 if self.source == AngleSource::Injection {
-                    s.seen.rotor_count = s.count_by_flux();
+                    k.rotor_count = s.count_by_flux();
                 }
                 self.watch_noise(s, 0, step.sample)
             }
@@ -89,7 +91,7 @@ impl Coefficients {
             }
             4 => self.check_lock(s, step),
             REFERENCE_AT => {
-                s.estimator.synchronous.average_reference(step.i_q);
+                s.estimator.synchronous.average_reference(step.reference.q);
                 if self.observer.is_some() && step.trust.observes() {
                     s.hand_over.update(step.flux_freq);
                     match step.trust.source {
@@ -99,7 +101,7 @@ impl Coefficients {
                     }
                 }
                 let silent = s.hand_over.silent;
-                self.turn(&mut s.axes, step.flux_freq, s.references.injection_axis, silent);
+                self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
                 Ok(())
             }
             6 => {
@@ -108,7 +110,7 @@ impl Coefficients {
                 self.check_both_channels(s, step)
             }
             7 => {
-                self.limit_torque(s, step);
+                self.limit_torque(k, step);
                 self.predict(s, step);
                 self.watch_noise(s, 3, step.sample)
             }
@@ -121,14 +123,14 @@ impl Coefficients {
             }
             _ => {
                 s.estimator.synchronous.average();
-                self.limit_voltage(s, step);
+                self.limit_voltage(s, k, step);
                 self.watch_noise(s, 5, step.sample)
             }
         }
     }
 
     /// Takes one of the six looks at the noise of the current sensors.
-    fn watch_noise(&self, s: &mut ControlState, look: usize, sample: &Sample) -> Result<(), Fault> {
+    fn watch_noise(&self, s: &mut Field, look: usize, sample: &Sample) -> Result<(), Fault> {
         match &self.noise_watch {
             Some(watch) => watch.step(&mut s.noise, look, sample, s.hand_over.is_quiet()),
             None => Ok(()),
@@ -136,7 +138,7 @@ impl Coefficients {
     }
 
     /// Computes the rotor voltage that the next judgement of the current reckons with.
-    fn predict(&self, s: &mut ControlState, step: &StepResults) {
+    fn predict(&self, s: &mut Field, step: &StepResults) {
         // On iron a weakened flux is larger than the current model says: the observer measures it.
         let magnetising = match &self.observer {
             Some(observer) if step.trust.observes() => observer.magnetising(&s.observer),
@@ -152,42 +154,35 @@ impl Coefficients {
     }
 
     /// Limits the currents to those that the voltage of the dc link allows.
-    fn limit_voltage(&self, s: &mut ControlState, step: &StepResults) {
+    fn limit_voltage(&self, s: &Field, k: &mut Kept, step: &StepResults) {
         let carrier = self.inject && !s.hand_over.silent;
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
         let now = Operation {
-            current: s.seen.reference,
+            current: step.reference,
             voltage: step.voltage,
             largest,
             flux_freq: step.flux_freq,
             kept: carrier,
-            added: s.limits.flux_a,
+            added: k.limits.now.flux_a,
         };
-        self.voltage_limit.step(&mut s.voltage_limit, &now);
+        self.voltage_limit.step(&mut k.limits.voltage, &now);
     }
 
     /// Limits the torque current to that which dc link, heat sink, motor and inverter bear.
-    fn limit_torque(&self, s: &mut ControlState, step: &StepResults) {
-        let (by_voltage, dc_link) = (s.voltage_limit.most.q, step.measured.dc_link);
-        let by_heat = self.protection.i_q - s.too_hot_for;
-        let most = if by_heat < by_voltage {
-            (by_heat, s.too_hot)
-        } else if s.voltage_limit.by_voltage {
-            (by_voltage, Limiting::Voltage)
-        } else {
-            (by_voltage, Limiting::No)
-        };
-        s.limits = self.dc_link.step(&mut s.dc_link, dc_link, step.rotor_freq, most);
+    fn limit_torque(&self, k: &mut Kept, step: &StepResults) {
+        let VoltageLimitState { most, by_voltage, .. } = k.limits.voltage;
+        let why = if by_voltage { Limiting::Voltage } else { Limiting::No };
+        k.limits.step(self, step.measured.dc_link, step.rotor_freq, (most.q, why));
     }
 
     /// Whether the demodulation has a carrier.
-    fn injects(&self, s: &ControlState) -> bool {
+    fn injects(&self, s: &Field) -> bool {
         self.inject && s.hand_over.demodulates()
     }
 
     /// Judges the current by the voltage.
-    fn judge(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
+    fn judge(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let trust = &step.trust;
         if !trust.mean {
             // The drop of the inverter may not be known either.
@@ -205,7 +200,7 @@ impl Coefficients {
     }
 
     /// Checks that the tracked angle is that of the flux.
-    fn check_lock(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
+    fn check_lock(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         let Some(monitor) = &self.lock_monitor else { return Ok(()) };
         let baseline = match step.trust.lock {
             Lock::Off => return Ok(()),
@@ -227,7 +222,7 @@ impl Coefficients {
     }
 
     /// Checks that both current sensors see the carrier.
-    fn check_both_channels(&self, s: &mut ControlState, step: &StepResults) -> Result<(), Fault> {
+    fn check_both_channels(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         if !self.injects(s) {
             return Ok(());
         }
@@ -237,11 +232,7 @@ impl Coefficients {
     }
 
     /// Fits the carrier into the voltage that the fundamental leaves.
-    fn check_carrier_headroom(
-        &self,
-        s: &mut ControlState,
-        step: &StepResults,
-    ) -> Result<(), Fault> {
+    fn check_carrier_headroom(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
         if !self.inject || s.hand_over.silent {
             return Ok(());
         }

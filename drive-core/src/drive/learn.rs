@@ -1,9 +1,9 @@
 //! Learning with the shaft locked, as a state of the drive.
 
-use super::Drive;
+use super::field::{Field, FluxPhase};
+use super::{Drive, End, Kept, Phase};
 use crate::carrier::DemodulatorKind;
 use crate::drive::coefficients::Coefficients;
-use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
 use crate::learned::{Tracked, TrackedLimit};
@@ -14,13 +14,17 @@ use crate::settings::{AngleSource, Settings};
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.
     pub fn learned(&self) -> Option<&Learned> {
-        self.learned.as_ref()
+        self.kept.learned.as_ref()
     }
 
     /// The point that is being measured, from 1 on, and the number of points; `None` unless the drive learns.
     pub fn learning_progress(&self) -> Option<(usize, usize)> {
-        let learns = self.state == State::Learning;
-        learns.then(|| self.c.learning.progress(&self.control.learning))
+        match &self.phase {
+            Phase::Field(Field { flux: FluxPhase::Learn(learning), .. }) => {
+                Some(self.c.learning.progress(learning))
+            }
+            _ => None,
+        }
     }
 
     pub(super) fn can_learn(&self) -> bool {
@@ -28,63 +32,61 @@ impl Drive {
         self.c.inject && self.c.demodulate && !literal
     }
 
+    /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the
+    /// flash. Returns the fault of one that cannot be used.
+    #[cold]
+    pub(super) fn evaluate_learning(&mut self) -> Option<Fault> {
+        let (c, Phase::Field(field)) = (&self.c, &self.phase) else { return None };
+        let FluxPhase::Learn(learning) = &field.flux else { return None };
+        let check = c.saliency_check;
+        let start = Start {
+            looked: check.map(|check| check.mean(&field.saliency_check)),
+            per_looked: check.map_or(0.0, |check| check.per_mean()),
+            baseline: field.lock.baseline,
+        };
+        let learned = c.learning.result(learning, &start);
+        self.kept.learned = Some(learned);
+        match learned.verdict {
+            verdict if verdict.is_accepted() => {
+                self.c.take(&learned);
+                self.changes = self.changes.wrapping_add(1);
+                None
+            }
+            Verdict::SlopeTooSmall | Verdict::LimitTooLow => Some(Fault::SlopeTooSmall),
+            _ => Some(Fault::NothingLearned),
+        }
+    }
+}
+
+impl Field {
     /// The torque current to regulate while learning, A; turns the frame behind the flux. At the end an accepted
     /// result replaces the settings, and the drive stops.
     #[cold]
-    pub(super) fn learn(&mut self) -> Result<f32, State> {
-        let (c, s) = (&self.c, &mut self.control);
-        let t = s.seen;
-        let saliency = *s.estimator.saliency();
-        let signal = if c.learning.normalised { saliency.q } else { s.estimator.delta_i };
+    pub(super) fn learn(&mut self, c: &Coefficients, k: &mut Kept) -> Result<f32, End> {
+        let FluxPhase::Learn(learning) = &mut self.flux else { return Ok(0.0) };
+        let saliency = *self.estimator.saliency();
+        let signal = if c.learning.normalised { saliency.q } else { self.estimator.delta_i };
         let sample = LearningSample {
             signal,
             carrier_squared: saliency.carrier_squared,
-            theta: t.phi + Angle::QUARTER,
-            flux_freq: t.flux_freq,
-            voltage: t.voltage,
+            theta: k.seen.phi + Angle::QUARTER,
+            flux_freq: k.seen.flux_freq,
+            voltage: k.seen.voltage,
         };
-        match c.learning.step(&mut s.learning, &sample) {
+        match c.learning.step(learning, &sample) {
             LearningAction::Operate(Operate { i_q, lead }) => {
-                let (r, lead) = (&mut self.control.references, Angle::from_radians(lead));
-                r.current.q = i_q;
-                if lead != r.lead {
-                    (r.lead, r.lead_axis) = (lead, lead.unit_vector());
+                let lead = Angle::from_radians(lead);
+                k.references.current.q = i_q;
+                if lead != self.lead {
+                    (self.lead, self.lead_axis) = (lead, lead.unit_vector());
                 }
             }
             LearningAction::Moved | LearningAction::Stuck => {
                 return Err(Fault::ShaftNotLocked.into());
             }
-            LearningAction::Done => {
-                self.control.all_measured = true;
-                return Err(State::Off);
-            }
+            LearningAction::Done => return Err(End::Measured),
         }
-        Ok(self.control.references.current.q)
-    }
-
-    /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the
-    /// flash. Returns the state to be in.
-    #[cold]
-    pub(super) fn evaluate_learning(&mut self) -> State {
-        let (c, s) = (&self.c, &mut self.control);
-        s.all_measured = false;
-        let check = c.saliency_check;
-        let start = Start {
-            looked: check.map(|check| check.mean(&s.saliency_check)),
-            per_looked: check.map_or(0.0, |check| check.per_mean()),
-            baseline: s.lock.baseline,
-        };
-        let learned = c.learning.result(&s.learning, &start);
-        self.learned = Some(learned);
-        match learned.verdict {
-            verdict if verdict.is_accepted() => {
-                self.c.take(&learned);
-                self.changes = self.changes.wrapping_add(1);
-                State::Off
-            }
-            Verdict::SlopeTooSmall | Verdict::LimitTooLow => Fault::SlopeTooSmall.into(),
-            _ => Fault::NothingLearned.into(),
-        }
+        Ok(k.references.current.q)
     }
 }
 

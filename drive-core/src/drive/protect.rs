@@ -1,10 +1,8 @@
 //! The checks of every step: the sample before it is used, and the state when a result is not finite.
 
-use super::Drive;
+use super::Kept;
 use crate::current::sensing::{Measured, SensingState};
-use crate::dc_link::Limiting;
-use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
-use crate::drive::state::State;
+use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::io::{Hardware, Sample};
 
@@ -43,59 +41,15 @@ impl Coefficients {
     }
 }
 
-impl Drive {
-    /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
-    /// finds the current that heat sink, motor and inverter bear, and switches the precharge relay. Returns whether the relay is closed:
-    /// always `false` where the settings have none.
-    pub fn after_step(&mut self, sample: &Sample) -> bool {
-        let share = self.c.sensing.heat_sink.share(sample.heat_sink);
-        let (heat_sink, loads) = ((share * share, Limiting::HeatSink), self.thermal.share());
-        let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
-        let s = &mut self.control;
-        (s.too_hot_for, s.too_hot) = if share < 1.0 {
-            let (largest, i_d) = (self.c.protection.i_q, s.references.current.d);
-            let square = share * largest * largest - i_d * i_d;
-            (largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }, why)
-        } else {
-            (0.0, Limiting::No)
-        };
-        let Some(relay) = &self.c.relay else { return false };
-        relay.step(&mut self.relay, sample.dc_link);
-        self.relay.closed
-    }
-
-    /// Whether the dc link is charged: a relay that there is has closed.
-    pub(super) fn is_charged(&self) -> bool {
-        self.c.relay.is_none() || self.relay.closed
-    }
-
-    /// Adds the current of the last periods to the thermal loads, in every state.
-    pub(super) fn watch_load(&mut self) -> Result<(), State> {
-        if !self.elapsed.is_multiple_of(THERMAL_EVERY) {
-            return Ok(());
-        }
-        let on = self.state.is_energised();
-        let square = if on { self.control.seen.current.length_squared() } else { 0.0 };
-        let borne = self.c.thermal.step(&mut self.thermal, square);
-        // Off it cools, and is not judged.
-        if on {
-            Ok(borne?)
-        } else {
-            self.c.dc_link.rest(&mut self.control.dc_link, THERMAL_EVERY);
-            Ok(())
-        }
-    }
-
-    /// The fault when a result is not finite: settings, references or state, whichever is not.
+impl Kept {
+    /// The fault when a result is not finite and settings, or references, are not; `goal_is_finite` says it of the references of
+    /// the goal.
     #[cold]
-    pub(super) fn not_finite(&self) -> Option<Fault> {
-        let r = &self.control.references;
-        if !self.c.is_finite() {
+    pub(super) fn not_finite(&self, c: &Coefficients, goal_is_finite: bool) -> Option<Fault> {
+        if !c.is_finite() {
             Some(Fault::NonFiniteSettings)
-        } else if !(r.current.is_finite() && (r.speed + r.turns.unwrap_or(0.0)).is_finite()) {
+        } else if !(self.references.current.is_finite() && goal_is_finite) {
             Some(Fault::NonFiniteCommand)
-        } else if !self.control.estimator.is_finite() {
-            Some(Fault::NonFiniteState)
         } else {
             None
         }

@@ -2,12 +2,15 @@
 
 use core::f32::consts::TAU;
 
-use super::Drive;
+use super::{End, Kept, Left, Telemetry};
 use crate::current::sensing::Measured;
 use crate::dc_link::{DIVIDER, Limiting};
+use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
-use crate::flux::volts_per_hertz::{Demand, VoltsPerHertz, VoltsPerHertzSettings};
+use crate::flux::volts_per_hertz::{
+    Demand, VoltsPerHertz, VoltsPerHertzSettings, VoltsPerHertzState,
+};
 use crate::io::{Compare, PERIOD_S};
 use crate::settings::Settings;
 use crate::settings::rules::PEAK_OF_PHASE;
@@ -48,33 +51,61 @@ impl Settings {
     }
 }
 
-impl Drive {
+/// A drive that turns by voltage and frequency.
+#[derive(Clone, Debug)]
+pub(super) struct Scalar {
+    turning: VoltsPerHertzState,
+    /// Reference of the speed, mechanical turns/s.
+    pub speed: f32,
+    /// Whether it comes to rest by the ramp of a quick stop, where it stops.
+    pub stop: Option<bool>,
+    pub left: Left,
+}
+
+impl Scalar {
+    pub fn new(speed: f32, left: Left) -> Self {
+        Self { turning: VoltsPerHertzState::default(), speed, stop: None, left }
+    }
+
+    pub fn state(&self) -> State {
+        if self.stop.is_some() { State::BrakingByFrequency } else { State::VoltsPerHertz }
+    }
+
     /// One period. All protections of a sample act, over-speed by the frequency, and the thermal loads.
     ///
     /// # Errors
-    /// The state to go to with the outputs off.
+    /// Why the outputs go off.
     #[cold]
-    pub(super) fn turn_by_voltage(&mut self, measured: &Measured) -> Result<Compare, State> {
-        let (c, s) = (&self.c, &mut self.control);
-        let Some(turning) = &c.volts_per_hertz else { return Err(State::Off) };
-        let rotor_freq = s.turning.rotor_freq();
-        let stops = self.state == State::BrakingByFrequency;
+    pub fn step(
+        &mut self,
+        c: &Coefficients,
+        k: &mut Kept,
+        measured: &Measured,
+    ) -> Result<Compare, End> {
+        let s = &mut self.turning;
+        let Some(turning) = &c.volts_per_hertz else { return Err(End::Stopped) };
+        let rotor_freq = s.rotor_freq();
+        let stops = self.stop.is_some();
         if stops && rotor_freq.abs() < STANDS {
-            return Err(State::Off);
+            return Err(End::Stopped);
         }
-        let freq = if stops { 0.0 } else { c.freq_per_speed * s.references.speed };
-        if self.elapsed.is_multiple_of(u32::from(DIVIDER)) {
-            let most = (c.protection.i_q - s.too_hot_for, s.too_hot);
-            s.limits = c.dc_link.step(&mut s.dc_link, measured.dc_link, rotor_freq, most);
+        let freq = if stops { 0.0 } else { c.freq_per_speed * self.speed };
+        if k.elapsed.is_multiple_of(u32::from(DIVIDER)) {
+            let by_voltage = (f32::INFINITY, Limiting::No);
+            k.limits.step(c, measured.dc_link, rotor_freq, by_voltage);
             if rotor_freq.abs() > c.protection.rotor_freq {
                 return Err(Fault::OverSpeed.into());
             }
         }
         let largest_v = c.modulator.circle(measured.dc_link);
-        let demand = Demand { freq, quick: s.quick_stop, i_q: s.limits.i_q, largest_v };
-        let turned = turning.step(&mut s.turning, measured.current, &demand)?;
-        if !(turned.voltage.d + turned.voltage.q + s.turning.freq).is_finite() {
-            return Err(self.not_finite().unwrap_or(Fault::NonFiniteState).into());
+        let quick = self.stop == Some(true);
+        let demand = Demand { freq, quick, i_q: k.limits.now.i_q, largest_v };
+        let turned = turning.step(s, measured.current, &demand)?;
+        if !(turned.voltage.d + turned.voltage.q + s.freq).is_finite() {
+            return Err(k
+                .not_finite(c, self.speed.is_finite())
+                .unwrap_or(Fault::NonFiniteState)
+                .into());
         }
         let voltage = turned.voltage.to_alpha_beta(turned.applied);
         let flowing = turned.current.to_alpha_beta(turned.applied);
@@ -82,16 +113,21 @@ impl Drive {
         let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
         let modulated = c.modulator.step(voltage, compensation, measured.dc_link);
 
-        let (_, why) = s.limits.hold(turned.current.q);
-        s.limiting = match why {
-            Limiting::No if s.turning.by_voltage => Limiting::Voltage,
-            why => why,
+        k.limits.hold(turned.current.q);
+        if k.limits.why == Limiting::No && s.by_voltage {
+            k.limits.why = Limiting::Voltage;
+        }
+        k.seen = Telemetry {
+            phi: turned.angle,
+            flux_freq: s.freq,
+            rotor_freq: s.rotor_freq(),
+            current: turned.current,
+            voltage: turned.voltage,
+            measured: measured.current,
+            realised: modulated.realised,
+            dc_link: measured.dc_link,
+            ..k.seen
         };
-        let seen = &mut s.seen;
-        (seen.phi, seen.flux_freq) = (turned.angle, s.turning.freq);
-        (seen.current, seen.voltage) = (turned.current, turned.voltage);
-        (seen.measured, seen.realised) = (measured.current, modulated.realised);
-        seen.dc_link = measured.dc_link;
         Ok(Compare::on(modulated.compare))
     }
 }

@@ -76,30 +76,41 @@ impl State {
         }
     }
 
-    /// Whether the current is regulated in the frame of the flux, for whatever purpose.
-    pub(crate) const fn has_current(self) -> bool {
-        matches!(
-            self,
-            Self::Catching
-                | Self::Magnetising
-                | Self::Verifying
-                | Self::Torque
-                | Self::Speed
-                | Self::Position
-                | Self::Learning
-                | Self::Braking
-                | Self::Stopping
-        )
+    /// The stage of a run that the state belongs to.
+    pub const fn stage(self) -> Stage {
+        match self {
+            Self::Off => Stage::Off,
+            Self::Fault(_) => Stage::Fault,
+            Self::Calibrating | Self::Precharge | Self::CheckingWiring => Stage::Starting,
+            Self::Catching | Self::Magnetising | Self::Verifying => Stage::Starting,
+            Self::Torque | Self::Speed | Self::Position | Self::VoltsPerHertz => Stage::Running,
+            Self::Learning | Self::Exciting => Stage::Running,
+            Self::Braking | Self::BrakingByFrequency | Self::Stopping => Stage::Stopping,
+        }
     }
 
-    /// Whether the outputs drive a current, for whatever purpose.
-    pub(crate) const fn is_energised(self) -> bool {
-        self.has_current() || self.has_frequency() || matches!(self, Self::Exciting)
+    /// The latched fault.
+    pub const fn fault(self) -> Option<Fault> {
+        match self {
+            Self::Fault(fault) => Some(fault),
+            _ => None,
+        }
     }
 
-    /// Whether the motor turns by voltage and frequency.
-    pub(crate) const fn has_frequency(self) -> bool {
-        matches!(self, Self::VoltsPerHertz | Self::BrakingByFrequency)
+    /// Whether the outputs are off, and stay off until the next command.
+    pub const fn is_off(self) -> bool {
+        matches!(self.stage(), Stage::Off | Stage::Fault)
+    }
+
+    /// Whether the current is regulated in the frame of the flux, for whatever purpose: with a wiring that was found right.
+    pub const fn has_current(self) -> bool {
+        match self {
+            Self::Catching | Self::Magnetising | Self::Verifying | Self::Learning => true,
+            Self::Torque | Self::Speed | Self::Position | Self::Braking | Self::Stopping => true,
+            Self::Off | Self::Fault(_) | Self::Calibrating | Self::Precharge => false,
+            Self::CheckingWiring | Self::Exciting => false,
+            Self::VoltsPerHertz | Self::BrakingByFrequency => false,
+        }
     }
 
     /// Whether torque, speed or position is regulated as asked for.
@@ -109,13 +120,23 @@ impl State {
 
     /// Whether it is coming to an end with the outputs on.
     pub const fn is_stopping(self) -> bool {
-        matches!(self, Self::Braking | Self::BrakingByFrequency | Self::Stopping)
+        matches!(self.stage(), Stage::Stopping)
     }
+}
 
-    /// Whether there is torque for a purpose: as asked for, or to come to rest.
-    pub(crate) const fn has_torque(self) -> bool {
-        self.regulates() || matches!(self, Self::Braking)
-    }
+/// A stage of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Outputs off.
+    Off,
+    /// On the way from off to running.
+    Starting,
+    /// Doing what it was started for.
+    Running,
+    /// Coming to an end with the outputs on.
+    Stopping,
+    /// Outputs off until the fault is cleared.
+    Fault,
 }
 
 impl From<Fault> for State {

@@ -1,45 +1,62 @@
 //! The ways to stop.
 
-use super::Drive;
+use super::field::{Field, FluxPhase, Goal};
+use super::{Drive, End, Kept, Phase};
+use crate::drive::coefficients::Coefficients;
 use crate::drive::command::Stop;
-use crate::drive::state::State;
 
 impl Drive {
     pub(super) fn stop(&mut self, stop: Stop) {
-        match (self.state, stop) {
-            (State::Off | State::Fault(_) | State::Stopping, _)
-            | (State::Braking | State::BrakingByFrequency, Stop::Ramp) => {}
-            (
-                State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting,
-                _,
-            )
-            | (State::VoltsPerHertz | State::BrakingByFrequency, Stop::Coast) => {
-                self.enter(State::Off);
+        match (&mut self.phase, stop) {
+            (Phase::Off(_) | Phase::Fault(..), _) => {}
+            (Phase::Prepare(_) | Phase::Excite(_), _) | (Phase::Scalar(_), Stop::Coast) => {
+                self.end(End::Stopped);
             }
-            (State::VoltsPerHertz, Stop::Ramp | Stop::Quick) => {
-                self.control.quick_stop = stop == Stop::Quick;
-                self.enter(State::BrakingByFrequency);
+            (Phase::Scalar(scalar), Stop::Ramp | Stop::Quick) => {
+                if scalar.stop.is_none() {
+                    self.kept.elapsed = 0;
+                }
+                scalar.stop = Some(scalar.stop == Some(true) || stop == Stop::Quick);
             }
-            (State::Braking | State::BrakingByFrequency, Stop::Quick) => {
-                self.control.quick_stop = true;
-            }
-            (State::Torque | State::Speed | State::Position, Stop::Ramp | Stop::Quick) => {
-                self.brake_from_here(stop);
-            }
-            (State::Catching | State::Magnetising | State::Verifying | State::Learning, _)
-            | (State::Torque | State::Speed | State::Position | State::Braking, Stop::Coast) => {
-                self.enter(State::Stopping);
-            }
+            (Phase::Field(field), _) => field.stop(&self.c, &mut self.kept, stop),
         }
     }
+}
 
-    /// Lets the speed loop take over at the present speed and torque current.
-    fn brake_from_here(&mut self, stop: Stop) {
-        let speed = self.rotor_freq() / self.c.freq_per_speed;
-        let s = &mut self.control;
-        let (i_q, _) = s.limits.hold(s.references.current.q);
-        self.c.motion.take_over(&mut s.motion, s.seen.rotor_count, speed, i_q);
-        s.quick_stop = stop == Stop::Quick;
-        self.enter(State::Braking);
+impl Field {
+    fn stop(&mut self, c: &Coefficients, k: &mut Kept, stop: Stop) {
+        match (&self.flux, &mut self.goal, stop) {
+            (_, Goal::Release, _) | (_, Goal::Brake { .. }, Stop::Ramp) => return,
+            (_, Goal::Brake { quick }, Stop::Quick) => {
+                *quick = true;
+                return;
+            }
+            (
+                FluxPhase::Ready,
+                Goal::Torque | Goal::Speed { .. } | Goal::Position { .. },
+                Stop::Ramp | Stop::Quick,
+            ) => {
+                // The speed loop takes over at the present speed and torque current.
+                let speed = k.seen.rotor_freq / c.freq_per_speed;
+                let (i_q, _) = k.limits.now.hold(k.references.current.q);
+                c.motion.take_over(&mut self.motion, k.rotor_count, speed, i_q);
+                self.goal = Goal::Brake { quick: stop == Stop::Quick };
+            }
+            (
+                FluxPhase::Search(_)
+                | FluxPhase::Build { .. }
+                | FluxPhase::Hold
+                | FluxPhase::Verify
+                | FluxPhase::Ready
+                | FluxPhase::Learn(_),
+                Goal::Torque
+                | Goal::Speed { .. }
+                | Goal::Position { .. }
+                | Goal::Learn
+                | Goal::Brake { .. },
+                _,
+            ) => self.goal = Goal::Release,
+        }
+        self.enter(k, FluxPhase::Ready);
     }
 }

@@ -6,8 +6,12 @@ mod motor;
 mod protections;
 mod trust;
 
+use super::field::Goal;
+use super::prepare::Job;
 use super::*;
-use crate::math::frames::Abc;
+use crate::filter::dissertation::LPF;
+use crate::math::frames::{Abc, AlphaBeta};
+use crate::settings::AngleSource;
 
 use crate::carrier::DemodulatorKind;
 use crate::io::Hardware;
@@ -104,6 +108,22 @@ fn running() -> (Drive, Load) {
     (drive, load)
 }
 
+/// The part of a drive that regulates current.
+fn field(drive: &mut Drive) -> &mut Field {
+    match &mut drive.phase {
+        Phase::Field(field) => field,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The reference of the speed of a drive that starts, turns/s.
+fn speed(drive: &Drive) -> Option<f32> {
+    match drive.phase {
+        Phase::Prepare(Prepare { job: Job::Field(Goal::Speed { speed, .. }), .. }) => Some(speed),
+        _ => None,
+    }
+}
+
 #[test]
 fn start_goes_through_its_states_and_stop_ramps_to_off() {
     let (mut drive, mut load) = (drive(), Load::new());
@@ -160,7 +180,7 @@ fn a_relock_is_for_a_sensorless_drive_that_runs() {
     drive.command(&Command::Torque(1.0)).unwrap();
     assert_eq!(drive.command(&Command::Relock), Ok(Accepted::AsGiven));
     assert_eq!(drive.state(), State::Magnetising);
-    assert_eq!(drive.control.references.current, Dq::new(0.7, 0.0));
+    assert_eq!(drive.kept.references.current, Dq::new(0.7, 0.0));
     assert!(run_to(&mut drive, &mut load, State::Verifying));
     assert!(run_to(&mut drive, &mut load, State::Torque));
 }
@@ -171,13 +191,13 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
     let cases: [(Break, Fault); 6] = [
         (|d| d.c.current_loop.d.k_c = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.c.sensing.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
-        (|d| d.control.references.current.q = f32::NAN, Fault::NonFiniteCommand),
-        (|d| d.control.current_loop.back_calculate(Dq::new(f32::NAN, 0.0)), Fault::NonFiniteState),
-        (|d| d.control.estimator.rotor_freq = f32::NAN, Fault::NonFiniteState),
+        (|d| d.kept.references.current.q = f32::NAN, Fault::NonFiniteCommand),
+        (|d| field(d).current_loop.back_calculate(Dq::new(f32::NAN, 0.0)), Fault::NonFiniteState),
+        (|d| field(d).estimator.rotor_freq = f32::NAN, Fault::NonFiniteState),
         (
             |d| {
                 let nan = AlphaBeta::new(f32::NAN, 0.0);
-                LPF.step(&mut d.control.low_pass, nan);
+                LPF.step(&mut field(d).low_pass, nan);
             },
             Fault::NonFiniteState,
         ),
@@ -220,7 +240,7 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(&Command::Torque(1.0)), Ok(Accepted::AsGiven));
     assert_eq!(d.command(&Command::Torque(f32::NAN)), Err(Refused::NotFinite));
     assert_eq!(d.command(&Command::Torque(f32::INFINITY)), Err(Refused::NotFinite));
-    assert_eq!(d.control.references.current.q, 1.0, "refused commands change nothing");
+    assert_eq!(d.kept.references.current.q, 1.0, "refused commands change nothing");
     // sqrt(3.5^2 - 0.7^2)
     let Ok(Accepted::Limited(most)) = d.command(&Command::Torque(-99.0)) else { panic!() };
     assert!((most + 3.429).abs() < 1e-3);
@@ -237,11 +257,13 @@ fn commands_are_taken_limited_or_refused() {
     assert_eq!(d.command(&Command::Speed(-120.0)), Ok(Accepted::AsGiven));
     assert_eq!(d.command(&Command::Speed(f32::NAN)), Err(Refused::NotFinite));
     assert_eq!(d.command(&Command::Torque(1.0)), Err(Refused::State(State::Speed)));
-    assert_eq!(d.control.references.speed, -2.0, "refused commands change nothing");
+    assert_eq!(speed(&d), Some(-2.0), "refused commands change nothing");
     assert_eq!(d.command(&Command::Speed(1e6)), Ok(Accepted::Limited(300.0)));
     d.command(&Command::Stop(Stop::Coast)).unwrap();
+    d.command(&Command::Start(Mode::Speed)).unwrap();
+    assert_eq!(speed(&d), Some(0.0), "a start takes the references back");
+    d.command(&Command::Stop(Stop::Coast)).unwrap();
     d.command(&Command::Start(Mode::Position)).unwrap();
-    assert_eq!(d.control.references.speed, 0.0, "a start takes the references back");
     assert_eq!(d.command(&Command::Speed(1.0)), Err(Refused::State(State::Position)));
     assert_eq!(d.command(&Command::Position(-1e9)), Ok(Accepted::Limited(-1000.0)));
     // While it starts there is nothing to press against, and no place to be position 0.
@@ -255,12 +277,12 @@ fn a_test_voltage_is_put_out_bounded_and_taken_back() {
     let (mut d, _) = running();
     let volts = Dq::new(20.0, -10.0);
     assert_eq!(d.command(&Command::TestVoltage(volts)), Ok(Accepted::AsGiven));
-    assert_eq!(d.control.references.test_voltage, volts);
+    assert_eq!(d.kept.references.test_voltage, volts);
     let refused = d.command(&Command::TestVoltage(Dq::new(0.0, 61.0)));
     assert_eq!(refused, Err(Refused::OutOfRange { min: -60.0, max: 60.0 }));
     let refused = d.command(&Command::TestVoltage(Dq::new(f32::NAN, 0.0)));
     assert_eq!(refused, Err(Refused::NotFinite));
-    assert_eq!(d.control.references.test_voltage, volts, "refused commands change nothing");
+    assert_eq!(d.kept.references.test_voltage, volts, "refused commands change nothing");
     d.command(&Command::Stop(Stop::Coast)).unwrap();
     assert!(matches!(d.command(&Command::TestVoltage(volts)), Err(Refused::State(_))));
 }
@@ -276,8 +298,10 @@ fn a_start_puts_the_injection_on_its_axis() {
         s.injection.demodulator = kind;
         let mut d = Drive::new(s.build().unwrap());
         d.command(&Command::Start(Mode::Torque)).unwrap();
-        assert_eq!(d.control.references.injection_axis, axis);
-        assert_eq!(d.control.axes.injection, axis);
+        let mut load = Load::new();
+        assert!(run_to(&mut d, &mut load, State::Magnetising));
+        assert_eq!(d.kept.references.injection_axis, axis);
+        assert_eq!(field(&mut d).axes.injection, axis);
     }
 }
 

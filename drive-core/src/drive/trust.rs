@@ -5,8 +5,8 @@ use Judged::{No, Strictly, Tolerantly};
 use Lock::{Baseline, Off, OwnBaseline, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
-use super::Drive;
-use crate::drive::state::{Mode, State};
+use super::field::{Field, FluxPhase, Frame};
+use crate::drive::coefficients::Coefficients;
 
 /// Sources that turn the frame of a drive without an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,24 +64,21 @@ impl Trust {
     }
 }
 
-impl Drive {
-    /// The row of the present state.
+impl Field {
+    /// The row of the present phase, `elapsed` periods after it began.
     #[rustfmt::skip] // A phase, a row.
-    pub(super) fn trust(&self) -> Trust {
-        let found = (self.control.catching.found, self.c.catching);
-        match (self.state, self.mode) {
-            (State::Magnetising, Mode::Learning) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
-            (State::Magnetising, _) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
-            (State::Catching, _) => match found {
-                // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
-                (None, _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
-                (Some(n), Some(c)) if self.elapsed.wrapping_sub(n) < c.alone => Trust { source: Injection, turns: true, lock: OwnBaseline, current: No, mean: false, resistance: false, drop: false },
-                (Some(_), _) => Trust { source: Both, turns: true, lock: OwnBaseline, current: Tolerantly, mean: false, resistance: false, drop: false },
+    pub(super) fn trust(&self, c: &Coefficients, elapsed: u32) -> Trust {
+        match (&self.flux, self.frame) {
+            // A turning shaft is looked for. It was found, and the injection alone turns the frame. The observer does as well.
+            (FluxPhase::Search(_), _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+            (FluxPhase::Build { from }, _) => match &c.catching {
+                Some(c) if elapsed.wrapping_sub(*from) < c.alone => Trust { source: Injection, turns: true, lock: OwnBaseline, current: No, mean: false, resistance: false, drop: false },
+                _ => Trust { source: Both, turns: true, lock: OwnBaseline, current: Tolerantly, mean: false, resistance: false, drop: false },
             },
-            (State::Learning, _) | (State::Stopping, Mode::Learning) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
-            (State::Verifying | State::Torque | State::Speed | State::Position | State::Braking | State::Stopping, _) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
-            // They regulate no current in the frame of the flux.
-            (State::Off | State::Calibrating | State::Precharge | State::CheckingWiring | State::Exciting | State::VoltsPerHertz | State::BrakingByFrequency | State::Fault(_), _) => Trust { source: Nothing, turns: false, lock: Off, current: No, mean: false, resistance: false, drop: false },
+            (FluxPhase::Hold, Frame::LockedShaft) => Trust { source: Slip, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
+            (FluxPhase::Hold, Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: false, lock: Baseline, current: Strictly, mean: false, resistance: false, drop: true },
+            (FluxPhase::Verify | FluxPhase::Ready | FluxPhase::Learn(_), Frame::LockedShaft) => Trust { source: Slip, turns: true, lock: Off, current: Strictly, mean: true, resistance: false, drop: false },
+            (FluxPhase::Verify | FluxPhase::Ready | FluxPhase::Learn(_), Frame::Encoder | Frame::Tracked) => Trust { source: Both, turns: true, lock: Watch, current: Strictly, mean: true, resistance: true, drop: false },
         }
     }
 }

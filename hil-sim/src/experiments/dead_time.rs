@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode};
 
 use super::{BENCH, Context, DRIVE, Experiment, FREE_SHAFT, SPEED_LOOP, TRACKING};
 use crate::config::LoadMode;
@@ -114,7 +114,7 @@ fn case(context: &Context<'_>, name: &'static str, compensate: bool) -> Result<C
         let phi = rig.plant.rotor_flux_angle();
         turned += wrapped_degrees(phi - last);
         last = phi;
-        if matches!(rig.drive.state(), State::Fault(_)) {
+        if rig.drive.state().fault().is_some() {
             return Err(Error::Refused(format!("the drive is {}", rig.drive.state())));
         }
         rig.step();

@@ -1,7 +1,7 @@
 //! Perturbation analysis: the angle error after steps of the load and of the torque current, measured
 //! and predicted.
 
-use drive_core::{Command, Mode, State};
+use drive_core::{Command, Mode};
 use rayon::prelude::*;
 
 use super::linear_model::{Disturbance, LinearModel};
@@ -144,7 +144,7 @@ fn one(config: &Config, case: &StepCase, seed: u64) -> Result<(Vec<[f64; 2]>, f6
         largest = largest.max(p.angle_error_deg.abs());
         points.push([p.angle_error_deg - angle.mean(), p.speed_rpm - speed.mean()]);
     });
-    let lost = largest > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
+    let lost = largest > LOST_DEG || rig.drive.state().fault().is_some();
     Ok((points, largest, lost))
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::{Command, Fault, Mode, Settings, State};
+use drive_core::{Command, Fault, Mode, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::fault_code;
@@ -128,7 +128,7 @@ pub fn steady_run_of(
 pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<SteadyRun, Error> {
     bring_up(&mut rig, case.rpm)?;
     let (mut error, mut torque) = (Stats::default(), Stats::default());
-    if let State::Fault(fault) = rig.drive.state() {
+    if let Some(fault) = rig.drive.state().fault() {
         return Ok(SteadyRun { case, error, torque: 0.0, lost: true, fault: Some(fault) });
     }
     rig.command(&Command::Torque(case.iq as f32))?;
@@ -137,10 +137,7 @@ pub fn judged(mut rig: Rig, case: OperatingPoint, seconds: f64) -> Result<Steady
         error.push(p.angle_error_deg);
         torque.push(p.torque);
     });
-    let fault = match rig.drive.state() {
-        State::Fault(fault) => Some(fault),
-        _ => None,
-    };
+    let fault = rig.drive.state().fault();
     let lost = error.largest() > LOST_DEG || fault.is_some();
     Ok(SteadyRun { case, error, torque: torque.mean(), lost, fault })
 }

@@ -157,7 +157,7 @@ impl Shadow {
         }
         self.compared += 1;
         // As the firmware's console: a drive that is past the check need not check again.
-        if self.drive.state() == State::Magnetising {
+        if self.drive.state().has_current() {
             self.settings.note(|settings| settings.command.wiring_checked = true);
         }
         if period.took_order {

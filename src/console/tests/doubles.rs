@@ -91,7 +91,7 @@ impl DriveHandle for FakeDrive {
             periods: self.commands.len() as u32,
             state: self.drive.state(),
             sample: self.sample,
-            telemetry: self.drive.telemetry(),
+            telemetry: *self.drive.telemetry(),
             worst_cycles: [u32::MAX; 2],
             last_cycles: 800,
             worst_latency: u32::MAX,

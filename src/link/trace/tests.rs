@@ -28,9 +28,9 @@ fn records_every_nth_period_and_gives_them_back_when_done() {
     for period in 0..5 {
         assert!(reader.recording());
         assert_eq!(reader.get(0), None);
-        recorder.step(false, &CODES, || at(period as f32));
+        recorder.step(false, &CODES, &at(period as f32));
     }
-    recorder.step(false, &CODES, Telemetry::default);
+    recorder.step(false, &CODES, &Telemetry::default());
     assert_eq!(all(&reader), [(0, 0.0), (1, 2.0), (2, 4.0)]);
 }
 
@@ -40,7 +40,7 @@ fn asks_for_no_more_than_there_is_room() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(100, 1, Trigger::Now)));
     for _ in 0..4 {
-        recorder.step(false, &CODES, Telemetry::default);
+        recorder.step(false, &CODES, &Telemetry::default());
     }
     assert!(!reader.recording());
     assert!(reader.get(3).is_some() && reader.get(4).is_none());
@@ -52,17 +52,17 @@ fn a_trace_of_a_fault_ends_with_it() {
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 2, Trigger::Fault)));
     for period in 0..10 {
-        recorder.step(false, &CODES, || at(period as f32));
+        recorder.step(false, &CODES, &at(period as f32));
     }
     assert!(reader.recording());
     // In a period that would not be due.
-    recorder.step(false, &CODES, || at(10.0));
-    recorder.step(true, &CODES, || at(11.0));
+    recorder.step(false, &CODES, &at(10.0));
+    recorder.step(true, &CODES, &at(11.0));
     assert_eq!(all(&reader), [(-3, 6.0), (-2, 8.0), (-1, 10.0), (0, 11.0)]);
     // One that comes before the ring is full.
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, &CODES, || at(1.0));
-    recorder.step(true, &CODES, || at(2.0));
+    recorder.step(false, &CODES, &at(1.0));
+    recorder.step(true, &CODES, &at(2.0));
     assert_eq!(all(&reader), [(-1, 1.0), (0, 2.0)]);
 }
 
@@ -78,7 +78,7 @@ fn a_level_keeps_a_quarter_from_before_it() {
                 break;
             }
             let turns = if above { n } else { 40 - n };
-            recorder.step(false, &CODES, || at(turns as f32));
+            recorder.step(false, &CODES, &at(turns as f32));
         }
         all(reader)
     };
@@ -96,9 +96,9 @@ fn a_trace_that_waits_for_its_trigger_can_be_ended() {
     let trace = Trace::<4>::new();
     let (mut recorder, mut reader) = trace.take().unwrap();
     assert!(reader.begin(&plan(4, 1, Trigger::Fault)));
-    recorder.step(false, &CODES, Telemetry::default);
+    recorder.step(false, &CODES, &Telemetry::default());
     reader.cancel();
-    recorder.step(true, &CODES, Telemetry::default);
+    recorder.step(true, &CODES, &Telemetry::default());
     assert!(!reader.recording() && reader.get(0).is_none());
     assert!(reader.begin(&plan(1, 1, Trigger::Now)));
 }

@@ -12,7 +12,7 @@ use induction_drive::link::mailbox::Mailbox;
 use super::{Control, RUNNING, Running};
 
 /// Version of the layout of [`Table`].
-const VERSION: usize = 1;
+const VERSION: usize = 2;
 
 /// The layout of the table. Sizes and offsets are in bytes.
 #[repr(C)]
@@ -28,12 +28,10 @@ struct Table {
     commands: *const u8,
     /// Offset in that mailbox of a byte that is 1 while a command waits for the interrupt.
     command_waits: usize,
-    /// Source of the flux angle, one byte: 0 is the encoder.
-    angle_source: *const u8,
     /// Estimated rotor-flux angle at the last sample, a `u32` fraction of an electrical turn.
     phi: *const u8,
-    /// Electrical speed of the rotor with the encoder and with the injection, turns per period, `f32`.
-    rotor_freq: [*const u8; 2],
+    /// Electrical speed of the rotor, turns per period, `f32`.
+    rotor_freq: *const u8,
     /// Filtered reference of the quadrature current, A, `f32`.
     reference_q: *const u8,
     /// Filtered quadrature current, A, `f32`.
@@ -71,12 +69,8 @@ static INDUCTION_DRIVE_ADDRESSES: Table = Table {
     ),
     commands: in_control(offset_of!(Control, commands)),
     command_waits: Mailbox::<Command>::FULL,
-    angle_source: in_drive(Drive::LAYOUT.angle_source),
     phi: in_drive(Drive::LAYOUT.phi),
-    rotor_freq: [
-        in_drive(Drive::LAYOUT.rotor_freq_encoder),
-        in_drive(Drive::LAYOUT.rotor_freq_injection),
-    ],
+    rotor_freq: in_drive(Drive::LAYOUT.rotor_freq),
     reference_q: in_drive(Drive::LAYOUT.reference_q),
     current_q: in_drive(Drive::LAYOUT.current_q),
     dc_link: in_drive(Drive::LAYOUT.dc_link),

@@ -1,6 +1,7 @@
 //! The protections of a running drive.
 
 use super::*;
+use crate::dc_link::Limiting;
 
 #[test]
 fn every_protection_switches_off_in_the_same_step() {

@@ -1,27 +1,9 @@
-//! The table of [`Trust`] in every state and mode.
+//! The table of [`Trust`] in every phase of the flux and for every source of the angle.
 
 use super::*;
+use crate::drive::catching::Search;
+use crate::drive::field::{FluxPhase, Frame};
 use crate::drive::trust::{Judged, Lock, Source, Trust};
-
-const STATES: [State; 17] = [
-    State::Off,
-    State::Calibrating,
-    State::Precharge,
-    State::CheckingWiring,
-    State::Exciting,
-    State::Catching,
-    State::Magnetising,
-    State::Verifying,
-    State::Torque,
-    State::Speed,
-    State::Position,
-    State::VoltsPerHertz,
-    State::Learning,
-    State::Braking,
-    State::BrakingByFrequency,
-    State::Stopping,
-    State::Fault(Fault::Break),
-];
 
 /// A row of the table, but for its name.
 fn row(trust: &Trust) -> String {
@@ -53,53 +35,38 @@ fn row(trust: &Trust) -> String {
     format!("{source} | {frame} | {lock} | {current} | {mean} | {resistance} |")
 }
 
-/// Each state and mode has its row in docs/control-law.md, and no other row is there.
+/// Each phase of the flux and each frame has its row in docs/control-law.md, and no other row is there.
 #[test]
-fn what_may_be_believed_is_a_row_for_every_state_and_mode() {
+fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let mut settings = Settings::default();
     (settings.observer.enabled, settings.sequence.catch) = (true, true);
-    let mut drive = Drive::new(settings.build().unwrap());
-    let alone = drive.c.catching.unwrap().alone;
+    let c = settings.build().unwrap();
+    let alone = c.catching.unwrap().alone;
+    let phases = [
+        (FluxPhase::Search(Search::new(None)), 5),
+        (FluxPhase::Build { from: 7 }, 7 + alone - 1),
+        (FluxPhase::Build { from: 7 }, 7 + alone),
+        (FluxPhase::Hold, 5),
+        (FluxPhase::Verify, 5),
+        (FluxPhase::Ready, 5),
+        (FluxPhase::Learn(Default::default()), 5),
+    ];
     let mut table = std::collections::BTreeMap::<&str, String>::new();
-    let mut note = |name: &'static str, trust: &Trust| {
-        let row = row(trust);
-        assert_eq!(*table.entry(name).or_insert_with(|| row.clone()), row, "{name}");
-    };
-    for (state, mode) in STATES.into_iter().flat_map(|state| MODES.map(|mode| (state, mode))) {
-        (drive.state, drive.mode) = (state, mode);
-        let learns = mode == Mode::Learning;
-        let name = match state {
-            State::Catching => {
-                for (found, elapsed, name) in [
-                    (None, 5, "looking for a turning shaft"),
-                    (Some(7), 7 + alone - 1, "the same, found"),
-                    (Some(7), 7 + alone, "the same, 0.2 s later"),
-                ] {
-                    (drive.control.catching.found, drive.elapsed) = (found, elapsed);
-                    note(name, &drive.trust());
-                }
-                continue;
-            }
-            State::Magnetising if learns => "magnetising to learn",
-            State::Magnetising => "magnetising",
-            State::Learning => "learning, and stopping from it",
-            State::Stopping if learns => "learning, and stopping from it",
-            State::Verifying
-            | State::Torque
-            | State::Speed
-            | State::Position
-            | State::Braking
-            | State::Stopping => "verifying, regulating, stopping",
-            State::Off
-            | State::Calibrating
-            | State::Precharge
-            | State::CheckingWiring
-            | State::Exciting
-            | State::VoltsPerHertz
-            | State::BrakingByFrequency
-            | State::Fault(_) => "without a frame of the flux",
-        };
-        note(name, &drive.trust());
+    for (number, (flux, elapsed)) in phases.into_iter().enumerate() {
+        for frame in [Frame::Encoder, Frame::LockedShaft, Frame::Tracked] {
+            let field = Field { flux: flux.clone(), frame, ..Field::default() };
+            let name = match (number, frame) {
+                (0, _) => "looking for a turning shaft",
+                (1, _) => "the same, found",
+                (2, _) => "the same, 0.2 s later",
+                (3, Frame::LockedShaft) => "magnetising to learn",
+                (3, Frame::Encoder | Frame::Tracked) => "magnetising",
+                (_, Frame::LockedShaft) => "learning, and stopping from it",
+                (_, Frame::Encoder | Frame::Tracked) => "verifying, regulating, stopping",
+            };
+            let row = row(&field.trust(&c, elapsed));
+            assert_eq!(*table.entry(name).or_insert_with(|| row.clone()), row, "{name}");
+        }
     }
     let manual = include_str!("../../../../docs/control-law.md");
     let (_, after) = manual.split_once("| phase | angle by | frame |").expect("the table");

@@ -184,7 +184,7 @@ impl Bench {
         for _ in 0..(seconds * RATE_HZ) as u64 {
             self.step();
             let state = self.rig.drive.state();
-            if state.regulates() || matches!(state, State::Off | State::Fault(_)) {
+            if state.regulates() || state.is_off() {
                 break;
             }
         }

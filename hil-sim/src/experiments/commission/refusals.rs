@@ -173,7 +173,7 @@ impl Study for Refusals {
         let commissioning = Commissioning::new(&settings);
         let session = Session::run(rig, commissioning, STEPS, abort, defect.sensors)?;
         let refusal = session.refusal().map(|(_, refusal)| refusal);
-        let off = matches!(session.rig.drive.state(), State::Off | State::Fault(_));
+        let off = session.rig.drive.state().is_off();
         Ok(Record {
             answer: refusal.map_or("accepted".into(), |refusal| refusal.to_string()),
             named: refusal.is_some_and(|refusal| (defect.named)(&refusal)),

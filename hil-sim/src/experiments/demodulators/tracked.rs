@@ -1,7 +1,7 @@
 //! Angle error of a drive without a position sensor, with each demodulation.
 
 use drive_core::carrier::injection::CARRIER_SAMPLES;
-use drive_core::{Command, Mode, Settings, State};
+use drive_core::{Command, Mode, Settings};
 
 use super::super::steady::{OperatingPoint, SteadyRun, steady_run_of};
 use super::super::torque::LOST_DEG;
@@ -40,7 +40,7 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, E
     let start = rig.time();
     let (mut error, mut stats) = (Vec::new(), Stats::default());
     for iq in LEVELS_A.map(|iq| config.amperes(iq)) {
-        if matches!(rig.drive.state(), State::Fault(_)) {
+        if rig.drive.state().fault().is_some() {
             break;
         }
         rig.command(&Command::Torque(iq as f32))?;
@@ -56,7 +56,7 @@ pub fn steps(drive: &Settings, config: &Config, seed: u64) -> Result<StepsRun, E
             error.push((t, mean.mean()));
         }
     }
-    let lost = stats.largest() > LOST_DEG || matches!(rig.drive.state(), State::Fault(_));
+    let lost = stats.largest() > LOST_DEG || rig.drive.state().fault().is_some();
     Ok(StepsRun { error, stats, lost })
 }
 

@@ -23,10 +23,7 @@ const WATCH_S: f64 = 2.0;
 
 /// Why the drive stopped itself, if it did.
 pub fn fault(rig: &Rig) -> Option<Fault> {
-    match rig.drive.state() {
-        State::Fault(fault) => Some(fault),
-        _ => None,
-    }
+    rig.drive.state().fault()
 }
 
 /// A random operating point: speeds within ±`bound` rpm.

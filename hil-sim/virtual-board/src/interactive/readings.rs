@@ -22,11 +22,9 @@ impl Readings {
     pub fn new(board: &Board) -> Self {
         let at = board.addresses();
         let float = |address| f64::from(f32::from_bits(board.word(address).unwrap_or_default()));
-        let [encoder, injection] = at.rotor_freq;
-        let by_encoder = board.byte(at.angle_source) == Some(0);
         Self {
             phi: board.flux_angle(),
-            rotor_freq: float(if by_encoder { encoder } else { injection }),
+            rotor_freq: float(at.rotor_freq),
             reference_q: float(at.reference_q),
             current_q: float(at.current_q),
             dc_link: float(at.dc_link),

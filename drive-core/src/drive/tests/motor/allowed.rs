@@ -164,7 +164,7 @@ fn every_command_is_taken_or_refused_in_every_state() {
                 .iter()
                 .flat_map(|bench| commands.iter().map(move |command| (bench, command)))
             {
-                let (state, mode) = (bench.drive.state(), bench.drive.mode);
+                let (state, mode) = (bench.drive.state(), bench.drive.mode());
                 seen.insert((discriminant(&state), discriminant(&mode)));
                 let mut after = bench.clone();
                 let answer = after.drive.command(command);

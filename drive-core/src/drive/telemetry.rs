@@ -1,7 +1,6 @@
 //! The quantities of a step that the drive shows.
 
-use super::Drive;
-use crate::drive::state::Mode;
+use super::{Drive, Phase};
 use crate::math::angle::Angle;
 use crate::math::frames::{AlphaBeta, Dq};
 
@@ -44,6 +43,13 @@ pub struct Telemetry {
     pub turns: f32,
 }
 
+impl Telemetry {
+    /// Without current, with the whole carrier.
+    pub(super) fn still() -> Self {
+        Self { carrier_share: 1.0, ..Self::default() }
+    }
+}
+
 /// Limits of the present torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Room {
@@ -56,59 +62,26 @@ pub struct Room {
     pub voltage: f32,
 }
 
-/// The telemetry of a step that is not part of another state; see [`Telemetry`].
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Observed {
-    pub phi: Angle,
-    pub flux_freq: f32,
-    pub reference: Dq,
-    pub current: Dq,
-    pub voltage: Dq,
-    pub measured: AlphaBeta,
-    pub realised: AlphaBeta,
-    pub dc_link: f32,
-    pub rotor_count: u32,
-}
-
 impl Drive {
-    /// Electrical speed of the rotor, turns per period.
-    pub(super) fn rotor_freq(&self) -> f32 {
-        let s = &self.control;
-        match self.mode {
-            Mode::VoltsPerHertz => s.turning.rotor_freq(),
-            _ if self.counts() => s.indirect.rotor_freq,
-            _ => s.estimator.rotor_freq,
-        }
-    }
-
     /// Limits of the present torque.
     pub fn room(&self) -> Room {
-        let s = &self.control;
-        let voltage = s.voltage_limit.available;
-        Room { i_q: s.limits.i_q, too_hot_for: s.too_hot_for, voltage }
+        let limits = &self.kept.limits;
+        let (i_q, voltage) = (limits.now.i_q, limits.voltage.available);
+        Room { i_q, too_hot_for: limits.too_hot_for, voltage }
     }
 
-    /// The telemetry of the last step.
-    #[inline(always)] // written where it goes, without a copy
-    pub fn telemetry(&self) -> Telemetry {
-        let (t, s) = (&self.control.seen, &self.control);
-        Telemetry {
-            phi: t.phi,
-            flux_freq: t.flux_freq,
-            rotor_freq: self.rotor_freq(),
-            reference: t.reference,
-            current: t.current,
-            voltage: t.voltage,
-            measured: t.measured,
-            realised: t.realised,
-            delta_i: s.estimator.delta_i,
-            saliency: s.estimator.saliency().q,
-            carrier_squared: s.estimator.saliency().carrier_squared,
-            carrier_share: s.carrier.share,
-            saliency_loss: s.lock.loss,
-            dc_link: t.dc_link,
-            inverter_drop: s.inverter_drop.volts,
-            turns: self.c.motion.turns(&s.motion, t.rotor_count),
+    /// The telemetry of the last step with the outputs on.
+    pub const fn telemetry(&self) -> &Telemetry {
+        &self.kept.seen
+    }
+
+    /// Tracked stator resistance relative to the settings, less one; only while an observer tracks it.
+    pub fn stator_resistance(&self) -> Option<f32> {
+        match &self.phase {
+            Phase::Field(field) if self.c.observer.is_some() && field.has_torque() => {
+                Some(field.observer.resistance)
+            }
+            _ => None,
         }
     }
 }

@@ -1,0 +1,548 @@
+//! Current in a frame of the flux: the control law, top to bottom, and the phases in which the flux is found, built up and
+//! verified.
+
+use super::catching::{Residual, Search};
+use super::in_turn::StepResults;
+use super::{End, Kept, Left};
+use crate::carrier::CarrierSample;
+use crate::carrier::injection::{Carrier, CarrierPeriod};
+use crate::current::inverter_drop::{DropSample, InverterDropState};
+use crate::current::pi::{DqPiState, ReferenceState};
+use crate::drive::axes::Axes;
+use crate::drive::coefficients::Coefficients;
+use crate::drive::state::{Mode, State};
+use crate::fault::Fault;
+use crate::filter::dissertation::{LPF, LpfState};
+use crate::flux::estimator::EstimatorState;
+use crate::flux::hand_over::HandOver;
+use crate::flux::indirect::IndirectState;
+use crate::flux::observer::{Induced, ObserverState};
+use crate::identify::learning::LearningState;
+use crate::io::{Compare, PERIOD_S, Sample};
+use crate::math::angle::{Angle, UnitVector};
+use crate::math::frames::{AlphaBeta, Dq};
+use crate::math::limited;
+use crate::motion::{self, MotionState, RotorCount};
+use crate::protect::lock_monitor::LockMonitorState;
+use crate::protect::noise_watch::NoiseWatchState;
+use crate::protect::plausibility::{CarrierWatch, PredictionState};
+use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction, SaliencyCheckState};
+use crate::settings::AngleSource;
+
+/// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
+const STANDING_FREQ: f32 = PERIOD_S;
+
+/// A drive that regulates the current in a frame of the flux.
+// In this order: the fields of every step lie within the 1020 bytes that a floating-point load of the core
+// reaches from one base address; otherwise every sixth instruction of a step computes an address.
+#[derive(Clone, Debug, Default)]
+#[repr(C)]
+pub(super) struct Field {
+    pub frame: Frame,
+    pub low_pass: LpfState,
+    pub indirect: IndirectState,
+    pub observer: ObserverState,
+    pub hand_over: HandOver,
+    /// What flux and leakage induce, and the observer's share in the angle, by which it is fed forward.
+    pub induced: Induced,
+    pub induced_share: f32,
+    pub carrier: Carrier,
+    pub axes: Axes,
+    pub reference: [ReferenceState; 2],
+    pub current_loop: DqPiState,
+    pub rotor: RotorCount,
+    pub prediction: PredictionState,
+    pub motion: MotionState,
+    pub carrier_watch: CarrierWatch,
+    pub saliency_check: SaliencyCheckState,
+    pub lock: LockMonitorState,
+    pub noise: NoiseWatchState,
+    pub inverter_drop: InverterDropState,
+    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
+    pub lead: Angle,
+    pub lead_axis: UnitVector,
+    pub goal: Goal,
+    /// Large: it holds the state of the alternative demodulations.
+    pub estimator: EstimatorState,
+    /// Large while a turning shaft is looked for.
+    pub flux: FluxPhase,
+}
+
+/// The source of the angle of the frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Frame {
+    /// The counted angle of the rotor and the slip.
+    #[default]
+    Encoder,
+    /// The slip alone: a drive that learns has a locked shaft.
+    LockedShaft,
+    /// Injection and observer.
+    Tracked,
+}
+
+impl Frame {
+    /// Whether the flux angle is the counted rotor angle plus the slip.
+    pub fn is_counted(self) -> bool {
+        match self {
+            Self::Encoder | Self::LockedShaft => true,
+            Self::Tracked => false,
+        }
+    }
+}
+
+/// A phase of the flux.
+// See `Phase`.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, Default)]
+pub(super) enum FluxPhase {
+    /// The frame stands, and nothing is judged: a turning shaft is looked for.
+    Search(Search),
+    /// The flux of a turning rotor builds up from this period on.
+    Build {
+        from: u32,
+    },
+    /// The frame is held along phase a until the flux stands; then the saliency is checked.
+    #[default]
+    Hold,
+    /// Tracking without torque: is it the flux that is tracked?
+    Verify,
+    Ready,
+    /// Ready, and a learning measures.
+    Learn(LearningState),
+}
+
+/// The work of the current, with its reference. That of the torque is the torque current itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Goal {
+    #[default]
+    Torque,
+    Speed {
+        /// Mechanical turns/s.
+        speed: f32,
+        /// Periods for which the speed holds where it is a jog; 0 where it is none.
+        jog: u32,
+    },
+    Position {
+        /// Mechanical turns; `None`: where the drive was started.
+        turns: Option<f32>,
+        /// Instead, to press on at this speed, mechanical turns/s, with at most this torque current, A.
+        press: Option<(f32, f32)>,
+    },
+    Learn,
+    /// To rest.
+    Brake {
+        quick: bool,
+    },
+    /// To no torque, and off.
+    Release,
+}
+
+impl Goal {
+    /// Whether torque, speed or position is regulated as asked for.
+    pub fn regulates(&self) -> bool {
+        match self {
+            Self::Torque | Self::Speed { .. } | Self::Position { .. } => true,
+            Self::Learn | Self::Brake { .. } | Self::Release => false,
+        }
+    }
+
+    /// The mode that has this goal; of a drive that stops none is asked for.
+    pub fn mode(&self) -> Mode {
+        match self {
+            Self::Torque | Self::Brake { .. } | Self::Release => Mode::Torque,
+            Self::Speed { .. } => Mode::Speed,
+            Self::Position { .. } => Mode::Position,
+            Self::Learn => Mode::Learning,
+        }
+    }
+
+    /// Speed 0.
+    pub const SPEED: Self = Self::Speed { speed: 0.0, jog: 0 };
+    /// The position where the drive is started.
+    pub const POSITION: Self = Self::Position { turns: None, press: None };
+
+    /// Whether its references are finite numbers.
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Speed { speed, .. } => speed.is_finite(),
+            Self::Position { turns, press } => {
+                (turns.unwrap_or(0.0) + press.map_or(0.0, |(speed, _)| speed)).is_finite()
+            }
+            Self::Torque | Self::Learn | Self::Brake { .. } | Self::Release => true,
+        }
+    }
+}
+
+impl Field {
+    /// Without a current yet, for this goal.
+    pub fn begin(&mut self, c: &Coefficients, goal: Goal, left: &Left) {
+        self.frame = match (c.source, goal) {
+            (_, Goal::Learn) => Frame::LockedShaft,
+            (AngleSource::Encoder, _) => Frame::Encoder,
+            (AngleSource::Injection, _) => Frame::Tracked,
+        };
+        self.goal = goal;
+        // A start on a turning shaft measures none of them.
+        self.inverter_drop.volts = left.inverter_drop;
+        self.lock.baseline = left.baseline;
+        self.observer.resistance = left.resistance;
+        c.turn(&mut self.axes, 0.0, c.injection_axis, false);
+        c.estimator.start(&mut self.estimator);
+        if let Some(observer) = &c.observer {
+            observer.start(&mut self.observer);
+        }
+    }
+
+    pub fn state(&self) -> State {
+        match (&self.flux, &self.goal) {
+            (_, Goal::Brake { .. }) => State::Braking,
+            (_, Goal::Release) => State::Stopping,
+            (FluxPhase::Search(_) | FluxPhase::Build { .. }, _) => State::Catching,
+            (FluxPhase::Hold, _) => State::Magnetising,
+            (FluxPhase::Verify, _) => State::Verifying,
+            (FluxPhase::Ready | FluxPhase::Learn(_), goal) => State::of_mode(goal.mode()),
+        }
+    }
+
+    /// Whether torque, speed or position is regulated as asked for.
+    pub fn regulates(&self) -> bool {
+        match &self.flux {
+            FluxPhase::Ready => self.goal.regulates(),
+            FluxPhase::Search(_) | FluxPhase::Build { .. } | FluxPhase::Hold => false,
+            FluxPhase::Verify | FluxPhase::Learn(_) => false,
+        }
+    }
+
+    /// Whether there is torque for a purpose: as asked for, or to come to rest.
+    pub fn has_torque(&self) -> bool {
+        self.regulates() || matches!(self.goal, Goal::Brake { .. })
+    }
+
+    /// What this run leaves to the next one.
+    pub fn left(&self) -> Left {
+        let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
+        let residual = match &self.flux {
+            // A search that found no speed knows no more than it was given.
+            FluxPhase::Search(search) => search.residual.unwrap_or_else(turning),
+            FluxPhase::Build { .. }
+            | FluxPhase::Hold
+            | FluxPhase::Verify
+            | FluxPhase::Ready
+            | FluxPhase::Learn(_) => turning(),
+        };
+        Left {
+            resistance: self.observer.resistance,
+            inverter_drop: self.inverter_drop.volts,
+            baseline: self.lock.baseline,
+            residual: Some(residual),
+        }
+    }
+
+    /// One period.
+    ///
+    /// # Errors
+    /// Why the outputs go off: a fault, or it has stopped.
+    pub fn step(
+        &mut self,
+        c: &Coefficients,
+        k: &mut Kept,
+        sample: &Sample,
+    ) -> Result<Compare, End> {
+        let measured = c.sensing.step(&mut k.sensing, sample);
+        c.protect(&k.sensing, sample, &measured)?;
+        if self.frame == Frame::Encoder {
+            k.rotor_count = sample.encoder;
+        }
+        let wanted = self.wanted(c, k)?;
+        let trust = self.trust(c, k.elapsed);
+        let counted = self.frame.is_counted();
+        let s = self;
+        let index = s.carrier.advance();
+        let reference = Dq {
+            d: c.reference_filter[0].step(&mut s.reference[0], wanted.d),
+            q: c.reference_filter[1].step(&mut s.reference[1], wanted.q),
+        };
+        k.seen.reference = reference;
+
+        // Flux angle at the sample.
+        let flux = if counted {
+            // While it learns, the shaft is locked, and the flux may lead the frame.
+            let count = if s.frame == Frame::Encoder { sample.encoder } else { 0 };
+            let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
+            flux.less(s.lead)
+        } else {
+            s.estimator.flux()
+        };
+        (k.seen.phi, k.seen.flux_freq) = (flux.phi, flux.freq);
+        let phi = flux.phi.unit_vector();
+        let axes = &s.axes;
+
+        // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
+        // alone it would let the sidebands of a turning carrier through.)
+        let silent = !c.inject || s.hand_over.silent;
+        let carrier =
+            if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
+        let carrier_axis = phi.turned_by(axes.carrier);
+        let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
+        let filtered = LPF.step(&mut s.low_pass, rest);
+        let seen = if s.hand_over.silent { measured.current } else { filtered };
+
+        // Current loop.
+        let flux_axis = phi.turned_by(axes.seen);
+        let current = seen.to_dq(flux_axis);
+        let voltage = c.current_loop.step(&mut s.current_loop, reference - current)
+            + s.induced.at(reference) * s.induced_share
+            + k.references.test_voltage;
+        (k.seen.current, k.seen.voltage) = (current, voltage);
+
+        // Injection, Eq. 3.6: the carrier along theta = phi + 90°.
+        let applied = phi.turned_by(axes.applied);
+        let total = (voltage + axes.injection * carrier.voltage).to_alpha_beta(applied);
+
+        // Dead-time compensation, by the signs of the currents that will flow.
+        let expected = (current + axes.injection * carrier.mean_current).to_alpha_beta(applied);
+        let signs = c.dead_time.signs(expected.to_abc());
+        let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
+        let modulated = c.modulator.step(total, compensation, measured.dc_link);
+        (k.seen.measured, k.seen.realised) = (measured.current, modulated.realised);
+        k.seen.dc_link = measured.dc_link;
+        if modulated.limited {
+            s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
+        }
+
+        if trust.drop {
+            let sample = DropSample {
+                current,
+                voltage,
+                magnetising: s.indirect.magnetising,
+                signs: signs.to_abc().to_alpha_beta().to_dq(applied),
+                dc_link: measured.dc_link,
+            };
+            if let Some(ratio) = c.inverter_drop.step(&mut s.inverter_drop, k.elapsed, &sample) {
+                s.observer.resistance = ratio - 1.0;
+            }
+        }
+
+        // Angles for the next sample.
+        if c.demodulate {
+            let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
+            c.estimator.observe(&mut s.estimator, &sample, flux.freq);
+        }
+        let flux_current = if counted { current.seen_from(s.lead_axis) } else { reference };
+        let rotor_freq = if counted {
+            c.indirect.slip(&mut s.indirect, flux_current.q);
+            s.indirect.rotor_freq
+        } else {
+            // By the reference: the measured current would feed the angle error back.
+            c.indirect.slip(&mut s.indirect, reference.q);
+            let slip_freq = s.indirect.slip_freq;
+            let turning = c.observe_fundamental(s, index, &trust, flux.freq, seen, phi);
+            if c.observer.is_some() {
+                let carrier =
+                    AlphaBeta::along(applied.turned_by(s.axes.injection), carrier.voltage);
+                s.observer.put_out(modulated.realised - carrier);
+            }
+            let (estimator, i_q) = (&mut s.estimator, reference.q);
+            if trust.turns && c.estimator.track(estimator, i_q, slip_freq, &turning).is_err() {
+                return Err(s.not_finite(c, k).unwrap_or(Fault::LostAngle).into());
+            }
+            s.estimator.rotor_freq
+        };
+        k.seen.rotor_freq = rotor_freq;
+
+        // No output from a state that is not finite. (The voltage contains current and reference of the step
+        // before, the speed contains the demodulated signal.)
+        if !(voltage.d + voltage.q + flux.freq + rotor_freq).is_finite() {
+            return Err(s.not_finite(c, k).unwrap_or(Fault::NonFiniteState).into());
+        }
+
+        // Checks and slow tasks, one a sample.
+        s.prediction.collect(measured.current, modulated.realised);
+        let results = StepResults {
+            sample,
+            measured: &measured,
+            flux_current,
+            reference,
+            voltage,
+            carrier_axis,
+            flux_axis,
+            flux_freq: flux.freq,
+            rotor_freq,
+            trust,
+        };
+        let result = c.in_turn(s, k, index, &results);
+        s.show(c, k);
+        result?;
+        Ok(Compare::on(modulated.compare))
+    }
+
+    /// Shows the state of the demodulation, the checks and the position.
+    fn show(&self, c: &Coefficients, k: &mut Kept) {
+        let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
+        seen.delta_i = self.estimator.delta_i;
+        seen.saliency = saliency.q;
+        seen.carrier_squared = saliency.carrier_squared;
+        seen.carrier_share = self.carrier.share;
+        seen.saliency_loss = self.lock.loss;
+        seen.inverter_drop = self.inverter_drop.volts;
+        seen.turns = c.motion.turns(&self.motion, k.rotor_count);
+    }
+
+    /// The current to regulate, A; moves on to the next phase of the flux, or the next goal, where it is time.
+    ///
+    /// # Errors
+    /// Why the outputs go off.
+    fn wanted(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, End> {
+        match self.flux {
+            FluxPhase::Search(_) => return Ok(self.search(c, k)?),
+            FluxPhase::Build { from } => return Ok(self.build(c, k, from)),
+            FluxPhase::Hold => return Ok(self.magnetise(c, k)?),
+            FluxPhase::Verify => return Ok(self.verify(c, k)?),
+            FluxPhase::Ready | FluxPhase::Learn(_) => {}
+        }
+        let i_q = match self.goal {
+            Goal::Torque => k.references.current.q,
+            Goal::Speed { .. } | Goal::Position { .. } | Goal::Brake { .. } => self.follow(c, k),
+            Goal::Learn => self.learn(c, k)?,
+            Goal::Release => {
+                let (i_q, ramp) = (&mut k.references.current.q, c.sequence.stop_ramp);
+                *i_q = if *i_q > ramp {
+                    *i_q - ramp
+                } else if *i_q < -ramp {
+                    *i_q + ramp
+                } else {
+                    return Err(End::Stopped);
+                };
+                *i_q
+            }
+        };
+        let (i_d, most) = (k.references.current.d, k.limits.voltage.most.d);
+        let d = if i_d < most { i_d } else { most } + k.limits.now.flux_a;
+        Ok(Dq { d, q: k.limits.hold(i_q) })
+    }
+
+    /// The torque current of the speed or the position loop, A.
+    fn follow(&mut self, c: &Coefficients, k: &mut Kept) -> f32 {
+        let mut range = k.limits.now.i_q;
+        let goal = match &mut self.goal {
+            Goal::Speed { speed, jog } => {
+                // A jog that is not repeated ends.
+                if *jog > 0 {
+                    *jog -= 1;
+                    if *jog == 0 {
+                        *speed = 0.0;
+                    }
+                }
+                motion::Goal::Speed(*speed)
+            }
+            Goal::Position { press: Some((speed, most)), .. } => {
+                range = (limited(range.0, *most), limited(range.1, *most));
+                motion::Goal::Speed(*speed)
+            }
+            Goal::Position { turns, press: None } => motion::Goal::Position(turns.unwrap_or(0.0)),
+            Goal::Brake { quick } => motion::Goal::Rest { quick: *quick },
+            Goal::Torque | Goal::Learn | Goal::Release => return k.references.current.q,
+        };
+        let i_q = c.motion.step(&mut self.motion, goal, k.rotor_count, range);
+        k.references.current.q = i_q;
+        if matches!(self.goal, Goal::Brake { .. }) && c.motion.is_at_rest(&self.motion) {
+            (self.goal, k.elapsed) = (Goal::Release, 0);
+        }
+        i_q
+    }
+
+    /// Goes on in this phase of the flux.
+    #[inline(always)] // a small phase is written, not the memory that it shares
+    pub fn enter(&mut self, k: &mut Kept, flux: FluxPhase) {
+        (self.flux, k.elapsed) = (flux, 0);
+    }
+
+    /// Holds the frame along phase a, and lets the flux build up there.
+    #[cold]
+    pub fn hold(&mut self, c: &Coefficients, k: &mut Kept, encoder: u32) {
+        (self.lock, self.inverter_drop) = Default::default();
+        k.rotor_count = match c.source {
+            AngleSource::Encoder => encoder,
+            AngleSource::Injection => self.count_by_flux(),
+        };
+        c.motion.start(&mut self.motion, k.rotor_count);
+        if let Some(home) = k.home {
+            self.motion.origin = home;
+            let here = c.motion.turns(&self.motion, k.rotor_count);
+            if let Goal::Position { turns, .. } = &mut self.goal {
+                turns.get_or_insert(here);
+            }
+        }
+        self.show(c, k);
+        self.enter(k, FluxPhase::Hold);
+    }
+
+    /// The current while the flux is built up, and while the saliency is checked, A.
+    #[cold]
+    fn magnetise(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+        let level = c.inverter_drop.level(k.elapsed);
+        let magnetising = Dq { d: level * k.references.current.d, q: 0.0 };
+        let learns = self.frame == Frame::LockedShaft;
+        let phase = match (k.elapsed.checked_sub(c.sequence.magnetise), c.saliency_check) {
+            (None, _) => return Ok(magnetising),
+            (Some(_), None) => SaliencyCheckAction::Passed,
+            (Some(n), Some(check)) => {
+                check.step(&mut self.saliency_check, n, self.estimator.saliency().q)
+            }
+        };
+        match phase {
+            SaliencyCheckAction::Look => {
+                k.references.injection_axis = SaliencyCheck::LOOK_AXIS;
+                return Ok(Dq::ZERO);
+            }
+            SaliencyCheckAction::Restore => k.references.injection_axis = c.injection_axis,
+            SaliencyCheckAction::Passed => {
+                self.flux = if learns {
+                    FluxPhase::Learn(LearningState::default())
+                } else if c.lock_monitor.is_some() {
+                    FluxPhase::Verify
+                } else {
+                    FluxPhase::Ready
+                };
+                k.elapsed = 0;
+            }
+            // A drive that learns judges the slope.
+            SaliencyCheckAction::Failed if learns => {
+                k.references.injection_axis = c.injection_axis;
+            }
+            SaliencyCheckAction::Failed => return Err(Fault::NoSaliency),
+        }
+        Ok(magnetising)
+    }
+
+    /// The current while the lock is verified, A: the axis is tracked for a while without torque.
+    #[cold]
+    fn verify(&mut self, c: &Coefficients, k: &mut Kept) -> Result<Dq, Fault> {
+        if k.elapsed >= c.sequence.verify {
+            if !k.stands() {
+                return Err(Fault::LostLock);
+            }
+            self.enter(k, FluxPhase::Ready);
+        }
+        Ok(Dq { d: k.references.current.d, q: 0.0 })
+    }
+
+    /// Angle of the rotor, flux less slip, counted as by an encoder.
+    pub fn count_by_flux(&mut self) -> u32 {
+        self.rotor.follow(self.estimator.flux().phi - self.indirect.slip)
+    }
+
+    /// The fault when a result is not finite: settings, references or state, whichever is not.
+    #[cold]
+    fn not_finite(&self, c: &Coefficients, k: &Kept) -> Option<Fault> {
+        let state = (!self.estimator.is_finite()).then_some(Fault::NonFiniteState);
+        k.not_finite(c, self.goal.is_finite()).or(state)
+    }
+}
+
+impl Kept {
+    /// Whether the shaft stands, as far as the angle tells; NaN is no standstill.
+    pub fn stands(&self) -> bool {
+        self.seen.rotor_freq.abs() <= STANDING_FREQ
+    }
+}

@@ -1,0 +1,111 @@
+//! The chain of limits of the torque current, with the reason of the one that acts.
+
+use super::{Drive, End, Kept, Phase};
+use crate::current::voltage_limit::VoltageLimitState;
+use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
+use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
+use crate::io::Sample;
+
+/// Limits of the torque current. What the brake resistor has taken outlives a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Limits {
+    pub dc_link: DcLinkState,
+    pub voltage: VoltageLimitState,
+    /// Present limits, by dc link, voltage and heat together.
+    pub now: DcLinkLimits,
+    /// Why the torque current is smaller than asked for.
+    pub why: Limiting,
+    /// Torque current that heat sink, motor or inverter does not bear, of the largest of all, A, and which of them.
+    pub too_hot_for: f32,
+    pub too_hot: Limiting,
+}
+
+impl Limits {
+    pub fn start(&mut self, c: &Coefficients) {
+        let voltage = c.voltage_limit.start();
+        *self = Self { dc_link: self.dc_link, voltage, ..Self::default() };
+        self.now.i_q = (-voltage.most.q, voltage.most.q);
+    }
+
+    /// The torque current within the limits, A.
+    #[inline(always)]
+    pub fn hold(&mut self, i_q: f32) -> f32 {
+        let (held, why) = self.now.hold(i_q);
+        self.why = why;
+        held
+    }
+
+    /// Takes the dc link and the speed of the rotor, electrical turns per period, of a carrier period, with the limit by
+    /// the voltage, A.
+    pub fn step(
+        &mut self,
+        c: &Coefficients,
+        dc_link: f32,
+        rotor_freq: f32,
+        (by_voltage, why): (f32, Limiting),
+    ) {
+        let by_heat = c.protection.i_q - self.too_hot_for;
+        let most = if by_heat < by_voltage { (by_heat, self.too_hot) } else { (by_voltage, why) };
+        self.now = c.dc_link.step(&mut self.dc_link, dc_link, rotor_freq, most);
+    }
+}
+
+impl Drive {
+    /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
+    /// finds the current that heat sink, motor and inverter bear, and switches the precharge relay. Returns whether the relay is closed:
+    /// always `false` where the settings have none.
+    pub fn after_step(&mut self, sample: &Sample) -> bool {
+        let (c, Kept { limits, thermal, references, relay, .. }) = (&self.c, &mut self.kept);
+        let share = c.sensing.heat_sink.share(sample.heat_sink);
+        let (heat_sink, loads) = ((share * share, Limiting::HeatSink), thermal.share());
+        let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
+        (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
+            let (largest, i_d) = (c.protection.i_q, references.current.d);
+            let square = share * largest * largest - i_d * i_d;
+            (largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }, why)
+        } else {
+            (0.0, Limiting::No)
+        };
+        let Some(switch) = &c.relay else { return false };
+        switch.step(relay, sample.dc_link);
+        relay.closed
+    }
+
+    /// Whether the dc link is charged: a relay that there is has closed.
+    pub(super) fn is_charged(&self) -> bool {
+        self.c.relay.is_none() || self.kept.relay.closed
+    }
+
+    /// Adds the current of the last periods to the thermal loads, in every state.
+    pub(super) fn watch_load(&mut self) -> Result<(), End> {
+        if !self.kept.elapsed.is_multiple_of(THERMAL_EVERY) {
+            return Ok(());
+        }
+        let on = self.is_energised();
+        let k = &mut self.kept;
+        let square = if on { k.seen.current.length_squared() } else { 0.0 };
+        let borne = self.c.thermal.step(&mut k.thermal, square);
+        // Off it cools, and is not judged.
+        if on {
+            Ok(borne?)
+        } else {
+            self.c.dc_link.rest(&mut k.limits.dc_link, THERMAL_EVERY);
+            Ok(())
+        }
+    }
+
+    /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
+    pub fn brake_duty(&self) -> f32 {
+        if self.is_energised() { self.kept.limits.now.chopper } else { 0.0 }
+    }
+
+    /// Why the torque is smaller than asked for.
+    pub fn limiting(&self) -> Limiting {
+        match &self.phase {
+            Phase::Field(field) if field.has_torque() => self.kept.limits.why,
+            Phase::Scalar(_) => self.kept.limits.why,
+            Phase::Field(_) | Phase::Off(_) | Phase::Fault(..) => Limiting::No,
+            Phase::Prepare(_) | Phase::Excite(_) => Limiting::No,
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! From off to the first current: offsets, bootstraps, wiring.
+
+use super::catching::Search;
+use super::excite::Excite;
+use super::field::{Field, FluxPhase, Goal};
+use super::scalar::Scalar;
+use super::{Drive, Kept, Left, Phase, References, Telemetry};
+use crate::current::sensing::Measured;
+use crate::drive::coefficients::Coefficients;
+use crate::drive::excitation::Excitation;
+use crate::drive::state::{Mode, State};
+use crate::fault::Fault;
+use crate::io::{Compare, Sample};
+use crate::math::angle::UnitVector;
+use crate::math::frames::Dq;
+use crate::protect::wiring_check::{WiringAction, WiringCheck, WiringCheckState};
+
+/// Periods from the order to switch the low sides on until a sample sees them on, with margin.
+const LOW_SIDES_ON_FROM: u32 = 4;
+
+/// A drive that prepares: the outputs are off, or on without control.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prepare {
+    pub step: Preparation,
+    pub job: Job,
+    pub left: Left,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Preparation {
+    /// Outputs off, offsets being measured.
+    Offsets,
+    /// Low sides on, to charge the bootstrap capacitors.
+    LowSides,
+    /// Pulses check the wiring.
+    Wiring(WiringCheckState),
+}
+
+/// The work that a drive was started for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Job {
+    Field(Goal),
+    Scalar {
+        /// Reference of the speed, mechanical turns/s.
+        speed: f32,
+    },
+    Excite(Excitation),
+}
+
+impl Job {
+    pub fn of_mode(mode: Mode) -> Self {
+        match mode {
+            Mode::Torque => Self::Field(Goal::Torque),
+            Mode::Speed => Self::Field(Goal::SPEED),
+            Mode::Position => Self::Field(Goal::POSITION),
+            Mode::Learning => Self::Field(Goal::Learn),
+            Mode::VoltsPerHertz => Self::Scalar { speed: 0.0 },
+            Mode::Commissioning => Self::Excite(Excitation::Rest),
+        }
+    }
+
+    pub fn mode(&self) -> Mode {
+        match self {
+            Self::Field(goal) => goal.mode(),
+            Self::Scalar { .. } => Mode::VoltsPerHertz,
+            Self::Excite(_) => Mode::Commissioning,
+        }
+    }
+
+    /// Whether its start looks for a turning shaft. A drive that learns has a locked one.
+    pub fn catches(&self, c: &Coefficients) -> bool {
+        c.catching.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
+    }
+}
+
+impl Prepare {
+    pub fn state(&self) -> State {
+        match self.step {
+            Preparation::Offsets => State::Calibrating,
+            Preparation::LowSides => State::Precharge,
+            Preparation::Wiring(_) => State::CheckingWiring,
+        }
+    }
+}
+
+/// A period of a pulse train, short voltages without control; `None` after its end.
+///
+/// # Errors
+/// [`Fault`] of a wiring that drives too much current.
+pub(super) fn pulse(
+    c: &Coefficients,
+    pulses: &WiringCheck,
+    state: &mut WiringCheckState,
+    measured: &Measured,
+) -> Result<Option<Compare>, Fault> {
+    Ok(match pulses.step(state, measured.phases)? {
+        WiringAction::Apply { voltage, current } => {
+            let signs = c.dead_time.signs(current.to_abc());
+            let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
+            Some(Compare::on(c.modulator.step(voltage, compensation, measured.dc_link).compare))
+        }
+        WiringAction::Ended => None,
+    })
+}
+
+impl Drive {
+    /// A step of the preparation.
+    #[cold]
+    pub(super) fn prepare(
+        &mut self,
+        sample: &Sample,
+        measured: &Measured,
+    ) -> Result<Compare, Fault> {
+        let (c, k) = (&self.c, &mut self.kept);
+        let Phase::Prepare(prepare) = &mut self.phase else { return Ok(Compare::OFF) };
+        match &mut prepare.step {
+            Preparation::Offsets => {
+                let residual = prepare.left.residual;
+                let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
+                if !waits && c.sensing.calibrate(&mut k.sensing, sample)?.is_some() {
+                    // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
+                    if residual.is_some() && !k.wiring_unchecked {
+                        self.energise(sample.encoder);
+                    } else {
+                        (prepare.step, k.elapsed) = (Preparation::LowSides, 0);
+                    }
+                }
+                return Ok(Compare::OFF);
+            }
+            Preparation::LowSides => {
+                // The first samples still see the bridge off.
+                if k.elapsed >= LOW_SIDES_ON_FROM {
+                    c.sensing.calibrate_again(&mut k.sensing, sample)?;
+                }
+                if k.elapsed >= c.sequence.precharge {
+                    // The boost of V/f and the pulses of the commissioning check the wiring themselves.
+                    if matches!(prepare.job, Job::Field(_)) && k.wiring_unchecked {
+                        prepare.step = Preparation::Wiring(WiringCheckState::default());
+                        k.elapsed = 0;
+                    } else {
+                        self.energise(sample.encoder);
+                    }
+                }
+            }
+            Preparation::Wiring(pulses) => match pulse(c, &c.wiring, pulses, measured)? {
+                Some(compare) => return Ok(compare),
+                None => {
+                    c.wiring.judge(&pulses.answers())?;
+                    k.wiring_unchecked = false;
+                    self.energise(sample.encoder);
+                }
+            },
+        }
+        Ok(Compare::LOW_SIDES_ON)
+    }
+
+    /// Goes on to the work that the drive was started for.
+    fn energise(&mut self, encoder: u32) {
+        let Phase::Prepare(Prepare { job, left, .. }) = self.phase else { return };
+        match job {
+            Job::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
+            Job::Excite(wanted) => self.enter(Phase::Excite(Excite::new(wanted, left))),
+            Job::Field(goal) => {
+                // Built where it stays: it is large.
+                self.enter(Phase::Field(Field::default()));
+                let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
+                    return;
+                };
+                field.begin(c, goal, &left);
+                if job.catches(c) {
+                    field.hand_over.silence();
+                    field.flux = FluxPhase::Search(Search::new(left.residual));
+                } else {
+                    field.hold(c, k, encoder);
+                }
+            }
+        }
+    }
+
+    /// Begins to prepare for this work.
+    pub(super) fn prepare_for(&mut self, job: Job) {
+        let mut left = self.left();
+        let (c, k) = (&self.c, &mut self.kept);
+        left.residual = left.residual.and_then(|residual| {
+            let residual = residual.after(k.elapsed);
+            (job.catches(c) && residual.is_recent(c)).then_some(residual)
+        });
+        let boost = c.volts_per_hertz.map(|turning| turning.boost_a);
+        let i_d = match job {
+            Job::Scalar { .. } => boost.unwrap_or(c.sequence.i_d),
+            Job::Field(_) | Job::Excite(_) => c.sequence.i_d,
+        };
+        k.start(c, i_d, left.inverter_drop);
+        if matches!(job, Job::Field(Goal::Learn)) {
+            k.learned = None;
+        }
+        self.enter(Phase::Prepare(Prepare { step: Preparation::Offsets, job, left }));
+    }
+}
+
+impl Kept {
+    /// Makes everything fresh that does not outlive a run.
+    fn start(&mut self, c: &Coefficients, i_d: f32, inverter_drop: f32) {
+        self.starts = self.starts.wrapping_add(1);
+        c.sensing.start(&mut self.sensing);
+        self.seen = Telemetry { inverter_drop, ..Telemetry::still() };
+        self.rotor_count = 0;
+        self.limits.start(c);
+        self.no_torque(i_d, c.injection_axis);
+    }
+
+    /// References of nothing but this direct current, A.
+    pub fn no_torque(&mut self, i_d: f32, injection_axis: UnitVector) {
+        let current = Dq::new(i_d, 0.0);
+        self.references = References { current, test_voltage: Dq::ZERO, injection_axis };
+    }
+}
