@@ -252,6 +252,9 @@ impl Drive {
     /// Switches off.
     #[cold]
     fn end(&mut self, end: End) {
+        if let Phase::Field(field) = &self.phase {
+            field.show(&self.c, &mut self.kept);
+        }
         let fault = match (end, &self.phase) {
             (End::Stopped, _) => None,
             (End::Measured, _) => self.evaluate_learning(),

@@ -94,6 +94,7 @@ impl Control {
             began: 0,
             reported: None,
             report_due: false,
+            report_late: 0,
         };
         // SAFETY: the only writer, once (STARTED), and the only reader is the interrupt, which is
         // still masked.
@@ -151,6 +152,8 @@ struct Running {
     /// State in the last report.
     reported: Option<State>,
     report_due: bool,
+    /// Periods for which a report has waited for the trace.
+    report_late: u8,
 }
 
 #[interrupt]
@@ -277,10 +280,13 @@ impl Running {
 
         self.unreported |= hardware;
         self.periods = self.periods.wrapping_add(1);
-        // A new state is reported immediately, but not in the period of a command, which takes long enough.
+        // A new state is reported at once, but not in the period of a command or, for two periods at most, of a record of
+        // the trace: these take long enough.
         self.report_due |=
             self.reported != Some(state) || self.periods.is_multiple_of(board::PERIODS_PER_STATUS);
-        let reports = self.report_due && !commanded;
+        let reports = self.report_due && !commanded && (!traced || self.report_late > 1);
+        self.report_late =
+            if self.report_due && !reports { self.report_late.saturating_add(1) } else { 0 };
         let busy = reports || traced || commanded;
         stream.step(self.periods, busy, &codes, drive.telemetry());
         PERIODS.store(self.periods, Ordering::Relaxed);

@@ -43,7 +43,7 @@ impl Drive {
                 finite(i_q)?;
                 let current = &mut self.kept.references.current;
                 let largest =
-                    libm::sqrtf(self.c.protection.current_squared - current.d * current.d);
+                    fpu_sqrt::sqrtf(self.c.protection.current_squared - current.d * current.d);
                 current.q = limited(limited(i_q, largest), self.c.protection.i_q);
                 return Ok(accepted(i_q, current.q));
             }
@@ -94,7 +94,8 @@ impl Drive {
                 }
                 let current = &mut self.kept.references.current;
                 let min = 0.2 * self.c.sequence.i_d;
-                let max = libm::sqrtf(self.c.protection.current_squared - current.q * current.q);
+                let max =
+                    fpu_sqrt::sqrtf(self.c.protection.current_squared - current.q * current.q);
                 if i_d < min {
                     return Err(Refused::OutOfRange { min, max });
                 }

@@ -370,14 +370,12 @@ impl Field {
             rotor_freq,
             trust,
         };
-        let result = c.in_turn(s, k, index, &results);
-        s.show(c, k);
-        result?;
+        c.in_turn(s, k, index, &results)?;
         Ok(Compare::on(modulated.compare))
     }
 
     /// Shows the state of the demodulation, the checks and the position.
-    fn show(&self, c: &Coefficients, k: &mut Kept) {
+    pub fn show(&self, c: &Coefficients, k: &mut Kept) {
         let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
         seen.delta_i = self.estimator.delta_i;
         seen.saliency = saliency.q;
@@ -473,7 +471,6 @@ impl Field {
                 turns.get_or_insert(here);
             }
         }
-        self.show(c, k);
         self.enter(k, FluxPhase::Hold);
     }
 

@@ -52,17 +52,21 @@ impl Limits {
 
 impl Drive {
     /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
-    /// finds the current that heat sink, motor and inverter bear, and switches the precharge relay. Returns whether the relay is closed:
+    /// finds the current that heat sink, motor and inverter bear, completes the telemetry, and switches the precharge relay. Returns whether the relay is closed:
     /// always `false` where the settings have none.
     pub fn after_step(&mut self, sample: &Sample) -> bool {
-        let (c, Kept { limits, thermal, references, relay, .. }) = (&self.c, &mut self.kept);
+        let (c, k) = (&self.c, &mut self.kept);
+        if let Phase::Field(field) = &self.phase {
+            field.show(c, k);
+        }
+        let Kept { limits, thermal, references, relay, .. } = k;
         let share = c.sensing.heat_sink.share(sample.heat_sink);
         let (heat_sink, loads) = ((share * share, Limiting::HeatSink), thermal.share());
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
             let (largest, i_d) = (c.protection.i_q, references.current.d);
             let square = share * largest * largest - i_d * i_d;
-            (largest - if square > 0.0 { libm::sqrtf(square) } else { 0.0 }, why)
+            (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
         } else {
             (0.0, Limiting::No)
         };

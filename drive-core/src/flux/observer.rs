@@ -243,7 +243,7 @@ impl Observer {
     pub fn update(&self, state: &mut ObserverState, rotor_freq: f32) {
         let (a, w) = (self.rate, rotor_freq * TAU);
         let gain = 2.0 * (AT_REST * a + WITH_SPEED * w.abs()) / (a * a + w * w);
-        let length = libm::sqrtf(state.current.length_squared());
+        let length = fpu_sqrt::sqrtf(state.current.length_squared());
         // A current that passes zero is large before the next update.
         let least = self.nominal / self.coupled;
         state.slow = Slow {
@@ -337,7 +337,7 @@ mod tests {
             state.put_out(AlphaBeta::ZERO);
             let current = AlphaBeta { alpha: after, beta: 0.0 };
             observer.step(&mut state, current, UnitVector::default(), false, 1.0);
-            let seen = libm::sqrtf(state.change.length_squared()) / (sigma * change);
+            let seen = fpu_sqrt::sqrtf(state.change.length_squared()) / (sigma * change);
             assert!(seen < 0.2, "{after} A: {seen}");
         }
     }
