@@ -238,7 +238,7 @@ impl<S> Entry<S> {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! number {
-    ($name:literal, $($path:ident).+, $unit:literal, $help:literal) => {
+    ($name:expr, $($path:ident).+, $unit:literal, $help:expr) => {
         Entry::new($name, $unit, Access::Number {
             get: |s: &Settings| s.$($path).+,
             set: |s, value| s.$($path).+ = value,
@@ -249,7 +249,7 @@ macro_rules! number {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! auto {
-    ($name:literal, $($path:ident).+, $effective:expr, $unit:literal, $help:literal) => {
+    ($name:expr, $($path:ident).+, $effective:expr, $unit:literal, $help:expr) => {
         Entry::new($name, $unit, Access::Auto {
             get: |s: &Settings| s.$($path).+,
             set: |s, value| s.$($path).+ = value,
@@ -261,7 +261,7 @@ macro_rules! auto {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! whole {
-    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
+    ($name:expr, $($path:ident).+: $type:ty, $help:expr) => {
         Entry::new($name, "", Access::Whole {
             get: |s: &Settings| s.$($path).+ as u32,
             // At most the largest of the range: see `parse`.
@@ -273,7 +273,7 @@ macro_rules! whole {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! word {
-    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
+    ($name:expr, $($path:ident).+: $type:ty, $help:expr) => {
         Entry::new($name, "", Access::Word {
             words: <$type as Words>::WORDS,
             get: |s: &Settings| s.$($path).+.place(),
