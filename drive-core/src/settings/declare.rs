@@ -16,10 +16,13 @@
 /// field: Type = default, kind("unit", rule: |settings| value).range(..).flags();
 ///
 /// /// Documentation of a field that is no setting itself.
-/// field: Type = default => [rows of the table, as the macros of `entry` make them];
+/// field: Type = default => [
+///     /// The help text of a setting inside of it, or of another that stands here in the list.
+///     "name" [path from `Settings`] field: Type, kind("unit", |settings| value in effect).range(..).flags();
+/// ];
 /// ```
 ///
-/// The kinds are the macros of [`entry`](super::entry): `number` and `auto` have a unit, `auto` has a rule. A rule becomes
+/// The kinds are those of `entry!`. A pure number, a word and a whole number have no unit; only `auto` has a rule, which becomes
 /// `Settings::rule`: the value that was set or, if none was, that of the rule.
 macro_rules! settings {
     ($(
@@ -30,7 +33,11 @@ macro_rules! settings {
                 $(#[doc = $more:literal])*
                 $field:ident: $type:ty = $default:expr
                 $(, $kind:ident($($unit:literal $(, $rule:ident: $value:expr)?)?) $(.$method:ident($($argument:expr),*))*)?
-                $(=> [$($row:expr),+ $(,)?])?;
+                $(=> [$(
+                    #[doc = $row_help:literal]
+                    $row_name:literal $row_path:tt $row_field:ident: $row_type:ty, $row_kind:ident($($row_argument:expr),*)
+                    $(.$row_method:ident($($row_value:expr),*))*;
+                )+])?;
             )+
         }
     )+) => {
@@ -60,10 +67,12 @@ macro_rules! settings {
 
         /// The settings of the drive, in the order in which they are shown.
         pub static SETTINGS: &[Entry<Settings>] = &[$($(
-            $(row!(
-                $kind($($unit $(, $rule)?)?), concat!($prefix, stringify!($field)), $help.trim_ascii(), $path $field: $type
+            $(entry!(
+                $kind($($unit $(, Settings::$rule)?)?), concat!($prefix, stringify!($field)), $path $field: $type, $help.trim_ascii()
             )$(.$method($($argument),*))*,)?
-            $($($row,)+)?
+            $($(entry!(
+                $row_kind($($row_argument),*), $row_name, $row_path $row_field: $row_type, $row_help.trim_ascii()
+            )$(.$row_method($($row_value),*))*,)+)?
         )+)+];
 
         impl Settings {
@@ -72,22 +81,6 @@ macro_rules! settings {
                 $rule, $path $field, $value
             );)?)?)?)+)+
         }
-    };
-}
-
-/// The row of the table for a field.
-macro_rules! row {
-    (number($unit:literal), $name:expr, $help:expr, [$($path:ident).*] $field:ident: $type:ty) => {
-        number!($name, $($path.)*$field, $unit, $help)
-    };
-    (auto($unit:literal, $rule:ident), $name:expr, $help:expr, [$($path:ident).*] $field:ident: $type:ty) => {
-        auto!($name, $($path.)*$field, Settings::$rule, $unit, $help)
-    };
-    (whole(), $name:expr, $help:expr, [$($path:ident).*] $field:ident: $type:ty) => {
-        whole!($name, $($path.)*$field: $type, $help)
-    };
-    (word(), $name:expr, $help:expr, [$($path:ident).*] $field:ident: $type:ty) => {
-        word!($name, $($path.)*$field: $type, $help)
     };
 }
 
@@ -101,4 +94,4 @@ macro_rules! rule {
     };
 }
 
-pub(super) use {row, rule, settings};
+pub(super) use {rule, settings};

@@ -213,10 +213,7 @@ impl<S> Entry<S> {
 
     /// The words that may be set; none for a number.
     pub fn words(&self) -> &'static [&'static str] {
-        match self.access {
-            Access::Word { words, .. } => words,
-            _ => &[],
-        }
+        if let Access::Word { words, .. } = self.access { words } else { &[] }
     }
 
     /// Whether the setting follows a rule unless it is set.
@@ -226,60 +223,45 @@ impl<S> Entry<S> {
 
     /// Whether two sets of settings have the same value in effect. A value that is not a number is never the same.
     pub fn same(&self, one: &S, other: &S) -> bool {
-        match self.access {
-            Access::Word { get, .. } => get(one) == get(other),
-            _ => self.number(one) == self.number(other),
+        match self.number(one) {
+            Some(number) => Some(number) == self.number(other),
+            None => self.get(one) == self.get(other),
         }
     }
 }
 
-// The rows of a table. `Settings` is the type of this name where the table is.
-
+/// A row of a table: kind with unit, name, path to the structure and field in it with its type, help. `Settings` is the type
+/// of this name where the table is.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! number {
-    ($name:expr, $($path:ident).+, $unit:literal, $help:expr) => {
-        Entry::new($name, $unit, Access::Number {
-            get: |s: &Settings| s.$($path).+,
-            set: |s, value| s.$($path).+ = value,
+macro_rules! entry {
+    (number($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($name, concat!($($unit)?), Access::Number {
+            get: |s: &Settings| s.$($path.)*$field,
+            set: |s, value| s.$($path.)*$field = value,
         }, $help)
     };
-}
-
-#[doc(hidden)]
-#[macro_export]
-macro_rules! auto {
-    ($name:expr, $($path:ident).+, $effective:expr, $unit:literal, $help:expr) => {
+    (auto($unit:expr, $effective:expr), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
         Entry::new($name, $unit, Access::Auto {
-            get: |s: &Settings| s.$($path).+,
-            set: |s, value| s.$($path).+ = value,
+            get: |s: &Settings| s.$($path.)*$field,
+            set: |s, value| s.$($path.)*$field = value,
             effective: $effective,
         }, $help)
     };
-}
-
-#[doc(hidden)]
-#[macro_export]
-macro_rules! whole {
-    ($name:expr, $($path:ident).+: $type:ty, $help:expr) => {
+    (whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
         Entry::new($name, "", Access::Whole {
-            get: |s: &Settings| s.$($path).+ as u32,
+            get: |s: &Settings| s.$($path.)*$field as u32,
             // At most the largest of the range: see `parse`.
-            set: |s, value| s.$($path).+ = value as $type,
+            set: |s, value| s.$($path.)*$field = value as $type,
         }, $help)
     };
-}
-
-#[doc(hidden)]
-#[macro_export]
-macro_rules! word {
-    ($name:expr, $($path:ident).+: $type:ty, $help:expr) => {
-        Entry::new($name, "", Access::Word {
+    (word($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($name, concat!($($unit)?), Access::Word {
             words: <$type as Words>::WORDS,
-            get: |s: &Settings| s.$($path).+.place(),
-            set: |s, place| s.$($path).+ = <$type as Words>::at(place),
+            get: |s: &Settings| s.$($path.)*$field.place(),
+            set: |s, place| s.$($path.)*$field = <$type as Words>::at(place),
         }, $help)
     };
 }
 
-pub(super) use crate::{auto, number, whole, word};
+pub(super) use crate::entry;

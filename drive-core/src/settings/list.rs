@@ -7,8 +7,8 @@
 //! A rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it depends on;
 //! see [`rules`](super::rules).
 
-use super::declare::{row, rule, settings};
-use super::entry::{Access, Change, Entry, auto, number, whole, word};
+use super::declare::{rule, settings};
+use super::entry::{Access, Change, Entry, entry};
 use super::rules::dc_link::{LOW_OF_TRIP, MARGIN};
 use super::rules::{RATED_A, RATED_RPM, WITHIN, either_sign, or_rule};
 use super::table::{CarrierTable, ReferenceTable};
@@ -68,12 +68,8 @@ settings! {
         /// The rule is three times the spread of noise and prediction.
         full_compensation_a: Option<f32> = None, auto("A", full_compensation_a: |s| s.share_of_range(0.03))
             .from_to(1e-4, 100.0).learned();
-        /// Voltage per phase that is lost beyond the dead time, V, as the commissioning found it; unset: measured at every start.
-        drop_v: Option<f32> = None => [
-            auto!("inverter.drop_v", inverter.drop_v, |s| s.inverter.drop_v.unwrap_or(0.0), "V",
-                "voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start")
-                .from_to(-50.0, 50.0).learned(),
-        ];
+        /// voltage per phase that is lost beyond the dead time, as the commissioning found it; auto: measured at every start
+        drop_v: Option<f32> = None, auto("V", drop_v: |_| 0.0).from_to(-50.0, 50.0).learned();
     }
 
     /// Scales of the converters and of the encoder. Defaults: Eq. 3.5; 0.11 V per code (451 V at full scale); the 5305 Hz
@@ -81,27 +77,32 @@ settings! {
     Scales "scales." [scales] {
         /// Current a, A.
         current_a: Line = Line::CHANNEL_A => [
-            number!("scales.current_a.gain", scales.current_a.gain, "A",
-                "current a per code; negative if a current into the motor lowers the code")
-                .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 1.0)).learned().hardware(),
-            number!("scales.current_a.offset", scales.current_a.offset, "A", "current a at code 0")
-                .beside(|s| s.offset_range(s.scales.current_a)).learned().hardware(),
+            /// current a per code; negative if a current into the motor lowers the code
+            "scales.current_a.gain" [scales.current_a] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_a.gain, 1e-6, 1.0)).learned().hardware();
+            /// current a at code 0
+            "scales.current_a.offset" [scales.current_a] offset: f32, number("A")
+                .beside(|s| s.offset_range(s.scales.current_a)).learned().hardware();
         ];
         /// Current b, A.
         current_b: Line = Line::CHANNEL_B => [
-            number!("scales.current_b.gain", scales.current_b.gain, "A", "current b per code")
-                .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 1.0)).learned().hardware(),
-            number!("scales.current_b.offset", scales.current_b.offset, "A", "current b at code 0")
-                .beside(|s| s.offset_range(s.scales.current_b)).learned().hardware(),
+            /// current b per code
+            "scales.current_b.gain" [scales.current_b] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_b.gain, 1e-6, 1.0)).learned().hardware();
+            /// current b at code 0
+            "scales.current_b.offset" [scales.current_b] offset: f32, number("A")
+                .beside(|s| s.offset_range(s.scales.current_b)).learned().hardware();
         ];
         /// Current c, A; for three shunts.
         current_c: Line = Line::CHANNEL_B => [
-            number!("scales.current_c.gain", scales.current_c.gain, "A", "current c per code; with three shunts")
-                .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 1.0)).learned().hardware(),
-            number!("scales.current_c.offset", scales.current_c.offset, "A", "current c at code 0").beside(|s| match s.scales.sensors {
+            /// current c per code; with three shunts
+            "scales.current_c.gain" [scales.current_c] gain: f32, number("A")
+                .beside(|s| either_sign(s.scales.current_c.gain, 1e-6, 1.0)).learned().hardware();
+            /// current c at code 0
+            "scales.current_c.offset" [scales.current_c] offset: f32, number("A").beside(|s| match s.scales.sensors {
                 CurrentSensors::InLine => (-1000.0, 1000.0),
                 CurrentSensors::LowSide => s.offset_range(s.scales.current_c),
-            }).learned().hardware(),
+            }).learned().hardware();
         ];
         /// sensors of the currents: two in the lines a and b, or three shunts below the low sides
         sensors: CurrentSensors = CurrentSensors::InLine, word().changed(Change::Board).learned();
@@ -111,14 +112,17 @@ settings! {
         shunt_settle_s: f32 = 2e-6, number("s").from_to(0.0, 20e-6).changed(Change::Board).learned();
         /// Dc-link voltage, V.
         dc_link: Line = Line { gain: 0.11, offset: 0.0 } => [
-            number!("scales.dc_link.gain", scales.dc_link.gain, "V", "dc link per code").from_to(1e-4, 10.0).learned().hardware(),
-            number!("scales.dc_link.offset", scales.dc_link.offset, "V", "dc link at code 0").from_to(-100.0, 100.0).learned().hardware(),
+            /// dc link per code
+            "scales.dc_link.gain" [scales.dc_link] gain: f32, number("V").from_to(1e-4, 10.0).learned().hardware();
+            /// dc link at code 0
+            "scales.dc_link.offset" [scales.dc_link] offset: f32, number("V").from_to(-100.0, 100.0).learned().hardware();
         ];
         /// Code of the highest dc link that the power stage stands in operation. A code, so that no scale lifts it.
         dc_link_highest: u16 = 4095 => [
-            whole!("scales.dc_link.highest", scales.dc_link_highest: u16,
-                "code of the highest dc link that the power stage stands in operation").from_to(100.0, 4095.0).changed(Change::Board),
-            number!("inverter.dc_link_v", inverter.dc_link_v, "V", "nominal voltage of the dc link").beside(|s| (10.0, s.dc_link_max_v())),
+            /// code of the highest dc link that the power stage stands in operation
+            "scales.dc_link.highest" [scales] dc_link_highest: u16, whole().from_to(100.0, 4095.0).changed(Change::Board);
+            /// nominal voltage of the dc link
+            "inverter.dc_link_v" [inverter] dc_link_v: f32, number("V").beside(|s| (10.0, s.dc_link_max_v()));
         ];
         /// largest code of the currents
         full_scale: u16 = 4095, whole().from_to(100.0, 65_535.0).changed(Change::Board);
@@ -179,13 +183,16 @@ settings! {
         angle_source: AngleSource = AngleSource::Injection, word();
         /// The plant that the current controllers are designed for.
         current_plant: CurrentPlant = CurrentPlant::DEFAULT => [
-            word!("current_plant", current_plant.source: PlantSource, "plant that the current controllers are designed for"),
-            auto!("current_plant.d.k", current_plant.d.k, |s| s.identified_d().k as f32, "A/V",
-                "identified plant k/(z - p) of the direct axis").from_to(1e-6, 10.0),
-            auto!("current_plant.d.p", current_plant.d.p, |s| s.identified_d().p as f32, "", "its pole").from_to(0.0, 0.999_99),
-            auto!("current_plant.q.k", current_plant.q.k, |s| s.identified_q().k as f32, "A/V",
-                "identified plant k/(z - p) of the quadrature axis").from_to(1e-6, 10.0),
-            auto!("current_plant.q.p", current_plant.q.p, |s| s.identified_q().p as f32, "", "its pole").from_to(0.0, 0.999_99),
+            /// plant that the current controllers are designed for
+            "current_plant" [current_plant] source: PlantSource, word();
+            /// identified plant k/(z - p) of the direct axis
+            "current_plant.d.k" [current_plant.d] k: Option<f32>, auto("A/V", |s| s.identified_d().k as f32).from_to(1e-6, 10.0);
+            /// its pole
+            "current_plant.d.p" [current_plant.d] p: Option<f32>, auto("", |s| s.identified_d().p as f32).from_to(0.0, 0.999_99);
+            /// identified plant k/(z - p) of the quadrature axis
+            "current_plant.q.k" [current_plant.q] k: Option<f32>, auto("A/V", |s| s.identified_q().k as f32).from_to(1e-6, 10.0);
+            /// its pole
+            "current_plant.q.p" [current_plant.q] p: Option<f32>, auto("", |s| s.identified_q().p as f32).from_to(0.0, 0.999_99);
         ];
         /// whether known delays are left uncompensated, as in the dissertation
         ///
@@ -251,7 +258,7 @@ settings! {
         /// gain of the tracker (Eq. 3.44); not synchronous
         k_s: f32 = 0.132_546, number("rad/A").from_to(0.0, 100.0);
         /// its zero
-        z_s: f32 = 0.90, number("").from_to(0.0, 1.0);
+        z_s: f32 = 0.90, number().from_to(0.0, 1.0);
         /// length of the filters of rms-impedance
         ///
         /// In samples of [`DemodulatorKind::RmsImpedance`]; the default is two carrier periods.
@@ -269,7 +276,7 @@ settings! {
         ///
         /// At the nominal magnetising current. Negative: the inductance along the flux is the larger one. Near zero the loop would
         /// have no gain.
-        flux_saliency: f32 = -0.035, number("").beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
+        flux_saliency: f32 = -0.035, number().beside(|s| either_sign(s.injection.synchronous.flux_saliency, 0.001, 0.3));
         /// whether a drive that has not learned starts without an encoder
         ///
         /// For motors whose saliency is known from elsewhere, as that of a model.
@@ -294,14 +301,15 @@ settings! {
         /// share of the flux-fixed saliency that may be missing
         ///
         /// 1 is zero flux.
-        allowed_loss: f32 = 0.55, number("").from_to(0.3, 0.9);
+        allowed_loss: f32 = 0.55, number().from_to(0.3, 0.9);
         /// time constant of the mean of that share
         loss_s: f32 = 0.12, number("s").from_to(0.01, 1.0);
         /// speed that trips without an encoder
         ///
         /// Mechanical: the end of the range in which the angle is tracked.
         tracked_rpm: Option<f32> = None, auto("rpm", tracked_rpm: |s| s.share_of_poles(700.0)).from_to(1.0, 20_000.0) => [
-            word!("injection.beside_encoder", injection.beside_encoder: bool, "whether the carrier is injected beside an encoder"),
+            /// whether the carrier is injected beside an encoder
+            "injection.beside_encoder" [injection] beside_encoder: bool, word();
         ];
     }
 
@@ -312,7 +320,7 @@ settings! {
         /// Without it the drive trips at [`tracked_rpm`](SynchronousTracking::tracked_rpm).
         enabled: bool = true, word();
         /// leakage inductance of the fundamental wave at no current, as a share of that of motor.*
-        leakage_share: f32 = 1.0, number("").from_to(0.5, 2.0);
+        leakage_share: f32 = 1.0, number().from_to(0.5, 2.0);
         /// change of that share per ampere of stator current, peak
         leakage_slope: f32 = 0.0, number("1/A").from_to(-1.0, 1.0);
     }
@@ -447,7 +455,7 @@ settings! {
         boost_a: Option<f32> = None, auto("A", boost_a: |s| f32::min(0.45 * s.rated_a(), 0.6 * s.current_limit_a()))
             .beside(|s| (0.01, s.current_limit_a()));
         /// share of its slip that is compensated
-        slip_share: f32 = 1.0, number("").from_to(0.0, 1.5);
+        slip_share: f32 = 1.0, number().from_to(0.0, 1.5);
     }
 }
 
