@@ -23,28 +23,22 @@ use crate::carrier::DemodulatorKind;
 use crate::tuning::TuningError;
 
 pub use hardware::{CurrentSensors, Line};
-pub use list::{
-    BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Motor,
-    Nameplate, Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings,
-    SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
-};
+pub use list::*;
 pub use ntc::HeatSink;
 
 /// The source of the flux angle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngleSource {
     /// Encoder and slip, Eq. 2.10.
     Encoder,
     /// The injected carrier: no sensor on the shaft.
-    #[default]
     Injection,
 }
 
 /// The plant that the current controllers are designed for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlantSource {
     /// First-order plants identified on the motor with the filters in place (section 3.7).
-    #[default]
     Identified,
     /// The plant computed from the parameters of the motor. The current loop of the dissertation's motor is a third slower
     /// with it.
@@ -52,10 +46,9 @@ pub enum PlantSource {
 }
 
 /// The flux that the drive magnetises the motor with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flux {
     /// That of the dissertation: 15 % of the rated flux of its motor.
-    #[default]
     Low,
     /// The rated flux, or that of 0.55 times the rated current where it is smaller: a motor of iron can be tracked with it
     /// where it hardly has a saliency at the low one.

@@ -21,10 +21,10 @@ pub static OWN: [Entry<Settings>; 9] = [
     entry!(whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
     entry!(word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
     entry!(word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
-    Entry::new(BOARD, "", Access::Word {
-        words: &boards::NAMES,
-        get: |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
-        set: |s, place| s.board = boards::ALL[place % boards::ALL.len()],
-    }, "board that the firmware is built for").changed(Change::Board),
+    Entry::new(BOARD, "", Access::Word(
+        |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
+        |s, place| s.board = boards::ALL[place % boards::ALL.len()],
+        &boards::NAMES,
+    ), "board that the firmware is built for").changed(Change::Board),
     entry!(whole(), "board.confirmed", [command] confirmed: u32, "number of the board whose bench steps were done; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
 ];

@@ -45,10 +45,9 @@ impl Line {
 }
 
 /// Sensors of the phase currents.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CurrentSensors {
     /// Two, in the lines a and b.
-    #[default]
     InLine,
     /// Three shunts below the low sides.
     LowSide,

@@ -10,7 +10,7 @@
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
 use super::rules::dc_link::{LOW_OF_TRIP, MARGIN};
-use super::rules::{RATED_A, RATED_RPM, WITHIN, either_sign, or_rule};
+use super::rules::{RATED_A, WITHIN, either_sign, or_rule};
 use super::table::{CarrierTable, ReferenceTable};
 use super::value::Words;
 use super::{AngleSource, CurrentSensors, Flux, Line, PlantSource};
@@ -342,7 +342,7 @@ settings! {
         /// dc link below which it trips while the outputs are on
         dc_under_v: Option<f32> = None, auto("V", dc_under_v: |s| s.share_of_dc_link(200.0)).beside(Settings::dc_under_range);
         /// speed of the shaft that trips
-        speed_rpm: Option<f32> = None, auto("rpm", speed_trip_rpm: |s| 2000.0 / RATED_RPM * s.nameplate.speed_rpm)
+        speed_rpm: Option<f32> = None, auto("rpm", speed_trip_rpm: |s| 2000.0 / Nameplate::DEFAULT.speed_rpm * s.nameplate.speed_rpm)
             .from_to(1.0, 20_000.0);
         /// largest voltage that the motor model does not explain at standstill
         ///

@@ -36,21 +36,15 @@ pub mod dc_link;
 use core::f32::consts::{SQRT_2, TAU};
 
 use super::table::{CarrierTable, ReferenceTable, SlopeTable};
-use super::{AngleSource, CurrentSensors, Flux, IdentifiedPlant, Line, Motor, Nameplate, Settings};
+use super::{
+    AngleSource, CurrentSensors, Flux, IdentifiedPlant, Inverter, Line, Motor, Nameplate, Settings,
+};
 use crate::carrier::DemodulatorKind;
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
-/// Its rated speed, rpm.
-pub(super) const RATED_RPM: f32 = Nameplate::DEFAULT.speed_rpm;
-/// Its pole pairs.
-const POLE_PAIRS: f32 = 2.0;
-/// Nominal dc link of its inverter, V.
-const DC_LINK_V: f32 = 311.0;
-/// End of the range of its current sensors, A.
-const RANGE_A: f32 = -Line::CHANNEL_A.offset;
 /// Carrier current per direct current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
 /// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
@@ -93,24 +87,24 @@ impl Settings {
     /// A current that is `on_reference`, A, with the dissertation's sensors, in proportion to the sensors' range: for
     /// thresholds above noise and steps of the converter.
     pub fn share_of_range(&self, on_reference: f32) -> f32 {
-        on_reference / RANGE_A * self.sensor_range_a()
+        on_reference / -Line::CHANNEL_A.offset * self.sensor_range_a()
     }
 
     /// A voltage that is `on_reference`, V, with the dissertation's inverter, in proportion to the dc link: for what
     /// dead time and drop of the inverter cause.
     pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
-        on_reference / DC_LINK_V * self.inverter.dc_link_v
+        on_reference / Inverter::DEFAULT.dc_link_v * self.inverter.dc_link_v
     }
 
     /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
     pub(super) fn share_of_poles(&self, on_reference: f32) -> f32 {
-        on_reference * POLE_PAIRS / f32::from(self.motor.pole_pairs)
+        on_reference * f32::from(Motor::DEFAULT.pole_pairs) / f32::from(self.motor.pole_pairs)
     }
 
     /// Largest phase current that all sensors can measure in both directions, A.
     pub fn sensor_range_a(&self) -> f32 {
         let s = &self.scales;
-        let end = |line: super::Line| {
+        let end = |line: Line| {
             // A negative gain has the positive end at code 0.
             let (zero, full) = (line.offset, line.at(s.full_scale));
             if line.gain < 0.0 { f32::min(zero, -full) } else { f32::min(-zero, full) }
@@ -223,7 +217,7 @@ impl Settings {
 
     fn identified(&self, set: &IdentifiedPlant, on_reference: FirstOrder) -> FirstOrder {
         let computed = |motor: &Motor| motor_plant(&motor.circuit(), f64::from(PERIOD_S));
-        let rule = match (computed(&self.motor), computed(&Motor::default())) {
+        let rule = match (computed(&self.motor), computed(&Motor::DEFAULT)) {
             (Ok(own), Ok(reference)) => FirstOrder {
                 k: on_reference.k * (own.k / reference.k),
                 p: 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p)),
