@@ -129,17 +129,13 @@ pub(super) fn gain_limit(
         };
         if by_ms < by_phase { by_ms } else { by_phase }
     };
-    let mut best = (f64::INFINITY, 0);
-    for n in 0..=LOW + HIGH {
-        let g = limit(grid(n));
-        if g < best.0 {
-            best = (g, n);
-        }
-    }
+    let (least, n) = (0..=LOW + HIGH)
+        .map(|n| (limit(grid(n)), n))
+        .fold((f64::INFINITY, 0), |least, here| if here.0 < least.0 { here } else { least });
     // Where the phase margin limits the gain, the limit jumps to infinity beside its minimum; the golden
     // section still ends on the lower side.
-    let (_, refined) = minimum_near(&limit, best.1);
-    if refined < best.0 { refined } else { best.0 }
+    let (_, refined) = minimum_near(&limit, n);
+    if refined < least { refined } else { least }
 }
 
 /// Zero of `f` between `low` and `high`.

@@ -85,7 +85,7 @@ pub fn design_motion_loops(
     let mut design = MotionDesign {
         k_c: 1.0,
         z_c: zero_at(sin / cos / SPREAD),
-        k_x: 0.0,
+        k_x: crossover / SPREAD,
         crossover,
         acceleration,
         tracking,
@@ -93,7 +93,6 @@ pub fn design_motion_loops(
         period_s,
     };
     design.k_c = 1.0 / design.open_loop(low).norm();
-    design.k_x = crossover / SPREAD;
     Ok(design)
 }
 
@@ -123,10 +122,7 @@ impl MotionDesign {
         let (z, t) = (Complex64::cis(omega_t), self.period_s);
         let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.acceleration)
             / ((z - Complex64::ONE) * (z - Complex64::ONE));
-        match self.tracking {
-            None => rigid,
-            Some(w_n) => rigid * tracked(omega_t / (t * w_n)),
-        }
+        self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)))
     }
 
     /// Open loop of the speed mode at `omega_t` rad/sample.
