@@ -72,12 +72,10 @@ impl HeatSink {
         } else {
             (code < self.window.0, code >= self.shorted)
         };
-        if cold {
-            Fault::ThermistorOpen
-        } else if shorted {
-            Fault::ThermistorShorted
-        } else {
-            Fault::OverTemperature
+        match (cold, shorted) {
+            (true, _) => Fault::ThermistorOpen,
+            (_, true) => Fault::ThermistorShorted,
+            _ => Fault::OverTemperature,
         }
     }
 
