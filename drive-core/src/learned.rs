@@ -35,6 +35,13 @@ pub struct Fitted {
     pub accepted: bool,
 }
 
+impl Fitted {
+    /// This value where it was accepted, or else `other`.
+    fn or(self, other: Self) -> Self {
+        if self.accepted { self } else { other }
+    }
+}
+
 /// Whether, and how well, the motor can be tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -121,41 +128,34 @@ pub struct Learned {
 impl fmt::Display for Learned {
     /// The verdict in words, with the numbers that it rests on.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (slope, least) = (self.slope_at_rest, Verdict::least(self.slope_at_rest));
+        let Self { slope_at_rest: slope, limit_a, spread, ripple, .. } = *self;
+        let (least, least_limit_a) = (Verdict::least(slope), self.least_limit_a());
         match self.verdict {
             Verdict::Sound => {
-                write!(f, "slope {slope:.4} /rad, torque current up to {:.2} A", self.limit_a)
+                write!(f, "slope {slope:.4} /rad, torque current up to {limit_a:.2} A")
             }
             Verdict::Weak => write!(
                 f,
-                "weak: slope {slope:.4} /rad is less than {WEAK} times the least, {least}; torque current up to {:.2} A",
-                self.limit_a
+                "weak: slope {slope:.4} /rad is less than {WEAK} times the least, {least}; torque current up to {limit_a:.2} A"
             ),
             Verdict::SlopeTooSmall => {
-                write!(
-                    f,
-                    "slope {slope:.4} /rad, which must be {least} at least; nothing was changed"
-                )
+                write!(f, "slope {slope:.4} /rad, which must be {least} at least")
             }
             Verdict::LimitTooLow => write!(
                 f,
-                "slope {slope:.4} /rad is lost above {:.2} A of torque current, less than {:.2} A; nothing was changed",
-                self.limit_a,
-                self.least_limit_a()
+                "slope {slope:.4} /rad is lost above {limit_a:.2} A of torque current, less than {least_limit_a:.2} A"
             ),
-            Verdict::Uneven => write!(
-                f,
-                "even part of the reference spreads by {:.5}, more than {SPREAD}; nothing was changed",
-                self.spread
-            ),
+            Verdict::Uneven => {
+                write!(f, "even part of the reference spreads by {spread:.5}, more than {SPREAD}")
+            }
             Verdict::Bent => write!(
                 f,
-                "saliency repeats four times in a turn by {:.5}, more than {:.5}: a current sensor is not linear; nothing was changed",
-                self.ripple,
+                "saliency repeats four times in a turn by {ripple:.5}, more than {:.5}: a current sensor is not linear",
                 RIPPLE * slope.abs()
             ),
-            Verdict::OutOfRange => f.write_str("a value is out of its range; nothing was changed"),
-        }
+            Verdict::OutOfRange => f.write_str("a value is out of its range"),
+        }?;
+        if self.verdict.is_accepted() { Ok(()) } else { f.write_str("; nothing was changed") }
     }
 }
 
@@ -232,24 +232,16 @@ impl Learned {
     pub fn on_top_of(&self, before: &Self) -> Self {
         let positions = before.positions.saturating_add(1);
         let share = 1.0 / f32::from(positions);
-        let mut gains = self.gain_mismatch;
-        if gains.accepted {
-            let corrected =
-                if before.gain_mismatch.accepted { before.gain_mismatch.value } else { 0.0 };
+        let mut gains = self.gain_mismatch.or(before.gain_mismatch);
+        if self.gain_mismatch.accepted {
+            let corrected = before.gain_mismatch.or(Fitted::default()).value;
             gains.value = corrected + share * gains.value;
-        } else {
-            gains = before.gain_mismatch;
         }
-        let current_saliency = if self.current_saliency.accepted {
-            self.current_saliency
-        } else {
-            before.current_saliency
-        };
         Self {
             gain_mismatch: gains,
             asymmetry: before.asymmetry.plus(&self.asymmetry, share),
             positions,
-            current_saliency,
+            current_saliency: self.current_saliency.or(before.current_saliency),
             carrier: self.carrier.or(before.carrier),
             ..*self
         }

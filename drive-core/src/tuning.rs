@@ -250,15 +250,7 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
         let z = Complex64::cis(omega_t);
         (z - Complex64::new(plant.p, 0.0)).arg() + (0.5 * PI + 0.5 * omega_t)
     };
-    let (mut low, mut high) = (0.0, PI);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if lag(middle) < wanted {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let (low, _) = bisected((0.0, PI), 60, &|omega_t| lag(omega_t) < wanted);
     let (sin, cos) = libm::sincos(0.5 * low);
     let half_v_t = sin / cos;
     let z_c = zero_at(half_v_t / 4.0);
@@ -267,6 +259,19 @@ pub fn rule_3_8(plant: FirstOrder, period_s: f64) -> Result<RuleDesign, TuningEr
         z_c,
         v: 2.0 / period_s * half_v_t,
     })
+}
+
+/// The interval that is left of one after `steps` bisections; `is_below` holds below the value that is sought.
+fn bisected(
+    (mut low, mut high): (f64, f64),
+    steps: u32,
+    is_below: &dyn Fn(f64) -> bool,
+) -> (f64, f64) {
+    for _ in 0..steps {
+        let middle = 0.5 * (low + high);
+        (low, high) = if is_below(middle) { (middle, high) } else { (low, middle) };
+    }
+    (low, high)
 }
 
 /// Real z with the fictitious frequency w = -2/T `half_w_t` (2.17).

@@ -1,8 +1,8 @@
 //! The table of the firmware's own settings, beside those of the drive.
 
+use drive_core::entry;
 use drive_core::settings::entry::{Access, Change, Entry};
 use drive_core::settings::value::Words;
-use drive_core::{number, whole, word};
 
 use super::FirmwareSettings as Settings;
 use super::bus::{Baud, Commander, Format};
@@ -14,21 +14,17 @@ pub const BOARD: &str = "board";
 /// In the order in which they are shown.
 #[rustfmt::skip] // One setting, one row.
 pub static OWN: [Entry<Settings>; 9] = [
-    number!("command.timeout_s", command.timeout_s, "s", "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
-    word!("wiring_checked", command.wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
-    word!("console.echo", command.echo: bool, "whether the console sends typed characters back"),
-    word!("bus.commands", bus.commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
-    whole!("bus.address", bus.address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
-    Entry::new("bus.baud", "bit/s", Access::Word {
-        words: Baud::WORDS,
-        get: |s: &Settings| s.bus.baud.place(),
-        set: |s, place| s.bus.baud = Baud::at(place),
-    }, "rate of the bus"),
-    word!("bus.parity", bus.format: Format, "data bits, parity and stop bits of the bus"),
-    Entry::new(BOARD, "", Access::Word {
-        words: &boards::NAMES,
-        get: |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
-        set: |s, place| s.board = boards::ALL[place % boards::ALL.len()],
-    }, "board that the firmware is built for").changed(Change::Board),
-    whole!("board.confirmed", command.confirmed: u32, "number of the board whose bench steps were done; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
+    entry!(number("s"), "command.timeout_s", [command] timeout_s: f32, "the drive stops when no valid line came for so long; 0: never").from_to(0.0, 3600.0),
+    entry!(word(), "wiring_checked", [command] wiring_checked: bool, "whether a start has checked the wiring since the defaults were set"),
+    entry!(word(), "console.echo", [command] echo: bool, "whether the console sends typed characters back"),
+    entry!(word(), "bus.commands", [bus] commander: Commander, "who starts the drive and gives it references; anybody may stop it"),
+    entry!(whole(), "bus.address", [bus] address: u32, "address of the drive on the bus").from_to(1.0, 247.0),
+    entry!(word("bit/s"), "bus.baud", [bus] baud: Baud, "rate of the bus"),
+    entry!(word(), "bus.parity", [bus] format: Format, "data bits, parity and stop bits of the bus"),
+    Entry::new(BOARD, "", Access::Word(
+        |s: &Settings| boards::NAMES.iter().position(|name| *name == s.board.name).unwrap_or(0),
+        |s, place| s.board = boards::ALL[place % boards::ALL.len()],
+        &boards::NAMES,
+    ), "board that the firmware is built for").changed(Change::Board),
+    entry!(whole(), "board.confirmed", [command] confirmed: u32, "number of the board whose bench steps were done; `confirm board` sets it").from_to(0.0, 16_777_215.0).changed(Change::Board),
 ];

@@ -32,40 +32,16 @@ pub struct Entry<S: 'static> {
     range: Range<S>,
 }
 
-/// The way to a value.
+/// The way to a value: the function that reads it, and the one that writes it.
 pub enum Access<S> {
     /// A number.
-    Number {
-        /// Reads it.
-        get: fn(&S) -> f32,
-        /// Writes it.
-        set: fn(&mut S, f32),
-    },
-    /// A number that follows a rule unless it is set.
-    Auto {
-        /// Reads what was set.
-        get: fn(&S) -> Option<f32>,
-        /// Writes it; `None` returns to the rule.
-        set: fn(&mut S, Option<f32>),
-        /// Reads the number in effect.
-        effective: fn(&S) -> f32,
-    },
-    /// A whole number.
-    Whole {
-        /// Reads it.
-        get: fn(&S) -> u32,
-        /// Writes it; at most the largest number of the range.
-        set: fn(&mut S, u32),
-    },
-    /// A word; see [`Words`](super::value::Words).
-    Word {
-        /// The words.
-        words: &'static [&'static str],
-        /// Reads its place.
-        get: fn(&S) -> usize,
-        /// Writes its place.
-        set: fn(&mut S, usize),
-    },
+    Number(fn(&S) -> f32, fn(&mut S, f32)),
+    /// A number that follows a rule while it is `None`; the third function reads the number in effect.
+    Auto(fn(&S) -> Option<f32>, fn(&mut S, Option<f32>), fn(&S) -> f32),
+    /// A whole number, which is written up to the largest of the range.
+    Whole(fn(&S) -> u32, fn(&mut S, u32)),
+    /// One of these words by its place among them; see [`Words`](super::value::Words).
+    Word(fn(&S) -> usize, fn(&mut S, usize), &'static [&'static str]),
 }
 
 enum Range<S> {
@@ -120,10 +96,10 @@ impl<S> Entry<S> {
     /// The value.
     pub fn get(&self, settings: &S) -> Value {
         match self.access {
-            Access::Number { get, .. } => Value::Number(get(settings)),
-            Access::Auto { get, .. } => get(settings).map_or(Value::Auto, Value::Number),
-            Access::Whole { get, .. } => Value::Whole(get(settings)),
-            Access::Word { words, get, .. } => {
+            Access::Number(get, _) => Value::Number(get(settings)),
+            Access::Auto(get, ..) => get(settings).map_or(Value::Auto, Value::Number),
+            Access::Whole(get, _) => Value::Whole(get(settings)),
+            Access::Word(get, _, words) => {
                 Value::Word(words.get(get(settings)).copied().unwrap_or_default())
             }
         }
@@ -132,10 +108,10 @@ impl<S> Entry<S> {
     /// The number in effect: that of the rule for `auto`; `None` for a word.
     pub fn number(&self, settings: &S) -> Option<f32> {
         match self.access {
-            Access::Number { get, .. } => Some(get(settings)),
-            Access::Auto { effective, .. } => Some(effective(settings)),
-            Access::Whole { get, .. } => Some(get(settings) as f32),
-            Access::Word { .. } => None,
+            Access::Number(get, _) => Some(get(settings)),
+            Access::Auto(.., effective) => Some(effective(settings)),
+            Access::Whole(get, _) => Some(get(settings) as f32),
+            Access::Word(..) => None,
         }
     }
 
@@ -143,11 +119,11 @@ impl<S> Entry<S> {
     /// [`check`](Self::check), since it may depend on other settings that are still to be set.
     pub fn set(&self, settings: &mut S, value: Value) {
         match (&self.access, value) {
-            (Access::Number { set, .. }, Value::Number(value)) => set(settings, value),
-            (Access::Auto { set, .. }, Value::Number(value)) => set(settings, Some(value)),
-            (Access::Auto { set, .. }, Value::Auto) => set(settings, None),
-            (Access::Whole { set, .. }, Value::Whole(value)) => set(settings, value),
-            (Access::Word { words, set, .. }, Value::Word(word)) => {
+            (Access::Number(_, set), Value::Number(value)) => set(settings, value),
+            (Access::Auto(_, set, _), Value::Number(value)) => set(settings, Some(value)),
+            (Access::Auto(_, set, _), Value::Auto) => set(settings, None),
+            (Access::Whole(_, set), Value::Whole(value)) => set(settings, value),
+            (Access::Word(_, set, words), Value::Word(word)) => {
                 if let Some(place) = words.iter().position(|known| *known == word) {
                     set(settings, place);
                 }
@@ -162,17 +138,17 @@ impl<S> Entry<S> {
     /// The text is not a value of this setting.
     pub fn parse(&self, text: &str) -> Result<Value, ValueError> {
         match self.access {
-            Access::Number { .. } => parsed(text).map(Value::Number).ok_or(ValueError::Number),
-            Access::Auto { .. } if text == AUTO => Ok(Value::Auto),
-            Access::Auto { .. } => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
-            Access::Whole { .. } => {
+            Access::Number(..) => parsed(text).map(Value::Number).ok_or(ValueError::Number),
+            Access::Auto(..) if text == AUTO => Ok(Value::Auto),
+            Access::Auto(..) => parsed(text).map(Value::Number).ok_or(ValueError::NumberOrAuto),
+            Access::Whole(..) => {
                 // Larger ones may not fit the type of the setting.
                 let Range::Fixed(_, max) = self.range else { return Err(ValueError::Whole(0)) };
                 let max = max as u32;
                 let value = text.parse().ok().filter(|value| *value <= max);
                 value.map(Value::Whole).ok_or(ValueError::Whole(max))
             }
-            Access::Word { words, .. } => {
+            Access::Word(.., words) => {
                 let word = words.iter().find(|word| **word == text);
                 word.map(|word| Value::Word(word)).ok_or(ValueError::Word(words))
             }
@@ -205,7 +181,7 @@ impl<S> Entry<S> {
     /// The range beside the present settings, `(min, max)`; `None` for a word.
     pub fn range(&self, settings: &S) -> Option<(f32, f32)> {
         match (&self.access, &self.range) {
-            (Access::Word { .. }, _) => None,
+            (Access::Word(..), _) => None,
             (_, Range::Fixed(min, max)) => Some((*min, *max)),
             (_, Range::Beside(range)) => Some(range(settings)),
         }
@@ -213,73 +189,50 @@ impl<S> Entry<S> {
 
     /// The words that may be set; none for a number.
     pub fn words(&self) -> &'static [&'static str] {
-        match self.access {
-            Access::Word { words, .. } => words,
-            _ => &[],
-        }
+        if let Access::Word(.., words) = self.access { words } else { &[] }
     }
 
     /// Whether the setting follows a rule unless it is set.
     pub fn has_rule(&self) -> bool {
-        matches!(self.access, Access::Auto { .. })
+        matches!(self.access, Access::Auto(..))
     }
 
     /// Whether two sets of settings have the same value in effect. A value that is not a number is never the same.
     pub fn same(&self, one: &S, other: &S) -> bool {
-        match self.access {
-            Access::Word { get, .. } => get(one) == get(other),
-            _ => self.number(one) == self.number(other),
+        match self.number(one) {
+            Some(number) => Some(number) == self.number(other),
+            None => self.get(one) == self.get(other),
         }
     }
 }
 
-// The rows of a table. `Settings` is the type of this name where the table is.
-
+/// A row of a table: kind with unit, name, path to the structure and field in it with its type, help. `Settings` is the type
+/// of this name where the table is.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! number {
-    ($name:literal, $($path:ident).+, $unit:literal, $help:literal) => {
-        Entry::new($name, $unit, Access::Number {
-            get: |s: &Settings| s.$($path).+,
-            set: |s, value| s.$($path).+ = value,
-        }, $help)
+macro_rules! entry {
+    (number($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($name, concat!($($unit)?), Access::Number(
+            |s: &Settings| s.$($path.)*$field, |s, value| s.$($path.)*$field = value
+        ), $help)
+    };
+    (auto($unit:expr, $effective:expr), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($name, $unit, Access::Auto(
+            |s: &Settings| s.$($path.)*$field, |s, value| s.$($path.)*$field = value, $effective
+        ), $help)
+    };
+    (whole(), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        // The range is within the type: see `parse`.
+        Entry::new($name, "", Access::Whole(
+            |s: &Settings| s.$($path.)*$field as u32, |s, value| s.$($path.)*$field = value as $type
+        ), $help)
+    };
+    (word($($unit:expr)?), $name:expr, [$($path:ident).*] $field:ident: $type:ty, $help:expr) => {
+        Entry::new($name, concat!($($unit)?), Access::Word(
+            |s: &Settings| s.$($path.)*$field.place(), |s, place| s.$($path.)*$field = <$type as Words>::at(place),
+            <$type as Words>::WORDS
+        ), $help)
     };
 }
 
-#[doc(hidden)]
-#[macro_export]
-macro_rules! auto {
-    ($name:literal, $($path:ident).+, $effective:expr, $unit:literal, $help:literal) => {
-        Entry::new($name, $unit, Access::Auto {
-            get: |s: &Settings| s.$($path).+,
-            set: |s, value| s.$($path).+ = value,
-            effective: $effective,
-        }, $help)
-    };
-}
-
-#[doc(hidden)]
-#[macro_export]
-macro_rules! whole {
-    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
-        Entry::new($name, "", Access::Whole {
-            get: |s: &Settings| s.$($path).+ as u32,
-            // At most the largest of the range: see `parse`.
-            set: |s, value| s.$($path).+ = value as $type,
-        }, $help)
-    };
-}
-
-#[doc(hidden)]
-#[macro_export]
-macro_rules! word {
-    ($name:literal, $($path:ident).+: $type:ty, $help:literal) => {
-        Entry::new($name, "", Access::Word {
-            words: <$type as Words>::WORDS,
-            get: |s: &Settings| s.$($path).+.place(),
-            set: |s, place| s.$($path).+ = <$type as Words>::at(place),
-        }, $help)
-    };
-}
-
-pub(super) use crate::{auto, number, whole, word};
+pub(super) use crate::entry;

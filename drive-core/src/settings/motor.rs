@@ -1,40 +1,8 @@
-//! The parameters of the motor.
+//! Quantities that follow from the parameters and from the nameplate of the motor.
 
+use super::{Motor, Nameplate};
+use crate::math::frames::SQRT_3;
 use crate::tuning::EquivalentCircuit;
-
-/// The motor: T-equivalent circuit per phase (Figure 21), star, SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motor {
-    /// Stator resistance, ohm.
-    pub r_s: f32,
-    /// Rotor resistance, ohm.
-    pub r_r: f32,
-    /// Stator leakage inductance, H.
-    pub l_ls: f32,
-    /// Rotor leakage inductance, H.
-    pub l_lr: f32,
-    /// Magnetising inductance, H.
-    pub l_m: f32,
-    /// Pole pairs.
-    pub pole_pairs: u8,
-    /// Inertia of rotor and load, kg m^2: the speed loop is designed for it.
-    pub inertia: f32,
-}
-
-impl Default for Motor {
-    /// Table 5; the inertia is assumed.
-    fn default() -> Self {
-        Self {
-            r_s: 5.4,
-            r_r: 1.1,
-            l_ls: 0.0276,
-            l_lr: 0.0276,
-            l_m: 0.1771,
-            pole_pairs: 2,
-            inertia: 0.012,
-        }
-    }
-}
 
 impl Motor {
     /// The equivalent circuit in double precision, for the design of the controllers.
@@ -72,5 +40,12 @@ impl Motor {
     /// 3/2 P L_m^2 / L_r i_d (Eq. 2.7 prints L_m for L_m^2 / L_r).
     pub fn torque_per_ampere(&self, i_d: f32) -> f32 {
         1.5 * f32::from(self.pole_pairs) * self.l_m * self.l_m / self.l_r() * i_d
+    }
+}
+
+impl Nameplate {
+    /// Base impedance of a phase, ohm.
+    pub(crate) fn base_impedance(&self) -> f32 {
+        self.voltage_v / (SQRT_3 * self.current_a)
     }
 }

@@ -2,6 +2,7 @@
 
 use micromath::F32;
 
+use super::Ntc;
 use crate::fault::Fault;
 use crate::io::CONVERTER_CODES;
 
@@ -13,32 +14,7 @@ const T_0: f32 = 273.15;
 const COLDEST_C: f32 = -40.0;
 const HOTTEST_C: f32 = 200.0;
 
-/// A thermistor with negative coefficient in a divider across the reference of the converter:
-/// R = R_25 exp(B (1/T - 1/T_25)).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ntc {
-    /// Resistance at 25 °C, ohm.
-    pub ohm_25: f32,
-    /// B, K.
-    pub beta_k: f32,
-    /// The other resistor of the divider, ohm.
-    pub divider_ohm: f32,
-    /// Whether the thermistor is the one at ground, so that the code falls with the temperature.
-    pub to_ground: bool,
-}
-
-impl Default for Ntc {
-    /// [`Ntc::DEFAULT`].
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 impl Ntc {
-    /// Assumed: 10 kohm, B 3435 K, from the reference, with 4.7 kohm to ground. The dissertation describes none.
-    pub const DEFAULT: Self =
-        Self { ohm_25: 10_000.0, beta_k: 3435.0, divider_ohm: 4700.0, to_ground: false };
-
     /// Temperature at a code, °C, within 0.1 °C of the formula from -40 to 150 °C; for telemetry. Codes at either end
     /// of the range give the temperature of the next code.
     pub fn celsius(&self, code: u16) -> f32 {
@@ -96,12 +72,10 @@ impl HeatSink {
         } else {
             (code < self.window.0, code >= self.shorted)
         };
-        if cold {
-            Fault::ThermistorOpen
-        } else if shorted {
-            Fault::ThermistorShorted
-        } else {
-            Fault::OverTemperature
+        match (cold, shorted) {
+            (true, _) => Fault::ThermistorOpen,
+            (_, true) => Fault::ThermistorShorted,
+            _ => Fault::OverTemperature,
         }
     }
 

@@ -32,27 +32,19 @@
 //! | `vf.boost_a` | 1.629 A | rated current; at most 0.6 of `limits.current_a` |
 
 pub mod dc_link;
-mod motion;
-mod volts_per_hertz;
 
 use core::f32::consts::{SQRT_2, TAU};
 
-use super::Settings;
 use super::table::{CarrierTable, ReferenceTable, SlopeTable};
-use super::{CurrentSensors, Flux, IdentifiedPlant, Line, Motor, Nameplate};
+use super::{
+    AngleSource, CurrentSensors, Flux, IdentifiedPlant, Inverter, Line, Motor, Nameplate, Settings,
+};
+use crate::carrier::DemodulatorKind;
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
-const RATED_A: f32 = Nameplate::TABLE_3.current_a * SQRT_2;
-/// Its rated speed, rpm.
-const RATED_RPM: f32 = Nameplate::TABLE_3.speed_rpm;
-/// Its pole pairs.
-const POLE_PAIRS: f32 = 2.0;
-/// Nominal dc link of its inverter, V.
-const DC_LINK_V: f32 = 311.0;
-/// End of the range of its current sensors, A.
-const RANGE_A: f32 = -Line::CHANNEL_A.offset;
+pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
 /// Carrier current per direct current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
 /// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
@@ -60,23 +52,27 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
-/// Band of the heat sink in which the current limit falls, K.
-const DERATING_C: f32 = 15.0;
 /// Rules end this far within the limits of the power stage and of other settings, since they round to four digits.
-const WITHIN: f32 = 0.998;
+pub(super) const WITHIN: f32 = 0.998;
 /// Frequency of the carrier, Hz.
 pub(crate) const CARRIER_HZ: f32 = 600.0;
 
 /// The value that was set or, if none was, that of the rule, rounded to four digits.
-fn or_rule(set: Option<f32>, rule: impl FnOnce() -> f32) -> f32 {
+pub(super) fn or_rule(s: &Settings, set: Option<f32>, rule: fn(&Settings) -> f32) -> f32 {
     set.unwrap_or_else(|| {
-        let value = f64::from(rule());
+        let value = f64::from(rule(s));
         // Zero has no first digit.
         let last = libm::pow(10.0, libm::floor(libm::log10(value.abs().max(1e-30))) - 3.0);
         (libm::round(value / last) * last) as f32
     })
 }
 
+/// The range of a value that has either sign, but is not zero.
+pub(super) fn either_sign(value: f32, min: f32, max: f32) -> (f32, f32) {
+    if value < 0.0 { (-max, -min) } else { (min, max) }
+}
+
+/// Quantities that the rules are in proportion to.
 impl Settings {
     /// Rated current, A peak.
     pub fn rated_a(&self) -> f32 {
@@ -91,19 +87,24 @@ impl Settings {
     /// A current that is `on_reference`, A, with the dissertation's sensors, in proportion to the sensors' range: for
     /// thresholds above noise and steps of the converter.
     pub fn share_of_range(&self, on_reference: f32) -> f32 {
-        on_reference / RANGE_A * self.sensor_range_a()
+        on_reference / -Line::CHANNEL_A.offset * self.sensor_range_a()
     }
 
     /// A voltage that is `on_reference`, V, with the dissertation's inverter, in proportion to the dc link: for what
     /// dead time and drop of the inverter cause.
     pub fn share_of_dc_link(&self, on_reference: f32) -> f32 {
-        on_reference / DC_LINK_V * self.inverter.dc_link_v
+        on_reference / Inverter::DEFAULT.dc_link_v * self.inverter.dc_link_v
+    }
+
+    /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
+    pub(super) fn share_of_poles(&self, on_reference: f32) -> f32 {
+        on_reference * f32::from(Motor::DEFAULT.pole_pairs) / f32::from(self.motor.pole_pairs)
     }
 
     /// Largest phase current that all sensors can measure in both directions, A.
     pub fn sensor_range_a(&self) -> f32 {
         let s = &self.scales;
-        let end = |line: super::Line| {
+        let end = |line: Line| {
             // A negative gain has the positive end at code 0.
             let (zero, full) = (line.offset, line.at(s.full_scale));
             if line.gain < 0.0 { f32::min(zero, -full) } else { f32::min(-zero, full) }
@@ -120,85 +121,86 @@ impl Settings {
         self.scales.dc_link.at(CONVERTER_CODES)
     }
 
-    /// Phase current that trips, A.
-    pub fn trip_a(&self) -> f32 {
-        let rule = || f32::min(self.share_of_rated(4.3), 0.962 * self.sensor_range_a());
-        or_rule(self.limits.trip_a, rule)
+    /// Speed above which the drive trips, rpm: that of the shaft's limit, or of the range in which the injection alone tracks
+    /// the angle.
+    pub fn highest_rpm(&self) -> f32 {
+        let alone = self.tracks_synchronously() && !self.uses_observer();
+        let tracked = if alone { self.tracked_rpm() } else { f32::INFINITY };
+        f32::min(tracked, self.speed_trip_rpm())
     }
 
-    /// Largest current that is regulated, A peak: the carrier and the noise stay clear of the trip.
-    pub fn current_limit_a(&self) -> f32 {
-        let rule = || f32::min(self.share_of_rated(3.5), 0.814 * self.trip_a());
-        or_rule(self.limits.current_a, rule)
+    /// A mechanical speed, rpm, in electrical turns per control period.
+    pub(crate) fn freq_of_rpm(&self, rpm: f32) -> f32 {
+        rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
     }
 
-    /// Direct (magnetising) current, A peak. 0.7 A is that of section 3.10.
-    ///
-    /// With high flux it is that of the rated flux or, where it is smaller, 0.55 times the rated current; and where the
-    /// current limit is small, 4/7 of that, which leaves 0.82 of it for the torque.
-    pub fn i_d(&self) -> f32 {
-        let plate = &self.nameplate;
-        let rule = || match self.sequence.flux {
+    /// Whether the angle comes from the synchronous demodulation.
+    pub(crate) fn tracks_synchronously(&self) -> bool {
+        self.angle_source == AngleSource::Injection
+            && self.injection.demodulator == DemodulatorKind::Synchronous
+    }
+
+    /// Whether the lock monitor runs.
+    pub(crate) fn watches_lock(&self) -> bool {
+        self.tracks_synchronously() && self.injection.synchronous.monitor
+    }
+
+    /// Whether the observer takes the angle over from the injection at speed.
+    pub(crate) fn uses_observer(&self) -> bool {
+        self.tracks_synchronously() && self.observer.enabled
+    }
+}
+
+/// Rules and ranges that take more than a line.
+impl Settings {
+    /// Currents of both signs are measured: zero current lies between 5 % and 95 % of the codes.
+    pub(super) fn offset_range(&self, line: Line) -> (f32, f32) {
+        let full = line.gain.abs() * f32::from(self.scales.full_scale);
+        either_sign(-line.gain, 0.05 * full, 0.95 * full)
+    }
+
+    /// The lock monitor needs a carrier. Near V_dc / sqrt 3 no room would be left for the fundamental.
+    pub(super) fn carrier_range(&self) -> (f32, f32) {
+        let dc_link_v = self.inverter.dc_link_v;
+        (if self.watches_lock() { 0.003 * dc_link_v } else { 0.0 }, 0.55 * dc_link_v)
+    }
+
+    /// The lock monitor measures its baseline during magnetisation; with the saliency check also while the flux is
+    /// restored.
+    pub(super) fn magnetise_range(&self) -> (f32, f32) {
+        let needs_baseline = self.watches_lock() && !self.injection.synchronous.check;
+        (if needs_baseline { 0.5 } else { 0.0 }, 60.0)
+    }
+
+    /// Rule of `sequence.i_d`.
+    pub(super) fn i_d_rule(&self) -> f32 {
+        match self.sequence.flux {
             Flux::Low => f32::min(self.share_of_rated(0.7), WITHIN * self.current_limit_a()),
             Flux::High => {
+                let plate = &self.nameplate;
                 let rated_flux = plate.voltage_v * PEAK_OF_PHASE / (TAU * plate.frequency_hz);
                 let of_flux = rated_flux / self.motor.l_m;
                 f32::min(of_flux, 0.55 * self.rated_a()).min(4.0 / 7.0 * self.current_limit_a())
             }
-        };
-        or_rule(self.sequence.i_d, rule)
+        }
     }
 
-    /// Temperature of the heat sink from which on the current limit falls, °C.
-    pub fn derate_c(&self) -> f32 {
-        or_rule(self.limits.derate_c, || self.limits.heat_sink_c - DERATING_C)
+    /// Rule of `injection.amplitude_v`; the setting says why.
+    pub(super) fn carrier_rule(&self) -> f32 {
+        let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
+        let of_i_d = CARRIER_OF_I_D * self.i_d();
+        let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
+        let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
+        let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
+        let most = f32::min(0.5 * self.i_d(), room) * reactance;
+        f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
     }
 
-    /// Current that the motor carries for any time at standstill, A peak.
-    pub fn motor_a(&self) -> f32 {
-        or_rule(self.limits.motor_a, || self.rated_a())
-    }
-
-    /// Current that the inverter carries for any time, A peak.
-    pub fn inverter_a(&self) -> f32 {
-        or_rule(self.limits.inverter_a, || self.current_limit_a())
-    }
-
-    /// Slope of the torque current at a stop, A/s.
-    pub fn stop_a_per_s(&self) -> f32 {
-        or_rule(self.sequence.stop_a_per_s, || self.share_of_rated(30.0))
-    }
-
-    /// Time with direct current alone, s: the flux is within 1 % after five rotor time constants.
-    pub fn magnetise_s(&self) -> f32 {
-        or_rule(self.sequence.magnetise_s, || f32::max(0.8, 5.0 * self.motor.tau_r()))
-    }
-
-    /// Phase current from which on the dead time is compensated in full, A: three times the spread of noise and
-    /// prediction.
-    pub fn full_compensation_a(&self) -> f32 {
-        or_rule(self.inverter.full_compensation_a, || self.share_of_range(0.03))
-    }
-
-    /// Peak of the injected voltage, V, from the reactance X = ω σL_s of the leakage at the carrier.
-    ///
-    /// The angle error is noise over saliency and carrier current, so the rule asks for a current: 0.368 of the direct
-    /// current, 0.26 A of the dissertation's motor at 0.7 A, and at most 0.46 A of it, which the trip leaves room for (family
-    /// R at 2 A: 2.9° rms with 0.26 A, 1.7° with 0.46 A). The remainder of the dead time asks for a voltage, 50 V at 311 V. The larger of both is
-    /// taken, but not more than the voltage that drives half the direct current: beyond, phases b and c would cross zero
-    /// at a start, where the drop of the inverter is uncertain; and not more than the trip leaves room for beside the current
-    /// limit. The voltage is between 20 and 110 V at 311 V.
-    pub fn carrier_v(&self) -> f32 {
-        let rule = || {
-            let reactance = TAU * CARRIER_HZ * self.motor.sigma_l_s();
-            let of_i_d = CARRIER_OF_I_D * self.i_d();
-            let by_noise = f32::min(of_i_d, self.share_of_rated(0.463)) * reactance;
-            let wanted = f32::max(by_noise, self.share_of_dc_link(50.0));
-            let room = CARRIER_OF_ROOM * (self.trip_a() - self.current_limit_a());
-            let most = f32::min(0.5 * self.i_d(), room) * reactance;
-            f32::min(wanted, most).clamp(self.share_of_dc_link(20.0), self.share_of_dc_link(110.0))
-        };
-        or_rule(self.injection.amplitude_v, rule)
+    /// Rule of `speed.limit_rpm`: it is below the speed that trips.
+    pub(super) fn speed_limit_rule(&self) -> f32 {
+        let alone = self.share_of_poles(300.0);
+        let rpm = if self.uses_observer() { self.nameplate.speed_rpm } else { alone };
+        f32::min(rpm, WITHIN * self.speed_trip_rpm())
     }
 
     /// Plant of the direct axis for the design of its current controller. The rule is the plant that was identified on the
@@ -215,7 +217,7 @@ impl Settings {
 
     fn identified(&self, set: &IdentifiedPlant, on_reference: FirstOrder) -> FirstOrder {
         let computed = |motor: &Motor| motor_plant(&motor.circuit(), f64::from(PERIOD_S));
-        let rule = match (computed(&self.motor), computed(&Motor::default())) {
+        let rule = match (computed(&self.motor), computed(&Motor::DEFAULT)) {
             (Ok(own), Ok(reference)) => FirstOrder {
                 k: on_reference.k * (own.k / reference.k),
                 p: 1.0 - (1.0 - on_reference.p) * ((1.0 - own.p) / (1.0 - reference.p)),
@@ -224,18 +226,6 @@ impl Settings {
             _ => on_reference,
         };
         FirstOrder { k: set.k.map_or(rule.k, f64::from), p: set.p.map_or(rule.p, f64::from) }
-    }
-
-    /// Torque current from which on the constant reference of the current difference is full, A peak.
-    pub fn full_reference_iq_a(&self) -> f32 {
-        let set = self.injection.printed.full_reference_iq_a;
-        or_rule(set, || self.share_of_rated(1.0))
-    }
-
-    /// Saliency per ampere of stator current, 1/A; for the gain schedule until it is learned.
-    pub fn current_saliency(&self) -> f32 {
-        let set = self.injection.synchronous.current_saliency;
-        or_rule(set, || 0.0338 * RATED_A / self.rated_a())
     }
 
     /// Reference of the saliency over the torque current.
@@ -254,58 +244,6 @@ impl Settings {
     pub fn carrier(&self) -> CarrierTable {
         let guess = || CarrierTable::guessed(self.current_limit_a());
         self.injection.synchronous.carrier.unwrap_or_else(guess)
-    }
-
-    /// Mechanical speed that trips without an encoder, rpm: the range in which the angle is tracked.
-    pub fn tracked_rpm(&self) -> f32 {
-        or_rule(self.injection.synchronous.tracked_rpm, || self.share_of_poles(700.0))
-    }
-
-    /// Speed of the shaft that trips, rpm.
-    pub fn speed_trip_rpm(&self) -> f32 {
-        let rule = || 2000.0 / RATED_RPM * self.nameplate.speed_rpm;
-        or_rule(self.limits.speed_rpm, rule)
-    }
-
-    /// Speed above which the drive trips, rpm: that of the shaft's limit, or of the range in which the injection alone tracks
-    /// the angle.
-    pub fn highest_rpm(&self) -> f32 {
-        let alone = self.tracks_synchronously() && !self.uses_observer();
-        let tracked = if alone { self.tracked_rpm() } else { f32::INFINITY };
-        f32::min(tracked, self.speed_trip_rpm())
-    }
-
-    /// Largest voltage that the model of the motor does not explain at standstill, V: an error of 26 % of the stator
-    /// resistance at the current limit, and 2.3 % of the dc link for dead time and drop of the inverter.
-    pub fn unexplained_v(&self) -> f32 {
-        let rule = || 0.26 * self.current_limit_a() * self.motor.r_s + self.share_of_dc_link(7.086);
-        or_rule(self.limits.unexplained_v, rule)
-    }
-
-    /// Whether the lock monitor runs.
-    pub(crate) fn watches_lock(&self) -> bool {
-        self.tracks_synchronously() && self.injection.synchronous.monitor
-    }
-
-    /// Whether the angle comes from the synchronous demodulation.
-    pub(crate) fn tracks_synchronously(&self) -> bool {
-        self.angle_source == super::AngleSource::Injection
-            && self.injection.demodulator == crate::carrier::DemodulatorKind::Synchronous
-    }
-
-    /// Whether the observer takes the angle over from the injection at speed.
-    pub(crate) fn uses_observer(&self) -> bool {
-        self.tracks_synchronously() && self.observer.enabled
-    }
-
-    /// A mechanical speed that is `on_reference` with the dissertation's pole pairs, at the same electrical frequency.
-    fn share_of_poles(&self, on_reference: f32) -> f32 {
-        on_reference * POLE_PAIRS / f32::from(self.motor.pole_pairs)
-    }
-
-    /// A mechanical speed, rpm, in electrical turns per control period.
-    pub(crate) fn freq_of_rpm(&self, rpm: f32) -> f32 {
-        rpm / 60.0 * f32::from(self.motor.pole_pairs) * PERIOD_S
     }
 }
 
@@ -394,7 +332,7 @@ mod tests {
     #[test]
     fn a_rule_of_zero_is_zero() {
         let mut s = Settings::default();
-        s.limits.heat_sink_c = DERATING_C;
+        s.limits.heat_sink_c = 15.0;
         assert_eq!(s.derate_c(), 0.0);
         assert_eq!(s.check(), Ok(()));
     }

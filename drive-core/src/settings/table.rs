@@ -49,10 +49,21 @@ impl Grid {
         (n, if past < 1.0 { past } else { 1.0 })
     }
 }
-/// Largest accepted saliency.
-const LARGEST: f32 = 0.3;
 
-/// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last.
+/// Values over the torque current at the points of a grid, of one of three kinds: [`ReferenceTable`], [`CarrierTable`] or
+/// [`SlopeTable`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Table<const KIND: u8> {
+    grid: Grid,
+    values: [f32; POINTS],
+}
+
+const REFERENCE: u8 = 0;
+const CARRIER: u8 = 1;
+const SLOPE: u8 = 2;
+
+/// Reference of the saliency `q` over i_q: odd, linear between the points, constant beyond the last. The first value is 0, and
+/// all are within ±0.3.
 ///
 /// ```
 /// use drive_core::settings::table::{Grid, ReferenceTable};
@@ -62,10 +73,73 @@ const LARGEST: f32 = 0.3;
 /// assert_eq!(table.at(3.5), 0.03);
 /// # Ok::<(), drive_core::settings::table::TableError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReferenceTable {
-    grid: Grid,
-    q: [f32; POINTS],
+pub type ReferenceTable = Table<REFERENCE>;
+/// Carrier current over i_q as a ratio to that at i_q = 0; even. The first value is 1, and all are within 0.5 to 2.
+pub type CarrierTable = Table<CARRIER>;
+/// Slope dq/de of the saliency over the angle error over i_q, 1/rad: even, of one sign. All values are within ±(0.001 to 0.6).
+///
+/// The error e is the angle of the flux less that of the estimated frame, and the slope the slow one: current and flux have
+/// settled at every e. A saliency `a` that is fixed to the flux and to nothing else has the slope 2a; it is negative where
+/// the inductance along the flux is the larger one.
+pub type SlopeTable = Table<SLOPE>;
+
+/// Largest accepted saliency.
+const LARGEST: f32 = 0.3;
+
+impl<const KIND: u8> Table<KIND> {
+    /// Table from its values at the points of `grid`; `None` when the first or any is not what the type states.
+    pub fn from_points(grid: Grid, values: [f32; POINTS]) -> Option<Self> {
+        let first = values[0];
+        let believable = |value: &f32| match KIND {
+            REFERENCE => first == 0.0 && (-LARGEST..=LARGEST).contains(value),
+            CARRIER => first == 1.0 && (0.5..=2.0).contains(value),
+            _ => (0.001..=0.6).contains(&value.abs()) && value * first > 0.0,
+        };
+        values.iter().all(believable).then_some(Self { grid, values })
+    }
+
+    /// The torque currents of the points.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The values at the points.
+    pub fn points(&self) -> &[f32; POINTS] {
+        &self.values
+    }
+
+    /// The default in proportion to the largest regulated current, A peak: a beginning until the motor's own is
+    /// learned.
+    pub fn guessed(largest_a: f32) -> Self
+    where
+        Self: Default,
+    {
+        Self { grid: Grid::for_current(largest_a), ..Self::default() }
+    }
+}
+
+impl Default for ReferenceTable {
+    /// Learned on the simulated motor of Table 5 with a flux-fixed saliency of -3.5 % (experiment
+    /// `learn-reference`): it belongs to that motor.
+    fn default() -> Self {
+        let values = [
+            0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
+            0.04356, 0.04345, 0.04328, 0.04308, 0.04308, 0.04308,
+        ];
+        Self { grid: Grid::REFERENCE, values }
+    }
+}
+
+impl Default for CarrierTable {
+    /// Learned on the simulated motor of Table 5 together with the default
+    /// [`ReferenceTable`]: it belongs to that motor.
+    fn default() -> Self {
+        let values = [
+            1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,
+            1.11946, 1.13211, 1.14488, 1.15781, 1.15781, 1.15781,
+        ];
+        Self { grid: Grid::REFERENCE, values }
+    }
 }
 
 /// Why a table was refused.
@@ -87,9 +161,7 @@ impl fmt::Display for TableError {
             Self::TooShort => write!(f, "a table needs two points at least"),
             Self::NotOdd => write!(f, "point 0 must be 0 at 0 A: the table is odd"),
             Self::NotIncreasing(n) => write!(f, "point {n}: the currents must increase strictly"),
-            Self::TooLarge(n, q) => {
-                write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}")
-            }
+            Self::TooLarge(n, q) => write!(f, "point {n}: {q} is outside -{LARGEST} to {LARGEST}"),
         }
     }
 }
@@ -103,78 +175,33 @@ impl ReferenceTable {
     /// # Errors
     /// See [`TableError`].
     pub fn new(grid: Grid, points: &[(f32, f32)]) -> Result<Self, TableError> {
-        let first = points.first().ok_or(TableError::TooShort)?;
-        if *first != (0.0, 0.0) {
-            return Err(TableError::NotOdd);
-        }
-        if points.len() < 2 {
-            return Err(TableError::TooShort);
-        }
-        for (n, pair) in points.windows(2).enumerate() {
+        let last = match points {
+            [first, ..] if *first != (0.0, 0.0) => return Err(TableError::NotOdd),
+            [] | [_] => return Err(TableError::TooShort),
+            [.., last] => last.1,
+        };
+        for (n, pair) in (1..).zip(points.windows(2)) {
+            let (before, (i_q, q)) = (pair[0].0, pair[1]);
             // NaN fails the comparisons.
-            if !(pair[1].0 > pair[0].0 && pair[1].0.is_finite()) {
-                return Err(TableError::NotIncreasing(n + 1));
+            if !(i_q > before && i_q.is_finite()) {
+                return Err(TableError::NotIncreasing(n));
             }
-            let believable = pair[1].1.abs() <= LARGEST;
-            if !believable {
-                return Err(TableError::TooLarge(n + 1, pair[1].1));
+            if !(-LARGEST..=LARGEST).contains(&q) {
+                return Err(TableError::TooLarge(n, q));
             }
         }
-        Ok(Self { grid, q: sampled(grid, points) })
-    }
-
-    /// Table from its values at the points of `grid`; `None` when the first is not 0 or any is beyond ±0.3.
-    pub fn from_points(grid: Grid, q: [f32; POINTS]) -> Option<Self> {
-        let believable = q.iter().all(|q| (-LARGEST..=LARGEST).contains(q));
-        (q[0] == 0.0 && believable).then_some(Self { grid, q })
-    }
-
-    /// The torque currents of the points.
-    pub fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    /// The values at the points.
-    pub fn points(&self) -> &[f32; POINTS] {
-        &self.q
+        let values = core::array::from_fn(|n| {
+            let i_q = grid.current(n);
+            let pair = points.windows(2).find(|pair| i_q <= pair[1].0);
+            pair.map_or(last, |p| p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0))
+        });
+        Ok(Self { grid, values })
     }
 
     /// Reference at a quadrature current `i_q`, A.
     pub fn at(&self, i_q: f32) -> f32 {
-        odd(i_q, between(&self.q, self.grid.place(i_q)))
+        odd(i_q, between(&self.values, self.grid.place(i_q)))
     }
-}
-
-impl Default for ReferenceTable {
-    /// Learned on the simulated motor of Table 5 with a flux-fixed saliency of -3.5 % (experiment
-    /// `learn-reference`): it belongs to that motor.
-    fn default() -> Self {
-        const LEARNED: [f32; POINTS] = [
-            0.0, 0.01617, 0.02813, 0.03534, 0.03926, 0.04140, 0.04257, 0.04319, 0.04349, 0.04359,
-            0.04356, 0.04345, 0.04328, 0.04308, 0.04308, 0.04308,
-        ];
-        Self { grid: Grid::REFERENCE, q: LEARNED }
-    }
-}
-
-impl ReferenceTable {
-    /// The default in proportion to the largest regulated current, A peak: a beginning until the motor's own is
-    /// learned.
-    pub fn guessed(largest_a: f32) -> Self {
-        Self { grid: Grid::for_current(largest_a), ..Self::default() }
-    }
-}
-
-/// Samples the line through `points` `(i_q in A, value)` on a grid; constant beyond the last. At least two points
-/// with increasing currents.
-pub(crate) fn sampled(grid: Grid, points: &[(f32, f32)]) -> [f32; POINTS] {
-    core::array::from_fn(|n| {
-        let i_q = grid.current(n);
-        match points.windows(2).find(|pair| i_q <= pair[1].0) {
-            Some(p) => p[0].1 + (p[1].1 - p[0].1) * (i_q - p[0].0) / (p[1].0 - p[0].0),
-            None => points[points.len() - 1].1,
-        }
-    })
 }
 
 /// Linear interpolation of a table at a [`place`](Grid::place).
@@ -187,99 +214,21 @@ pub(crate) fn odd(i_q: f32, q: f32) -> f32 {
     if i_q < 0.0 { -q } else { q }
 }
 
-/// Accepted range of the ratio.
-const RATIO: (f32, f32) = (0.5, 2.0);
-
-/// Carrier current over i_q as a ratio to that at i_q = 0; even.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CarrierTable {
-    grid: Grid,
-    ratio: [f32; POINTS],
-}
-
-impl CarrierTable {
-    /// Table from its values at the points of `grid`; `None` when the first is not 1 or any is outside 0.5 to 2.
-    pub fn from_points(grid: Grid, ratio: [f32; POINTS]) -> Option<Self> {
-        let believable = ratio.iter().all(|r| (RATIO.0..=RATIO.1).contains(r));
-        (ratio[0] == 1.0 && believable).then_some(Self { grid, ratio })
-    }
-
-    /// The torque currents of the points.
-    pub fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    /// The values at the points.
-    pub fn points(&self) -> &[f32; POINTS] {
-        &self.ratio
-    }
-}
-
-impl Default for CarrierTable {
-    /// Learned on the simulated motor of Table 5 together with the default
-    /// [`ReferenceTable`]: it belongs to that motor.
-    fn default() -> Self {
-        const LEARNED: [f32; POINTS] = [
-            1.0, 1.00233, 1.0137, 1.02747, 1.04167, 1.05552, 1.06871, 1.08156, 1.0942, 1.10684,
-            1.11946, 1.13211, 1.14488, 1.15781, 1.15781, 1.15781,
-        ];
-        Self { grid: Grid::REFERENCE, ratio: LEARNED }
-    }
-}
-
-impl CarrierTable {
-    /// As [`ReferenceTable::guessed`].
-    pub fn guessed(largest_a: f32) -> Self {
-        Self { grid: Grid::for_current(largest_a), ..Self::default() }
-    }
-}
-
-/// Accepted magnitude of the slope, 1/rad.
-const SLOPE: (f32, f32) = (0.001, 0.6);
-
-/// Slope dq/de of the saliency over the angle error over i_q, 1/rad: even, of one sign.
-///
-/// The error e is the angle of the flux less that of the estimated frame, and the slope the slow one: current and flux have
-/// settled at every e. A saliency `a` that is fixed to the flux and to nothing else has the slope 2a; it is negative where
-/// the inductance along the flux is the larger one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlopeTable {
-    grid: Grid,
-    k: [f32; POINTS],
-}
-
 impl SlopeTable {
-    /// Table from its values at the points of `grid`; `None` when one is outside ±(0.001 to 0.6) or has not the sign of
-    /// the first.
-    pub fn from_points(grid: Grid, k: [f32; POINTS]) -> Option<Self> {
-        let believable = |k_n: &f32| (SLOPE.0..=SLOPE.1).contains(&k_n.abs()) && k_n * k[0] > 0.0;
-        k.iter().all(believable).then_some(Self { grid, k })
-    }
-
     /// The slope of a saliency `a` that is fixed to the flux.
     pub fn of_flux_saliency(grid: Grid, a: f32) -> Self {
-        Self { grid, k: [2.0 * a; POINTS] }
-    }
-
-    /// The torque currents of the points.
-    pub fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    /// The values at the points, 1/rad.
-    pub fn points(&self) -> &[f32; POINTS] {
-        &self.k
+        Self { grid, values: [2.0 * a; POINTS] }
     }
 
     /// The slope without torque current, 1/rad.
     pub fn at_rest(&self) -> f32 {
-        self.k[0]
+        self.values[0]
     }
 
     /// The inverses, rad, at most `most` times that without torque current.
     pub(crate) fn inverses(&self, most: f32) -> [f32; POINTS] {
-        let [first, ..] = self.k;
-        self.k.map(|k| {
+        let first = self.at_rest();
+        self.values.map(|k| {
             let ratio = first / k;
             (if ratio < most { ratio } else { most }) / first
         })

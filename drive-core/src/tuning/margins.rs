@@ -4,6 +4,8 @@ use core::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
+use super::bisected;
+
 /// Stability margins of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
@@ -86,12 +88,8 @@ pub(super) fn scan(
     }
 
     let (phase_margin, crossover) = phase_margin?;
-    let n = nearest.2;
-    let (ms_w, least) = if n == 0 {
-        (nearest.0, nearest.1)
-    } else {
-        minimum(&distance, grid(n - 1), grid(if n < LOW + HIGH { n + 1 } else { n }))
-    };
+    let (w, d, n) = nearest;
+    let (ms_w, least) = if n == 0 { (w, d) } else { minimum_near(&distance, n) };
     // Argument principle: with all closed-loop poles inside, the phase of 1 + L changes by +90° per
     // integrator along the upper half circle, and by 180° less per pole outside.
     let stable = 0.5 * PI * f64::from(integrators) - turned < 0.5 * PI;
@@ -131,32 +129,25 @@ pub(super) fn gain_limit(
         };
         if by_ms < by_phase { by_ms } else { by_phase }
     };
-    let mut best = (f64::INFINITY, 0);
-    for n in 0..=LOW + HIGH {
-        let g = limit(grid(n));
-        if g < best.0 {
-            best = (g, n);
-        }
-    }
-    let (from, to) = (best.1.max(1) - 1, if best.1 < LOW + HIGH { best.1 + 1 } else { best.1 });
+    let (least, n) = (0..=LOW + HIGH)
+        .map(|n| (limit(grid(n)), n))
+        .fold((f64::INFINITY, 0), |least, here| if here.0 < least.0 { here } else { least });
     // Where the phase margin limits the gain, the limit jumps to infinity beside its minimum; the golden
     // section still ends on the lower side.
-    let refined = minimum(&limit, grid(from), grid(to)).1;
-    if refined < best.0 { refined } else { best.0 }
+    let (_, refined) = minimum_near(&limit, n);
+    if refined < least { refined } else { least }
 }
 
-/// Zero of `f` between `low` and `high`, by bisection.
-fn crossing(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+/// Zero of `f` between `low` and `high`.
+fn crossing(f: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let sign = f(low) < 0.0;
-    for _ in 0..40 {
-        let middle = 0.5 * (low + high);
-        if (f(middle) < 0.0) == sign {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let (low, high) = bisected((low, high), 40, &|w| (f(w) < 0.0) == sign);
     0.5 * (low + high)
+}
+
+/// The minimum of `f` beside grid point `n`.
+fn minimum_near(f: &dyn Fn(f64) -> f64, n: u32) -> (f64, f64) {
+    minimum(f, grid(n.max(1) - 1), grid((n + 1).min(LOW + HIGH)))
 }
 
 /// Position and value of the minimum of a unimodal function, by golden section.

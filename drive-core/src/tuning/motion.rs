@@ -3,7 +3,7 @@
 use core::f64::consts::{PI, TAU};
 
 use super::margins::{Margins, scan};
-use super::{TuningError, check, check_period, pi_response, zero_at};
+use super::{TuningError, bisected, check, check_period, pi_response, zero_at};
 use num_complex::Complex64;
 
 /// Result of [`design_motion_loops`], with the plant it is for.
@@ -74,26 +74,18 @@ pub fn design_motion_loops(
     let smoothing = tracking.map_or(1.0, |w_n| -libm::expm1(-CORNER * w_n * period_s));
 
     let spare = libm::atan2(SPREAD, 1.0) - phase_margin_deg * (PI / 180.0);
+    // Increases with the frequency.
     let lag = |omega_t: f64| {
         let tracked = tracking.map_or(Complex64::ONE, |w_n| tracked(omega_t / (period_s * w_n)));
         omega_t - tracked.arg() - low_pass(smoothing, omega_t).arg()
     };
-    // The lag increases with the frequency: bisection.
-    let (mut low, mut high) = (0.0, PI);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if lag(middle) < spare {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let (low, _) = bisected((0.0, PI), 50, &|omega_t| lag(omega_t) < spare);
     let crossover = low / period_s;
     let (sin, cos) = libm::sincos(0.5 * low);
     let mut design = MotionDesign {
         k_c: 1.0,
         z_c: zero_at(sin / cos / SPREAD),
-        k_x: 0.0,
+        k_x: crossover / SPREAD,
         crossover,
         acceleration,
         tracking,
@@ -101,7 +93,6 @@ pub fn design_motion_loops(
         period_s,
     };
     design.k_c = 1.0 / design.open_loop(low).norm();
-    design.k_x = crossover / SPREAD;
     Ok(design)
 }
 
@@ -131,10 +122,7 @@ impl MotionDesign {
         let (z, t) = (Complex64::cis(omega_t), self.period_s);
         let rigid = (z + Complex64::ONE) * (0.5 * t * t * self.acceleration)
             / ((z - Complex64::ONE) * (z - Complex64::ONE));
-        match self.tracking {
-            None => rigid,
-            Some(w_n) => rigid * tracked(omega_t / (t * w_n)),
-        }
+        self.tracking.map_or(rigid, |w_n| rigid * tracked(omega_t / (t * w_n)))
     }
 
     /// Open loop of the speed mode at `omega_t` rad/sample.

@@ -19,56 +19,40 @@ use num_complex::Complex64;
 /// assert!(roots.iter().any(|z| (z.re + 2.0).abs() < 1e-12 && z.im.abs() < 1e-12));
 /// ```
 pub fn roots<const N: usize>(c: [f64; N]) -> Option<[Complex64; N]> {
-    // No root lies outside 1 + max |c|.
-    let mut bound = 1.0;
-    for c in c {
-        if !c.is_finite() {
-            return None;
-        }
-        if 1.0 + c.abs() > bound {
-            bound = 1.0 + c.abs();
-        }
+    if !c.iter().all(|c| c.is_finite()) {
+        return None;
     }
+    // No root lies outside 1 + max |c|.
+    let bound = c.iter().fold(1.0, |bound, c| f64::max(bound, 1.0 + c.abs()));
+    let value = |z| c.iter().fold(Complex64::ONE, |v, c| v * z + Complex64::new(*c, 0.0));
     // Start values neither real nor symmetric about the real axis.
     let seed = Complex64::new(0.4, 0.9);
-    let mut roots = [Complex64::ONE; N];
     let mut power = Complex64::new(bound, 0.0);
-    for r in &mut roots {
+    let mut roots = [Complex64::ONE; N].map(|_| {
         power *= seed;
-        *r = power;
-    }
+        power
+    });
     for _ in 0..1000 {
         let mut moved = 0.0;
         for i in 0..N {
             let here = roots[i];
-            let mut value = Complex64::ONE;
-            for c in c {
-                value = value * here + Complex64::new(c, 0.0);
-            }
             let mut others = Complex64::ONE;
-            for (j, other) in roots.iter().enumerate() {
-                if j != i {
-                    others *= here - *other;
-                }
+            for (_, other) in roots.iter().enumerate().filter(|(j, _)| *j != i) {
+                others *= here - *other;
             }
             if others == Complex64::default() {
                 // Two estimates coincide: separate them.
                 others = Complex64::new(1e-12, 1e-12);
             }
-            let step = value / others;
+            let step = value(here) / others;
             roots[i] = here - step;
-            if step.norm() > moved {
-                moved = step.norm();
-            }
+            moved = f64::max(moved, step.norm());
         }
         if moved < 1e-14 * bound {
             return Some(roots);
         }
     }
     // Multiple roots converge slowly; accept them if the residual is at the level of rounding.
-    let close = |r: &Complex64| {
-        let value = c.iter().fold(Complex64::ONE, |v, c| v * *r + Complex64::new(*c, 0.0));
-        value.norm() <= 1e-10 * (0..N).fold(1.0, |power, _| power * bound)
-    };
-    roots.iter().all(close).then_some(roots)
+    let rounding = 1e-10 * (0..N).fold(1.0, |power, _| power * bound);
+    roots.iter().all(|root| value(*root).norm() <= rounding).then_some(roots)
 }

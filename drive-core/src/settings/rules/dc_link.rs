@@ -1,6 +1,6 @@
 //! The rules for the voltages of the dc link.
 
-use super::{WITHIN, or_rule};
+use super::WITHIN;
 use crate::dc_link::{ChopperSettings, DcLinkSettings};
 use crate::io::{CONVERTER_CODES, periods};
 use crate::settings::Settings;
@@ -16,12 +16,14 @@ const BAND: f32 = 0.64;
 /// Largest change of a dc link that counts as steady, with 311 V.
 const STEADY_V: f32 = 5.0;
 
-impl Settings {
-    /// Largest dc link without generating torque, in relation to the voltage that trips.
-    pub(in crate::settings) const HIGH_OF_TRIP: f32 = 0.975;
-    /// Least dc link without motoring torque, likewise.
-    pub(in crate::settings) const LOW_OF_TRIP: f32 = 1.15;
+/// Largest dc link without generating torque, in relation to the voltage that trips.
+const HIGH_OF_TRIP: f32 = 0.975;
+/// Least dc link without motoring torque, likewise.
+pub(in crate::settings) const LOW_OF_TRIP: f32 = 1.15;
+/// `braking.high_v` and `.low_v` stay this far from their neighbours.
+pub(in crate::settings) const MARGIN: f32 = 0.05;
 
+impl Settings {
     /// Highest dc link that the power stage stands in operation, V.
     pub fn highest_dc_link_v(&self) -> f32 {
         self.scales.dc_link.at(self.scales.dc_link_highest)
@@ -33,39 +35,38 @@ impl Settings {
     }
 
     /// Largest dc link above which the drive may trip, V.
-    pub(in crate::settings) fn dc_over_max_v(&self) -> f32 {
+    fn dc_over_max_v(&self) -> f32 {
         f32::min(OVER_OF_HIGHEST * self.highest_dc_link_v(), self.dc_link_range_v())
     }
 
-    /// Dc link above which the drive trips, V.
-    pub fn dc_over_v(&self) -> f32 {
+    /// Rule of `limits.dc_over_v`.
+    pub(in crate::settings) fn dc_over_rule(&self) -> f32 {
         let board = f32::min(WITHIN * self.dc_over_max_v(), 0.95 * self.dc_link_range_v());
-        let rule = || f32::min(self.share_of_dc_link(400.0), board);
-        or_rule(self.limits.dc_over_v, rule)
+        f32::min(self.share_of_dc_link(400.0), board)
     }
 
-    /// Dc link below which the drive trips while the outputs are on, V.
-    pub fn dc_under_v(&self) -> f32 {
-        or_rule(self.limits.dc_under_v, || self.share_of_dc_link(200.0))
+    /// Range of `limits.dc_over_v`: it leaves room for `braking.high_v`, which follows from it or is set.
+    pub(in crate::settings) fn dc_over_range(&self) -> (f32, f32) {
+        let high = self.braking.high_v.map_or(HIGH_OF_TRIP, |_| 1.0);
+        ((1.0 + MARGIN) / high * self.inverter.dc_link_v, self.dc_over_max_v())
     }
 
-    /// Dc link without generating torque, V.
-    pub fn dc_high_v(&self) -> f32 {
-        let board =
-            f32::min(Self::HIGH_OF_TRIP * self.dc_over_v(), WITHIN * self.highest_dc_link_v());
-        or_rule(self.braking.high_v, || f32::min(self.share_of_dc_link(390.0), board))
+    /// Range of `limits.dc_under_v`: it leaves room for `braking.low_v`, likewise.
+    pub(in crate::settings) fn dc_under_range(&self) -> (f32, f32) {
+        let low = self.braking.low_v.map_or(LOW_OF_TRIP, |_| 1.0 + MARGIN);
+        (5.0, f32::min((1.0 - MARGIN) / low * self.inverter.dc_link_v, self.dc_over_v()))
     }
 
-    /// Dc link without motoring torque, V.
-    pub fn dc_low_v(&self) -> f32 {
-        let rule = || f32::max(self.share_of_dc_link(260.0), Self::LOW_OF_TRIP * self.dc_under_v());
-        or_rule(self.braking.low_v, rule)
+    /// Rule of `braking.high_v`.
+    pub(in crate::settings) fn dc_high_rule(&self) -> f32 {
+        let board = f32::min(HIGH_OF_TRIP * self.dc_over_v(), WITHIN * self.highest_dc_link_v());
+        f32::min(self.share_of_dc_link(390.0), board)
     }
 
-    /// Direct current that is added while generating torque is limited, A.
-    pub fn braking_flux_a(&self) -> f32 {
-        let rule = || f32::min(self.share_of_rated(1.0), WITHIN * self.current_limit_a());
-        or_rule(self.braking.flux_a, rule)
+    /// Range of `braking.high_v`.
+    pub(in crate::settings) fn dc_high_range(&self) -> (f32, f32) {
+        let nominal = self.inverter.dc_link_v;
+        (nominal + MARGIN * nominal, f32::min(self.dc_over_v(), self.highest_dc_link_v()))
     }
 
     /// The precharge relay, which opens where the drive trips.
