@@ -52,24 +52,6 @@ impl<const N: usize> Sos<N> {
         Self { sections }
     }
 
-    /// Cascade with `b0` = 1 in all sections but the last, which carries the whole gain: with constant
-    /// coefficients the multiplications by 1 vanish. Rows as in [`Sos::from_f64`].
-    pub const fn with_gain_last(rows: &[[f64; 5]; N]) -> Self {
-        let mut rows = *rows;
-        let mut n = 0;
-        while n + 1 < N {
-            let b0 = rows[n][0];
-            let mut k = 0;
-            while k < 3 {
-                rows[n][k] /= b0;
-                rows[N - 1][k] *= b0;
-                k += 1;
-            }
-            n += 1;
-        }
-        Self::from_f64(&rows)
-    }
-
     /// The filter scaled to H(1) = 1. The last section is scaled, so the signal range before it does not
     /// change; its three numerator coefficients are rounded once more.
     pub const fn with_unit_dc_gain(mut self) -> Self {
@@ -91,15 +73,8 @@ impl<const N: usize> Sos<N> {
     }
 
     /// Whether all poles lie inside the unit circle.
-    pub const fn is_stable(&self) -> bool {
-        let mut n = 0;
-        while n < N {
-            if !self.sections[n].is_stable() {
-                return false;
-            }
-            n += 1;
-        }
-        true
+    pub fn is_stable(&self) -> bool {
+        self.sections.iter().all(Section::is_stable)
     }
 
     /// Filters one sample, any unit; a vector component by component.

@@ -123,16 +123,3 @@ fn responses_of_trivial_cascades() {
         assert!(!Sos { sections: [Section::IDENTITY, section] }.is_stable());
     }
 }
-
-/// The gain may stand in any section.
-#[test]
-fn the_gain_of_a_cascade_can_be_put_last() {
-    let rows =
-        [[0.5, 0.2, 0.1, -0.3, 0.4], [0.25, -0.1, 0.2, 0.1, 0.2], [3.0, 1.0, 0.5, -0.5, 0.1]];
-    let (plain, last) = (Sos::from_f64(&rows), Sos::with_gain_last(&rows));
-    for k in 0..10 {
-        let w = 0.3 * f64::from(k);
-        assert!((plain.response(w) / last.response(w) - 1.0).norm() < 1e-6);
-    }
-    assert_eq!(last.sections.map(|section| section.b0), [1.0, 1.0, 0.375]);
-}
