@@ -122,10 +122,10 @@ struct Sums {
     signal: f32,
     /// Squares of the carrier current, A^2.
     carrier: f32,
-    /// Parts in phase with the sine and the cosine of twice the angle of the injection axis.
-    once: [f32; 2],
+    /// Parts in phase with cosine (d) and sine (q) of twice the angle of the injection axis.
+    twice: Dq,
     /// The same of four times that angle.
-    twice: [f32; 2],
+    four_times: Dq,
     voltage: Dq,
 }
 
@@ -242,13 +242,10 @@ impl Learning {
         s.turned += sample.flux_freq;
         s.voltage += sample.voltage;
         if point.turns {
-            let four = twice.turned_by(twice);
             s.signal += sample.signal;
             s.carrier += sample.carrier_squared;
-            s.once[0] += sample.signal * twice.sin;
-            s.once[1] += sample.signal * twice.cos;
-            s.twice[0] += sample.signal * four.sin;
-            s.twice[1] += sample.signal * four.cos;
+            s.twice += twice * sample.signal;
+            s.four_times += twice.turned_by(twice) * sample.signal;
         } else {
             let known = &state.turning;
             s.signal += sample.signal - known.sin * twice.sin - known.cos * twice.cos;
@@ -281,11 +278,10 @@ impl Learning {
         if point.turns {
             if state.point <= 2 * TURNING {
                 let share = mean / self.points.clamp(1, TURNING) as f32;
-                state.turning.sin += share * s.once[0];
-                state.turning.cos += share * s.once[1];
+                state.turning.sin += share * s.twice.q;
+                state.turning.cos += share * s.twice.d;
             }
-            let [sin, cos] = s.twice.map(|sum| 2.0 * sum * mean);
-            let ripple = sin * sin + cos * cos;
+            let ripple = (s.four_times * (2.0 * mean)).length_squared();
             if ripple > state.ripple {
                 state.ripple = ripple;
             }

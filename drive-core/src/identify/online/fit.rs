@@ -4,6 +4,7 @@
 
 use crate::identify::rls::Rls;
 use crate::identify::rls::ud::N;
+use crate::math::limited;
 use num_complex::Complex32;
 
 /// Fitted parameters.
@@ -97,15 +98,6 @@ impl Machine {
         }
         let Solution { step, information } = solve(&columns, first)?;
         // The step is limited; the next calls continue.
-        let limited = |x: f32, limit: f32| {
-            if x > limit {
-                limit
-            } else if x < -limit {
-                -limit
-            } else {
-                x
-            }
-        };
         let unknowns = Unknowns {
             rate: from.rate + limited(step[2] * scale.rate, 0.3 * from.rate),
             r_s: from.r_s + limited(step[1], 0.3) * scale.r_s,
