@@ -18,17 +18,10 @@ pub const CARRIER_COS: [f32; CARRIER_SAMPLES] = [
 ];
 
 /// `sin(2 pi k / 10)`.
+#[rustfmt::skip]
 pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
-    0.0,
-    0.587_785_24,
-    0.951_056_5,
-    0.951_056_5,
-    0.587_785_24,
-    0.0,
-    -0.587_785_24,
-    -0.951_056_5,
-    -0.951_056_5,
-    -0.587_785_24,
+    0.0, 0.587_785_24, 0.951_056_5, 0.951_056_5, 0.587_785_24,
+    0.0, -0.587_785_24, -0.951_056_5, -0.951_056_5, -0.587_785_24,
 ];
 
 /// Coefficients of the injection: the carrier tabulated over one carrier period.
