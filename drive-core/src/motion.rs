@@ -250,13 +250,8 @@ impl Motion {
                 }
                 state.pi.back_calculate(state.output - wanted);
                 state.acceleration = step * (1.0 / DIVIDER as f32);
-                state.rest = if state.ramp.reference != 0.0 || state.speed.abs() >= REST {
-                    0
-                } else if state.rest < REST_STEPS {
-                    state.rest + 1
-                } else {
-                    REST_STEPS
-                };
+                let moves = state.ramp.reference != 0.0 || state.speed.abs() >= REST;
+                state.rest = if moves { 0 } else { REST_STEPS.min(state.rest.saturating_add(1)) };
             }
             _ => {}
         }

@@ -148,7 +148,7 @@ pub struct VoltsPerHertz {
 }
 
 /// State.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct VoltsPerHertzState {
     angle: Angle,
     /// Ramped frequency, without the slip.
@@ -170,33 +170,10 @@ pub struct VoltsPerHertzState {
     stalled: u32,
     /// Whether the motor has pulled out.
     recovers: bool,
-    /// Share of the flux that the reactive current leaves.
+    /// Share of the flux that the reactive current leaves; the boost sets it to 1.
     flux: f32,
     /// Whether the dc link has no more voltage at this frequency.
     pub by_voltage: bool,
-}
-
-impl Default for VoltsPerHertzState {
-    fn default() -> Self {
-        let (angle, zero) = (Angle::ZERO, Dq::ZERO);
-        Self {
-            angle,
-            ramp: 0.0,
-            freq: 0.0,
-            slip: 0.0,
-            boost: 0.0,
-            held: 0,
-            fast: zero,
-            slow: zero,
-            backwards: zero,
-            measured: 0,
-            beyond: 0,
-            stalled: 0,
-            recovers: false,
-            flux: 1.0,
-            by_voltage: false,
-        }
-    }
 }
 
 /// Demand and limits of a period.
@@ -310,11 +287,9 @@ impl VoltsPerHertz {
         if state.boost > self.most_v {
             return Err(Fault::WiringNoCurrent);
         }
-        if error.abs() < BOOST_WITHIN * self.boost_a {
-            state.held += 1;
-        } else {
-            state.held = 0;
-        }
+        let holds = error.abs() < BOOST_WITHIN * self.boost_a;
+        state.held = if holds { state.held + 1 } else { 0 };
+        state.flux = 1.0;
         if self.is_built(state) {
             wired(current)?;
         }
@@ -338,18 +313,15 @@ impl VoltsPerHertz {
         state.beyond = if square > limit { state.beyond + 1 } else { 0 };
         state.recovers |= state.beyond > self.pulled_out;
         state.recovers &= square > RECOVERED * RECOVERED * limit;
-        if state.recovers {
-            state.ramp -= limited(state.ramp, self.recovery);
+        state.ramp += if state.recovers {
+            -limited(state.ramp, self.recovery)
         } else {
-            state.ramp += share * step - self.per_excess * excess;
-        }
+            share * step - self.per_excess * excess
+        };
 
         let at_limit = state.recovers || excess != 0.0 || share < 0.25;
-        if at_limit && state.ramp.abs() < STALLED_BELOW {
-            state.stalled += 4;
-        } else {
-            state.stalled = state.stalled.saturating_sub(1);
-        }
+        let stands = at_limit && state.ramp.abs() < STALLED_BELOW;
+        state.stalled = if stands { state.stalled + 4 } else { state.stalled.saturating_sub(1) };
         if state.stalled > self.stalled { Err(Fault::Stalled) } else { Ok(()) }
     }
 
