@@ -89,6 +89,12 @@ impl Fault {
         self as u8
     }
 
+    /// The result of a check: this fault, unless what was seen is `sound`. A comparison with NaN is not.
+    #[inline]
+    pub(crate) const fn unless(self, sound: bool) -> Result<(), Self> {
+        if sound { Ok(()) } else { Err(self) }
+    }
+
     /// Likely causes, the most likely first.
     pub const fn causes(self) -> &'static [&'static str] {
         remedy(self.code()).0
@@ -101,6 +107,7 @@ impl Fault {
 }
 
 /// Causes and cure of the fault with this number.
+#[expect(clippy::manual_range_patterns, reason = "the build script lists the numbers")]
 const fn remedy(code: u8) -> (&'static [&'static str], &'static str) {
     include!(concat!(env!("OUT_DIR"), "/remedies.rs"))
 }

@@ -322,7 +322,7 @@ impl VoltsPerHertz {
         let at_limit = state.recovers || excess != 0.0 || share < 0.25;
         let stands = at_limit && state.ramp.abs() < STALLED_BELOW;
         state.stalled = if stands { state.stalled + 4 } else { state.stalled.saturating_sub(1) };
-        if state.stalled > self.stalled { Err(Fault::Stalled) } else { Ok(()) }
+        Fault::Stalled.unless(state.stalled <= self.stalled)
     }
 
     /// The voltage of a motor that turns.

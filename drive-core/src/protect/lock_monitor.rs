@@ -210,9 +210,7 @@ impl LockMonitor {
     ) -> Result<Option<f32>, Fault> {
         let carrier = saliency.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
-        if state.weak >= WEAK_PERIODS {
-            return Err(Fault::CarrierWeak);
-        }
+        Fault::CarrierWeak.unless(state.weak < WEAK_PERIODS)?;
         if held {
             let place = self.grid.place(saliency.i_q);
             let carrier = carrier * between(&self.inverse_square, place);
@@ -240,9 +238,8 @@ impl LockMonitor {
         let loss = -deviation * between(&self.per_change, place);
         state.loss += self.smoothing * (loss - state.loss);
         let least = -ALLOWED_GAIN[usize::from(self.is_positive)];
-        // NaN fails the comparisons.
-        let right = state.loss <= self.allowed && state.loss >= least;
-        if right { Ok(Some(deviation)) } else { Err(Fault::LostLock) }
+        Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)?;
+        Ok(Some(deviation))
     }
 
     /// Whether the torque current `i_q`, A, has just moved, so that the loss is not judged.
