@@ -131,8 +131,7 @@ impl CatchState {
         if let Some(place) = self.kept.get_mut(self.count % KEPT) {
             *place = self.sum;
         }
-        let [short, middle, long] = &mut self.correlations;
-        for (sums, (lag, _)) in [(short, SHORT), (middle, MIDDLE), (long, LONG)] {
+        for (sums, (lag, _)) in self.correlations.iter_mut().zip([SHORT, MIDDLE, LONG]) {
             sums.add(lag, &self.kept, self.count);
         }
         self.count += 1;

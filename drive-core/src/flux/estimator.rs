@@ -28,19 +28,6 @@ pub struct ConstantReference {
     pub from: f32,
 }
 
-impl ConstantReference {
-    /// Reference of the current difference at `i_q`, both A.
-    fn at(&self, i_q: f32) -> f32 {
-        if i_q > self.from {
-            self.full
-        } else if i_q < -self.from {
-            -self.full
-        } else {
-            self.slope * i_q
-        }
-    }
-}
-
 /// Reference of the current difference over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
@@ -54,8 +41,10 @@ impl Reference {
     /// Reference of the current difference at `i_q`, both A.
     fn at(&self, i_q: f32) -> f32 {
         match self {
-            Self::Constant(constant) => constant.at(i_q),
             Self::Learned(table) => table.at(i_q),
+            Self::Constant(constant) if i_q > constant.from => constant.full,
+            Self::Constant(constant) if i_q < -constant.from => -constant.full,
+            Self::Constant(constant) => constant.slope * i_q,
         }
     }
 }

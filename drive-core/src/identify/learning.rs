@@ -65,6 +65,9 @@ const LEAST_TAN_LEAD: f32 = 0.15;
 const MOST_TAN_LEAD: f32 = 0.27;
 const LONE_TAN_LEAD: f32 = 0.2;
 
+/// rad/s per turn per control period.
+const RAD_PER_S: f32 = TAU / PERIOD_S;
+
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
@@ -91,8 +94,6 @@ pub struct Learning {
     leakage: f32,
     /// L_m^2 / L_r, H.
     coupled: f32,
-    /// rad/s per turn per control period.
-    rad_per_s: f32,
 }
 
 /// Input of the learning, one per control period.
@@ -212,7 +213,6 @@ impl Learning {
             tau_r: motor.tau_r(),
             leakage: motor.l_ls + motor.l_m - coupled,
             coupled,
-            rad_per_s: TAU / PERIOD_S,
         }
     }
 
@@ -313,7 +313,7 @@ impl Learning {
     /// Whether a free shaft follows the current, by the mean direct voltage, V, of a pair without lead and the slip, turns
     /// per period.
     fn follows(&self, state: &mut LearningState, point: Point, voltage: f32, slip: f32) -> bool {
-        let x = self.rad_per_s * slip.abs() * self.grid.current(point.n);
+        let x = RAD_PER_S * slip.abs() * self.grid.current(point.n);
         let direct = voltage + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
         let free_shaft_v = self.coupled * (x - first_x);
