@@ -47,11 +47,8 @@ use crate::math::frames::DmQm;
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
 pub trait Demodulate {
-    /// The demodulated signal.
-    type Output: Into<f32>;
-
-    /// Demodulates one sample.
-    fn step(&mut self, sample: &CarrierSample) -> Self::Output;
+    /// Demodulates one sample; returns the demodulated signal.
+    fn step(&mut self, sample: &CarrierSample) -> f32;
 }
 
 /// The selected demodulator. The synchronous one is always present beside it, in the estimator.

@@ -35,8 +35,6 @@ pub struct Envelope {
 }
 
 impl Demodulate for Envelope {
-    type Output = f32;
-
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let now = rotated_carrier(&mut self.band_pass, sample);
         let [last, before] = self.before;

@@ -22,8 +22,6 @@ pub struct PrintedChain<const RECTIFIED: bool> {
 }
 
 impl<const RECTIFIED: bool> Demodulate for PrintedChain<RECTIFIED> {
-    type Output = f32;
-
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let carrier = BPF.step(&mut self.band_pass, sample.current);
         let i = carrier.to_dm_qm(sample.dm_axis());

@@ -58,8 +58,6 @@ impl RmsImpedance {
 }
 
 impl Demodulate for RmsImpedance {
-    type Output = f32;
-
     fn step(&mut self, sample: &CarrierSample) -> f32 {
         let i = rotated_carrier(&mut self.band_pass, sample);
         // The carrier voltage lies on the bisector: equal components in both channels.
