@@ -135,11 +135,9 @@ impl WiringCheck {
         Fault::WiringCurrent.unless(phases.a.abs() < allowed && phases.b.abs() < allowed)?;
         let sign = if state.pulse.is_multiple_of(2) { 1.0 } else { -1.0 };
         let leg = (state.pulse / 2 % 3) as usize;
-        if risen == self.rise
-            && let Some(answer) = state.answers.get_mut(leg)
-        {
-            answer[0] += sign * phases.a;
-            answer[1] += sign * phases.b;
+        if risen == self.rise {
+            state.answers[leg][0] += sign * phases.a;
+            state.answers[leg][1] += sign * phases.b;
         }
         let volts = if state.period < self.rise {
             sign * self.volts
@@ -157,8 +155,7 @@ impl WiringCheck {
                 return Ok(WiringAction::Ended);
             }
         }
-        let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
-        Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
+        Ok(WiringAction::Apply { voltage: AXES[leg] * volts, current: AXES[leg] * flowing })
     }
 
     /// Evaluates the [answers](WiringCheckState::answers).
