@@ -245,9 +245,8 @@ impl VoltsPerHertz {
     ) -> Result<Turned, Fault> {
         let axis = state.angle.unit_vector();
         let seen = current.to_dq(axis);
-        let follow = |mean: &mut Dq, now: Dq, share: f32| *mean += (now - *mean) * share;
-        follow(&mut state.fast, seen, FAST);
-        follow(&mut state.slow, state.fast, SLOW);
+        state.fast += (seen - state.fast) * FAST;
+        state.slow += (state.fast - state.slow) * SLOW;
         let turning = self.is_built(state);
         let mut voltage = if turning {
             let backwards = current.to_dq(UnitVector { cos: axis.cos, sin: -axis.sin });
