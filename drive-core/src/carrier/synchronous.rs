@@ -38,28 +38,16 @@ pub const AVERAGES_LAG: f32 = 20.0;
 /// Mixed current: real and imaginary part along the axis, real and imaginary part across it.
 type Mixed = [f32; 4];
 
-/// The two sums `S` and `D` over a carrier period, A.
-#[derive(Clone, Copy, Debug, Default)]
-struct Period {
-    sum: Mixed,
-    ramp: Mixed,
-}
+/// Contributions of earlier carrier periods to the average of one signal, A: its state in transposed form.
+type Earlier = [f32; 3];
 
-/// State of the average of one signal in transposed form: contributions of earlier carrier periods, A.
-#[derive(Clone, Copy, Debug, Default)]
-struct Average {
-    earlier: [f32; 3],
-}
-
-impl Average {
-    /// Adds one carrier period and returns the average, times [`WEIGHTS`].
-    fn step(&mut self, sum: f32, ramp: f32) -> f32 {
-        const N: f32 = CARRIER_SAMPLES as f32;
-        let [one, two, three] = self.earlier;
-        let (level, falling) = (N * sum, N * sum - ramp);
-        self.earlier = [level + ramp + two, level + falling + three, falling];
-        ramp + one
-    }
+/// Adds one carrier period and returns the average, times [`WEIGHTS`].
+fn average(earlier: &mut Earlier, sum: f32, ramp: f32) -> f32 {
+    const N: f32 = CARRIER_SAMPLES as f32;
+    let [one, two, three] = *earlier;
+    let (level, falling) = (N * sum, N * sum - ramp);
+    *earlier = [level + ramp + two, level + falling + three, falling];
+    ramp + one
 }
 
 /// Sum of the weights of the averages: two times twenty samples.
@@ -68,11 +56,12 @@ const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    /// The present carrier period.
-    period: Period,
+    /// The sums `S` and `D` over the present carrier period, A.
+    sum: Mixed,
+    ramp: Mixed,
     /// Sum over the previous carrier period, A.
     last: Mixed,
-    averages: [Average; 4],
+    earlier: [Earlier; 4],
     /// X and Y, times [`WEIGHTS`], A.
     mean: Mixed,
     i_q_earlier: [f32; 3],
@@ -86,8 +75,7 @@ impl SynchronousState {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
         let mixed = [along * c, along * s, across * c, across * s];
-        let Period { sum, ramp } = &mut self.period;
-        for ((sum, ramp), x) in sum.iter_mut().zip(ramp).zip(mixed) {
+        for ((sum, ramp), x) in self.sum.iter_mut().zip(&mut self.ramp).zip(mixed) {
             *sum += x;
             *ramp += *sum;
         }
@@ -95,12 +83,11 @@ impl SynchronousState {
 
     /// Updates the averages and restarts the sums; called once per carrier period, after its last sample.
     pub fn average(&mut self) {
-        let Period { sum, ramp } = &mut self.period;
-        for n in 0..sum.len() {
-            self.mean[n] = self.averages[n].step(sum[n], ramp[n]);
-            self.last[n] = sum[n];
-            (sum[n], ramp[n]) = (0.0, 0.0);
+        for n in 0..self.sum.len() {
+            self.mean[n] = average(&mut self.earlier[n], self.sum[n], self.ramp[n]);
         }
+        self.last = self.sum;
+        (self.sum, self.ramp) = ([0.0; 4], [0.0; 4]);
     }
 
     /// Averages the reference of the quadrature current, `now`, A, over four carrier periods with weights
