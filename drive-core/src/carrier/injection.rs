@@ -5,12 +5,15 @@
 //! carrier to a `share` of it, and reports when less than half would remain.
 
 use crate::fault::Fault;
+use crate::io::PERIOD_S;
 use crate::math::frames::Dq;
 use crate::tuning::FirstOrder;
 use num_complex::Complex64;
 
 /// Samples per period of the carrier.
 pub const CARRIER_SAMPLES: usize = 10;
+/// Period of the carrier, s.
+pub const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 
 /// `cos(2 pi k / 10)`.
 pub const CARRIER_COS: [f32; CARRIER_SAMPLES] = [
