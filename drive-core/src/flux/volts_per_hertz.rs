@@ -23,8 +23,6 @@
 //!
 //! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate alone: half the rated speed within 1 % of
 //! the rated one without load, within 3 % with 0.3 of the rated torque.
-//!
-//! More than 400 lines, because the six equations share one state and most of the text explains them.
 
 use crate::fault::Fault;
 use crate::io::PERIOD_S;
