@@ -13,14 +13,14 @@ use drive_core::{AlphaBeta, Angle};
 use hil_sim::rig::{RATE_HZ, Rig, wrapped_degrees};
 
 /// One step of a chain, dm along `axis`.
-fn step(chain: &mut impl Demodulate<Output = f32>, current: AlphaBeta, axis: Angle) -> f32 {
+fn step(chain: &mut impl Demodulate, current: AlphaBeta, axis: Angle) -> f32 {
     let axis = (axis + Angle::EIGHTH).unit_vector();
     chain.step(&CarrierSample { current, axis, carrier: CarrierPeriod::default() })
 }
 
 /// Mean output, A, of a chain fed with the true current, its injection axis at phi2 - theta = `x`
 /// rad.
-fn delta_i(rig: &mut Rig, mut chain: impl Demodulate<Output = f32>, x: f64) -> f64 {
+fn delta_i(rig: &mut Rig, mut chain: impl Demodulate, x: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for k in 0..1500 {
         let i = rig.plant.current();

@@ -169,20 +169,18 @@ impl Motion {
     /// Takes over from whatever gave the torque current `i_q`, A, with the rotor at `count` and `speed`, turns/s: the speed
     /// loop goes on from both, with the acceleration that it had.
     pub fn take_over(&self, state: &mut MotionState, count: u32, speed: f32, i_q: f32) {
-        let MotionState { acceleration, origin, .. } = *state;
-        let step = acceleration * f32::from(DIVIDER);
+        let step = state.acceleration * f32::from(DIVIDER);
         *state = MotionState {
             pi: PiState::at_rest(i_q - self.forward * step),
             ramp: RampState::at(speed, step),
-            acceleration,
             speed,
             wanted: speed,
-            origin,
             // The speed is known to the last period.
             last: Some(count),
             phase: 1,
             rest: 0,
             output: i_q,
+            ..*state
         };
     }
 
@@ -250,13 +248,8 @@ impl Motion {
                 }
                 state.pi.back_calculate(state.output - wanted);
                 state.acceleration = step * (1.0 / DIVIDER as f32);
-                state.rest = if state.ramp.reference != 0.0 || state.speed.abs() >= REST {
-                    0
-                } else if state.rest < REST_STEPS {
-                    state.rest + 1
-                } else {
-                    REST_STEPS
-                };
+                let moves = state.ramp.reference != 0.0 || state.speed.abs() >= REST;
+                state.rest = if moves { 0 } else { REST_STEPS.min(state.rest.saturating_add(1)) };
             }
             _ => {}
         }

@@ -97,7 +97,7 @@ fn the_integrator_stops_below_the_stated_error() {
     let moves = |e: f32| {
         let mut state = PiState::default();
         pi.step(&mut state, e);
-        state.back_calculate(180.0 - state.output());
+        state.back_calculate(180.0 - state.output);
         pi.step(&mut state, e) != 180.0
     };
     assert!(!moves(2.5e-6) && moves(3.5e-6));
@@ -120,9 +120,9 @@ proptest! {
             both.back_calculate(applied - u);
             d.back_calculate(applied.d - u_d);
             q.back_calculate(applied.q - u_q);
-            prop_assert_eq!(both.output(), Dq::new(d.output(), q.output()));
+            prop_assert_eq!(Dq::new(both.d.output, both.q.output), Dq::new(d.output, q.output));
             // Never wound up beyond the limit, but for rounding.
-            prop_assert!(d.output().abs() <= limit * 1.000_001 + 1e-4);
+            prop_assert!(d.output.abs() <= limit * 1.000_001 + 1e-4);
         }
     }
 
@@ -138,7 +138,7 @@ proptest! {
         }
         // And with no error it holds its output for ever.
         pi.step(&mut told, 0.0);
-        let held = told.output();
+        let held = told.output;
         for _ in 0..10_000 {
             prop_assert_eq!(pi.step(&mut told, 0.0), held);
         }

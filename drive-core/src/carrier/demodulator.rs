@@ -35,22 +35,20 @@ mod printed;
 mod rms_impedance;
 
 pub use envelope::Envelope;
-pub use printed::{Literal, Rectified};
+pub use printed::{Literal, PrintedChain, Rectified};
 pub use rms_impedance::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES, RmsImpedance};
 
 #[cfg(doc)]
 use crate::carrier::synchronous::SynchronousState;
 use crate::carrier::{CarrierSample, DemodulatorKind};
-use crate::filter::dissertation::{BPF, BpfState, PP, PpState};
-use crate::math::frames::{AlphaBeta, DmQm};
+use crate::filter::dissertation::BPF;
+use crate::filter::sos::SosState;
+use crate::math::frames::DmQm;
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
 pub trait Demodulate {
-    /// The demodulated signal.
-    type Output: Into<f32>;
-
-    /// Demodulates one sample.
-    fn step(&mut self, sample: &CarrierSample) -> Self::Output;
+    /// Demodulates one sample; returns the demodulated signal.
+    fn step(&mut self, sample: &CarrierSample) -> f32;
 }
 
 /// The selected demodulator. The synchronous one is always present beside it, in the estimator.
@@ -73,15 +71,12 @@ impl Demodulator {
     /// [`RmsImpedance`]. In place, because a move of the large state takes longer than its
     /// initialisation.
     pub fn start(&mut self, tracking: DemodulatorKind, rms_samples: u8) {
+        use DemodulatorKind as Kind;
         match tracking {
-            DemodulatorKind::Literal | DemodulatorKind::Synchronous => {
-                *self = Self::Literal(Literal::default())
-            }
-            DemodulatorKind::Rectified => *self = Self::Rectified(Rectified::default()),
-            DemodulatorKind::RmsImpedance => {
-                *self = Self::RmsImpedance(RmsImpedance::new(rms_samples))
-            }
-            DemodulatorKind::Envelope => *self = Self::Envelope(Envelope::default()),
+            Kind::Literal | Kind::Synchronous => *self = Self::Literal(Literal::default()),
+            Kind::Rectified => *self = Self::Rectified(Rectified::default()),
+            Kind::RmsImpedance => *self = Self::RmsImpedance(RmsImpedance::new(rms_samples)),
+            Kind::Envelope => *self = Self::Envelope(Envelope::default()),
         }
     }
 }
@@ -92,33 +87,14 @@ impl Default for Demodulator {
     }
 }
 
-/// The band-pass [`BPF`] on a vector.
-#[derive(Clone, Copy, Debug, Default)]
-struct BandPass(BpfState);
+/// State of the band-pass on the currents of the dm and qm channels.
+type RotatedBandPass = SosState<DmQm, 2>;
 
-impl BandPass {
-    fn step(&mut self, x: AlphaBeta) -> AlphaBeta {
-        BPF.step(&mut self.0, x)
-    }
-
-    /// Carrier currents of the dm and qm channels, A, filtered after the rotation as in Figure 9. In
-    /// this order the filter delays the saliency but not the angle of the frame, and the speed of the
-    /// frame does not appear.
-    fn step_rotated(&mut self, sample: &CarrierSample) -> DmQm {
-        let i = sample.current.to_dm_qm(sample.dm_axis());
-        let carrier = self.step(AlphaBeta { alpha: i.dm, beta: i.qm });
-        DmQm { dm: carrier.alpha, qm: carrier.beta }
-    }
-}
-
-/// The post-processing filter [`PP`].
-#[derive(Clone, Copy, Debug, Default)]
-struct PostFilter(PpState);
-
-impl PostFilter {
-    fn step(&mut self, x: f32) -> f32 {
-        PP.step(&mut self.0, x)
-    }
+/// Carrier currents of the dm and qm channels, A, filtered after the rotation as in Figure 9. In
+/// this order the filter delays the saliency but not the angle of the frame, and the speed of the
+/// frame does not appear.
+fn rotated_carrier(state: &mut RotatedBandPass, sample: &CarrierSample) -> DmQm {
+    BPF.step(state, sample.current.to_dm_qm(sample.dm_axis()))
 }
 
 #[cfg(test)]

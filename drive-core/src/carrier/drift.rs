@@ -19,7 +19,7 @@
 //! 2 to 6 s from the start on).
 
 use crate::carrier::asymmetry::Asymmetry;
-use crate::carrier::injection::CARRIER_SAMPLES;
+use crate::carrier::injection::CARRIER_S;
 use crate::io::PERIOD_S;
 use crate::math::angle::UnitVector;
 use crate::math::limited;
@@ -34,8 +34,6 @@ const LARGEST_PER_SLOPE: f32 = 0.25;
 const LEAST_FREQ: f32 = 0.2 * PERIOD_S;
 /// Largest mean frequency that is remembered: a flux that stops is noticed within 0.2 s.
 const LARGEST_MEAN_FREQ: f32 = 1.5 * LEAST_FREQ;
-/// Carrier period, s.
-const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 /// Shares of the newest value in the means of the ratio, 1 s, and of the frequency, 0.5 s.
 const MEAN_SHARE: f32 = CARRIER_S;
 const FREQ_SHARE: f32 = CARRIER_S / 0.5;

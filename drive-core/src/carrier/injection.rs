@@ -4,12 +4,16 @@
 //! The fundamental may leave too little voltage for the full amplitude. [`Carrier::fit`] then reduces the
 //! carrier to a `share` of it, and reports when less than half would remain.
 
+use crate::fault::Fault;
+use crate::io::PERIOD_S;
 use crate::math::frames::Dq;
 use crate::tuning::FirstOrder;
 use num_complex::Complex64;
 
 /// Samples per period of the carrier.
 pub const CARRIER_SAMPLES: usize = 10;
+/// Period of the carrier, s.
+pub const CARRIER_S: f32 = CARRIER_SAMPLES as f32 * PERIOD_S;
 
 /// `cos(2 pi k / 10)`.
 pub const CARRIER_COS: [f32; CARRIER_SAMPLES] = [
@@ -18,17 +22,10 @@ pub const CARRIER_COS: [f32; CARRIER_SAMPLES] = [
 ];
 
 /// `sin(2 pi k / 10)`.
+#[rustfmt::skip]
 pub const CARRIER_SIN: [f32; CARRIER_SAMPLES] = [
-    0.0,
-    0.587_785_24,
-    0.951_056_5,
-    0.951_056_5,
-    0.587_785_24,
-    0.0,
-    -0.587_785_24,
-    -0.951_056_5,
-    -0.951_056_5,
-    -0.587_785_24,
+    0.0, 0.587_785_24, 0.951_056_5, 0.951_056_5, 0.587_785_24,
+    0.0, -0.587_785_24, -0.951_056_5, -0.951_056_5, -0.587_785_24,
 ];
 
 /// Coefficients of the injection: the carrier tabulated over one carrier period.
@@ -97,10 +94,6 @@ impl Default for Carrier {
     }
 }
 
-/// The fundamental leaves too little voltage for the carrier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InsufficientHeadroom;
-
 /// Decrease of the share per carrier period. Fast: a voltage outside the hexagon is shortened, which
 /// rotates the carrier.
 const SHARE_DOWN: f32 = 1.0 / 16.0;
@@ -134,13 +127,13 @@ impl Carrier {
     /// period. `largest` is the largest vector that the inverter realises in every direction, V peak.
     ///
     /// # Errors
-    /// [`InsufficientHeadroom`] when less than half of the amplitude fits.
+    /// [`Fault::CarrierNoRoom`] when less than half of the amplitude fits.
     pub fn fit(
         &mut self,
         injection: &Injection,
         fundamental: Dq,
         largest: f32,
-    ) -> Result<(), InsufficientHeadroom> {
+    ) -> Result<(), Fault> {
         let at_most_all = |share: f32| if share < 1.0 { share } else { 1.0 };
         let used = fundamental.length_squared();
         let fits = |share: f32| {
@@ -160,7 +153,7 @@ impl Carrier {
             self.unchanged = 0;
             (self.share, self.per_share_squared) = (share, 1.0 / (share * share));
         }
-        if share < LEAST_SHARE { Err(InsufficientHeadroom) } else { Ok(()) }
+        Fault::CarrierNoRoom.unless(share >= LEAST_SHARE)
     }
 
     /// Whether the demodulation averages contain the present share only.
@@ -253,8 +246,8 @@ mod tests {
             let result = result.collect::<Vec<_>>();
             let squared = carrier.share * carrier.share;
             assert!((carrier.per_share_squared * squared - 1.0).abs() < 1e-6);
-            assert!(carrier.is_settled() || result.last() == Some(&Err(InsufficientHeadroom)));
-            (carrier.share, result.contains(&Err(InsufficientHeadroom)))
+            assert!(carrier.is_settled() || result.last() == Some(&Err(Fault::CarrierNoRoom)));
+            (carrier.share, result.contains(&Err(Fault::CarrierNoRoom)))
         };
         assert_eq!(settled(150.0), (1.0, false));
         assert_eq!(settled(140.0), (0.75, false));

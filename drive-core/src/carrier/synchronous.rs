@@ -38,28 +38,16 @@ pub const AVERAGES_LAG: f32 = 20.0;
 /// Mixed current: real and imaginary part along the axis, real and imaginary part across it.
 type Mixed = [f32; 4];
 
-/// The two sums `S` and `D` over a carrier period, A.
-#[derive(Clone, Copy, Debug, Default)]
-struct Period {
-    sum: Mixed,
-    ramp: Mixed,
-}
+/// Contributions of earlier carrier periods to the average of one signal, A: its state in transposed form.
+type Earlier = [f32; 3];
 
-/// State of the average of one signal in transposed form: contributions of earlier carrier periods, A.
-#[derive(Clone, Copy, Debug, Default)]
-struct Average {
-    earlier: [f32; 3],
-}
-
-impl Average {
-    /// Adds one carrier period and returns the average, times [`WEIGHTS`].
-    fn step(&mut self, sum: f32, ramp: f32) -> f32 {
-        const N: f32 = CARRIER_SAMPLES as f32;
-        let [one, two, three] = self.earlier;
-        let (level, falling) = (N * sum, N * sum - ramp);
-        self.earlier = [level + ramp + two, level + falling + three, falling];
-        ramp + one
-    }
+/// Adds one carrier period and returns the average, times [`WEIGHTS`].
+fn average(earlier: &mut Earlier, sum: f32, ramp: f32) -> f32 {
+    const N: f32 = CARRIER_SAMPLES as f32;
+    let [one, two, three] = *earlier;
+    let (level, falling) = (N * sum, N * sum - ramp);
+    *earlier = [level + ramp + two, level + falling + three, falling];
+    ramp + one
 }
 
 /// Sum of the weights of the averages: two times twenty samples.
@@ -68,11 +56,12 @@ const WEIGHTS: f32 = (4 * CARRIER_SAMPLES * CARRIER_SAMPLES) as f32;
 /// State of the demodulation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SynchronousState {
-    /// The present carrier period.
-    period: Period,
+    /// The sums `S` and `D` over the present carrier period, A.
+    sum: Mixed,
+    ramp: Mixed,
     /// Sum over the previous carrier period, A.
     last: Mixed,
-    averages: [Average; 4],
+    earlier: [Earlier; 4],
     /// X and Y, times [`WEIGHTS`], A.
     mean: Mixed,
     i_q_earlier: [f32; 3],
@@ -86,8 +75,7 @@ impl SynchronousState {
         let (along, across) = sample.current.seen_from(sample.axis);
         let (c, s) = (sample.carrier.cos, sample.carrier.sin);
         let mixed = [along * c, along * s, across * c, across * s];
-        let Period { sum, ramp } = &mut self.period;
-        for ((sum, ramp), x) in sum.iter_mut().zip(ramp).zip(mixed) {
+        for ((sum, ramp), x) in self.sum.iter_mut().zip(&mut self.ramp).zip(mixed) {
             *sum += x;
             *ramp += *sum;
         }
@@ -95,12 +83,11 @@ impl SynchronousState {
 
     /// Updates the averages and restarts the sums; called once per carrier period, after its last sample.
     pub fn average(&mut self) {
-        let Period { sum, ramp } = &mut self.period;
-        for n in 0..sum.len() {
-            self.mean[n] = self.averages[n].step(sum[n], ramp[n]);
-            self.last[n] = sum[n];
-            (sum[n], ramp[n]) = (0.0, 0.0);
+        for n in 0..self.sum.len() {
+            self.mean[n] = average(&mut self.earlier[n], self.sum[n], self.ramp[n]);
         }
+        self.last = self.sum;
+        (self.sum, self.ramp) = ([0.0; 4], [0.0; 4]);
     }
 
     /// Averages the reference of the quadrature current, `now`, A, over four carrier periods with weights
@@ -160,16 +147,8 @@ pub(crate) mod tests {
         i_q: f32,
     }
 
-    impl From<Saliency> for f32 {
-        fn from(saliency: Saliency) -> Self {
-            saliency.q
-        }
-    }
-
     impl Demodulate for InTurn {
-        type Output = Saliency;
-
-        fn step(&mut self, sample: &CarrierSample) -> Saliency {
+        fn step(&mut self, sample: &CarrierSample) -> f32 {
             self.state.mix(sample);
             match self.k % CARRIER_SAMPLES {
                 0 => self.state.update_saliency(),
@@ -178,7 +157,7 @@ pub(crate) mod tests {
                 _ => {}
             }
             self.k += 1;
-            self.state.saliency
+            self.state.saliency.q
         }
     }
 
@@ -237,7 +216,7 @@ pub(crate) mod tests {
             x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let noise = (x >> 8) as f32 / 4e6 - 2.0;
             let given = sample(AlphaBeta::new(noise, 0.0), axis, k);
-            let seen = demodulation.step(&given);
+            demodulation.step(&given);
             let (c, s) = (f64::from(given.carrier.cos), f64::from(given.carrier.sin));
             let along = f64::from(noise) * f64::from(given.axis.cos);
             mixed[0].push(2.0 * along * c);
@@ -245,7 +224,7 @@ pub(crate) mod tests {
             if k % 10 == 0 && k > 50 {
                 // As of the last sample of the carrier period before.
                 let [re, im] = mixed.each_ref().map(|m| moving(&moving(m))[k - 1]);
-                let found = f64::from(seen.carrier_squared);
+                let found = f64::from(demodulation.state.saliency.carrier_squared);
                 assert!((found - (re * re + im * im)).abs() < 1e-5 * (1e-2 + found), "{k}");
             }
         }
@@ -258,11 +237,10 @@ pub(crate) mod tests {
             (demodulation.k, demodulation.i_q) = (k, x);
             demodulation.step(&sample(AlphaBeta::new(x, -x), axis, k));
             demodulation.i_q = 0.0;
-            let mut rest = Saliency::default();
             for k in k + 1..k + 65 {
-                rest = demodulation.step(&sample(AlphaBeta::ZERO, axis, k));
+                demodulation.step(&sample(AlphaBeta::ZERO, axis, k));
             }
-            assert_eq!(rest, Saliency::default(), "{x}");
+            assert_eq!(demodulation.state.saliency, Saliency::default(), "{x}");
         }
     }
 

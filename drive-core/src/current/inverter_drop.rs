@@ -118,15 +118,14 @@ impl InverterDrop {
         elapsed: u32,
         sample: &DropSample,
     ) -> Option<f32> {
-        let level = if elapsed < self.until {
-            // The current settles in the first half.
-            if 2 * elapsed < self.until { None } else { Some(0) }
-        } else if elapsed >= self.from {
-            Some(1)
+        let [high, low] = &mut state.levels;
+        // The current settles in the first half.
+        let (level, settles) = if elapsed < self.until {
+            (high, 2 * elapsed < self.until)
         } else {
-            None
+            (low, elapsed < self.from)
         };
-        if let Some(level) = level.and_then(|n| state.levels.get_mut(n)) {
+        if !settles {
             level.voltage +=
                 sample.voltage.d - self.rotor * (sample.current.d - sample.magnetising);
             level.current += sample.current.d;

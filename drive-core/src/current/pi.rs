@@ -41,7 +41,8 @@ pub struct Pi {
 /// State of a PI controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PiState {
-    output: f32,
+    /// Realised output of the last step.
+    pub output: f32,
     error: f32,
 }
 
@@ -71,11 +72,6 @@ impl PiState {
     pub fn back_calculate(&mut self, correction: f32) {
         self.output += correction;
     }
-
-    /// Realised output of the last step.
-    pub fn output(&self) -> f32 {
-        self.output
-    }
 }
 
 /// Coefficients of the current loop in the flux frame: one controller per axis, A peak to V peak.
@@ -90,8 +86,10 @@ pub struct DqPi {
 /// State of the current loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DqPiState {
-    d: PiState,
-    q: PiState,
+    /// Direct axis.
+    pub d: PiState,
+    /// Quadrature axis.
+    pub q: PiState,
 }
 
 impl DqPi {
@@ -113,11 +111,6 @@ impl DqPiState {
     pub fn back_calculate(&mut self, correction: Dq) {
         self.d.back_calculate(correction.d);
         self.q.back_calculate(correction.q);
-    }
-
-    /// Realised voltage of the last step, V peak.
-    pub fn output(&self) -> Dq {
-        Dq { d: self.d.output, q: self.q.output }
     }
 }
 

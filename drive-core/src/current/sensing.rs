@@ -87,31 +87,23 @@ impl Sensing {
     /// that of the heat sink.
     pub fn check(&self, state: &SensingState, sample: &Sample) -> Result<(), Fault> {
         let saturated = |code: u16| code == 0 || code >= self.full_scale;
-        if saturated(sample.current_a) {
-            Err(Fault::SensorSaturatedA)
-        } else if saturated(sample.current_b) {
-            Err(Fault::SensorSaturatedB)
-        } else if sample.heat_sink < self.heat_sink.window.0
-            || sample.heat_sink > self.heat_sink.window.1
-        {
-            Err(self.heat_sink.fault(sample.heat_sink))
-        } else if let Some(shunts) = &self.shunts {
-            if saturated(sample.current_c) {
-                Err(Fault::SensorSaturatedC)
-            } else if !shunts.sums_to_zero(&state.shunts) {
-                Err(Fault::CurrentSum)
-            } else {
-                Ok(())
+        let (least, most) = self.heat_sink.window;
+        match &self.shunts {
+            _ if saturated(sample.current_a) => Err(Fault::SensorSaturatedA),
+            _ if saturated(sample.current_b) => Err(Fault::SensorSaturatedB),
+            _ if sample.heat_sink < least || sample.heat_sink > most => {
+                Err(self.heat_sink.fault(sample.heat_sink))
             }
-        } else {
-            Ok(())
+            Some(_) if saturated(sample.current_c) => Err(Fault::SensorSaturatedC),
+            Some(shunts) if !shunts.sums_to_zero(&state.shunts) => Err(Fault::CurrentSum),
+            _ => Ok(()),
         }
     }
 
     /// Resets `state` to the calibration lines of the settings, without offset correction.
     pub fn start(&self, state: &mut SensingState) {
-        *state =
-            SensingState { zeros: self.lines().map(|line| line.offset), ..SensingState::default() };
+        let zeros = self.lines().map(|line| line.offset);
+        *state = SensingState { zeros, ..SensingState::default() };
     }
 
     /// Calibration of a, b and c; of c that of b if there is no sensor c.
@@ -184,15 +176,11 @@ impl Sensing {
         state.sum = [0.0; 3];
         state.count = 0;
         // NaN fails the comparison.
-        let [a, b, c] = mean.map(|x| x.abs() <= largest);
-        if !a {
-            Err(Fault::OffsetA)
-        } else if !b {
-            Err(Fault::OffsetB)
-        } else if !c && self.shunts.is_some() {
-            Err(Fault::OffsetC)
-        } else {
-            Ok(Some(mean))
+        match mean.map(|x| x.abs() <= largest) {
+            [false, ..] => Err(Fault::OffsetA),
+            [_, false, _] => Err(Fault::OffsetB),
+            [_, _, false] if self.shunts.is_some() => Err(Fault::OffsetC),
+            _ => Ok(Some(mean)),
         }
     }
 }

@@ -7,7 +7,7 @@ mod tests;
 use core::f32::consts::TAU;
 
 use crate::carrier::DemodulatorKind;
-use crate::carrier::injection::{CARRIER_SAMPLES, Injection};
+use crate::carrier::injection::Injection;
 use crate::current::dead_time::DeadTime;
 use crate::current::inverter_drop::InverterDrop;
 use crate::current::modulation::Modulator;
@@ -219,7 +219,6 @@ impl Settings {
                     smoothing_s: t.loss_s,
                     allowed: t.allowed_loss,
                     carrier_a: injection.current_amplitude,
-                    period_s: CARRIER_SAMPLES as f32 * PERIOD_S,
                 },
             )
         });

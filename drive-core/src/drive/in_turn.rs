@@ -237,7 +237,6 @@ impl Coefficients {
             return Ok(());
         }
         let largest = self.modulator.circle(step.measured.dc_link);
-        let fit = s.carrier.fit(&self.injection, step.voltage, largest);
-        fit.map_err(|_| Fault::CarrierNoRoom)
+        s.carrier.fit(&self.injection, step.voltage, largest)
     }
 }

@@ -34,12 +34,6 @@ impl Section {
         Self { b0: c[0] as f32, b1: c[1] as f32, b2: c[2] as f32, a1: c[3] as f32, a2: c[4] as f32 }
     }
 
-    /// Whether both poles lie inside the unit circle (Jury: |a2| < 1 and |a1| < 1 + a2).
-    pub const fn is_stable(&self) -> bool {
-        let (a1, a2) = (self.a1 as f64, self.a2 as f64);
-        a2 < 1.0 && a1 < 1.0 + a2 && -a1 < 1.0 + a2
-    }
-
     /// Gain at dc, H(1), of the rounded coefficients.
     pub const fn dc_gain(&self) -> f64 {
         (self.b0 as f64 + self.b1 as f64 + self.b2 as f64) / (1.0 + self.a1 as f64 + self.a2 as f64)

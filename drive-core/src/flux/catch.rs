@@ -128,11 +128,8 @@ impl CatchState {
 
     /// Takes an average.
     fn take(&mut self) {
-        if let Some(place) = self.kept.get_mut(self.count % KEPT) {
-            *place = self.sum;
-        }
-        let [short, middle, long] = &mut self.correlations;
-        for (sums, (lag, _)) in [(short, SHORT), (middle, MIDDLE), (long, LONG)] {
+        self.kept[self.count % KEPT] = self.sum;
+        for (sums, (lag, _)) in self.correlations.iter_mut().zip([SHORT, MIDDLE, LONG]) {
             sums.add(lag, &self.kept, self.count);
         }
         self.count += 1;
@@ -163,10 +160,7 @@ impl Correlation {
         if count < 3 * lag {
             return;
         }
-        let at = |lags: usize| {
-            let place = kept.get((count - lags * lag) % KEPT);
-            place.copied().unwrap_or(Dq::ZERO)
-        };
+        let at = |lags: usize| kept[(count - lags * lag) % KEPT];
         let (one, two) = (at(1), at(2));
         let now = at(0) - one * 2.0 + two;
         let before = one - two * 2.0 + at(3);

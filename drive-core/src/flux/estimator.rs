@@ -28,19 +28,6 @@ pub struct ConstantReference {
     pub from: f32,
 }
 
-impl ConstantReference {
-    /// Reference of the current difference at `i_q`, both A.
-    fn at(&self, i_q: f32) -> f32 {
-        if i_q > self.from {
-            self.full
-        } else if i_q < -self.from {
-            -self.full
-        } else {
-            self.slope * i_q
-        }
-    }
-}
-
 /// Reference of the current difference over i_q.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reference {
@@ -54,8 +41,10 @@ impl Reference {
     /// Reference of the current difference at `i_q`, both A.
     fn at(&self, i_q: f32) -> f32 {
         match self {
-            Self::Constant(constant) => constant.at(i_q),
             Self::Learned(table) => table.at(i_q),
+            Self::Constant(constant) if i_q > constant.from => constant.full,
+            Self::Constant(constant) if i_q < -constant.from => -constant.full,
+            Self::Constant(constant) => constant.slope * i_q,
         }
     }
 }
@@ -263,20 +252,16 @@ impl Estimator {
         slip_freq: f32,
         turning: &Turning,
     ) -> Result<(), TrackingLost> {
-        match &self.angle_loop {
+        let EstimatorState { tracker: axis, rotor_freq, correction, delta_i, .. } = state;
+        let held = match &self.angle_loop {
             AngleLoop::Pii { reference, tracker } => {
-                let error = reference.at(i_q) - state.delta_i;
-                let held = tracker.step(&mut state.tracker, error);
-                let rotor_freq = state.tracker.freq - slip_freq;
-                state.rotor_freq += ROTOR_SMOOTHING * (rotor_freq - state.rotor_freq);
-                if held { Ok(()) } else { Err(TrackingLost) }
+                let held = tracker.step(axis, reference.at(i_q) - *delta_i);
+                *rotor_freq += ROTOR_SMOOTHING * (axis.freq - slip_freq - *rotor_freq);
+                held
             }
-            AngleLoop::Pll { .. } => {
-                let EstimatorState { tracker, rotor_freq, correction, .. } = state;
-                let finite = Pll::step(tracker, rotor_freq, *correction, slip_freq, turning);
-                if finite { Ok(()) } else { Err(TrackingLost) }
-            }
-        }
+            AngleLoop::Pll { .. } => Pll::step(axis, rotor_freq, *correction, slip_freq, turning),
+        };
+        if held { Ok(()) } else { Err(TrackingLost) }
     }
 }
 

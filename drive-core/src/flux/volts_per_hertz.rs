@@ -23,11 +23,9 @@
 //!
 //! Simulated with eight motors of 0.19 to 18.5 kW whose drive knew the nameplate alone: half the rated speed within 1 % of
 //! the rated one without load, within 3 % with 0.3 of the rated torque.
-//!
-//! More than 400 lines, because the six equations share one state and most of the text explains them.
 
 use crate::fault::Fault;
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::{limited, within};
@@ -37,9 +35,10 @@ const BOOST_K: f32 = 0.03;
 const BOOST_PER_S: f32 = 0.5;
 /// Largest voltage of the boost: that of this share of the base impedance, which no stator resistance reaches.
 const BOOST_MOST: f32 = 0.3;
-/// Tolerance of the boost current, and time for which it must hold: the flux has built up by then in most motors, s.
+/// Tolerance of the boost current, and control periods for which it must hold, 0.5 s: the flux has built up by then in most
+/// motors.
 const BOOST_WITHIN: f32 = 0.05;
-const BOOST_HOLDS_S: f32 = 0.5;
+const BOOST_HOLDS: u32 = 3000;
 /// Share of the voltage across the resistance that is added for the torque current: 1 would be on the verge of stability.
 const COMPENSATED: f32 = 0.55;
 /// Resistance that limits the current, as a share of the base impedance.
@@ -50,13 +49,13 @@ const NEAR: f32 = 0.83;
 const STEEPEST_S: f32 = 2.0;
 /// Share of it that must be left for the whole acceleration.
 const ROOM: f32 = 0.25;
-/// A current beyond the limit for this time, s, is that of a motor that has pulled out. The frequency then goes down, the
-/// rated one in this time, s, until the current is below this share of the limit.
-const PULLED_OUT_S: f32 = 0.02;
+/// A current beyond the limit for these control periods, 20 ms, is that of a motor that has pulled out. The frequency then
+/// goes down, the rated one in this time, s, until the current is below this share of the limit.
+const PULLED_OUT: u32 = 120;
 const RECOVERY_S: f32 = 0.5;
 const RECOVERED: f32 = 0.75;
-/// Time for which the motor may be at its limit below this frequency, s.
-const STALLED_S: f32 = 2.0;
+/// Control periods for which the motor may be at its limit below this frequency, 2 s, four for each.
+const STALLED: u32 = 4 * 12_000;
 const STALLED_BELOW: f32 = 4.0 * PERIOD_S;
 /// Time in which an excess of the whole current limit would take the rated frequency off, s.
 const EXCESS_S: f32 = 0.34;
@@ -74,11 +73,11 @@ const SLIP: f32 = PERIOD_S / 0.1;
 /// Frequency from which on the whole slip is compensated: a motor that is to stand gets a field that stands.
 const SLIP_WHOLE_FROM: f32 = 3.0 * PERIOD_S;
 /// The current that turns backwards: time constant, largest share of the whole, frequency from which on it is measured,
-/// and after which time it is judged, s.
+/// and after how many control periods it is judged, 0.5 s.
 const BACKWARDS: f32 = PERIOD_S / 0.1;
 const BACKWARDS_SQUARED: f32 = 0.4 * 0.4;
 const JUDGED_FROM: f32 = 8.0 * PERIOD_S;
-const JUDGED_AFTER_S: f32 = 0.5;
+const JUDGED_AFTER: u32 = 3000;
 /// Across the boost, a sensor with the wrong sign or two that are exchanged make 1.15 or more of the current along it; the dead
 /// time of an inverter of low voltage makes up to 0.58, as an open phase would, which shows later.
 const ACROSS: f32 = 0.7;
@@ -139,16 +138,12 @@ pub struct VoltsPerHertz {
     damping: f32,
     ramp: f32,
     quick_ramp: f32,
-    holds: u32,
-    judged_after: u32,
-    pulled_out: u32,
-    stalled: u32,
     recovery: f32,
     per_room: f32,
 }
 
 /// State.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct VoltsPerHertzState {
     angle: Angle,
     /// Ramped frequency, without the slip.
@@ -170,33 +165,10 @@ pub struct VoltsPerHertzState {
     stalled: u32,
     /// Whether the motor has pulled out.
     recovers: bool,
-    /// Share of the flux that the reactive current leaves.
+    /// Share of the flux that the reactive current leaves; the boost sets it to 1.
     flux: f32,
     /// Whether the dc link has no more voltage at this frequency.
     pub by_voltage: bool,
-}
-
-impl Default for VoltsPerHertzState {
-    fn default() -> Self {
-        let (angle, zero) = (Angle::ZERO, Dq::ZERO);
-        Self {
-            angle,
-            ramp: 0.0,
-            freq: 0.0,
-            slip: 0.0,
-            boost: 0.0,
-            held: 0,
-            fast: zero,
-            slow: zero,
-            backwards: zero,
-            measured: 0,
-            beyond: 0,
-            stalled: 0,
-            recovers: false,
-            flux: 1.0,
-            by_voltage: false,
-        }
-    }
 }
 
 /// Demand and limits of a period.
@@ -253,10 +225,6 @@ impl VoltsPerHertz {
             damping: DAMPING * s.frequency_hz * PERIOD_S / s.rated_a,
             ramp: ramp(s.ramp_hz_per_s),
             quick_ramp: ramp(s.quick_hz_per_s),
-            holds: periods(BOOST_HOLDS_S),
-            judged_after: periods(JUDGED_AFTER_S),
-            pulled_out: periods(PULLED_OUT_S),
-            stalled: periods(4.0 * STALLED_S),
             per_room: 1.0 / (ROOM * s.limit_a),
             recovery: s.frequency_hz * PERIOD_S * (PERIOD_S / RECOVERY_S),
         }
@@ -275,9 +243,8 @@ impl VoltsPerHertz {
     ) -> Result<Turned, Fault> {
         let axis = state.angle.unit_vector();
         let seen = current.to_dq(axis);
-        let follow = |mean: &mut Dq, now: Dq, share: f32| *mean += (now - *mean) * share;
-        follow(&mut state.fast, seen, FAST);
-        follow(&mut state.slow, state.fast, SLOW);
+        state.fast += (seen - state.fast) * FAST;
+        state.slow += (state.fast - state.slow) * SLOW;
         let turning = self.is_built(state);
         let mut voltage = if turning {
             let backwards = current.to_dq(UnitVector { cos: axis.cos, sin: -axis.sin });
@@ -299,7 +266,7 @@ impl VoltsPerHertz {
 
     /// Whether the boost stands, and references act.
     pub fn is_built(&self, state: &VoltsPerHertzState) -> bool {
-        state.held >= self.holds
+        state.held >= BOOST_HOLDS
     }
 
     /// The voltage of a motor that stands, while its current rises.
@@ -310,11 +277,9 @@ impl VoltsPerHertz {
         if state.boost > self.most_v {
             return Err(Fault::WiringNoCurrent);
         }
-        if error.abs() < BOOST_WITHIN * self.boost_a {
-            state.held += 1;
-        } else {
-            state.held = 0;
-        }
+        let holds = error.abs() < BOOST_WITHIN * self.boost_a;
+        state.held = if holds { state.held + 1 } else { 0 };
+        state.flux = 1.0;
         if self.is_built(state) {
             wired(current)?;
         }
@@ -336,21 +301,18 @@ impl VoltsPerHertz {
         let share = within(room * self.per_room, (0.0, 1.0));
 
         state.beyond = if square > limit { state.beyond + 1 } else { 0 };
-        state.recovers |= state.beyond > self.pulled_out;
+        state.recovers |= state.beyond > PULLED_OUT;
         state.recovers &= square > RECOVERED * RECOVERED * limit;
-        if state.recovers {
-            state.ramp -= limited(state.ramp, self.recovery);
+        state.ramp += if state.recovers {
+            -limited(state.ramp, self.recovery)
         } else {
-            state.ramp += share * step - self.per_excess * excess;
-        }
+            share * step - self.per_excess * excess
+        };
 
         let at_limit = state.recovers || excess != 0.0 || share < 0.25;
-        if at_limit && state.ramp.abs() < STALLED_BELOW {
-            state.stalled += 4;
-        } else {
-            state.stalled = state.stalled.saturating_sub(1);
-        }
-        if state.stalled > self.stalled { Err(Fault::Stalled) } else { Ok(()) }
+        let stands = at_limit && state.ramp.abs() < STALLED_BELOW;
+        state.stalled = if stands { state.stalled + 4 } else { state.stalled.saturating_sub(1) };
+        Fault::Stalled.unless(state.stalled <= STALLED)
     }
 
     /// The voltage of a motor that turns.
@@ -385,7 +347,7 @@ impl VoltsPerHertz {
         state.backwards += (backwards - state.backwards) * BACKWARDS;
         state.measured = state.measured.saturating_add(1);
         let most = BACKWARDS_SQUARED * state.slow.length_squared();
-        if state.measured > self.judged_after && state.backwards.length_squared() > most {
+        if state.measured > JUDGED_AFTER && state.backwards.length_squared() > most {
             return Err(Fault::CurrentNotAsPredicted);
         }
         Ok(())

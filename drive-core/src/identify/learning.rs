@@ -65,6 +65,9 @@ const LEAST_TAN_LEAD: f32 = 0.15;
 const MOST_TAN_LEAD: f32 = 0.27;
 const LONE_TAN_LEAD: f32 = 0.2;
 
+/// rad/s per turn per control period.
+const RAD_PER_S: f32 = TAU / PERIOD_S;
+
 /// Coefficients of the learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
@@ -91,8 +94,6 @@ pub struct Learning {
     leakage: f32,
     /// L_m^2 / L_r, H.
     coupled: f32,
-    /// rad/s per turn per control period.
-    rad_per_s: f32,
 }
 
 /// Input of the learning, one per control period.
@@ -122,10 +123,10 @@ struct Sums {
     signal: f32,
     /// Squares of the carrier current, A^2.
     carrier: f32,
-    /// Parts in phase with the sine and the cosine of twice the angle of the injection axis.
-    once: [f32; 2],
+    /// Parts in phase with cosine (d) and sine (q) of twice the angle of the injection axis.
+    twice: Dq,
     /// The same of four times that angle.
-    twice: [f32; 2],
+    four_times: Dq,
     voltage: Dq,
 }
 
@@ -212,7 +213,6 @@ impl Learning {
             tau_r: motor.tau_r(),
             leakage: motor.l_ls + motor.l_m - coupled,
             coupled,
-            rad_per_s: TAU / PERIOD_S,
         }
     }
 
@@ -242,13 +242,10 @@ impl Learning {
         s.turned += sample.flux_freq;
         s.voltage += sample.voltage;
         if point.turns {
-            let four = twice.turned_by(twice);
             s.signal += sample.signal;
             s.carrier += sample.carrier_squared;
-            s.once[0] += sample.signal * twice.sin;
-            s.once[1] += sample.signal * twice.cos;
-            s.twice[0] += sample.signal * four.sin;
-            s.twice[1] += sample.signal * four.cos;
+            s.twice += twice * sample.signal;
+            s.four_times += twice.turned_by(twice) * sample.signal;
         } else {
             let known = &state.turning;
             s.signal += sample.signal - known.sin * twice.sin - known.cos * twice.cos;
@@ -281,11 +278,10 @@ impl Learning {
         if point.turns {
             if state.point <= 2 * TURNING {
                 let share = mean / self.points.clamp(1, TURNING) as f32;
-                state.turning.sin += share * s.once[0];
-                state.turning.cos += share * s.once[1];
+                state.turning.sin += share * s.twice.q;
+                state.turning.cos += share * s.twice.d;
             }
-            let [sin, cos] = s.twice.map(|sum| 2.0 * sum * mean);
-            let ripple = sin * sin + cos * cos;
+            let ripple = (s.four_times * (2.0 * mean)).length_squared();
             if ripple > state.ripple {
                 state.ripple = ripple;
             }
@@ -317,7 +313,7 @@ impl Learning {
     /// Whether a free shaft follows the current, by the mean direct voltage, V, of a pair without lead and the slip, turns
     /// per period.
     fn follows(&self, state: &mut LearningState, point: Point, voltage: f32, slip: f32) -> bool {
-        let x = self.rad_per_s * slip.abs() * self.grid.current(point.n);
+        let x = RAD_PER_S * slip.abs() * self.grid.current(point.n);
         let direct = voltage + self.leakage * x;
         let (first_v, first_x) = *state.first.get_or_insert((direct, x));
         let free_shaft_v = self.coupled * (x - first_x);

@@ -43,6 +43,7 @@ use crate::identify::rls::filter::Filter;
 use crate::identify::rls::{Rls, RlsError, RlsSettings};
 use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, Dq};
+use crate::math::within;
 use crate::settings::Settings;
 use fit::{Machine, Unknowns};
 use num_complex::Complex32;
@@ -156,21 +157,6 @@ pub struct Online {
     calls: u32,
 }
 
-/// `base` clamped to 0.02 to 1 times `limit`, within the range that the least squares require.
-fn between(base: f32, limit: f32) -> f32 {
-    if base > limit {
-        limit
-    } else if base < 0.02 * limit {
-        0.02 * limit
-    } else {
-        base
-    }
-}
-
-const fn squared(x: f32) -> f32 {
-    x * x
-}
-
 /// MotorModel parameters from the settings.
 #[derive(Clone, Copy, Debug)]
 struct MotorModel {
@@ -218,7 +204,9 @@ impl Online {
         let m = &settings.motor;
         let (i_d, trip_a, dc_over_v) = (settings.i_d(), settings.trip_a(), settings.dc_over_v());
         let synchronous = &settings.injection.synchronous;
-        let l_s = m.l_m + m.l_ls;
+        let (l_s, steady) = (m.l_m + m.l_ls, STEADY_CURRENT * i_d);
+        // Within the range that the least squares require.
+        let base = |typical: f32, limit: f32| within(typical, (0.02 * limit, limit));
         let motor = MotorModel {
             r_s: m.r_s,
             tau_r: m.tau_r(),
@@ -226,14 +214,14 @@ impl Online {
             l_s,
             flux_saliency: synchronous.flux_saliency,
             current_saliency: settings.current_saliency(),
-            steady_squared: squared(STEADY_CURRENT * i_d),
+            steady_squared: steady * steady,
         };
         let rls = Rls::new(RlsSettings {
             lambda: LAMBDA,
             p0: P0,
             corner: TAU * CORNER_HZ * SAMPLE_S,
-            voltage_base: between(settings.current_limit_a() * m.r_s, dc_over_v),
-            current_base: between(i_d, trip_a),
+            voltage_base: base(settings.current_limit_a() * m.r_s, dc_over_v),
+            current_base: base(i_d, trip_a),
             voltage_limit: dc_over_v,
             current_limit: trip_a,
         })?;

@@ -27,7 +27,7 @@ pub mod ud;
 use num_complex::Complex32;
 
 use crate::math::frames::AlphaBeta;
-use filter::{Filter, Filtered};
+use filter::Filter;
 use ud::{Forgetting, N, Ud};
 
 /// Initial estimate: all coefficients of Eq. 14 zero, as in the paper.
@@ -102,7 +102,7 @@ const LOUDNESS: f32 = 1.0 / 32.0;
 const SETTLE: f32 = 20.0;
 
 /// Bookkeeping for the validity of the estimate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Validity {
     /// Used samples since the last invalid one.
     good: u32,
@@ -112,10 +112,6 @@ struct Validity {
     error: f32,
     /// Mean square of the predicted signal.
     signal: f32,
-}
-
-impl Validity {
-    const NONE: Self = Self { good: 0, missing: 0, error: 0.0, signal: 0.0 };
 }
 
 /// Recursive least-squares estimator of the sampled machine.
@@ -153,17 +149,21 @@ impl Rls {
         let base = |x: f32| x.is_finite() && x > 1e-9 && x < 1e9;
         let limits = [settings.voltage_limit / voltage_base, settings.current_limit / current_base];
         match () {
-            () if !(0.9..=1.0).contains(&lambda) => return Err(RlsError::Lambda),
-            () if !(1e-3..=1e7).contains(&p0) => return Err(RlsError::Covariance),
-            () if !(1e-3..=1.0).contains(&corner) => return Err(RlsError::Corner),
-            () if !base(voltage_base) || !base(current_base) => return Err(RlsError::Base),
-            () if !limits.iter().all(|x| (0.1..=100.0).contains(x)) => return Err(RlsError::Limit),
-            () => {}
+            () if !(0.9..=1.0).contains(&lambda) => Err(RlsError::Lambda),
+            () if !(1e-3..=1e7).contains(&p0) => Err(RlsError::Covariance),
+            () if !(1e-3..=1.0).contains(&corner) => Err(RlsError::Corner),
+            () if !base(voltage_base) || !base(current_base) => Err(RlsError::Base),
+            () if !limits.iter().all(|x| (0.1..=100.0).contains(x)) => Err(RlsError::Limit),
+            () => Ok(Self::at_rest(settings)),
         }
+    }
+
+    fn at_rest(settings: RlsSettings) -> Self {
+        let RlsSettings { lambda, p0, corner, voltage_base, current_base, .. } = settings;
         let settle = (SETTLE / corner) as u32;
         // With lambda = 1 nothing is forgotten; the memory is then taken as 10 000 samples.
         let memory = if lambda < 0.9999 { (1.0 / (1.0 - lambda)) as u32 } else { 10_000 };
-        Ok(Self {
+        Self {
             settings,
             scale: [1.0 / voltage_base, 1.0 / current_base],
             ud: Ud::new(START, p0),
@@ -178,8 +178,8 @@ impl Rls {
             forget: 1.0 / memory as f32,
             forgetting: Forgetting { lambda, inverse: 1.0 / lambda },
             unknown: UNKNOWN / (corner * corner * corner),
-            validity: Validity::NONE,
-        })
+            validity: Validity::default(),
+        }
     }
 
     /// Processes one sample in the stator frame: the sampled `current`, A peak, and the `voltage` applied
@@ -196,7 +196,9 @@ impl Rls {
         let v = self.voltage.step(Complex32::from(voltage) * self.scale[0]);
         let i = self.current.step(Complex32::from(current) * self.scale[1]);
         let [[dv, v2, _], [di, i2, _]] = self.history;
-        self.remember(v, i);
+        for (history, x) in self.history.iter_mut().zip([v, i]) {
+            *history = [x.change, history[2], x.value];
+        }
         if self.settling > 0 {
             self.settling -= 1;
             self.unused();
@@ -220,13 +222,6 @@ impl Rls {
         match self.ud.update([di, i2, dv, v2], i.change, forgetting) {
             Some(error) => self.judge(error, i.change),
             None => self.reset(),
-        }
-    }
-
-    /// Shifts the history by one sample.
-    fn remember(&mut self, v: Filtered, i: Filtered) {
-        for (history, x) in self.history.iter_mut().zip([v, i]) {
-            *history = [x.change, history[2], x.value];
         }
     }
 
@@ -307,19 +302,12 @@ impl Rls {
     pub fn begin_at(&mut self, [g1, g0, h1, u0]: [Complex32; N]) {
         let impedance = self.settings.voltage_base * self.scale[1];
         self.ud = Ud::new([g1, g0, h1 * impedance, u0 * impedance], self.settings.p0);
-        self.validity = Validity::NONE;
+        self.validity = Validity::default();
     }
 
     /// Restarts the estimator at rest with the same settings.
     #[cold]
     pub fn reset(&mut self) {
-        self.ud = Ud::new(START, self.settings.p0);
-        self.voltage = Filter::new(self.settings.corner);
-        self.current = Filter::new(self.settings.corner);
-        self.history = [[Complex32::ZERO; 3]; 2];
-        self.power = [0.0; 2];
-        self.axes = [0.0; 3];
-        self.settling = self.settle;
-        self.validity = Validity::NONE;
+        *self = Self::at_rest(self.settings);
     }
 }

@@ -35,6 +35,7 @@
 //! times a learned even function of i_q.
 
 use crate::carrier::Saliency;
+use crate::carrier::injection::CARRIER_S;
 use crate::fault::Fault;
 use crate::learned::Learned;
 use crate::settings::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
@@ -53,7 +54,6 @@ use crate::settings::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 ///     allowed: 0.55,
 ///     carrier_a: 0.26,
 ///     moved_a: 0.03,
-///     period_s: 1.0 / 600.0,
 /// };
 /// let monitor = LockMonitor::new(&CarrierTable::default(), &settings);
 /// let mut state = LockMonitorState::default();
@@ -77,8 +77,6 @@ pub struct LockMonitor {
     per_change: [f32; POINTS],
     /// Share of the newest value in the mean loss.
     smoothing: f32,
-    /// Share of the newest value in the mean baseline.
-    baseline_smoothing: f32,
     /// Allowed loss, and whether the slope is positive, which gives the other limit.
     allowed: f32,
     is_positive: bool,
@@ -101,8 +99,6 @@ pub struct LockMonitorSettings {
     pub carrier_a: f32,
     /// Change of the torque current in a carrier period that counts as a move, A.
     pub moved_a: f32,
-    /// Interval of the monitor's steps, s: the carrier period.
-    pub period_s: f32,
 }
 
 /// State of the monitor.
@@ -138,8 +134,8 @@ impl LockMonitorState {
     }
 }
 
-/// Time constant of the baseline mean, s: noise of 5 mA causes 0.1 % of error in it, 0.03 in the loss.
-const BASELINE_S: f32 = 0.1;
+/// Share of the newest value in the mean baseline, 0.1 s: noise of 5 mA causes 0.1 % of error in it, 0.03 in the loss.
+const BASELINE_SHARE: f32 = CARRIER_S / 0.1;
 /// Carrier periods that make a baseline: 0.1 s.
 const MEASURED: u8 = 60;
 /// Minimum carrier current as a share of the expected one. With an open phase the carrier current is
@@ -176,8 +172,7 @@ impl LockMonitor {
             per_change: per_change(&s.slope),
             is_positive: s.slope.at_rest() > 0.0,
             moved: s.moved_a,
-            smoothing: s.period_s / (s.smoothing_s + s.period_s),
-            baseline_smoothing: s.period_s / BASELINE_S,
+            smoothing: CARRIER_S / (s.smoothing_s + CARRIER_S),
             allowed: s.allowed,
             least: least * least,
         }
@@ -210,13 +205,11 @@ impl LockMonitor {
     ) -> Result<Option<f32>, Fault> {
         let carrier = saliency.carrier_squared * per_share_squared;
         state.weak = if carrier >= self.least { 0 } else { state.weak.saturating_add(1) };
-        if state.weak >= WEAK_PERIODS {
-            return Err(Fault::CarrierWeak);
-        }
+        Fault::CarrierWeak.unless(state.weak < WEAK_PERIODS)?;
         if held {
             let place = self.grid.place(saliency.i_q);
             let carrier = carrier * between(&self.inverse_square, place);
-            let share = if state.baseline == 0.0 { 1.0 } else { self.baseline_smoothing };
+            let share = if state.baseline == 0.0 { 1.0 } else { BASELINE_SHARE };
             state.baseline += share * (carrier - state.baseline);
             *state = LockMonitorState {
                 baseline: state.baseline,
@@ -240,9 +233,8 @@ impl LockMonitor {
         let loss = -deviation * between(&self.per_change, place);
         state.loss += self.smoothing * (loss - state.loss);
         let least = -ALLOWED_GAIN[usize::from(self.is_positive)];
-        // NaN fails the comparisons.
-        let right = state.loss <= self.allowed && state.loss >= least;
-        if right { Ok(Some(deviation)) } else { Err(Fault::LostLock) }
+        Fault::LostLock.unless(state.loss <= self.allowed && state.loss >= least)?;
+        Ok(Some(deviation))
     }
 
     /// Whether the torque current `i_q`, A, has just moved, so that the loss is not judged.

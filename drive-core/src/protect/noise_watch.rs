@@ -111,9 +111,7 @@ impl NoiseWatch {
             1 => channel.difference = channel.difference.wrapping_sub(2 * code),
             _ => {
                 channel.difference = channel.difference.wrapping_add(code);
-                if channel.is_noisy(per_allowed, quiet) {
-                    return Err(fault);
-                }
+                fault.unless(channel.is_still(per_allowed, quiet))?;
             }
         }
         Ok(())
@@ -121,8 +119,8 @@ impl NoiseWatch {
 }
 
 impl Channel {
-    /// Updates the mean square; returns whether it exceeds the allowed one.
-    fn is_noisy(&mut self, per_allowed: f32, quiet: bool) -> bool {
+    /// Updates the mean square; returns whether it is within the allowed one.
+    fn is_still(&mut self, per_allowed: f32, quiet: bool) -> bool {
         // Wrapping guards against a flipped bit; sixteen codes fit.
         let [one, two] = self.last;
         let d = self.difference.wrapping_sub(one.wrapping_mul(2)).wrapping_add(two) as f32;
@@ -131,9 +129,7 @@ impl Channel {
             d * d * if quiet { per_allowed } else { per_allowed * (1.0 / (AT_SPEED * AT_SPEED)) };
         let square = if square < MOST { square } else { MOST };
         self.level += SMOOTHING * (square - self.level);
-        // NaN fails the comparison and counts as noisy.
-        let within = self.level <= 1.0;
-        !within
+        self.level <= 1.0
     }
 }
 

@@ -62,13 +62,8 @@ impl CarrierWatch {
             let quiet = judged && re * re + im * im < due * due;
             *silent = if quiet { silent.saturating_add(1) } else { 0 };
         }
-        if self.silent[0] >= SILENT_PERIODS {
-            Err(Fault::CarrierMissingA)
-        } else if self.silent[1] >= SILENT_PERIODS {
-            Err(Fault::CarrierMissingB)
-        } else {
-            Ok(())
-        }
+        Fault::CarrierMissingA.unless(self.silent[0] < SILENT_PERIODS)?;
+        Fault::CarrierMissingB.unless(self.silent[1] < SILENT_PERIODS)
     }
 }
 
@@ -205,16 +200,11 @@ impl Prediction {
         // The two uncertainties are independent: their squares add.
         let share = if known.building { EMF_SHARE_BUILDING } else { EMF_SHARE };
         let allowed = self.allowed * self.allowed + share * share * state.rotor.length_squared();
-        // NaN fails the comparison.
-        let explained = state.unexplained.length_squared() <= allowed;
-        if !explained {
-            return Err(Fault::CurrentNotAsPredicted);
-        }
+        Fault::CurrentNotAsPredicted.unless(state.unexplained.length_squared() <= allowed)?;
         let (axis, emf) = state.flux;
         state.mean += (unexplained.to_dq(axis) - state.mean) * MEAN_SMOOTHING;
         let allowed = self.allowed_mean[usize::from(known.tracked)] + MEAN_EMF_SHARE * emf.abs();
-        let explained = state.mean.length_squared() <= allowed * allowed;
-        if explained { Ok(()) } else { Err(Fault::FluxNotAsPredicted) }
+        Fault::FluxNotAsPredicted.unless(state.mean.length_squared() <= allowed * allowed)
     }
 }
 

@@ -81,14 +81,8 @@ impl Thermal {
     pub fn step(&self, loads: &mut ThermalLoads, square: f32) -> Result<(), Fault> {
         self.motor.step(&mut loads.motor, square);
         self.inverter.step(&mut loads.inverter, square);
-        let bears = |load: f32| load <= TRIP;
-        if !bears(loads.motor) {
-            Err(Fault::MotorOverload)
-        } else if !bears(loads.inverter) {
-            Err(Fault::InverterOverload)
-        } else {
-            Ok(())
-        }
+        Fault::MotorOverload.unless(loads.motor <= TRIP)?;
+        Fault::InverterOverload.unless(loads.inverter <= TRIP)
     }
 }
 

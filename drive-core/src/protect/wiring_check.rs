@@ -132,17 +132,12 @@ impl WiringCheck {
         let risen = state.period.saturating_sub(1);
         let share = if risen < self.rise { risen as f32 / self.rise as f32 } else { 1.0 };
         let allowed = LARGEST * self.expected * share + self.noise;
-        // NaN fails the comparison.
-        if !(phases.a.abs() < allowed && phases.b.abs() < allowed) {
-            return Err(Fault::WiringCurrent);
-        }
+        Fault::WiringCurrent.unless(phases.a.abs() < allowed && phases.b.abs() < allowed)?;
         let sign = if state.pulse.is_multiple_of(2) { 1.0 } else { -1.0 };
         let leg = (state.pulse / 2 % 3) as usize;
-        if risen == self.rise
-            && let Some(answer) = state.answers.get_mut(leg)
-        {
-            answer[0] += sign * phases.a;
-            answer[1] += sign * phases.b;
+        if risen == self.rise {
+            state.answers[leg][0] += sign * phases.a;
+            state.answers[leg][1] += sign * phases.b;
         }
         let volts = if state.period < self.rise {
             sign * self.volts
@@ -160,8 +155,7 @@ impl WiringCheck {
                 return Ok(WiringAction::Ended);
             }
         }
-        let axis = AXES.get(leg).copied().unwrap_or(AlphaBeta::ZERO);
-        Ok(WiringAction::Apply { voltage: axis * volts, current: axis * flowing })
+        Ok(WiringAction::Apply { voltage: AXES[leg] * volts, current: AXES[leg] * flowing })
     }
 
     /// Evaluates the [answers](WiringCheckState::answers).
@@ -173,21 +167,16 @@ impl WiringCheck {
         let [a, b, c] = *answers;
         let least = LEAST_SHARE * self.expected;
         // Responses of a sensor to its own phase and to the two others.
-        let sensors = [
-            ([a[0], b[0], c[0]], Fault::WiringPolarityA),
-            ([b[1], a[1], c[1]], Fault::WiringPolarityB),
-        ];
+        let (at_a, at_b) = ([a[0], b[0], c[0]], [b[1], a[1], c[1]]);
         let silent = |[x, y, z]: [f32; 3]| x.abs() < least && y.abs() < least && z.abs() < least;
         let exchanged = |[own, y, z]: [f32; 3]| own.abs() < y.abs() || own.abs() < z.abs();
-        let [(at_a, _), (at_b, _)] = sensors;
-        if silent(at_a) || silent(at_b) {
-            return Err(Fault::WiringNoCurrent);
+        match () {
+            () if silent(at_a) || silent(at_b) => Err(Fault::WiringNoCurrent),
+            () if exchanged(at_a) || exchanged(at_b) => Err(Fault::WiringExchanged),
+            () if a[0] < 0.0 => Err(Fault::WiringPolarityA),
+            () if b[1] < 0.0 => Err(Fault::WiringPolarityB),
+            () => Ok(()),
         }
-        if exchanged(at_a) || exchanged(at_b) {
-            return Err(Fault::WiringExchanged);
-        }
-        let reversed = sensors.into_iter().find(|([own, ..], _)| *own < 0.0);
-        reversed.map_or(Ok(()), |(_, fault)| Err(fault))
     }
 }
 

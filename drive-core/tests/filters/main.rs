@@ -8,6 +8,7 @@ mod states;
 
 use core::f64::consts::{PI, TAU};
 
+use drive_core::filter::section::Section;
 use num_complex::Complex64;
 
 const RATE: f64 = 6000.0;
@@ -21,6 +22,12 @@ fn largest_distance(one: impl Fn(f64) -> Complex64, other: impl Fn(f64) -> Compl
     (0..=6000)
         .map(|n| PI * f64::from(n) / 6000.0)
         .fold(0.0, |m, w| m.max((one(w) - other(w)).norm()))
+}
+
+/// Whether both poles lie inside the unit circle (Jury: |a2| < 1 and |a1| < 1 + a2).
+fn is_stable(s: &Section) -> bool {
+    let (a1, a2) = (f64::from(s.a1), f64::from(s.a2));
+    a2 < 1.0 && a1 < 1.0 + a2 && -a1 < 1.0 + a2
 }
 
 /// Magnitude in dB.

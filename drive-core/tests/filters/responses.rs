@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 use super::db;
 use super::printed::{TABLE_7_LPF, TABLE_8_BPF, TABLE_8_PP};
-use super::{largest_distance, rad};
+use super::{is_stable, largest_distance, rad};
 
 #[test]
 fn sections_have_the_printed_transfer_functions() {
@@ -18,7 +18,8 @@ fn sections_have_the_printed_transfer_functions() {
     let pp = largest_distance(|w| PP.response(w), |w| TABLE_8_PP.response(w));
     println!("largest |dH|: LPF {lpf:.2e}, BPF {bpf:.2e}, PP {pp:.2e}");
     assert!(lpf < 3.5e-6 && bpf < 1.5e-6 && pp < 6e-6);
-    assert!(LPF_AS_PRINTED.is_stable() && LPF.is_stable() && BPF.is_stable() && PP.is_stable());
+    assert!(LPF_AS_PRINTED.sections.iter().chain(&LPF.sections).all(is_stable));
+    assert!(BPF.sections.iter().chain(&PP.sections).all(is_stable));
 }
 
 #[test]
@@ -113,26 +114,4 @@ fn responses_of_trivial_cascades() {
     assert!((delay.group_delay(0.3) - 1.0).abs() < 1e-15);
     let mut state = SosState::default();
     assert_eq!([1.0, 2.0, 3.0].map(|x| delay.step(&mut state, x)), [0.0, 1.0, 2.0]);
-    assert!(Sos { sections: [Section::IDENTITY; 2] }.is_stable());
-    // Unstable ones are seen as such.
-    for (a1, a2) in
-        [(0.0, 1.0), (-2.0, 1.0), (1.5, 0.5), (-1.5, 0.5), (1.9, 0.5), (-1.9, 0.5), (f32::NAN, 0.0)]
-    {
-        let section = Section { a1, a2, ..Section::IDENTITY };
-        assert!(!section.is_stable(), "{a1} {a2}");
-        assert!(!Sos { sections: [Section::IDENTITY, section] }.is_stable());
-    }
-}
-
-/// The gain may stand in any section.
-#[test]
-fn the_gain_of_a_cascade_can_be_put_last() {
-    let rows =
-        [[0.5, 0.2, 0.1, -0.3, 0.4], [0.25, -0.1, 0.2, 0.1, 0.2], [3.0, 1.0, 0.5, -0.5, 0.1]];
-    let (plain, last) = (Sos::from_f64(&rows), Sos::with_gain_last(&rows));
-    for k in 0..10 {
-        let w = 0.3 * f64::from(k);
-        assert!((plain.response(w) / last.response(w) - 1.0).norm() < 1e-6);
-    }
-    assert_eq!(last.sections.map(|section| section.b0), [1.0, 1.0, 0.375]);
 }

@@ -14,7 +14,7 @@
 //! 600 Hz and 1200 Hz (the "spurious oscillations" of section 5.2), where this average has zeros. No
 //! post-processing filter is needed, which saves its delay of 24 samples.
 
-use super::{BandPass, Demodulate};
+use super::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::filter::moving_sum::MovingSum;
@@ -28,17 +28,15 @@ const UNITS: f32 = 131_072.0;
 /// Demodulator with output envelope(i_dm) - envelope(i_qm), A peak.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Envelope {
-    band_pass: BandPass,
+    band_pass: RotatedBandPass,
     before: [DmQm; APART],
     index: usize,
     sum: MovingSum<1, CARRIER_SAMPLES>,
 }
 
 impl Demodulate for Envelope {
-    type Output = f32;
-
     fn step(&mut self, sample: &CarrierSample) -> f32 {
-        let now = self.band_pass.step_rotated(sample);
+        let now = rotated_carrier(&mut self.band_pass, sample);
         let [last, before] = self.before;
         self.before = [now, last];
         let difference = envelope(now.dm, before.dm) - envelope(now.qm, before.qm);

@@ -15,8 +15,9 @@
 //! rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum of
 //! band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::{BandPass, Demodulate, PostFilter};
+use super::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
+use crate::filter::dissertation::{PP, PpState};
 use crate::filter::moving_sum::MovingSum;
 
 /// Minimum length of the rms filters, samples. A single sample may lie on a zero of the current.
@@ -36,31 +37,29 @@ const LEAST: i32 = 5;
 /// Demodulator with output F3 (Z_dm - Z_qm), ohm; the difference counts as 0 without carrier current.
 #[derive(Clone, Copy, Debug)]
 pub struct RmsImpedance {
-    band_pass: BandPass,
+    band_pass: RotatedBandPass,
     squares: MovingSum<3, { MAX_RMS_SAMPLES as usize }>,
     length: u8,
     index: u8,
-    f3: PostFilter,
+    f3: PpState,
 }
 
 impl RmsImpedance {
     /// At rest, with rms filters of `samples`, clamped to [`MIN_RMS_SAMPLES`] to [`MAX_RMS_SAMPLES`].
     pub fn new(samples: u8) -> Self {
         Self {
-            band_pass: BandPass::default(),
+            band_pass: RotatedBandPass::default(),
             squares: MovingSum::default(),
             length: samples.clamp(MIN_RMS_SAMPLES, MAX_RMS_SAMPLES),
             index: 0,
-            f3: PostFilter::default(),
+            f3: PpState::default(),
         }
     }
 }
 
 impl Demodulate for RmsImpedance {
-    type Output = f32;
-
     fn step(&mut self, sample: &CarrierSample) -> f32 {
-        let i = self.band_pass.step_rotated(sample);
+        let i = rotated_carrier(&mut self.band_pass, sample);
         // The carrier voltage lies on the bisector: equal components in both channels.
         let v = sample.carrier.voltage * (core::f32::consts::FRAC_1_SQRT_2 / VOLTS);
         let squares = [i.dm, i.qm, v].map(|x| {
@@ -77,6 +76,6 @@ impl Demodulate for RmsImpedance {
         } else {
             0.0
         };
-        self.f3.step(difference)
+        PP.step(&mut self.f3, difference)
     }
 }

@@ -7,6 +7,7 @@ use super::*;
 use crate::carrier::injection::CarrierPeriod;
 use crate::carrier::synchronous::tests::InTurn;
 use crate::math::angle::Angle;
+use crate::math::frames::AlphaBeta;
 
 /// Gain (-0.490 dB) and phase of the band-pass at 600 Hz, and of the post-processing filter at dc.
 const BPF_GAIN: f64 = 0.9452;
@@ -54,7 +55,7 @@ impl Carried {
     fn steady(&self, demodulator: &mut impl Demodulate) -> (f64, f64) {
         let mut out = [0.0_f64; 10];
         for k in 0..6000 {
-            out[k % 10] = f64::from(demodulator.step(&self.sample(k)).into());
+            out[k % 10] = f64::from(demodulator.step(&self.sample(k)));
         }
         let (low, high) = out.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
         (out.iter().sum::<f64>() / 10.0, high - low)
@@ -142,7 +143,7 @@ fn delay<D: Demodulate>(mut demodulator: D) -> f64 {
     let after = Carried { dm: before.dm + 0.002, ..before };
     let start = before.steady(&mut demodulator).0;
     let response: Vec<f64> =
-        (0..6000).map(|k| f64::from(demodulator.step(&after.sample(k)).into())).collect();
+        (0..6000).map(|k| f64::from(demodulator.step(&after.sample(k)))).collect();
     let end = response[5990..].iter().sum::<f64>() / 10.0;
     response[..1200].iter().map(|x| 1.0 - (x - start) / (end - start)).sum()
 }

@@ -4,6 +4,7 @@ use core::f32::consts::TAU;
 
 use super::estimator::carrier_lag;
 use super::*;
+use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::drive::axes::Axes;
 use crate::tuning::FirstOrder;
 use num_complex::Complex64;

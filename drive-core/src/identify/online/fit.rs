@@ -4,6 +4,7 @@
 
 use crate::identify::rls::Rls;
 use crate::identify::rls::ud::N;
+use crate::math::limited;
 use num_complex::Complex32;
 
 /// Fitted parameters.
@@ -76,36 +77,26 @@ impl Machine {
         scale: &Unknowns,
         free_speed: bool,
     ) -> Option<Fit> {
-        // The rate comes last: the last pivot is its information with the other unknowns free.
-        let sizes = [scale.rate, scale.r_s, scale.rate];
-        let first = if free_speed { 0 } else { 1 };
-        let here = self.coefficients(from);
         // Difference quotient over a hundredth of the scale: nearly linear, and far above rounding.
         const PART: f32 = 0.01;
-        let mut columns = [[Complex32::ZERO; N]; UNKNOWNS + 1];
-        for (k, column) in columns.iter_mut().enumerate().skip(first) {
-            let mut to = [from.omega_m, from.r_s, from.rate];
-            let mut there = rls.latest();
-            let mut part = 1.0;
-            if let (Some(x), Some(size)) = (to.get_mut(k), sizes.get(k)) {
-                *x += PART * size;
-                let [omega_m, r_s, rate] = to;
-                there = self.coefficients(&Unknowns { r_s, rate, omega_m });
-                part = 1.0 / PART;
-            }
-            *column = rls.whitened(core::array::from_fn(|n| (there[n] - here[n]) * part));
+        // The rate comes last: the last pivot is its information with the other unknowns free.
+        let shifted = [
+            Unknowns { omega_m: from.omega_m + PART * scale.rate, ..*from },
+            Unknowns { r_s: from.r_s + PART * scale.r_s, ..*from },
+            Unknowns { rate: from.rate + PART * scale.rate, ..*from },
+        ];
+        let first = if free_speed { 0 } else { 1 };
+        let here = self.coefficients(from);
+        let difference = |there: Column, factor: f32| {
+            rls.whitened(core::array::from_fn(|n| (there[n] - here[n]) * factor))
+        };
+        // The right-hand side comes last.
+        let mut columns = [difference(rls.latest(), 1.0); UNKNOWNS + 1];
+        for (column, x) in columns.iter_mut().zip(&shifted).skip(first) {
+            *column = difference(self.coefficients(x), 1.0 / PART);
         }
         let Solution { step, information } = solve(&columns, first)?;
         // The step is limited; the next calls continue.
-        let limited = |x: f32, limit: f32| {
-            if x > limit {
-                limit
-            } else if x < -limit {
-                -limit
-            } else {
-                x
-            }
-        };
         let unknowns = Unknowns {
             rate: from.rate + limited(step[2] * scale.rate, 0.3 * from.rate),
             r_s: from.r_s + limited(step[1], 0.3) * scale.r_s,

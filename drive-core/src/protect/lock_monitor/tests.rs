@@ -12,7 +12,6 @@ fn monitor_of(a: f32) -> LockMonitor {
             allowed: 0.55,
             carrier_a: 0.26,
             moved_a: 0.03,
-            period_s: 1.0 / 600.0,
         },
     )
 }
