@@ -207,6 +207,8 @@ impl Drive {
     /// One PWM period: from the sample of instant `k T` to the compare values of the period that
     /// begins at `(k + 1) T`.
     ///
+    /// [`Self::after_step`] completes the period once the outputs are set.
+    ///
     /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
     /// with the outputs off in the same step.
     #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median

@@ -262,7 +262,7 @@ impl Motion {
     fn braking_curve(&self, error: f32) -> f32 {
         // sqrt(bend^2 + 2 a |e|) - bend with the sign of e, written without cancellation.
         let square = self.bend * self.bend + self.twice_braking * error.abs();
-        self.twice_braking * error / (libm::sqrtf(square) + self.bend)
+        self.twice_braking * error / (fpu_sqrt::sqrtf(square) + self.bend)
     }
 }
 

@@ -51,7 +51,7 @@ impl Asymmetry {
     /// Root of the sum of the squares.
     pub fn size(&self) -> f32 {
         let Self { constant, sin, cos } = self;
-        libm::sqrtf(constant * constant + sin * sin + cos * cos)
+        fpu_sqrt::sqrtf(constant * constant + sin * sin + cos * cos)
     }
 
     /// Takes the asymmetry out of a saliency that was seen with the injection along `axis`.

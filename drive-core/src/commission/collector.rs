@@ -268,7 +268,7 @@ impl Collector {
     pub(super) fn quiet(&self) -> Quiet {
         let share = 1.0 / self.samples as f32;
         let [a, b, aa, bb, dc_link, ..] = self.sums.map(|sum| share * sum);
-        let rms = |square: f32, mean: f32| libm::sqrtf(square - mean * mean);
+        let rms = |square: f32, mean: f32| fpu_sqrt::sqrtf(square - mean * mean);
         Quiet { noise: [rms(aa, a), rms(bb, b)], dc_link: self.first_dc_link + dc_link }
     }
 }

@@ -96,7 +96,7 @@ impl Found {
             return self.iron.map(|iron| Motor { inertia, pole_pairs, ..iron.motor });
         }
         let coupled = levels.coupled();
-        let k = 1.0 / libm::sqrtf(1.0 + leakage.inductance / coupled);
+        let k = 1.0 / fpu_sqrt::sqrtf(1.0 + leakage.inductance / coupled);
         let l_ls = leakage.inductance / (1.0 + k);
         Some(Motor {
             r_s: levels.r_s,

@@ -110,7 +110,7 @@ impl Commissioning {
                     let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
                     let amperes = volts * admittances(&seen)[0];
                     let allowed =
-                        6.0 * noise / (amperes * libm::sqrtf(CARRIER_PERIODS as f32 / 2.0));
+                        6.0 * noise / (amperes * fpu_sqrt::sqrtf(CARRIER_PERIODS as f32 / 2.0));
                     let allowed = allowed.max(LEFT);
                     Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
                         .of((-allowed, allowed))

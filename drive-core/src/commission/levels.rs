@@ -156,7 +156,7 @@ impl Commissioning {
             let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
             let across = (a + 2.0 * b) * (1.0 / SQRT_3);
             let allowed = ACROSS.0 * a.abs() + ACROSS.1 * plate.amperes;
-            let allowed = allowed + 6.0 * noise / libm::sqrtf(bin.periods);
+            let allowed = allowed + 6.0 * noise / fpu_sqrt::sqrtf(bin.periods);
             Quantity::new("current across phase a", "A", across)
                 .of((-allowed, allowed))
                 .check(Meaning::Turning, Meaning::Turning)?;

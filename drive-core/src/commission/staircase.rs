@@ -219,7 +219,7 @@ impl Commissioning {
         let [[along, _], _] = self.inductances;
         let seconds = dwell(self.found.levels.ok_or(Refusal::Needs(Step::Levels))?.tau_r);
         let (r_r, i_d) = (fit.r_r * gain, self.stairs.i_d);
-        let k = 1.0 / libm::sqrtf(1.0 + along / (fit.tau_r * r_r));
+        let k = 1.0 / fpu_sqrt::sqrtf(1.0 + along / (fit.tau_r * r_r));
         let l = along / (1.0 + k);
         let r_r = r_r / (k * k);
         self.stairs.complete(seconds, r_r, l);

@@ -95,7 +95,7 @@ impl VoltageLimit {
             leakage,
             stator: leakage + motor.coupled_inductance(),
             i_d,
-            i_q: libm::sqrtf(largest_a * largest_a - i_d * i_d),
+            i_q: fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d),
             current_squared: largest_a * largest_a,
         }
     }
@@ -129,8 +129,11 @@ impl VoltageLimit {
         let i_d = if kept { self.i_d } else { self.direct(available, flux_freq, current.q) };
         state.available = if kept { 0.0 } else { available };
         let all = i_d + added;
-        let rest =
-            if all == self.i_d { self.i_q } else { libm::sqrtf(self.current_squared - all * all) };
+        let rest = if all == self.i_d {
+            self.i_q
+        } else {
+            fpu_sqrt::sqrtf(self.current_squared - all * all)
+        };
         state.by_voltage = by_leakage < rest;
         state.most = Dq { d: i_d, q: if state.by_voltage { by_leakage } else { rest } };
     }
@@ -142,7 +145,7 @@ impl VoltageLimit {
         let (w, size) = (angular(flux_freq), i_q.abs());
         let drop = self.r_s * if i_q * flux_freq < 0.0 { -size } else { size };
         let across = w * self.leakage * if size < by_leakage { size } else { by_leakage };
-        let along = libm::sqrtf(available * available - across * across) - drop;
+        let along = fpu_sqrt::sqrtf(available * available - across * across) - drop;
         let i_d = along / (w * self.stator);
         // NaN gives the setting; the step finds it.
         if i_d.is_nan() || i_d >= self.i_d {

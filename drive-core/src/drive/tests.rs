@@ -101,6 +101,14 @@ fn run_to(drive: &mut Drive, load: &mut Load, state: State) -> bool {
     false
 }
 
+/// A whole control period.
+fn period(drive: &mut Drive, load: &mut Load) {
+    let sample = load.sample();
+    let compare = drive.step(&sample);
+    drive.after_step(&sample);
+    load.advance(compare);
+}
+
 fn running() -> (Drive, Load) {
     let (mut drive, mut load) = (drive(), Load::new());
     drive.command(&Command::Start(Mode::Torque)).unwrap();

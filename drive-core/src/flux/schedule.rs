@@ -54,7 +54,7 @@ impl GainSchedule {
         let mut share = *slope.points();
         for (n, share) in share.iter_mut().enumerate() {
             let i_q = slope.grid().current(n);
-            let length = libm::sqrtf(i_d * i_d + i_q * i_q);
+            let length = fpu_sqrt::sqrtf(i_d * i_d + i_q * i_q);
             let ratio = 1.0 + 2.0 * b * (i_d * i_d - i_q * i_q) / length / *share;
             let by_slope = if ratio > 1.0 { 1.0 / ratio } else { 1.0 };
             *share = LEAST_SHARE + (1.0 - LEAST_SHARE) * by_slope;

@@ -255,7 +255,7 @@ impl VoltsPerHertz {
         };
         let square = seen.length_squared();
         if square > self.limit_a * self.limit_a {
-            let beyond = 1.0 - self.limit_a / libm::sqrtf(square);
+            let beyond = 1.0 - self.limit_a / fpu_sqrt::sqrtf(square);
             voltage -= seen * (self.limiting * beyond);
         }
         let angle = state.angle;
@@ -271,7 +271,7 @@ impl VoltsPerHertz {
 
     /// The voltage of a motor that stands, while its current rises.
     fn rise(&self, state: &mut VoltsPerHertzState, current: AlphaBeta) -> Result<Dq, Fault> {
-        let length = libm::sqrtf(current.length_squared());
+        let length = fpu_sqrt::sqrtf(current.length_squared());
         let error = self.boost_a - length;
         state.boost += self.boost.1 * error;
         if state.boost > self.most_v {
@@ -290,7 +290,7 @@ impl VoltsPerHertz {
     fn follow(&self, state: &mut VoltsPerHertzState, demand: &Demand) -> Result<(), Fault> {
         let (square, limit) = (state.fast.length_squared(), self.limit_a * self.limit_a);
         let most = NEAR * NEAR * limit - state.slow.d * state.slow.d;
-        let most = if most > 0.0 { libm::sqrtf(most) } else { 0.0 };
+        let most = if most > 0.0 { fpu_sqrt::sqrtf(most) } else { 0.0 };
         let i_q = state.fast.q;
         let range = (within(-most, demand.i_q), within(most, demand.i_q));
         let excess = i_q - within(i_q, range);

@@ -183,7 +183,7 @@ impl Learning {
     /// signal is the saliency, not a current difference.
     pub fn new(motor: &Motor, i_d: f32, largest_a: f32, normalised: bool) -> Self {
         let grid = Grid::for_current(largest_a);
-        let most = libm::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
+        let most = fpu_sqrt::sqrtf(largest_a * largest_a - i_d * i_d) / grid.step_a();
         let coupled = motor.coupled_inductance();
         let half_step = 0.5 * grid.step_a() / i_d;
         let tan_lead = if half_step > MOST_TAN_LEAD {

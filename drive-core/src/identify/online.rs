@@ -182,7 +182,7 @@ impl MotorModel {
         let square = current.length_squared();
         let along = current.d * current.d - current.q * current.q;
         let share = if square > 1e-6 {
-            self.current_saliency * libm::sqrtf(square) + self.flux_saliency * along / square
+            self.current_saliency * fpu_sqrt::sqrtf(square) + self.flux_saliency * along / square
         } else {
             self.flux_saliency
         };

@@ -53,7 +53,7 @@ impl Ramp {
     /// Largest change, with its sign, from which the reference can still end `left` further on.
     fn largest(&self, left: f32) -> f32 {
         let way = left.abs();
-        let steps = 0.5 * (libm::sqrtf(1.0 + self.eight_per_jerk * way) - 1.0);
+        let steps = 0.5 * (fpu_sqrt::sqrtf(1.0 + self.eight_per_jerk * way) - 1.0);
         let n = steps as i32 as f32;
         let change = (way + 0.5 * self.jerk * n * (n + 1.0)) / (n + 1.0);
         if left < 0.0 { -change } else { change }

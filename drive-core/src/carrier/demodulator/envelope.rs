@@ -49,5 +49,5 @@ impl Demodulate for Envelope {
 /// Amplitude of a sinusoid at the carrier frequency from two samples [`APART`] apart.
 fn envelope(now: f32, before: f32) -> f32 {
     let square = now * now + before * before - 2.0 * CARRIER_COS[APART] * (now * before);
-    libm::sqrtf(square) * (1.0 / CARRIER_SIN[APART])
+    fpu_sqrt::sqrtf(square) * (1.0 / CARRIER_SIN[APART])
 }

@@ -71,7 +71,7 @@ impl Demodulate for RmsImpedance {
 
         let least = LEAST * i32::from(self.length);
         let difference = if dm > least && qm > least {
-            let impedance = |i: i32| libm::sqrtf(v as f32 / i as f32) * VOLTS;
+            let impedance = |i: i32| fpu_sqrt::sqrtf(v as f32 / i as f32) * VOLTS;
             impedance(dm) - impedance(qm)
         } else {
             0.0

@@ -137,7 +137,9 @@ impl Bench {
     }
 
     fn step(&mut self) {
-        let compare = self.drive.step(&self.motor.sample());
+        let sample = self.motor.sample();
+        let compare = self.drive.step(&sample);
+        self.drive.after_step(&sample);
         self.motor.advance(compare);
     }
 

@@ -163,8 +163,7 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
         drive.command(&Command::Torque(3.1)).unwrap();
         let mut current = 0.0;
         for _ in 0..1200 {
-            let compare = drive.step(&load.sample());
-            load.advance(compare);
+            period(&mut drive, &mut load);
             current = drive.telemetry().current.q;
         }
         let share = drive.telemetry().carrier_share;
@@ -173,10 +172,7 @@ fn a_carrier_without_room_is_made_smaller_visibly_or_refused() {
         assert!((current - 3.1).abs() < 0.05, "{current}");
         // All of it comes back with the room.
         load.v_dc = 311.0;
-        for _ in 0..1200 {
-            let compare = drive.step(&load.sample());
-            load.advance(compare);
-        }
+        (0..1200).for_each(|_| period(&mut drive, &mut load));
         assert_eq!(drive.telemetry().carrier_share, 1.0);
     }
     let mut settings = settings();

@@ -41,7 +41,7 @@ impl Learning {
         let (reference, current_saliency) = self.reference(state);
         let slope = self.slope(state);
         let limit_a = slope.limit_a;
-        let ripple = libm::sqrtf(state.ripple);
+        let ripple = fpu_sqrt::sqrtf(state.ripple);
         let verdict = if reference.is_none() || asymmetry.size() > LARGEST_ASYMMETRY {
             Verdict::OutOfRange
         } else if !(spread <= SPREAD && self.points > 0) {
@@ -117,14 +117,14 @@ impl Learning {
         let (mut xx, mut xq, mut qq) = (0.0_f32, 0.0_f32, 0.0_f32);
         for (n, q) in q.iter().enumerate().take(self.points + 1) {
             let i_q = self.grid.current(n);
-            let x = 2.0 * self.i_d * i_q / libm::sqrtf(self.i_d * self.i_d + i_q * i_q);
+            let x = 2.0 * self.i_d * i_q / fpu_sqrt::sqrtf(self.i_d * self.i_d + i_q * i_q);
             xx += x * x;
             xq += x * q;
             qq += q * q;
         }
         let value = xq / xx;
         let rest = qq - value * xq;
-        let misfit = libm::sqrtf(if rest > 0.0 { rest / qq } else { 0.0 });
+        let misfit = fpu_sqrt::sqrtf(if rest > 0.0 { rest / qq } else { 0.0 });
         let accepted = self.normalised
             && value.abs() * self.grid.step_a() <= CURRENT_SALIENCY.0
             && misfit <= CURRENT_SALIENCY.1;
@@ -169,7 +169,7 @@ impl Learning {
 
     /// The carrier current over the torque current.
     fn carrier(&self, state: &LearningState, baseline: f32) -> Option<CarrierTable> {
-        let mut ratio = state.carrier.map(|square| libm::sqrtf(square / baseline));
+        let mut ratio = state.carrier.map(|square| fpu_sqrt::sqrtf(square / baseline));
         ratio[0] = 1.0;
         CarrierTable::from_points(self.grid, Self::held_beyond(&ratio, self.points))
     }

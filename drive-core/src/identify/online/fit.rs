@@ -107,7 +107,7 @@ impl Machine {
         }
         // The filtered prediction errors are correlated over about 1/corner samples.
         let noise = rls.error_square() / rls.settings().corner;
-        let uncertainty = libm::sqrtf(noise / information);
+        let uncertainty = fpu_sqrt::sqrtf(noise / information);
         let rate_moved = (unknowns.rate / from.rate - 1.0).abs();
         let r_s_moved = ((unknowns.r_s - from.r_s) / scale.r_s).abs();
         let moved = if rate_moved > r_s_moved { rate_moved } else { r_s_moved };
@@ -144,7 +144,7 @@ fn solve(columns: &[Column; UNKNOWNS + 1], first: usize) -> Option<Solution> {
                     return None;
                 }
                 information = sum;
-                l[i][i] = libm::sqrtf(sum);
+                l[i][i] = fpu_sqrt::sqrtf(sum);
             } else {
                 l[i][j] = sum / l[j][j];
             }

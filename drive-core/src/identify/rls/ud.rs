@@ -65,7 +65,7 @@ impl Ud {
                 x[i] -= self.u[above(i, j)] * x[j];
             }
         }
-        core::array::from_fn(|k| x[k] * (1.0 / libm::sqrtf(self.d[k])))
+        core::array::from_fn(|k| x[k] * (1.0 / fpu_sqrt::sqrtf(self.d[k])))
     }
 
     /// Updates the estimate with the equation y = sum x theta. Returns the prediction error before the
