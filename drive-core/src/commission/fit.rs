@@ -9,9 +9,8 @@
 //! For a given rotor time constant `i_m` follows from the measured current, exactly over bins of constant current, and the
 //! rest is linear in the four unknowns. The time constant with the least misfit is searched for.
 
-use core::ops::ControlFlow;
-
 use super::collector::{Bin, Collector};
+use super::report::Refusal;
 use crate::io::PERIOD_S;
 
 /// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
@@ -37,6 +36,8 @@ pub(super) struct Fitted {
     pub e: f32,
     /// Voltage times current that e lacks at a small current, V A; see [`levels`](super::levels).
     pub bend: f32,
+    /// Gain mismatch of the sensors; see [`levels`](super::levels).
+    pub mismatch: f32,
     /// ohm.
     pub r_r: f32,
     /// s.
@@ -81,16 +82,11 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// With no flux at the beginning.
-    pub fn new() -> Self {
-        Self::from_steady(0.0)
-    }
-
-    /// With the flux of this current, A, at the beginning.
-    pub fn from_steady(current: f32) -> Self {
+    /// With the flux of the current `steady`, A, at the beginning.
+    pub fn new(steady: f32) -> Self {
         let (from, to) = (libm::logf(TAU_R.0), libm::logf(TAU_R.1));
         Self {
-            steady: current,
+            steady,
             round: 0,
             point: 0,
             begins: FROM_S.0 / PERIOD_S,
@@ -103,8 +99,8 @@ impl Search {
         }
     }
 
-    /// One fit; the result, none where nothing can be fitted, after the last.
-    pub fn step(&mut self, sums: &Collector) -> ControlFlow<Option<Fitted>> {
+    /// One fit; the result after the last. Refused where nothing can be fitted.
+    pub fn step(&mut self, sums: &Collector) -> Result<Option<Fitted>, Refusal> {
         let x = self.from + self.step * f32::from(self.point);
         if let Some(candidate) = fit(sums, self.steady, libm::expf(x), self.begins) {
             let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
@@ -121,11 +117,11 @@ impl Search {
         self.point += 1;
         let points = if self.round == 0 { POINTS } else { CLOSER_POINTS };
         if self.point < points {
-            return ControlFlow::Continue(());
+            return Ok(None);
         }
-        let Some((x, best)) = self.best else { return ControlFlow::Break(None) };
+        let (x, best) = self.best.ok_or(Refusal::SamplesLost)?;
         if self.round + 1 == ROUNDS {
-            return ControlFlow::Break(Some(self.fitted(x, &best)));
+            return Ok(Some(self.fitted(x, &best)));
         }
         if self.round == 0 {
             let (least, most) = FROM_S;
@@ -136,7 +132,7 @@ impl Search {
         self.step *= 2.0 / f32::from(CLOSER_POINTS - 1);
         (self.round, self.point, self.best) = (self.round + 1, 0, None);
         (self.after_best, self.last_left) = (false, 0.0);
-        ControlFlow::Continue(())
+        Ok(None)
     }
 
     fn fitted(&self, x: f32, best: &Candidate) -> Fitted {
@@ -150,6 +146,7 @@ impl Search {
             r_s,
             e,
             bend: 0.0,
+            mismatch: 0.0,
             r_r,
             tau_r,
             misfit: libm::sqrt(best.left / best.weight) as f32,

@@ -73,15 +73,15 @@ impl Levels {
         self.tau_r * self.r_r
     }
 
-    pub(super) fn new(fit: &Fitted, mismatch: f32) -> Self {
+    pub(super) fn new(fit: &Fitted) -> Self {
         // Impedances were divided by the current of sensor a.
-        let gain = 1.0 + 0.5 * mismatch;
+        let gain = 1.0 + 0.5 * fit.mismatch;
         Self {
             r_s: fit.r_s * gain,
             r_r: fit.r_r * gain,
             tau_r: fit.tau_r,
             inverter_v: 0.75 * fit.e,
-            mismatch,
+            mismatch: fit.mismatch,
             saturates: false,
         }
     }
