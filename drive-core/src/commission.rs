@@ -54,10 +54,10 @@ mod steps;
 mod tests;
 
 use crate::drive::{Excitation, Excited, Regulator, State};
-use crate::io::PERIOD_S;
+use crate::io::{PERIOD_S, periods};
 use crate::math::frames::AlphaBeta;
+use crate::settings::Settings;
 use crate::settings::value::Words as _;
-use crate::settings::{Motor, Settings};
 use crate::tuning::{CurrentLoopDesign, FirstOrder, TuningError, design_current_loop, motor_plant};
 
 pub use collector::{BINS, Bin, Collector, Record};
@@ -65,10 +65,9 @@ pub use found::{Found, Iron, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
-use inertia::Swings;
-use plate::Plate;
+use plate::{Plate, TAU_R};
+use report::{SIZE, TIME};
 use staircase::Staircase;
-use steps::Pulses;
 
 /// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
 const CAUTION: f32 = 0.75;
@@ -101,15 +100,13 @@ pub enum Next {
 /// What a step asks for next.
 type Answer = Result<Next, Refusal>;
 
-/// A part of a step: what is recorded, for how many samples, and the excitation.
-type Part = (Record, u32, Excitation);
+/// A part of a step: what is recorded, for how many seconds, and the excitation.
+type Part = (Record, f32, Excitation);
 
 /// The commissioning: what it does, and what it has found.
 #[derive(Clone, Debug)]
 pub struct Commissioning {
     plate: Plate,
-    /// Whether the nameplate is plausible.
-    plausible: Result<(), Refusal>,
     found: Found,
     /// Inductances along and across at each bias of the leakage, H: the staircase needs them too.
     inductances: [[f32; 2]; 2],
@@ -134,13 +131,17 @@ struct StepState {
     search: Option<Search>,
     /// The current loop along and across, once it is designed.
     design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
-    pulses: Pulses,
-    /// What the first two levels have shown.
+    /// Of the wiring: volt-seconds of the present train of pulses, V s, and trains before it.
+    volt_seconds: f32,
+    trains: u32,
+    /// Of the levels: what the first two have shown.
     fitted: Fitted,
     stairs: Staircase,
     /// The plants along and across that the current loop is to be designed for.
     plants: [Option<FirstOrder>; 2],
-    swings: Swings,
+    /// Of the inertia: torque current, A, and whether it is that of the measurement.
+    amperes: f32,
+    measures: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,10 +159,8 @@ enum Progress {
 impl Commissioning {
     /// A commissioning of the motor with the nameplate, on the board, of these settings. Nothing is begun.
     pub fn new(settings: &Settings) -> Self {
-        let (plate, plausible) = Plate::new(settings);
         Self {
-            plate,
-            plausible,
+            plate: Plate::new(settings),
             found: Found::default(),
             inductances: [[0.0; 2]; 2],
             step: Step::Nameplate,
@@ -205,10 +204,7 @@ impl Commissioning {
     /// The settings with what has been found in them; equal to `settings` where nothing has, or where the last steps ended
     /// with a refusal.
     pub fn settings(&self, settings: &Settings) -> Settings {
-        if self.refused {
-            return *settings;
-        }
-        self.found.settings(settings, self.plate.pole_pairs)
+        if self.refused { *settings } else { self.found.settings(settings, self.plate.pole_pairs) }
     }
 
     /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](crate::Drive::excited).
@@ -225,10 +221,8 @@ impl Commissioning {
                 (self.progress, Next::Wait)
             }
             (Progress::StoppingToDesign | Progress::Steps, _) => {
-                return match self.go_on(drive, sums) {
-                    Ok(next) => next,
-                    Err(refusal) => Next::Report(self.refuse(refusal)),
-                };
+                let next = self.go_on(drive, sums);
+                return next.unwrap_or_else(|refusal| Next::Report(self.refuse(refusal)));
             }
         };
         self.progress = progress;
@@ -238,7 +232,7 @@ impl Commissioning {
     /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes
     /// as long as [`Settings::build`]: a second on the target, so the drive must be off.
     pub fn design(&mut self) {
-        self.state.design = self.found.motor(&Motor::default()).map(|motor| {
+        self.state.design = self.found.motor().map(|motor| {
             let period_s = f64::from(PERIOD_S);
             let plant = motor_plant(&motor.circuit(), period_s)?;
             let designed = |identified| design_current_loop(identified, plant, period_s);
@@ -268,17 +262,11 @@ impl Commissioning {
             State::Catching | State::Magnetising | State::Verifying | State::Torque => turns,
             _ => false,
         };
-        if !excites {
-            return Err(Refusal::Drive(drive.state));
-        }
-        if sums.is_incomplete() {
-            return Err(Refusal::SamplesLost);
-        }
-        if sums.samples() < self.state.until {
-            return Ok(Next::Wait);
-        }
-        self.plausible?;
         match self.step {
+            _ if !excites => Err(Refusal::Drive(drive.state)),
+            _ if sums.is_incomplete() => Err(Refusal::SamplesLost),
+            _ if sums.samples() < self.state.until => Ok(Next::Wait),
+            _ if let Some(entry) = self.plate.implausible => Err(Refusal::Plate(entry)),
             Step::Nameplate => self.report(&self.plate.values()),
             Step::Sensors => self.sensors(drive, sums),
             Step::Wiring => self.wiring(drive, sums),
@@ -292,9 +280,9 @@ impl Commissioning {
     }
 
     /// Begins a part of the present step.
-    fn begin(&mut self, sums: &mut Collector, (record, samples, excitation): Part) -> Answer {
+    fn begin(&mut self, sums: &mut Collector, (record, seconds, excitation): Part) -> Answer {
         sums.begin(record);
-        self.state.until = samples;
+        self.state.until = periods(seconds);
         self.state.part += 1;
         Ok(Next::Excite(excitation))
     }
@@ -303,10 +291,9 @@ impl Commissioning {
     fn report(&mut self, values: &[Quantity]) -> Answer {
         let report = Report::new(self.step, values);
         if self.step < self.last {
+            let saturates = self.found.levels.is_some_and(|levels| levels.saturates);
             self.step = match self.step {
-                Step::Leakage if self.found.levels.is_none_or(|levels| !levels.saturates) => {
-                    Step::CurrentLoop
-                }
+                Step::Leakage if !saturates => Step::CurrentLoop,
                 Step::CurrentLoop if self.last != Step::Plant => Step::Inertia,
                 step => Step::at(step.place() + 1),
             };
@@ -346,13 +333,9 @@ impl Commissioning {
         Ok(Regulator { k_c, z_c, ..Regulator::default() })
     }
 
-    /// A share of the test current along phase a, with a carrier.
-    fn along(&self, share: f32, regulator: Regulator, carrier: AlphaBeta) -> Excitation {
-        Excitation::Current {
-            amperes: share * self.plate.amperes,
-            regulator,
-            carrier,
-            binary: false,
-        }
+    /// A share of the test current along phase a.
+    fn along(&self, share: f32, regulator: Regulator) -> Excitation {
+        let (amperes, carrier) = (share * self.plate.amperes, AlphaBeta::ZERO);
+        Excitation::Current { amperes, regulator, carrier, binary: false }
     }
 }

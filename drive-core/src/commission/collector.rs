@@ -3,13 +3,11 @@
 //! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: that of step `k-1` acts
 //! from `k` on, that of `k-2` ended at `k`.
 
-use super::inertia::{Motion, Slope};
+use super::inertia::Motion;
 use super::plant::PlantFit;
-use super::report::Refusal;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta};
-use crate::tuning::FirstOrder;
 
 /// Bins of a record.
 pub const BINS: usize = 57;
@@ -64,17 +62,13 @@ pub struct Bin {
     pub current: AlphaBeta,
 }
 
-/// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.
-pub(super) type Phasors = [[f32; 2]; 4];
-
 /// The sums.
 ///
 /// Call [`begin`](Self::begin) before the command that changes the excitation, and [`push`](Self::push) for every step of
 /// the drive while it [excites](crate::Drive::excites). 2 KiB.
 #[derive(Clone, Debug)]
 pub struct Collector {
-    record: Record,
-    sums: Sums,
+    pub(super) recorded: Recorded,
     /// Voltages of the last two steps.
     voltages: [AlphaBeta; 2],
     /// Sums of length, voltage, current of each bin; they stay until a record takes their half.
@@ -83,7 +77,8 @@ pub struct Collector {
 
 /// What a record has collected since it began.
 #[derive(Clone, Debug, Default)]
-struct Sums {
+pub(super) struct Recorded {
+    record: Record,
     samples: u32,
     /// Whether samples are missing.
     incomplete: bool,
@@ -91,33 +86,28 @@ struct Sums {
     bin: usize,
     length: f32,
     end: f32,
-    /// Products with the cosine and the sine of the carrier.
-    carrier: Phasors,
+    /// Products of the cosine and the sine of the carrier with voltage along phase a and across it, and with the current likewise.
+    carrier: [[f32; 2]; 4],
     /// Phase currents a and b, their squares, dc link less its first value.
     noise: [f32; 5],
     first_dc_link: f32,
-    motion: Motion,
-    plant: PlantFit,
+    pub motion: Motion,
+    pub plant: PlantFit,
 }
 
 impl Default for Collector {
     fn default() -> Self {
         let bins = [[Bin::default(); BINS]; 2];
-        Self {
-            record: Record::Nothing,
-            sums: Sums::default(),
-            voltages: [AlphaBeta::ZERO; 2],
-            bins,
-        }
+        Self { recorded: Recorded::default(), voltages: [AlphaBeta::ZERO; 2], bins }
     }
 }
 
 impl Collector {
     /// Begins a record.
     pub fn begin(&mut self, record: Record) {
-        (self.record, self.sums) = (record, Sums::default());
+        self.recorded = Recorded { record, ..Recorded::default() };
         if let Record::Bins { half, first } = record {
-            (self.sums.end, self.sums.length) = (first, first);
+            (self.recorded.end, self.recorded.length) = (first, first);
             if let Some(bins) = self.bins.get_mut(half) {
                 *bins = [Bin::default(); BINS];
             }
@@ -126,32 +116,34 @@ impl Collector {
 
     /// Samples since the record began.
     pub fn samples(&self) -> u32 {
-        self.sums.samples
+        self.recorded.samples
     }
 
     /// Notes that steps of the drive are missing between the last and the next: a record that has begun is incomplete.
     pub fn gap(&mut self) {
-        self.sums.incomplete |= self.sums.samples > 0 && self.record != Record::Nothing;
+        let sums = &mut self.recorded;
+        sums.incomplete |= sums.samples > 0 && sums.record != Record::Nothing;
     }
 
     /// Whether samples are missing in the record.
     pub fn is_incomplete(&self) -> bool {
-        self.sums.incomplete
+        self.recorded.incomplete
     }
 
     /// Takes a step of the drive while it regulates torque: reference of the torque current, A, and `rotor_freq` of its
     /// [telemetry](crate::Telemetry).
     pub fn push_motion(&mut self, i_q: f32, rotor_freq: f32) {
-        if self.record == Record::Motion {
-            self.sums.motion.push(i_q, rotor_freq);
-            self.sums.samples = self.sums.samples.wrapping_add(1);
+        let sums = &mut self.recorded;
+        if sums.record == Record::Motion {
+            sums.motion.push(i_q, rotor_freq);
+            sums.samples = sums.samples.wrapping_add(1);
         }
     }
 
     /// Takes a step of the drive while it excites: `measured`, `realised` and `dc_link` of its [telemetry](crate::Telemetry).
     pub fn push(&mut self, measured: AlphaBeta, realised: AlphaBeta, dc_link: f32) {
-        let ([last, before], sums) = (self.voltages, &mut self.sums);
-        match self.record {
+        let ([last, before], sums) = (self.voltages, &mut self.recorded);
+        match sums.record {
             Record::Motion => return,
             Record::Nothing => {}
             Record::Bins { half, .. } => {
@@ -198,8 +190,7 @@ impl Collector {
         let filled = self.bins.get(half).into_iter().flatten().filter(|bin| bin.periods > 0.0);
         filled.map(|sum| {
             let share = 1.0 / sum.periods;
-            let (voltage, current) = (sum.voltage * share, sum.current * share);
-            Bin { periods: sum.periods, voltage, current }
+            Bin { voltage: sum.voltage * share, current: sum.current * share, ..*sum }
         })
     }
 
@@ -215,27 +206,17 @@ impl Collector {
         Bin { voltage: sum.voltage * share, current: sum.current * share, ..sum }
     }
 
-    /// The amplitudes at the carrier.
-    pub(super) fn phasors(&self) -> Phasors {
-        let share = 2.0 / self.sums.samples as f32;
-        self.sums.carrier.map(|parts| parts.map(|sum| share * sum))
+    /// Voltage along phase a and across it, V peak, and current likewise, A peak, at the carrier: cosine and sine part.
+    pub(super) fn phasors(&self) -> [[f32; 2]; 4] {
+        let share = 2.0 / self.recorded.samples as f32;
+        self.recorded.carrier.map(|parts| parts.map(|sum| share * sum))
     }
 
     /// Noise of the sensors a and b, A rms, and the dc link, V, without current.
     pub(super) fn quiet(&self) -> ([f32; 2], f32) {
-        let share = 1.0 / self.sums.samples as f32;
-        let [a, b, aa, bb, dc_link] = self.sums.noise.map(|sum| share * sum);
+        let share = 1.0 / self.recorded.samples as f32;
+        let [a, b, aa, bb, dc_link] = self.recorded.noise.map(|sum| share * sum);
         let rms = |square: f32, mean: f32| libm::sqrtf(square - mean * mean);
-        ([rms(aa, a), rms(bb, b)], self.sums.first_dc_link + dc_link)
-    }
-
-    /// The plant that was fitted, in the bases of its record; refused without one.
-    pub(super) fn plant(&self) -> Result<FirstOrder, Refusal> {
-        self.sums.plant.found().ok_or(Refusal::SamplesLost)
-    }
-
-    /// What torque current and speed say.
-    pub(super) fn slope(&self) -> Slope {
-        self.sums.motion.slope()
+        ([rms(aa, a), rms(bb, b)], self.recorded.first_dc_link + dc_link)
     }
 }

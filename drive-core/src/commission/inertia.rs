@@ -12,9 +12,7 @@
 
 use core::mem::replace;
 
-use super::collector::{Collector, Record};
-use super::report::{Meaning, Quantity};
-use super::{Answer, Commissioning, Next};
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
 use crate::drive::{Excited, State};
 use crate::io::{PERIOD_S, periods};
 use crate::math::limited;
@@ -101,16 +99,8 @@ impl Motion {
     }
 }
 
-/// State of the step. Part 0 starts the drive; every further part is a quarter.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Swings {
-    /// Torque current, A.
-    amperes: f32,
-    /// Whether the current is that of the measurement.
-    measures: bool,
-}
-
 impl Commissioning {
+    /// Part 0 starts the drive; every further part is a quarter.
     pub(super) fn inertia(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
         let (rated, limit) = (self.plate.rated, self.plate.i_q_limit);
         match self.state.part {
@@ -121,14 +111,14 @@ impl Commissioning {
             }
             1 if drive.state != State::Torque => return Ok(Next::Wait),
             1 => {
-                self.state.swings.amperes = FIRST * rated;
+                self.state.amperes = FIRST * rated;
                 sums.begin(Record::Motion);
             }
             _ => {}
         }
-        let Swings { amperes, measures } = self.state.swings;
+        let measures = self.state.measures;
         if self.state.part == 1 + if measures { QUARTERS } else { 4 } {
-            let slope = sums.slope();
+            let slope = sums.recorded.motion.slope();
             if measures {
                 return self.report_inertia(slope);
             }
@@ -137,9 +127,9 @@ impl Commissioning {
             let follows = slope.explained >= EXPLAINED && slope.value > 0.0;
             let most = MOST * limit;
             let needed = (PEAK_RAD_PER_S / QUARTER_S + slope.friction.abs()) / slope.value;
-            let next = if follows { needed } else { 2.0 * amperes };
-            let amperes = next.clamp(LEAST * rated, most);
-            self.state.swings = Swings { amperes, measures: follows || amperes >= most };
+            let next = if follows { needed } else { 2.0 * self.state.amperes };
+            self.state.amperes = next.clamp(LEAST * rated, most);
+            self.state.measures = follows || self.state.amperes >= most;
             self.state.part = 1;
             sums.begin(Record::Motion);
         }
@@ -147,21 +137,21 @@ impl Commissioning {
         let ahead = matches!(self.state.part % 4, 0 | 1);
         self.state.until = periods(QUARTER_S) * self.state.part as u32;
         self.state.part += 1;
-        let amperes = self.state.swings.amperes;
+        let amperes = self.state.amperes;
         Ok(Next::Torque(if ahead { amperes } else { -amperes }))
     }
 
     fn report_inertia(&mut self, slope: Slope) -> Answer {
         let (explained, free) = (slope.explained, [Meaning::NotFree; 2]);
         let explained = Quantity::new("explained share of the speed", "", explained)
-            .of((EXPLAINED, 1.0), free)?;
+            .checked((EXPLAINED, 1.0), free)?;
         // Mechanical: the slopes are electrical.
         let inertia = self.plate.torque_per_ampere * self.plate.pole_pairs_in_force / slope.value;
         let friction = inertia * slope.friction / self.plate.pole_pairs_in_force;
         let values = [
-            Quantity::new("inertia", "kg m2", inertia).of((0.0, f32::INFINITY), free)?,
+            Quantity::new("inertia", "kg m2", inertia).checked((0.0, f32::INFINITY), free)?,
             Quantity::new("friction", "Nm", friction),
-            Quantity::new("torque current", "A", self.state.swings.amperes),
+            Quantity::new("torque current", "A", self.state.amperes),
             explained,
         ];
         self.found.inertia = Some(inertia);

@@ -14,12 +14,12 @@
 
 use core::f32::consts::TAU;
 
-use super::collector::{Collector, Phasors, Record};
-use super::found::Leakage;
-use super::report::{Meaning, Quantity, Refusal, SIZE, Step};
-use super::{Answer, Commissioning};
+use super::{
+    Answer, Collector, Commissioning, Leakage, Meaning, Quantity, Record, Refusal, SIZE, Step,
+};
 use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::{PERIOD_S, periods};
+use crate::drive::Excitation;
+use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, SQRT_3};
 use crate::settings::rules::CARRIER_HZ;
 
@@ -32,22 +32,22 @@ const CARRIER: f32 = 0.07;
 const CARRIER_OF_BUS: f32 = 0.3;
 /// Longest time until the flux of a bias counts as standing, s: it moves the saliency, not the mean inductance.
 const SETTLED_S: f32 = 2.1;
-/// Control periods of a record, of the rise of the carrier, and of its fall.
-const CARRIER_PERIODS: u32 = 1500;
-const RISE_PERIODS: u32 = 300;
+/// Samples of a record, and time of the rise of the carrier, and of its fall, s.
+const RECORDED: f32 = 1500.0;
+const RISE_S: f32 = 0.05;
 /// Largest gain mismatch that is left at the carrier.
 const LEFT: f32 = 0.01;
 /// rad/s.
 const CARRIER_RAD_PER_S: f32 = TAU * CARRIER_HZ;
 
 /// A/V along phase a, and across it.
-fn admittances(seen: &Phasors) -> [f32; 2] {
+fn admittances(seen: &[[f32; 2]; 4]) -> [f32; 2] {
     let [v_a, v_b, i_a, i_b] = seen.map(|[re, im]| libm::hypotf(re, im));
     [i_a / v_a, i_b / v_b]
 }
 
 /// Gain mismatch that the carrier along phase a shows: (gain of a)/(gain of b) - 1.
-fn mismatch([_, _, [re_a, im_a], [re_b, im_b]]: &Phasors) -> f32 {
+fn mismatch([_, _, [re_a, im_a], [re_b, im_b]]: &[[f32; 2]; 4]) -> f32 {
     SQRT_3 * (re_a * re_b + im_a * im_b) / (re_a * re_a + im_a * im_a)
 }
 
@@ -61,11 +61,8 @@ fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) 
         let middle = 0.5 * (low + high);
         let decayed = -libm::expm1f(-PERIOD_S * resistance / libm::expf(middle));
         let to_pole = libm::hypotf(cos - (1.0 - decayed), sin);
-        if seen * decayed / (resistance * to_pole) > admittance {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        let is_low = seen * decayed / (resistance * to_pole) > admittance;
+        *(if is_low { &mut low } else { &mut high }) = middle;
     }
     libm::expf(0.5 * (low + high))
 }
@@ -80,13 +77,13 @@ impl Commissioning {
         let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
         // The parts of a bias.
         let parts = [
-            (Record::Nothing, periods((3.0 * levels.tau_r).min(SETTLED_S)), none),
-            (Record::Nothing, RISE_PERIODS, along),
-            (Record::Carrier, CARRIER_PERIODS, along),
-            (Record::Nothing, RISE_PERIODS, none),
-            (Record::Nothing, RISE_PERIODS, across),
-            (Record::Carrier, CARRIER_PERIODS, across),
-            (Record::Nothing, RISE_PERIODS, none),
+            (Record::Nothing, (3.0 * levels.tau_r).min(SETTLED_S), none),
+            (Record::Nothing, RISE_S, along),
+            (Record::Carrier, RECORDED * PERIOD_S, along),
+            (Record::Nothing, RISE_S, none),
+            (Record::Nothing, RISE_S, across),
+            (Record::Carrier, RECORDED * PERIOD_S, across),
+            (Record::Nothing, RISE_S, none),
         ];
         let (bias, part) = (self.state.part / parts.len(), self.state.part % parts.len());
         let Some(&share) = BIASES.get(bias) else { return self.report_leakage() };
@@ -102,15 +99,16 @@ impl Commissioning {
                 inductance(admittance / gain, levels.r_s + levels.r_r, self.plate.filter, range);
             if axis == 0 {
                 let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-                let of_noise =
-                    6.0 * noise / (volts * admittance * libm::sqrtf(CARRIER_PERIODS as f32 / 2.0));
+                let of_noise = 6.0 * noise / (volts * admittance * libm::sqrtf(RECORDED / 2.0));
                 let allowed = of_noise.max(LEFT);
                 Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
-                    .of((-allowed, allowed), [Meaning::Turning; 2])?;
+                    .up_to(allowed, Meaning::Turning)?;
             }
         }
-        let (record, samples, carrier) = parts[part];
-        self.begin(sums, (record, samples, self.along(share, regulator, carrier)))
+        let (record, seconds, carrier) = parts[part];
+        let amperes = share * self.plate.amperes;
+        let excitation = Excitation::Current { amperes, regulator, carrier, binary: false };
+        self.begin(sums, (record, seconds, excitation))
     }
 
     fn report_leakage(&mut self) -> Answer {
@@ -121,7 +119,7 @@ impl Commissioning {
         let slope = (high[1] - low[1]) / (most - least);
         let fundamental = low[1] - slope * least;
         let values = [
-            Quantity::new("sigma L_s", "H", inductance).of(self.plate.leakage, SIZE)?,
+            Quantity::new("sigma L_s", "H", inductance).checked(self.plate.leakage, SIZE)?,
             Quantity::new("saliency at half the current", "", saliency(high)),
             Quantity::new("saliency at a quarter", "", saliency(low)),
             Quantity::new("fundamental wave, no current", "H", fundamental),

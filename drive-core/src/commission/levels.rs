@@ -1,13 +1,11 @@
 //! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
 
-use super::collector::{BINS, Collector, Record};
-use super::fit::Fitted;
-use super::found::Levels;
-use super::plate::TAU_R;
-use super::report::{Meaning, Quantity, Refusal, SIZE, Step, TIME};
-use super::{Answer, Commissioning, Next};
+use super::{
+    Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, Quantity, Record,
+    Refusal, SIZE, Step, TAU_R, TIME,
+};
 use crate::drive::Excitation;
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, SQRT_3};
 
 /// Pause before the first level, s.
@@ -82,8 +80,7 @@ impl Commissioning {
         }
         let tau_r = self.state.fitted.tau_r;
         let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(QUIET_S));
-        let at = |share| self.along(share, regulator, AlphaBeta::ZERO);
-        let [high, low, third, fourth] = LEVELS.map(at);
+        let [high, low, third, fourth] = LEVELS.map(|share| self.along(share, regulator));
         let parts = [
             (Record::Nothing, QUIET_S, Excitation::Rest),
             (Record::bins(0, LEVEL_S), LEVEL_S, high),
@@ -93,8 +90,7 @@ impl Commissioning {
             (Record::Nothing, wait, fourth),
             (Record::bins(0, mean), mean, fourth),
         ];
-        let (record, seconds, excitation) = parts[part % parts.len()];
-        self.begin(sums, (record, periods(seconds), excitation))
+        self.begin(sums, parts[part % parts.len()])
     }
 
     /// The gain mismatch that the first two levels show. No current may flow across phase a, once the gains are corrected.
@@ -102,8 +98,7 @@ impl Commissioning {
         let [high, low] = [0, 1].map(|half| sums.mean(half, STEADY).current);
         let (da, db) = (high.alpha - low.alpha, on_b(high) - on_b(low));
         let mismatch = -da / (2.0 * db) - 1.0;
-        Quantity::new("gain mismatch", "", mismatch)
-            .of((-MISMATCH, MISMATCH), [Meaning::Mismatch; 2])?;
+        Quantity::new("gain mismatch", "", mismatch).up_to(MISMATCH, Meaning::Mismatch)?;
         for bin in sums.bins(0).chain(sums.bins(1)) {
             let (a, b) = (bin.current.alpha, on_b(bin.current));
             let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
@@ -111,7 +106,7 @@ impl Commissioning {
             let allowed = ACROSS.0 * a.abs() + ACROSS.1 * self.plate.amperes;
             let allowed = allowed + 6.0 * noise / libm::sqrtf(bin.periods);
             Quantity::new("current across phase a", "A", across)
-                .of((-allowed, allowed), [Meaning::Turning; 2])?;
+                .up_to(allowed, Meaning::Turning)?;
         }
         Ok(mismatch)
     }
@@ -134,21 +129,21 @@ impl Commissioning {
             self.state.fitted = fit.bent(error, self.plate.amperes);
             return Ok(false);
         }
-        let error = Quantity::new("error of the last level", "V", error);
-        error.of((-allowed, allowed), [Meaning::Inverter; 2]).map(|_| true)
+        Quantity::new("error of the last level", "V", error).up_to(allowed, Meaning::Inverter)?;
+        Ok(true)
     }
 
     /// The main flux saturates: the ends of the levels give the resistance, the staircase is to give the rest.
     fn report_saturated(&mut self, sums: &Collector, limit: f32) -> Answer {
         let fit = self.state.fitted;
         Quantity::new("misfit", "V", fit.misfit)
-            .of((0.0, SATURATED * limit), [Meaning::Misfit; 2])?;
+            .checked((0.0, SATURATED * limit), [Meaning::Misfit; 2])?;
         let [high, low] = [0, 1].map(|half| sums.mean(half, ENDS));
         let r_s = (high.voltage - low.voltage) / (high.current.alpha - low.current.alpha);
         let ends = Fitted { r_s, e: low.voltage - r_s * low.current.alpha, ..fit };
         let levels = Levels { saturates: true, ..Levels::new(&ends) };
         let values = [
-            Quantity::new("r_s", "ohm", levels.r_s).of(self.plate.r_s, SIZE)?,
+            Quantity::new("r_s", "ohm", levels.r_s).checked(self.plate.r_s, SIZE)?,
             self.inverter_voltage(&levels)?,
             Quantity::new("gain mismatch", "", levels.mismatch),
             misfit(&fit, limit),
@@ -160,17 +155,17 @@ impl Commissioning {
     fn inverter_voltage(&self, levels: &Levels) -> Result<Quantity, Refusal> {
         let of_dead_time = self.plate.dead_time * self.found.dc_link.unwrap_or(0.0);
         Quantity::new("inverter voltage", "V", levels.inverter_v)
-            .of((DEAD_TIME * of_dead_time, f32::INFINITY), [Meaning::Inverter; 2])
+            .checked((DEAD_TIME * of_dead_time, f32::INFINITY), [Meaning::Inverter; 2])
     }
 
     fn level_values(&self, limit: f32) -> Result<[Quantity; 7], Refusal> {
         let fit = &self.state.fitted;
         let (plate, levels) = (&self.plate, Levels::new(fit));
-        let [d_r_s, d_e, d_r_r] = fit.deviations;
+        let ([d_r_s, d_e, d_r_r], d_tau_r) = (fit.deviations, fit.tau_deviation);
         Ok([
-            Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).of(plate.r_s, SIZE)?,
-            Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).of(plate.r_r, SIZE)?,
-            Quantity::new("tau_r", "s", levels.tau_r).within(fit.tau_deviation).of(TAU_R, TIME)?,
+            Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).checked(plate.r_s, SIZE)?,
+            Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).checked(plate.r_r, SIZE)?,
+            Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(TAU_R, TIME)?,
             Quantity::new("L_M", "H", levels.coupled()),
             self.inverter_voltage(&levels)?.within(0.75 * d_e),
             Quantity::new("gain mismatch", "", fit.mismatch),
@@ -181,7 +176,7 @@ impl Commissioning {
 
 /// The misfit, beside that of a linear motor.
 fn misfit(fit: &Fitted, limit: f32) -> Quantity {
-    Quantity { allowed: (0.0, limit), ..Quantity::new("misfit", "V", fit.misfit) }
+    Quantity::new("misfit", "V", fit.misfit).allowing((0.0, limit))
 }
 
 /// Phase current b of a current vector, A.

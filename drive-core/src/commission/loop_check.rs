@@ -1,13 +1,8 @@
 //! Step 7: the current loop, designed by the rule of section 3.8 and its limits for the motor that was found, and checked by
 //! a step of the current along phase a.
 
-use super::collector::{Collector, Record};
-use super::report::{Meaning, Quantity, Refusal, Step};
-use super::{Answer, Commissioning, Next};
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use crate::drive::Regulator;
-use crate::io::periods;
-use crate::math::frames::AlphaBeta;
-use crate::settings::Motor;
 use crate::tuning::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
@@ -26,22 +21,22 @@ const NOISES: f32 = 4.0;
 
 impl Commissioning {
     pub(super) fn current_loop(&mut self, sums: &mut Collector) -> Answer {
-        let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
+        let motor = self.found.motor().ok_or(Refusal::Needs(Step::Leakage))?;
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
         if self.state.part == 0 {
             self.found.plants = None;
             // Less flux first: while the next start has the low sides on, what is left drives a current against itself,
             // which turns a light shaft away.
-            let low = self.along(LOW, self.regulator()?, AlphaBeta::ZERO);
-            return self.begin(sums, (Record::Nothing, periods(LOW_T * motor.tau_r()), low));
+            let low = self.along(LOW, self.regulator()?);
+            return self.begin(sums, (Record::Nothing, LOW_T * motor.tau_r(), low));
         }
         let Some([design, _]) = self.designed()? else { return Ok(Next::Wait) };
         let (k_c, z_c) = (design.k_c as f32, design.z_c as f32);
         let regulator = Regulator { k_c, z_c, direct: DIRECT_SHARE, filtered: true };
-        let [before, after] = STEP.map(|share| self.along(share, regulator, AlphaBeta::ZERO));
+        let [before, after] = STEP.map(|share| self.along(share, regulator));
         let parts = [
-            (Record::Nothing, periods(BEFORE_S + motor.tau_r()), before),
-            (Record::bins(0, RECORD_S), periods(RECORD_S), after),
+            (Record::Nothing, BEFORE_S + motor.tau_r(), before),
+            (Record::bins(0, RECORD_S), RECORD_S, after),
         ];
         if let Some(&part) = parts.get(self.state.part - 1) {
             return self.begin(sums, part);
@@ -52,14 +47,13 @@ impl Commissioning {
         let overshoot = (highest - end) / step;
         let missing = (end - STEP[1] * self.plate.amperes) / step;
         let allowed = OVERSHOOT + NOISES * noise / step;
-        let (range, meaning) = ((-allowed, allowed), [Meaning::Loop; 2]);
         self.report(&[
             Quantity::new("k_c", "V/A", k_c),
             Quantity::new("z_c", "", z_c),
             Quantity::new("phase margin", "deg", design.margins.phase_margin_deg as f32),
             Quantity::new("crossover", "Hz", design.margins.crossover_hz as f32),
-            Quantity::new("overshoot", "", overshoot).of(range, meaning)?,
-            Quantity::new("error after the step", "", missing).of(range, meaning)?,
+            Quantity::new("overshoot", "", overshoot).up_to(allowed, Meaning::Loop)?,
+            Quantity::new("error after the step", "", missing).up_to(allowed, Meaning::Loop)?,
         ])
     }
 }

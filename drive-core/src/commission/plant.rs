@@ -14,15 +14,12 @@
 
 use num_complex::Complex32;
 
-use super::collector::{Collector, Record};
-use super::report::{Meaning, Quantity, Refusal, Step};
-use super::{Answer, Commissioning, Next};
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use crate::drive::Excitation;
 use crate::filter::dissertation::{LPF, LpfState};
 use crate::identify::rls::ud::{Forgetting, Ud};
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::math::frames::AlphaBeta;
-use crate::settings::Motor;
 use crate::tuning::{FirstOrder, motor_plant};
 
 /// Bias along phase a, and current that a sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A, which
@@ -74,16 +71,17 @@ impl PlantFit {
         }
     }
 
-    /// The plant.
-    pub fn found(&self) -> Option<FirstOrder> {
+    /// The plant, in the bases.
+    pub fn found(&self) -> Result<FirstOrder, Refusal> {
         let [p, b1, b2, _] = self.ud.theta.map(|x| f64::from(x.re));
-        (self.sound && self.samples > SETTLING).then_some(FirstOrder { k: b1 + b2, p })
+        let is_sound = self.sound && self.samples > SETTLING;
+        is_sound.then_some(FirstOrder { k: b1 + b2, p }).ok_or(Refusal::SamplesLost)
     }
 }
 
 impl Commissioning {
     pub(super) fn plant(&mut self, sums: &mut Collector) -> Answer {
-        let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
+        let motor = self.found.motor().ok_or(Refusal::Needs(Step::Leakage))?;
         let leakage = self.found.leakage.ok_or(Refusal::Needs(Step::Leakage))?.inductance;
         let i = STEP * self.plate.amperes;
         let volts = i * leakage / PERIOD_S;
@@ -92,23 +90,25 @@ impl Commissioning {
             match self.state.part {
                 0 => self.found.plants = None,
                 part @ (2 | 4) => {
-                    let found = sums.plant()?;
+                    let found = sums.recorded.plant.found()?;
                     let k = found.k * f64::from(i) / f64::from(volts);
                     self.state.plants[part / 2 - 1] = Some(FirstOrder { k, ..found });
                 }
                 _ => {}
             }
-            let amperes = BIAS * self.plate.amperes;
-            let bias =
-                Excitation::Current { amperes, regulator, carrier: AlphaBeta::ZERO, binary: false };
+            let (amperes, bias) = (BIAS * self.plate.amperes, self.along(BIAS, regulator));
             let axis = |across, carrier| {
                 let excitation = Excitation::Current { amperes, regulator, carrier, binary: true };
-                (Record::Plant { across, bases: (volts, i) }, SETTLING + FITTED, excitation)
+                (
+                    Record::Plant { across, bases: (volts, i) },
+                    (SETTLING + FITTED) as f32 * PERIOD_S,
+                    excitation,
+                )
             };
             let parts = [
-                (Record::Nothing, periods(FLUX_T * motor.tau_r()), bias),
+                (Record::Nothing, FLUX_T * motor.tau_r(), bias),
                 axis(false, AlphaBeta::new(volts, 0.0)),
-                (Record::Nothing, periods(BETWEEN_S), bias),
+                (Record::Nothing, BETWEEN_S, bias),
                 axis(true, AlphaBeta::new(0.0, volts)),
             ];
             if let Some(&part) = parts.get(self.state.part) {
@@ -121,10 +121,10 @@ impl Commissioning {
         let k = expected.k as f32;
         let gain = |name, plant: FirstOrder| {
             Quantity::new(name, "A/V", plant.k as f32)
-                .of((GAIN.0 * k, GAIN.1 * k), [Meaning::Loop; 2])
+                .checked((GAIN.0 * k, GAIN.1 * k), [Meaning::Loop; 2])
         };
         let pole = |name, plant: FirstOrder| {
-            Quantity::new(name, "", plant.p as f32).of(POLE, [Meaning::Loop; 2])
+            Quantity::new(name, "", plant.p as f32).checked(POLE, [Meaning::Loop; 2])
         };
         let [margin_d, margin_q] = designs.map(|design| design.margins.phase_margin_deg as f32);
         let [Some(d), Some(q)] = self.state.plants else { return Err(Refusal::SamplesLost) };

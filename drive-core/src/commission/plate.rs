@@ -2,10 +2,10 @@
 
 use core::f32::consts::{SQRT_2, TAU};
 
-use super::report::{Quantity, Refusal};
+use super::report::Quantity;
 use crate::io::PERIOD_S;
 use crate::math::frames::SQRT_3;
-use crate::settings::{Nameplate, Settings};
+use crate::settings::Settings;
 
 /// Plausible share of the shaft's power in the apparent power: efficiency times power factor.
 const POWER: (f32, f32) = (0.15, 0.95);
@@ -51,19 +51,30 @@ pub(super) struct Plate {
     pub dead_time: f32,
     /// Nominal dc link, V.
     pub dc_link: f32,
+    /// The first entry of the nameplate that cannot belong to the others.
+    pub implausible: Option<Quantity>,
 }
 
 impl Plate {
-    /// That of the settings, and whether their nameplate is plausible.
-    pub fn new(settings: &Settings) -> (Self, Result<(), Refusal>) {
+    /// That of the settings.
+    pub fn new(settings: &Settings) -> Self {
         let plate = &settings.nameplate;
-        let pairs = libm::roundf(60.0 * plate.frequency_hz / plate.speed_rpm);
-        let pairs = if pairs >= 1.0 { pairs } else { 1.0 };
+        let pairs = libm::roundf(60.0 * plate.frequency_hz / plate.speed_rpm).max(1.0);
         let safe = OF_RANGE * settings.sensor_range_a();
         let rated = settings.rated_a();
         let z_b = plate.base_impedance();
         let l_b = z_b / (TAU * plate.frequency_hz);
-        let found = Self {
+        let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
+        let synchronous = 60.0 * plate.frequency_hz / pairs;
+        let power = (POWER.0 * apparent, POWER.1 * apparent);
+        let speed = ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous);
+        let current = (0.0, safe / (LEAST_CURRENT * SQRT_2));
+        let entries = [
+            Quantity::new("nameplate.power_w", "W", plate.power_w).allowing(power),
+            Quantity::new("nameplate.speed_rpm", "rpm", plate.speed_rpm).allowing(speed),
+            Quantity::new("nameplate.current_a", "A", plate.current_a).allowing(current),
+        ];
+        Self {
             amperes: rated.min(safe).min(settings.trip_a() / 1.15),
             z_b,
             leakage: (0.08 * l_b, 0.8 * l_b),
@@ -81,8 +92,8 @@ impl Plate {
             pulse_v: settings.share_of_dc_link(60.0),
             dead_time: settings.inverter.dead_time_s / PERIOD_S,
             dc_link: settings.inverter.dc_link_v,
-        };
-        (found, plausible(&settings.nameplate, pairs, safe))
+            implausible: entries.into_iter().find(|entry| !entry.is_allowed()),
+        }
     }
 
     /// The values of the report.
@@ -93,26 +104,4 @@ impl Plate {
             Quantity::new("base impedance", "ohm", self.z_b),
         ]
     }
-}
-
-/// Whether the entries of the nameplate can belong together, and to sensors that are used up to `safe`, A.
-fn plausible(plate: &Nameplate, pairs: f32, safe: f32) -> Result<(), Refusal> {
-    let apparent = SQRT_3 * plate.voltage_v * plate.current_a;
-    let synchronous = 60.0 * plate.frequency_hz / pairs;
-    let (power, speed) = (
-        (POWER.0 * apparent, POWER.1 * apparent),
-        ((1.0 - SLIP.1) * synchronous, (1.0 - SLIP.0) * synchronous),
-    );
-    let current = (0.0, safe / (LEAST_CURRENT * SQRT_2));
-    for (name, unit, value, allowed) in [
-        ("nameplate.power_w", "W", plate.power_w, power),
-        ("nameplate.speed_rpm", "rpm", plate.speed_rpm, speed),
-        ("nameplate.current_a", "A", plate.current_a, current),
-    ] {
-        let entry = Quantity { allowed, ..Quantity::new(name, unit, value) };
-        if !(value >= allowed.0 && value <= allowed.1) {
-            return Err(Refusal::Plate(entry));
-        }
-    }
-    Ok(())
 }

@@ -159,11 +159,8 @@ pub(super) const TIME: [Meaning; 2] = [Meaning::TooSmall, Meaning::TooLarge];
 impl Report {
     /// A report of a step that is sound.
     pub(super) fn new(step: Step, values: &[Quantity]) -> Self {
-        let mut report = Self { step, values: [None; VALUES], refusal: None };
-        for (place, value) in report.values.iter_mut().zip(values) {
-            *place = Some(*value);
-        }
-        report
+        let values = core::array::from_fn(|n| values.get(n).copied());
+        Self { step, values, refusal: None }
     }
 }
 
@@ -178,19 +175,30 @@ impl Quantity {
         Self { deviation, ..self }
     }
 
-    /// With the range that is allowed. Refuses a value outside, or one that is not finite; `below` and `above` say what
-    /// that means.
-    pub(super) fn of(
+    /// With the range that is allowed.
+    pub(super) const fn allowing(self, allowed: (f32, f32)) -> Self {
+        Self { allowed, ..self }
+    }
+
+    /// Whether it is in that range; not if it is not a number.
+    pub(super) fn is_allowed(&self) -> bool {
+        self.value >= self.allowed.0 && self.value <= self.allowed.1
+    }
+
+    /// Refuses a value outside this range; `below` and `above` say what that means.
+    pub(super) fn checked(
         self,
         allowed: (f32, f32),
         [below, above]: [Meaning; 2],
     ) -> Result<Self, Refusal> {
-        let found = Self { allowed, ..self };
-        if found.value >= allowed.0 && found.value <= allowed.1 {
-            return Ok(found);
-        }
+        let found = self.allowing(allowed);
         let meaning = if found.value < allowed.0 { below } else { above };
-        Err(Refusal::Value { found, meaning })
+        if found.is_allowed() { Ok(found) } else { Err(Refusal::Value { found, meaning }) }
+    }
+
+    /// Refuses a value beyond plus or minus `most`.
+    pub(super) fn up_to(self, most: f32, meaning: Meaning) -> Result<Self, Refusal> {
+        self.checked((-most, most), [meaning; 2])
     }
 }
 

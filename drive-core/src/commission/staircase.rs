@@ -15,14 +15,11 @@
 //! r_r = R_R'/k'^2        k' = 1/sqrt(1 + L_s'/L_M')        L_l = L_s'/(1 + k')        l_m = psi_m(i_d)/i_d
 //! ```
 
-use super::collector::{BINS, Collector, Record};
-use super::fit::Fitted;
-use super::found::Iron;
-use super::plate::TAU_R;
-use super::report::{Meaning, Quantity, Refusal, SIZE, Step, TIME};
-use super::{Answer, Commissioning, Next};
-use crate::io::{PERIOD_S, periods};
-use crate::math::frames::AlphaBeta;
+use super::{
+    Answer, BINS, Collector, Commissioning, Fitted, Iron, Meaning, Next, Quantity, Record, Refusal,
+    SIZE, Step, TAU_R, TIME,
+};
+use crate::io::PERIOD_S;
 use crate::settings::Motor;
 
 /// Levels, as shares of the test current.
@@ -94,7 +91,7 @@ impl Staircase {
         for end in ends() {
             let allowed = LINE.0 * r_s * end.0 + LINE.1 * dc_link;
             Quantity::new("distance from the resistive line", "V", end.1 - v - r_s * (end.0 - i))
-                .of((-allowed, allowed), [Meaning::Inverter; 2])?;
+                .up_to(allowed, Meaning::Inverter)?;
         }
         let growth = |stair: &Stair| stair.areas.0 - r_s * stair.areas.1;
         let [first, second, ..] = &self.stairs;
@@ -175,8 +172,8 @@ impl Commissioning {
         let around = [(Record::Nothing, high), (half(0), low), (half(1), high)];
         let mut parts = STAIRS.map(|share| (half(0), share)).into_iter().chain(around);
         if let Some((record, share)) = parts.nth(part) {
-            let excitation = self.along(share, self.regulator()?, AlphaBeta::ZERO);
-            return self.begin(sums, (record, periods(seconds), excitation));
+            let excitation = self.along(share, self.regulator()?);
+            return self.begin(sums, (record, seconds, excitation));
         }
         // The first half began where the second has ended.
         let steady = sums.mean(1, BINS - 3).current.alpha;
@@ -201,16 +198,16 @@ impl Commissioning {
         let motor = Motor { r_s: stairs.r_s, r_r, l_ls: l, l_lr: l, l_m, ..Motor::default() };
         let deviation = fit.deviations[2] / fit.r_r;
         Quantity::new("deviation of r_r", "", deviation)
-            .of((0.0, UNCERTAIN), [Meaning::Uncertain; 2])?;
+            .checked((0.0, UNCERTAIN), [Meaning::Uncertain; 2])?;
         let values = [
-            Quantity::new("r_s", "ohm", motor.r_s).of(plate.r_s, SIZE)?,
+            Quantity::new("r_s", "ohm", motor.r_s).checked(plate.r_s, SIZE)?,
             Quantity::new("r_r", "ohm", motor.r_r).within(deviation * motor.r_r),
             Quantity::new("direct current", "A", i_d),
             Quantity::new("main flux there", "Wb", l_m * i_d),
             Quantity::new("L_m, chord", "H", l_m),
-            Quantity::new("tau_r, chord", "s", motor.tau_r()).of(TAU_R, TIME)?,
+            Quantity::new("tau_r, chord", "s", motor.tau_r()).checked(TAU_R, TIME)?,
             Quantity::new("chord of the straight beginning over it", "", straight)
-                .of((0.95, 5.0), [Meaning::Misfit; 2])?,
+                .checked((0.95, 5.0), [Meaning::Misfit; 2])?,
         ];
         self.found.iron = Some(Iron { motor, i_d, points });
         if let Some(levels) = &mut self.found.levels {

@@ -1,10 +1,8 @@
 //! Steps 2 and 3: the sensors without current, and the pulses of the wiring check.
 
-use super::collector::{Collector, Record};
-use super::report::{Meaning, Quantity, Refusal, SIZE};
-use super::{Answer, Commissioning, Next};
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, SIZE};
 use crate::drive::{Excitation, Excited};
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 
 /// Time of the sums without current, and of the pause before the pulses, s.
@@ -30,31 +28,22 @@ const UNANSWERED: f32 = 0.25;
 /// The inductance by pulses may be that much smaller or larger than the true one.
 const ROUGH: (f32, f32) = (0.5, 1.7);
 
-/// State of the pulses.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Pulses {
-    /// Volt-seconds of the present train, V s.
-    volt_seconds: f32,
-    /// Trains before it.
-    trains: u32,
-}
-
 impl Commissioning {
     pub(super) fn sensors(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
         if self.state.part == 0 {
             self.found.noise = None;
-            return self.begin(sums, (Record::Noise, periods(QUIET_S), Excitation::Rest));
+            return self.begin(sums, (Record::Noise, QUIET_S, Excitation::Rest));
         }
         let ([noise_a, noise_b], dc_link) = sums.quiet();
         let ([offset_a, offset_b], i) = (drive.offsets, self.plate.amperes);
-        let (offset, noise) = ((-OFFSET * i, OFFSET * i), (0.0, NOISE * i));
+        let (offset, noise) = (OFFSET * i, (0.0, NOISE * i));
         let bus = (BUS * self.plate.peak_v, f32::INFINITY);
         let values = [
-            Quantity::new("offset a", "A", offset_a).of(offset, [Meaning::Offset; 2])?,
-            Quantity::new("offset b", "A", offset_b).of(offset, [Meaning::Offset; 2])?,
-            Quantity::new("noise a", "A", noise_a).of(noise, [Meaning::Noise; 2])?,
-            Quantity::new("noise b", "A", noise_b).of(noise, [Meaning::Noise; 2])?,
-            Quantity::new("dc link", "V", dc_link).of(bus, [Meaning::BusTooLow; 2])?,
+            Quantity::new("offset a", "A", offset_a).up_to(offset, Meaning::Offset)?,
+            Quantity::new("offset b", "A", offset_b).up_to(offset, Meaning::Offset)?,
+            Quantity::new("noise a", "A", noise_a).checked(noise, [Meaning::Noise; 2])?,
+            Quantity::new("noise b", "A", noise_b).checked(noise, [Meaning::Noise; 2])?,
+            Quantity::new("dc link", "V", dc_link).checked(bus, [Meaning::BusTooLow; 2])?,
         ];
         self.found.noise = Some(noise_a.max(noise_b));
         self.found.dc_link = Some(dc_link);
@@ -64,12 +53,9 @@ impl Commissioning {
     /// The present pulses.
     fn pulses(&self) -> WiringSettings {
         let expected_a = EXPECTED * self.plate.amperes;
-        WiringSettings {
-            sigma_ls: self.state.pulses.volt_seconds / expected_a,
-            expected_a,
-            noise_a: self.plate.pulse_noise + RESIDUAL * self.plate.amperes,
-            highest_v: self.plate.pulse_v,
-        }
+        let sigma_ls = self.state.volt_seconds / expected_a;
+        let noise_a = self.plate.pulse_noise + RESIDUAL * self.plate.amperes;
+        WiringSettings { sigma_ls, expected_a, noise_a, highest_v: self.plate.pulse_v }
     }
 
     pub(super) fn wiring(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
@@ -77,30 +63,28 @@ impl Commissioning {
         match self.state.part {
             0 => {
                 self.found.rough = None;
-                self.state.pulses.volt_seconds = SILENT * i * least;
-                return self.begin(sums, (Record::Nothing, periods(QUIET_S), Excitation::Rest));
+                self.state.volt_seconds = SILENT * i * least;
+                return self.begin(sums, (Record::Nothing, QUIET_S, Excitation::Rest));
             }
             1 => {
-                self.state.pulses.trains = drive.trains;
+                self.state.trains = drive.trains;
                 self.state.part = 2;
                 return Ok(Next::Excite(Excitation::Pulses(self.pulses())));
             }
-            _ if drive.trains == self.state.pulses.trains => return Ok(Next::Wait),
+            _ if drive.trains == self.state.trains => return Ok(Next::Wait),
             _ => {}
         }
         let legs = drive.answers.map(|[a, b]| a.abs().max(b.abs()));
         let largest = legs.into_iter().fold(0.0, f32::max);
         // Not the volt-seconds, but the duration and the voltage are limited.
         let longest = self.plate.pulse_v * 60.0 * PERIOD_S;
-        if largest < ANSWERED * i {
-            if self.state.pulses.volt_seconds < longest {
-                self.state.pulses.volt_seconds *= GROWTH;
-                self.state.part = 1;
-                return Ok(Next::Wait);
-            }
-            if largest < SILENT * i {
-                return Err(Refusal::NoMotor);
-            }
+        if largest < ANSWERED * i && self.state.volt_seconds < longest {
+            self.state.volt_seconds *= GROWTH;
+            self.state.part = 1;
+            return Ok(Next::Wait);
+        }
+        if largest < SILENT * i {
+            return Err(Refusal::NoMotor);
         }
         let is_open = |answer: f32| answer < UNANSWERED * largest;
         if let Some(leg) = legs.into_iter().position(is_open) {
@@ -114,9 +98,9 @@ impl Commissioning {
         let judged = WiringSettings { expected_a: largest, ..self.pulses() };
         WiringCheck::new(&judged).judge(&drive.answers).map_err(Refusal::Wiring)?;
         let [[a, _], [_, b], [c_a, c_b]] = drive.answers;
-        let put = self.state.pulses.volt_seconds.min(longest);
+        let put = self.state.volt_seconds.min(longest);
         let rough = Quantity::new("sigma L_s, rough", "H", put * 3.0 / (a + b - c_a - c_b))
-            .of((ROUGH.0 * least, ROUGH.1 * most), SIZE)?;
+            .checked((ROUGH.0 * least, ROUGH.1 * most), SIZE)?;
         self.found.rough = Some(rough.value);
         self.report(&[rough])
     }
