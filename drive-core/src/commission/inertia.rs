@@ -116,10 +116,10 @@ impl Commissioning {
             }
             _ => {}
         }
-        let measures = self.state.measures;
-        if self.state.part == 1 + if measures { QUARTERS } else { 4 } {
+        let last = if self.state.measures { QUARTERS } else { 4 };
+        if self.state.part > last {
             let slope = sums.recorded.motion.slope();
-            if measures {
+            if self.state.measures {
                 return self.report_inertia(slope);
             }
             // Twice where it is too little to overcome the friction or to be seen; else as much as friction and the peak

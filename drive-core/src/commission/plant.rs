@@ -29,9 +29,9 @@ const STEP: f32 = 0.027;
 /// Time until the flux stands, in rotor time constants, and between the axes, s.
 const FLUX_T: f32 = 4.0;
 const BETWEEN_S: f32 = 0.2;
-/// Samples until filters and amplitude have settled, and samples of the fit: six times the sequence.
+/// Samples until filters and amplitude have settled, and time of a record, s: with six times the sequence.
 const SETTLING: u32 = 600;
-const FITTED: u32 = 6 * 255;
+const FITTED_S: f32 = (SETTLING + 6 * 255) as f32 * PERIOD_S;
 /// Accepted k relative to that by the parameters, and accepted p.
 const GAIN: (f32, f32) = (0.8, 1.25);
 const POLE: (f32, f32) = (0.7, 0.9999);
@@ -92,18 +92,14 @@ impl Commissioning {
                 part @ (2 | 4) => {
                     let found = sums.recorded.plant.found()?;
                     let k = found.k * f64::from(i) / f64::from(volts);
-                    self.state.plants[part / 2 - 1] = Some(FirstOrder { k, ..found });
+                    self.state.plants[usize::from(part == 4)] = Some(FirstOrder { k, ..found });
                 }
                 _ => {}
             }
             let (amperes, bias) = (BIAS * self.plate.amperes, self.along(BIAS, regulator));
             let axis = |across, carrier| {
                 let excitation = Excitation::Current { amperes, regulator, carrier, binary: true };
-                (
-                    Record::Plant { across, bases: (volts, i) },
-                    (SETTLING + FITTED) as f32 * PERIOD_S,
-                    excitation,
-                )
+                (Record::Plant { across, bases: (volts, i) }, FITTED_S, excitation)
             };
             let parts = [
                 (Record::Nothing, FLUX_T * motor.tau_r(), bias),
@@ -119,23 +115,17 @@ impl Commissioning {
         let circuit = motor_plant(&motor.circuit(), f64::from(PERIOD_S));
         let expected = circuit.map_err(Refusal::Design)?;
         let k = expected.k as f32;
-        let gain = |name, plant: FirstOrder| {
-            Quantity::new(name, "A/V", plant.k as f32)
-                .checked((GAIN.0 * k, GAIN.1 * k), [Meaning::Loop; 2])
-        };
-        let pole = |name, plant: FirstOrder| {
-            Quantity::new(name, "", plant.p as f32).checked(POLE, [Meaning::Loop; 2])
-        };
+        let (gain, meaning) = ((GAIN.0 * k, GAIN.1 * k), [Meaning::Loop; 2]);
         let [margin_d, margin_q] = designs.map(|design| design.margins.phase_margin_deg as f32);
         let [Some(d), Some(q)] = self.state.plants else { return Err(Refusal::SamplesLost) };
         let values = [
             Quantity::new("k by the parameters", "A/V", k),
             Quantity::new("p by the parameters", "", expected.p as f32),
-            gain("k along", d)?,
-            pole("p along", d)?,
+            Quantity::new("k along", "A/V", d.k as f32).checked(gain, meaning)?,
+            Quantity::new("p along", "", d.p as f32).checked(POLE, meaning)?,
             Quantity::new("phase margin by rule 3.8 along", "deg", margin_d),
-            gain("k across", q)?,
-            pole("p across", q)?,
+            Quantity::new("k across", "A/V", q.k as f32).checked(gain, meaning)?,
+            Quantity::new("p across", "", q.p as f32).checked(POLE, meaning)?,
             Quantity::new("phase margin by rule 3.8 across", "deg", margin_q),
         ];
         self.found.plants = Some([d, q]);
