@@ -68,6 +68,7 @@ use fit::{Fitted, Search};
 use plate::{Plate, TAU_R};
 use report::{SIZE, TIME};
 use staircase::Staircase;
+use steps::QUIET_S;
 
 /// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
 const CAUTION: f32 = 0.75;

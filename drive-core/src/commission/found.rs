@@ -83,7 +83,8 @@ impl Levels {
 }
 
 impl Found {
-    /// The motor, as a T with equal leakages, without its inertia and its pole pairs; `None` until both steps have found theirs.
+    /// The motor, as a T with equal leakages; inertia and pole pairs are the default ones. `None` until levels and leakage, and
+    /// with a main flux that saturates the staircase too, have found theirs.
     pub fn motor(&self) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
         if levels.saturates {

@@ -87,6 +87,7 @@ impl Commissioning {
         ];
         let (bias, part) = (self.state.part / parts.len(), self.state.part % parts.len());
         let Some(&share) = BIASES.get(bias) else { return self.report_leakage() };
+        // A record has ended: along the bias, or across it.
         if let 3 | 6 = part {
             let axis = usize::from(part == 6);
             let seen = sums.phasors();

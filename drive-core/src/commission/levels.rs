@@ -1,15 +1,13 @@
 //! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
 
 use super::{
-    Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, Quantity, Record,
-    Refusal, SIZE, Step, TAU_R, TIME,
+    Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
+    Record, Refusal, SIZE, Step, TAU_R, TIME,
 };
 use crate::drive::Excitation;
 use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, SQRT_3};
 
-/// Pause before the first level, s.
-const QUIET_S: f32 = 0.1;
 /// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
 /// depends on the current.
 const LEVELS: [f32; 4] = [0.8, 0.2, 0.45, 0.3];
@@ -63,6 +61,7 @@ impl Commissioning {
         let part = self.state.part;
         match part {
             0 => self.found.levels = None,
+            // The first two levels have ended; or the third, or the fourth.
             3 => {
                 let Some(fit) = self.search(sums, 0.0)? else { return Ok(Next::Wait) };
                 self.state.fitted = Fitted { mismatch: self.mismatch(sums, noise)?, ..fit };

@@ -89,6 +89,7 @@ impl Commissioning {
             let regulator = self.regulator()?;
             match self.state.part {
                 0 => self.found.plants = None,
+                // A record has ended: along the bias, or across it.
                 part @ (2 | 4) => {
                     let found = sums.recorded.plant.found()?;
                     let k = found.k * f64::from(i) / f64::from(volts);

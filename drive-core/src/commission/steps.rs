@@ -5,8 +5,8 @@ use crate::drive::{Excitation, Excited};
 use crate::io::PERIOD_S;
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 
-/// Time of the sums without current, and of the pause before the pulses, s.
-const QUIET_S: f32 = 0.1;
+/// Time of the sums without current, and of the pause before the pulses and before the levels, s.
+pub(super) const QUIET_S: f32 = 0.1;
 /// Largest offset and noise, as shares of the test current.
 const OFFSET: f32 = 0.05;
 const NOISE: f32 = 0.01;
