@@ -45,9 +45,7 @@ mod inertia;
 mod leakage;
 mod levels;
 mod loop_check;
-mod motion;
 mod plant;
-mod plant_fit;
 mod plate;
 mod report;
 mod staircase;
@@ -55,9 +53,11 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-use crate::drive::{Excitation, Excited, State};
-use crate::io::PERIOD_S;
-use crate::settings::{Motor, Settings};
+use crate::drive::{Excitation, Excited, Regulator, State};
+use crate::io::{PERIOD_S, periods};
+use crate::math::frames::AlphaBeta;
+use crate::settings::Settings;
+use crate::settings::value::Words as _;
 use crate::tuning::{CurrentLoopDesign, FirstOrder, TuningError, design_current_loop, motor_plant};
 
 pub use collector::{BINS, Bin, Collector, Record};
@@ -65,9 +65,15 @@ pub use found::{Found, Iron, Leakage, Levels};
 pub use report::{Meaning, Quantity, Refusal, Report, Step};
 
 use fit::{Fitted, Search};
-use inertia::Swings;
-use plate::Plate;
+use plate::{Plate, TAU_R};
+use report::{SIZE, TIME};
 use staircase::Staircase;
+use steps::QUIET_S;
+
+/// Share of the rough inductance that the controller is designed for, its gain per inductance, and its zero, rad/s.
+const CAUTION: f32 = 0.75;
+const GAIN_RAD_PER_S: f32 = 500.0;
+const ZERO_RAD_PER_S: f32 = 167.0;
 
 /// The next action that the commissioning asks for.
 // A report is passed once a step.
@@ -92,56 +98,51 @@ pub enum Next {
     Done,
 }
 
+/// What a step asks for next.
+type Answer = Result<Next, Refusal>;
+
+/// A part of a step: what is recorded, for how many seconds, and the excitation.
+type Part = (Record, f32, Excitation);
+
 /// The commissioning: what it does, and what it has found.
 #[derive(Clone, Debug)]
 pub struct Commissioning {
-    setup: Setup,
+    plate: Plate,
     found: Found,
+    /// Inductances along and across at each bias of the leakage, H: the staircase needs them too.
+    inductances: [[f32; 2]; 2],
     /// The present step, and the last.
     step: Step,
     last: Step,
-    /// Part of the step, and the samples that it waits for.
-    part: u8,
-    until: u32,
+    state: StepState,
     progress: Progress,
     /// Whether the drive has left the state off, and its starts before that.
     on: bool,
     starts: Option<u32>,
     /// Whether a step was refused since the last start of steps.
     refused: bool,
-    /// Pulses of the present train, and trains before it.
-    pulses: (f32, u32),
-    search: Option<Search>,
-    /// Fit of the levels, gain mismatch, and misfit, until the third level confirms them.
-    fitted: (Fitted, f32, Option<Quantity>),
-    /// The current loop along and across, once it is designed in its step, and the plants it is to be designed for.
-    design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
-    plants: [FirstOrder; 2],
-    stairs: Staircase,
-    swings: Swings,
-    /// Inductances along and across at each bias, H.
-    inductances: [[f32; 2]; 2],
 }
 
-/// Values from the settings.
-#[derive(Clone, Copy, Debug)]
-struct Setup {
-    plate: Result<Plate, Refusal>,
-    /// Time constant of the analog filter of the currents, control periods.
-    filter: f32,
-    /// Margin for noise of the pulses, A, and their largest voltage, V.
-    pulse_noise: f32,
-    pulse_v: f32,
-    /// Dead time as a share of the control period.
-    dead_time: f32,
-    /// Nominal dc link, V.
-    dc_link: f32,
-    /// Rated current, and limit of the torque current, A peak.
-    rated: f32,
-    i_q_limit: f32,
-    /// Torque per torque current, Nm/A, and pole pairs, in force.
-    torque_per_ampere: f32,
-    pole_pairs: f32,
+/// State of the present step; a step begins with the default.
+#[derive(Clone, Debug, Default)]
+struct StepState {
+    /// The next part, and the samples that it waits for.
+    part: usize,
+    until: u32,
+    search: Option<Search>,
+    /// The current loop along and across, once it is designed.
+    design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
+    /// Of the wiring: volt-seconds of the present train of pulses, V s, and trains before it.
+    volt_seconds: f32,
+    trains: u32,
+    /// Of the levels: what the first two have shown.
+    fitted: Fitted,
+    stairs: Staircase,
+    /// The plants along and across that the current loop is to be designed for.
+    plants: [Option<FirstOrder>; 2],
+    /// Of the inertia: torque current, A, and whether it is that of the measurement.
+    amperes: f32,
+    measures: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,44 +161,25 @@ impl Commissioning {
     /// A commissioning of the motor with the nameplate, on the board, of these settings. Nothing is begun.
     pub fn new(settings: &Settings) -> Self {
         Self {
-            setup: Setup {
-                plate: Plate::new(settings),
-                filter: settings.scales.current_delay_s / PERIOD_S,
-                pulse_noise: settings.share_of_range(0.05),
-                pulse_v: settings.share_of_dc_link(60.0),
-                dead_time: settings.inverter.dead_time_s / PERIOD_S,
-                dc_link: settings.inverter.dc_link_v,
-                rated: settings.rated_a(),
-                i_q_limit: settings.i_q_limit_a(),
-                torque_per_ampere: settings.motor.torque_per_ampere(settings.i_d()),
-                pole_pairs: f32::from(settings.motor.pole_pairs),
-            },
+            plate: Plate::new(settings),
             found: Found::default(),
+            inductances: [[0.0; 2]; 2],
             step: Step::Nameplate,
             last: Step::Nameplate,
-            part: 0,
-            until: 0,
+            state: StepState::default(),
             progress: Progress::Ended,
             on: false,
             starts: None,
             refused: false,
-            pulses: (0.0, 0),
-            search: None,
-            fitted: (Fitted::default(), 0.0, None),
-            design: None,
-            plants: [FirstOrder { k: 0.0, p: 0.0 }; 2],
-            stairs: Staircase::default(),
-            swings: Swings::default(),
-            inductances: [[0.0; 2]; 2],
         }
     }
 
     /// Begins the steps from `first` to `last`; the drive must be off. What earlier steps have found is kept until
     /// they are repeated.
     pub fn start(&mut self, first: Step, last: Step) {
-        (self.step, self.last, self.progress, self.on) = (first, last, Progress::Steps, false);
-        (self.part, self.until, self.design) = (0, 0, None);
-        (self.starts, self.refused) = (None, false);
+        (self.step, self.last, self.state) = (first, last, StepState::default());
+        (self.progress, self.on, self.starts) = (Progress::Steps, false, None);
+        self.refused = false;
     }
 
     /// Whether steps are being done.
@@ -223,77 +205,39 @@ impl Commissioning {
     /// The settings with what has been found in them; equal to `settings` where nothing has, or where the last steps ended
     /// with a refusal.
     pub fn settings(&self, settings: &Settings) -> Settings {
-        if self.refused {
-            return *settings;
-        }
-        let pole_pairs = self.setup.plate.map(|plate| plate.pole_pairs);
-        self.found.settings(settings, pole_pairs.unwrap_or(settings.motor.pole_pairs))
+        if self.refused { *settings } else { self.found.settings(settings, self.plate.pole_pairs) }
     }
 
     /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](crate::Drive::excited).
     pub fn poll(&mut self, drive: &Excited, sums: &mut Collector) -> Next {
-        match self.progress {
-            Progress::Ended => return Next::Done,
-            Progress::Stop | Progress::Stopping => {
-                if matches!(drive.state, State::Off | State::Fault(_)) {
-                    self.progress = Progress::Ended;
-                    return Next::Done;
-                }
-                let first = self.progress == Progress::Stop;
-                self.progress = Progress::Stopping;
-                return if first { Next::Stop } else { Next::Wait };
+        let (progress, next) = match (self.progress, drive.state) {
+            (Progress::Ended, _)
+            | (Progress::Stop | Progress::Stopping, State::Off | State::Fault(_)) => {
+                (Progress::Ended, Next::Done)
             }
-            Progress::StopToDesign => {
-                self.progress = Progress::StoppingToDesign;
-                return Next::Stop;
+            (Progress::Stop, _) => (Progress::Stopping, Next::Stop),
+            (Progress::StopToDesign, _) => (Progress::StoppingToDesign, Next::Stop),
+            (Progress::StoppingToDesign, State::Off) => (self.progress, Next::Design),
+            (Progress::Stopping, _) | (Progress::StoppingToDesign, State::Exciting) => {
+                (self.progress, Next::Wait)
             }
-            Progress::StoppingToDesign if drive.state == State::Off => return Next::Design,
-            Progress::StoppingToDesign if drive.state == State::Exciting => return Next::Wait,
-            Progress::StoppingToDesign | Progress::Steps => {}
-        }
-        let before = *self.starts.get_or_insert(drive.starts);
-        self.on |= drive.state != State::Off || drive.starts != before;
-        let excites = match drive.state {
-            State::Off => !self.on,
-            State::Calibrating | State::Precharge | State::CheckingWiring => true,
-            State::Exciting => self.step != Step::Inertia,
-            State::Catching | State::Magnetising | State::Verifying | State::Torque => {
-                self.step == Step::Inertia
+            (Progress::StoppingToDesign | Progress::Steps, _) => {
+                let next = self.go_on(drive, sums);
+                return next.unwrap_or_else(|refusal| Next::Report(self.refuse(refusal)));
             }
-            _ => false,
         };
-        let result = if !excites {
-            Err(Refusal::Drive(drive.state))
-        } else if sums.is_incomplete() {
-            Err(Refusal::SamplesLost)
-        } else if sums.samples() < self.until {
-            return Next::Wait;
-        } else {
-            self.go_on(drive, sums)
-        };
-        match result {
-            Ok(Next::Report(report)) => {
-                if self.step < self.last {
-                    self.next_step();
-                } else {
-                    self.progress = Progress::Stop;
-                }
-                Next::Report(report)
-            }
-            Ok(next) => next,
-            Err(refusal) => Next::Report(self.refuse(refusal)),
-        }
+        self.progress = progress;
+        next
     }
 
     /// Designs the current loop for the motor that was found, or for the plants that the present step has identified. It takes
     /// as long as [`Settings::build`]: a second on the target, so the drive must be off.
     pub fn design(&mut self) {
-        self.design = self.found.motor(&Motor::default()).map(|motor| {
+        self.state.design = self.found.motor().map(|motor| {
             let period_s = f64::from(PERIOD_S);
             let plant = motor_plant(&motor.circuit(), period_s)?;
             let designed = |identified| design_current_loop(identified, plant, period_s);
-            if self.step == Step::Plant {
-                let [d, q] = self.plants;
+            if let [Some(d), Some(q)] = self.state.plants {
                 return Ok([designed(d)?, designed(q)?]);
             }
             designed(plant).map(|design| [design; 2])
@@ -304,23 +248,95 @@ impl Commissioning {
     /// Ends the present step, which is refused, and stops the drive.
     pub fn refuse(&mut self, refusal: Refusal) -> Report {
         (self.progress, self.refused) = (Progress::Stop, true);
-        Report { refusal: Some(refusal), ..Report::new(self.step, []) }
+        Report { refusal: Some(refusal), ..Report::new(self.step, &[]) }
     }
 
-    fn next_step(&mut self) {
-        self.step = match self.step {
-            Step::Nameplate => Step::Sensors,
-            Step::Sensors => Step::Wiring,
-            Step::Wiring => Step::Levels,
-            Step::Levels => Step::Leakage,
-            Step::Leakage if self.found.levels.is_some_and(|levels| levels.saturates) => {
-                Step::Staircase
-            }
-            Step::Leakage => Step::CurrentLoop,
-            Step::Staircase => Step::CurrentLoop,
-            Step::CurrentLoop if self.last == Step::Plant => Step::Plant,
-            Step::CurrentLoop | Step::Plant | Step::Inertia => Step::Inertia,
+    /// The next action of the present step, once the samples of its part are there.
+    fn go_on(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+        let before = *self.starts.get_or_insert(drive.starts);
+        self.on |= drive.state != State::Off || drive.starts != before;
+        let turns = self.step == Step::Inertia;
+        let excites = match drive.state {
+            State::Off => !self.on,
+            State::Calibrating | State::Precharge | State::CheckingWiring => true,
+            State::Exciting => !turns,
+            State::Catching | State::Magnetising | State::Verifying | State::Torque => turns,
+            _ => false,
         };
-        (self.part, self.until, self.design) = (0, 0, None);
+        match self.step {
+            _ if !excites => Err(Refusal::Drive(drive.state)),
+            _ if sums.is_incomplete() => Err(Refusal::SamplesLost),
+            _ if sums.samples() < self.state.until => Ok(Next::Wait),
+            _ if let Some(entry) = self.plate.implausible => Err(Refusal::Plate(entry)),
+            Step::Nameplate => self.report(&self.plate.values()),
+            Step::Sensors => self.sensors(drive, sums),
+            Step::Wiring => self.wiring(drive, sums),
+            Step::Levels => self.levels(sums),
+            Step::Leakage => self.leakage(sums),
+            Step::Staircase => self.staircase(sums),
+            Step::CurrentLoop => self.current_loop(sums),
+            Step::Plant => self.plant(sums),
+            Step::Inertia => self.inertia(drive, sums),
+        }
+    }
+
+    /// Begins a part of the present step.
+    fn begin(&mut self, sums: &mut Collector, (record, seconds, excitation): Part) -> Answer {
+        sums.begin(record);
+        self.state.until = periods(seconds);
+        self.state.part += 1;
+        Ok(Next::Excite(excitation))
+    }
+
+    /// Ends the present step, which has found these values.
+    fn report(&mut self, values: &[Quantity]) -> Answer {
+        let report = Report::new(self.step, values);
+        if self.step < self.last {
+            let saturates = self.found.levels.is_some_and(|levels| levels.saturates);
+            self.step = match self.step {
+                Step::Leakage if !saturates => Step::CurrentLoop,
+                Step::CurrentLoop if self.last != Step::Plant => Step::Inertia,
+                step => Step::at(step.place() + 1),
+            };
+            self.state = StepState::default();
+        } else {
+            self.progress = Progress::Stop;
+        }
+        Ok(Next::Report(report))
+    }
+
+    /// One fit to the recorded bins, which began with the flux of the current `steady`, A; none before the last.
+    fn search(&mut self, sums: &mut Collector, steady: f32) -> Result<Option<Fitted>, Refusal> {
+        if let Some(search) = &mut self.state.search {
+            return search.step(sums);
+        }
+        sums.begin(Record::Nothing);
+        (self.state.search, self.state.until) = (Some(Search::new(steady)), 0);
+        Ok(None)
+    }
+
+    /// The current loop along and across; none while the drive is to be stopped for its design.
+    fn designed(&mut self) -> Result<Option<[CurrentLoopDesign; 2]>, Refusal> {
+        if self.state.design.is_none() {
+            self.progress = Progress::StopToDesign;
+        }
+        self.state.design.transpose().map_err(Refusal::Design)
+    }
+
+    /// Transient inductance by the pulses, rather too small, H.
+    fn rough(&self) -> Result<f32, Refusal> {
+        Ok(CAUTION * self.found.rough.ok_or(Refusal::Needs(Step::Wiring))?)
+    }
+
+    /// A cautious controller of the current.
+    fn regulator(&self) -> Result<Regulator, Refusal> {
+        let (k_c, z_c) = (GAIN_RAD_PER_S * self.rough()?, 1.0 - ZERO_RAD_PER_S * PERIOD_S);
+        Ok(Regulator { k_c, z_c, ..Regulator::default() })
+    }
+
+    /// A share of the test current along phase a.
+    fn along(&self, share: f32, regulator: Regulator) -> Excitation {
+        let (amperes, carrier) = (share * self.plate.amperes, AlphaBeta::ZERO);
+        Excitation::Current { amperes, regulator, carrier, binary: false }
     }
 }

@@ -9,9 +9,8 @@
 //! For a given rotor time constant `i_m` follows from the measured current, exactly over bins of constant current, and the
 //! rest is linear in the four unknowns. The time constant with the least misfit is searched for.
 
-use core::ops::ControlFlow;
-
 use super::collector::{Bin, Collector};
+use super::report::Refusal;
 use crate::io::PERIOD_S;
 
 /// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
@@ -37,6 +36,8 @@ pub(super) struct Fitted {
     pub e: f32,
     /// Voltage times current that e lacks at a small current, V A; see [`levels`](super::levels).
     pub bend: f32,
+    /// Gain mismatch of the sensors; see [`levels`](super::levels).
+    pub mismatch: f32,
     /// ohm.
     pub r_r: f32,
     /// s.
@@ -62,7 +63,7 @@ struct Candidate {
 }
 
 /// The search for the time constant: one fit a call, so that the main loop goes on meanwhile.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Search {
     /// Magnetising current at the beginning, A.
     steady: f32,
@@ -81,39 +82,23 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// With no flux at the beginning.
-    pub fn new() -> Self {
-        Self::from_steady(0.0)
-    }
-
-    /// With the flux of this current, A, at the beginning.
-    pub fn from_steady(current: f32) -> Self {
+    /// With the flux of the current `steady`, A, at the beginning.
+    pub fn new(steady: f32) -> Self {
         let (from, to) = (libm::logf(TAU_R.0), libm::logf(TAU_R.1));
-        Self {
-            steady: current,
-            round: 0,
-            point: 0,
-            begins: FROM_S.0 / PERIOD_S,
-            from,
-            step: (to - from) / f32::from(POINTS - 1),
-            best: None,
-            last_left: 0.0,
-            neighbours: 0.0,
-            after_best: false,
-        }
+        let step = (to - from) / f32::from(POINTS - 1);
+        Self { steady, begins: FROM_S.0 / PERIOD_S, from, step, ..Self::default() }
     }
 
-    /// One fit; the result, none where nothing can be fitted, after the last.
-    pub fn step(&mut self, sums: &Collector) -> ControlFlow<Option<Fitted>> {
+    /// One fit; the result after the last. Refused where nothing can be fitted.
+    pub fn step(&mut self, sums: &Collector) -> Result<Option<Fitted>, Refusal> {
         let x = self.from + self.step * f32::from(self.point);
         if let Some(candidate) = fit(sums, self.steady, libm::expf(x), self.begins) {
             let better = self.best.is_none_or(|(_, best)| candidate.left < best.left);
-            if self.after_best && !better {
-                self.neighbours += candidate.left;
-            }
             if better {
                 self.best = Some((x, candidate));
                 self.neighbours = self.last_left;
+            } else if self.after_best {
+                self.neighbours += candidate.left;
             }
             self.after_best = better;
             self.last_left = candidate.left;
@@ -121,11 +106,11 @@ impl Search {
         self.point += 1;
         let points = if self.round == 0 { POINTS } else { CLOSER_POINTS };
         if self.point < points {
-            return ControlFlow::Continue(());
+            return Ok(None);
         }
-        let Some((x, best)) = self.best else { return ControlFlow::Break(None) };
+        let (x, best) = self.best.ok_or(Refusal::SamplesLost)?;
         if self.round + 1 == ROUNDS {
-            return ControlFlow::Break(Some(self.fitted(x, &best)));
+            return Ok(Some(self.fitted(x, &best)));
         }
         if self.round == 0 {
             let (least, most) = FROM_S;
@@ -136,7 +121,7 @@ impl Search {
         self.step *= 2.0 / f32::from(CLOSER_POINTS - 1);
         (self.round, self.point, self.best) = (self.round + 1, 0, None);
         (self.after_best, self.last_left) = (false, 0.0);
-        ControlFlow::Continue(())
+        Ok(None)
     }
 
     fn fitted(&self, x: f32, best: &Candidate) -> Fitted {
@@ -146,23 +131,17 @@ impl Search {
         let tau_r = libm::expf(x);
         let step = f64::from(self.step);
         let curvature = (self.neighbours - 2.0 * best.left) / (step * step);
-        Fitted {
-            r_s,
-            e,
-            bend: 0.0,
-            r_r,
-            tau_r,
-            misfit: libm::sqrt(best.left / best.weight) as f32,
-            deviations: [d_r_s, d_e, d_r_r],
-            tau_deviation: tau_r * libm::sqrt(2.0 * variance / curvature.max(1e-12)) as f32,
-        }
+        let misfit = libm::sqrt(best.left / best.weight) as f32;
+        let tau_deviation = tau_r * libm::sqrt(2.0 * variance / curvature.max(1e-12)) as f32;
+        let deviations = [d_r_s, d_e, d_r_r];
+        Fitted { r_s, e, r_r, tau_r, misfit, deviations, tau_deviation, ..Fitted::default() }
     }
 }
 
 /// The linear fit for this time constant, s, over the bins that begin so many periods after a change of the level.
 fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Option<Candidate> {
-    let (mut xx, mut xy, mut yy) = ([[0.0_f64; N]; N], [0.0_f64; N], 0.0_f64);
-    let (mut weight, mut count) = (0.0_f64, 0.0_f64);
+    // Products of i, 1, i - i_m, di/dt and v.
+    let (mut products, mut count) = ([[0.0_f64; N + 1]; N + 1], 0.0_f64);
     for half in 0..2 {
         let mut bins = sums.bins(half).peekable();
         let (mut start, mut before) = (0.0_f32, None::<Bin>);
@@ -180,19 +159,16 @@ fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Optio
             {
                 let apart = bin.periods + 0.5 * (before.periods + after.periods);
                 let slope = (after.current.alpha - before.current.alpha) / (apart * PERIOD_S);
-                let x = [i, 1.0, i - mean, slope].map(f64::from);
-                let (y, w) = (f64::from(bin.voltage), f64::from(bin.periods));
+                let x = [i, 1.0, i - mean, slope, bin.voltage].map(f64::from);
+                let w = f64::from(bin.periods);
                 // The upper half, and few operations: in software they take some 60 cycles each, and the main loop
                 // must be back within 4 ms.
-                for n in 0..N {
+                for n in 0..=N {
                     let weighted = w * x[n];
-                    for m in n..N {
-                        xx[n][m] += weighted * x[m];
+                    for m in n..=N {
+                        products[n][m] += weighted * x[m];
                     }
-                    xy[n] += weighted * y;
                 }
-                yy += w * y * y;
-                weight += w;
                 count += 1.0;
             }
         }
@@ -200,38 +176,36 @@ fn fit(sums: &Collector, mut magnetising: f32, tau_r: f32, begins: f32) -> Optio
     if count <= N as f64 {
         return None;
     }
-    let whole = core::array::from_fn(|n| core::array::from_fn(|m| xx[n.min(m)][n.max(m)]));
-    let inverse = inverse(whole)?;
+    let inverse = inverse(&products)?;
+    let xy: [f64; N] = core::array::from_fn(|n| products[n][N]);
     let values = inverse.map(|row| row.iter().zip(&xy).map(|(a, b)| a * b).sum::<f64>());
     let explained: f64 = values.iter().zip(&xy).map(|(a, b)| a * b).sum();
-    let left = (yy - explained).max(0.0);
+    let left = (products[N][N] - explained).max(0.0);
     let variances = core::array::from_fn(|n| inverse[n][n]);
-    Some(Candidate { left, values, variances, weight, bins: count })
+    Some(Candidate { left, values, variances, weight: products[1][1], bins: count })
 }
 
-#[expect(clippy::needless_range_loop, reason = "matrix indices read as in the equations")]
-/// The inverse of a positive definite matrix, by Gauss and Jordan; none where it is not one.
-fn inverse(mut a: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
-    let mut inverse = [[0.0; N]; N];
+/// The inverse of a positive definite matrix, given by its upper half, by Gauss and Jordan; none where it is not one.
+fn inverse(a: &[[f64; N + 1]; N + 1]) -> Option<[[f64; N]; N]> {
+    // A and the identity beside it become the identity and the inverse.
+    let mut rows = [[0.0; 2 * N]; N];
     for n in 0..N {
-        inverse[n][n] = 1.0;
+        for m in 0..N {
+            rows[n][m] = a[n.min(m)][n.max(m)];
+        }
+        rows[n][N + n] = 1.0;
     }
     for n in 0..N {
-        let pivot = 1.0 / a[n][n];
-        if !(a[n][n] > 0.0 && pivot.is_finite()) {
+        let pivot = 1.0 / rows[n][n];
+        if !(rows[n][n] > 0.0 && pivot.is_finite()) {
             return None;
         }
-        let (own, own_inverse) = (a[n].map(|x| x * pivot), inverse[n].map(|x| x * pivot));
-        for row in 0..N {
-            let factor = a[row][n];
-            for column in 0..N {
-                if row != n {
-                    a[row][column] -= factor * own[column];
-                    inverse[row][column] -= factor * own_inverse[column];
-                }
-            }
+        let own = rows[n].map(|x| x * pivot);
+        for row in &mut rows {
+            let factor = row[n];
+            row.iter_mut().zip(own).for_each(|(x, own)| *x -= factor * own);
         }
-        (a[n], inverse[n]) = (own, own_inverse);
+        rows[n] = own;
     }
-    Some(inverse)
+    Some(rows.map(|row| core::array::from_fn(|m| row[N + m])))
 }

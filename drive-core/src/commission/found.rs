@@ -73,70 +73,51 @@ impl Levels {
         self.tau_r * self.r_r
     }
 
-    pub(super) fn new(fit: &Fitted, mismatch: f32) -> Self {
+    pub(super) fn new(fit: &Fitted) -> Self {
         // Impedances were divided by the current of sensor a.
-        let gain = 1.0 + 0.5 * mismatch;
-        Self {
-            r_s: fit.r_s * gain,
-            r_r: fit.r_r * gain,
-            tau_r: fit.tau_r,
-            inverter_v: 0.75 * fit.e,
-            mismatch,
-            saturates: false,
-        }
+        let gain = 1.0 + 0.5 * fit.mismatch;
+        let (r_s, r_r, inverter_v) = (fit.r_s * gain, fit.r_r * gain, 0.75 * fit.e);
+        let Fitted { tau_r, mismatch, .. } = *fit;
+        Self { r_s, r_r, tau_r, inverter_v, mismatch, saturates: false }
     }
 }
 
 impl Found {
-    /// The motor, as a T with equal leakages; `None` until both steps have found theirs.
-    pub fn motor(&self, settings: &Motor) -> Option<Motor> {
+    /// The motor, as a T with equal leakages; inertia and pole pairs are the default ones. `None` until levels and leakage, and
+    /// with a main flux that saturates the staircase too, have found theirs.
+    pub fn motor(&self) -> Option<Motor> {
         let (levels, leakage) = (self.levels?, self.leakage?);
         if levels.saturates {
-            let Motor { inertia, pole_pairs, .. } = *settings;
-            return self.iron.map(|iron| Motor { inertia, pole_pairs, ..iron.motor });
+            return self.iron.map(|iron| iron.motor);
         }
         let coupled = levels.coupled();
         let k = 1.0 / fpu_sqrt::sqrtf(1.0 + leakage.inductance / coupled);
         let l_ls = leakage.inductance / (1.0 + k);
-        Some(Motor {
-            r_s: levels.r_s,
-            r_r: levels.r_r / (k * k),
-            l_m: coupled / k,
-            l_ls,
-            l_lr: l_ls,
-            ..*settings
-        })
+        let (r_s, r_r, l_m) = (levels.r_s, levels.r_r / (k * k), coupled / k);
+        Some(Motor { r_s, r_r, l_m, l_ls, l_lr: l_ls, ..Motor::default() })
     }
 
     /// These settings with what has been found.
     pub(super) fn settings(&self, settings: &Settings, pole_pairs: u8) -> Settings {
         let mut new = *settings;
-        if let Some(inertia) = self.inertia {
-            new.motor.inertia = inertia;
-        }
-        let (Some(levels), Some(motor)) = (self.levels, self.motor(&new.motor)) else {
-            return new;
-        };
-        new.motor = Motor { pole_pairs, ..motor };
+        let inertia = self.inertia.unwrap_or(settings.motor.inertia);
+        new.motor.inertia = inertia;
+        let (Some(levels), Some(leakage)) = (self.levels, self.leakage) else { return new };
+        let Some(motor) = self.motor() else { return new };
+        new.motor = Motor { pole_pairs, inertia, ..motor };
         let half = 0.5 * levels.mismatch;
         new.scales.current_a = new.scales.current_a.scaled(1.0 / (1.0 + half));
         new.scales.current_b = new.scales.current_b.scaled(1.0 + half);
-        let set = |plant: FirstOrder| IdentifiedPlant {
-            k: Some(plant.k as f32),
-            p: Some(plant.p as f32),
-        };
-        match self.plants {
-            Some([d, q]) => {
-                new.current_plant =
-                    CurrentPlant { source: PlantSource::Identified, d: set(d), q: set(q) };
-            }
-            None => new.current_plant.source = PlantSource::Motor,
+        new.current_plant.source = PlantSource::Motor;
+        if let Some(plants) = self.plants {
+            let set =
+                |FirstOrder { k, p }| IdentifiedPlant { k: Some(k as f32), p: Some(p as f32) };
+            let [d, q] = plants.map(set);
+            new.current_plant = CurrentPlant { source: PlantSource::Identified, d, q };
         }
-        if let Some(leakage) = self.leakage {
-            let per = 1.0 / new.motor.sigma_l_s();
-            new.observer.leakage_share = leakage.fundamental * per;
-            new.observer.leakage_slope = leakage.slope * per;
-        }
+        let per = 1.0 / new.motor.sigma_l_s();
+        new.observer.leakage_share = leakage.fundamental * per;
+        new.observer.leakage_slope = leakage.slope * per;
         // The direct current of the rule for this motor.
         (new.sequence.flux, new.sequence.i_d) = (Flux::High, None);
         let of_dead_time = settings.inverter.dead_time_s / PERIOD_S * self.dc_link.unwrap_or(0.0);

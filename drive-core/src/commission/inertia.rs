@@ -10,16 +10,16 @@
 //! The inertia J and the friction T_f follow from the slopes of least squares. The tracked speed rings after a change of the
 //! current, and is right while the acceleration is constant: only the second half of every quarter counts.
 
-use super::collector::{Collector, Record};
-use super::motion::Slope;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next};
+use core::mem::replace;
+
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
 use crate::drive::{Excited, State};
-use crate::io::periods;
+use crate::io::{PERIOD_S, periods};
+use crate::math::limited;
 
 /// Duration of a quarter, s, and the quarters of the measurement: three times + - - +.
 const QUARTER_S: f32 = 0.8;
-const QUARTERS: u8 = 12;
+const QUARTERS: usize = 12;
 /// First current and least one, as shares of the rated peak: 0.15 and 0.1 A of 3.62 A.
 const FIRST: f32 = 0.0414;
 const LEAST: f32 = 0.0276;
@@ -29,81 +29,132 @@ const MOST: f32 = 0.8;
 const PEAK_RAD_PER_S: f32 = 12.566;
 /// Least share of the variance of the speed that inertia and friction explain.
 const EXPLAINED: f32 = 0.9;
+/// Control periods from one pair of values to the next: 10 ms. The speed is a mean over as long, and smoothed over 5 ms: it
+/// belongs to the integrals one pair before.
+const EVERY: u16 = 60;
+/// Pairs after a change of the current that do not count, 0.35 s: the tracking of the angle settles.
+const SETTLING: u16 = 35;
+/// Speed from which on it counts as a direction in full, electrical rad/s: 10 rpm of four poles.
+const MOVES_RAD_PER_S: f32 = 2.094;
 
-/// Progress of the step.
+/// Sums over integrals and speed.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Swings {
-    /// Torque current, A.
-    amperes: f32,
-    /// Quarters that have ended.
-    quarters: u8,
-    /// Whether the current is that of the measurement.
-    measures: bool,
+pub(super) struct Motion {
+    /// Integral of i_q, A s, and of the direction, s; now, and at the last values.
+    x: f32,
+    f: f32,
+    earlier: (f32, f32),
+    /// Sum of the speed since the last values.
+    speed: f32,
+    periods: u16,
+    /// Torque current, A, and values since it changed.
+    i_q: f32,
+    settled: u16,
+    /// Sums of 1, w, x, f, w w, x x, f f, x w, f w, x f.
+    sums: [f32; 10],
+}
+
+/// What the sums say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slope {
+    /// Speed per integral of the current, electrical rad/s per A s.
+    pub value: f32,
+    /// Speed that friction takes, electrical rad/s^2.
+    pub friction: f32,
+    /// Share of the variance of the speed that is explained.
+    pub explained: f32,
+}
+
+impl Motion {
+    /// Takes a period: the reference of the torque current, A, and the speed, electrical turns per period.
+    pub fn push(&mut self, i_q: f32, rotor_freq: f32) {
+        self.x += PERIOD_S * i_q;
+        self.speed += rotor_freq;
+        self.periods += 1;
+        if self.periods < EVERY {
+            return;
+        }
+        let w = self.speed * (core::f32::consts::TAU / (PERIOD_S * f32::from(EVERY)));
+        (self.periods, self.speed) = (0, 0.0);
+        self.f += PERIOD_S * f32::from(EVERY) * limited(w * (1.0 / MOVES_RAD_PER_S), 1.0);
+        let (x, f) = replace(&mut self.earlier, (self.x, self.f));
+        let moved = (i_q - replace(&mut self.i_q, i_q)).abs() > 0.01 * i_q.abs();
+        self.settled = if moved { 0 } else { self.settled.saturating_add(1) };
+        if self.settled >= SETTLING {
+            let terms = [1.0, w, x, f, w * w, x * x, f * f, x * w, f * w, x * f];
+            self.sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+    }
+
+    /// The slopes.
+    pub fn slope(&self) -> Slope {
+        let [count, w, x, f, ww, xx, ff, xw, fw, xf] = self.sums;
+        let centred = |sum: f32, one: f32, other: f32| sum - one * other / count;
+        let (ww, xx, ff) = (centred(ww, w, w), centred(xx, x, x), centred(ff, f, f));
+        let (xw, fw, xf) = (centred(xw, x, w), centred(fw, f, w), centred(xf, x, f));
+        let per_determinant = 1.0 / (xx * ff - xf * xf);
+        let value = (xw * ff - fw * xf) * per_determinant;
+        let friction = (xw * xf - fw * xx) * per_determinant;
+        Slope { value, friction, explained: (value * xw - friction * fw) / ww }
+    }
 }
 
 impl Commissioning {
-    pub(super) fn inertia(
-        &mut self,
-        drive: &Excited,
-        sums: &mut Collector,
-    ) -> Result<Next, Refusal> {
-        let (rated, limit) = (self.setup.rated, self.setup.i_q_limit);
-        match self.part {
+    /// Part 0 starts the drive; every further part is a quarter.
+    pub(super) fn inertia(&mut self, drive: &Excited, sums: &mut Collector) -> Answer {
+        let (rated, limit) = (self.plate.rated, self.plate.i_q_limit);
+        match self.state.part {
             0 => {
-                self.part = 1;
+                self.state.part = 1;
                 self.found.inertia = None;
                 return Ok(Next::Start);
             }
             1 if drive.state != State::Torque => return Ok(Next::Wait),
             1 => {
-                self.part = 2;
-                self.swings = Swings { amperes: FIRST * rated, ..Swings::default() };
+                self.state.amperes = FIRST * rated;
                 sums.begin(Record::Motion);
             }
-            _ => self.swings.quarters += 1,
+            _ => {}
         }
-        let Swings { amperes, quarters, measures } = self.swings;
+        let last = if self.state.measures { QUARTERS } else { 4 };
+        if self.state.part > last {
+            let slope = sums.recorded.motion.slope();
+            if self.state.measures {
+                return self.report_inertia(slope);
+            }
+            // Twice where it is too little to overcome the friction or to be seen; else as much as friction and the peak
+            // of the speed ask for.
+            let follows = slope.explained >= EXPLAINED && slope.value > 0.0;
+            let most = MOST * limit;
+            let needed = (PEAK_RAD_PER_S / QUARTER_S + slope.friction.abs()) / slope.value;
+            let next = if follows { needed } else { 2.0 * self.state.amperes };
+            self.state.amperes = next.clamp(LEAST * rated, most);
+            self.state.measures = follows || self.state.amperes >= most;
+            self.state.part = 1;
+            sums.begin(Record::Motion);
+        }
         // + - - +, one after the other.
-        let last = if measures { QUARTERS } else { 4 };
-        if quarters < last {
-            self.until = periods(QUARTER_S) * (u32::from(quarters) + 1);
-            let ahead = matches!(quarters % 4, 0 | 3);
-            return Ok(Next::Torque(if ahead { amperes } else { -amperes }));
-        }
-        let slope = sums.motion().slope();
-        let follows = slope.explained >= EXPLAINED && slope.value > 0.0;
-        if measures {
-            return self.report_inertia(slope);
-        }
-        // Twice where it is too little to overcome the friction or to be seen; else as much as friction and the peak of the
-        // speed ask for.
-        let most = MOST * limit;
-        let needed = (PEAK_RAD_PER_S / QUARTER_S + slope.friction.abs()) / slope.value;
-        let next = if follows { needed } else { 2.0 * amperes };
-        let wanted = next.clamp(LEAST * rated, most);
-        let measures = follows || wanted >= most;
-        self.swings = Swings { amperes: wanted, quarters: 0, measures };
-        sums.begin(Record::Motion);
-        self.until = periods(QUARTER_S);
-        Ok(Next::Torque(wanted))
+        let ahead = matches!(self.state.part % 4, 0 | 1);
+        self.state.until = periods(QUARTER_S) * self.state.part as u32;
+        self.state.part += 1;
+        let amperes = self.state.amperes;
+        Ok(Next::Torque(if ahead { amperes } else { -amperes }))
     }
 
-    fn report_inertia(&mut self, slope: Slope) -> Result<Next, Refusal> {
-        let explained = Quantity::new("explained share of the speed", "", slope.explained)
-            .of((EXPLAINED, 1.0))
-            .check(Meaning::NotFree, Meaning::NotFree)?;
+    fn report_inertia(&mut self, slope: Slope) -> Answer {
+        let (explained, free) = (slope.explained, [Meaning::NotFree; 2]);
+        let explained = Quantity::new("explained share of the speed", "", explained)
+            .checked((EXPLAINED, 1.0), free)?;
         // Mechanical: the slopes are electrical.
-        let inertia = self.setup.torque_per_ampere * self.setup.pole_pairs / slope.value;
-        let friction = inertia * slope.friction / self.setup.pole_pairs;
+        let inertia = self.plate.torque_per_ampere * self.plate.pole_pairs_in_force / slope.value;
+        let friction = inertia * slope.friction / self.plate.pole_pairs_in_force;
         let values = [
-            Quantity::new("inertia", "kg m2", inertia)
-                .of((0.0, f32::INFINITY))
-                .check(Meaning::NotFree, Meaning::NotFree)?,
+            Quantity::new("inertia", "kg m2", inertia).checked((0.0, f32::INFINITY), free)?,
             Quantity::new("friction", "Nm", friction),
-            Quantity::new("torque current", "A", self.swings.amperes),
+            Quantity::new("torque current", "A", self.state.amperes),
             explained,
         ];
         self.found.inertia = Some(inertia);
-        Ok(Next::Report(Report::new(Step::Inertia, values)))
+        self.report(&values)
     }
 }

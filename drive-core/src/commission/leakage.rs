@@ -14,13 +14,12 @@
 
 use core::f32::consts::TAU;
 
-use super::collector::{Collector, Phasors, Record};
-use super::found::Leakage;
-use super::plate::Plate;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next};
+use super::{
+    Answer, Collector, Commissioning, Leakage, Meaning, Quantity, Record, Refusal, SIZE, Step,
+};
 use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::{PERIOD_S, periods};
+use crate::drive::Excitation;
+use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, SQRT_3};
 use crate::settings::rules::CARRIER_HZ;
 
@@ -33,31 +32,23 @@ const CARRIER: f32 = 0.07;
 const CARRIER_OF_BUS: f32 = 0.3;
 /// Longest time until the flux of a bias counts as standing, s: it moves the saliency, not the mean inductance.
 const SETTLED_S: f32 = 2.1;
-/// Control periods of a record, of the rise of the carrier, and of its fall.
-const CARRIER_PERIODS: u32 = 1500;
-const RISE_PERIODS: u32 = 300;
+/// Samples of a record, and time of the rise of the carrier, and of its fall, s.
+const RECORDED: f32 = 1500.0;
+const RISE_S: f32 = 0.05;
 /// Largest gain mismatch that is left at the carrier.
 const LEFT: f32 = 0.01;
 /// rad/s.
 const CARRIER_RAD_PER_S: f32 = TAU * CARRIER_HZ;
 
-/// An amplitude along an axis, of its cosine and sine parts.
-fn amplitude(parts: [AlphaBeta; 2], along: fn(&AlphaBeta) -> f32) -> f32 {
-    let [re, im] = parts.map(|part| along(&part));
-    libm::hypotf(re, im)
-}
-
 /// A/V along phase a, and across it.
-fn admittances(seen: &Phasors) -> [f32; 2] {
-    let axes: [fn(&AlphaBeta) -> f32; 2] = [|v| v.alpha, |v| v.beta];
-    axes.map(|axis| amplitude(seen.current, axis) / amplitude(seen.voltage, axis))
+fn admittances(seen: &[[f32; 2]; 4]) -> [f32; 2] {
+    let [v_a, v_b, i_a, i_b] = seen.map(|[re, im]| libm::hypotf(re, im));
+    [i_a / v_a, i_b / v_b]
 }
 
 /// Gain mismatch that the carrier along phase a shows: (gain of a)/(gain of b) - 1.
-fn mismatch(seen: &Phasors) -> f32 {
-    let [re, im] = seen.current;
-    let square = re.alpha * re.alpha + im.alpha * im.alpha;
-    SQRT_3 * (re.alpha * re.beta + im.alpha * im.beta) / square
+fn mismatch([_, _, [re_a, im_a], [re_b, im_b]]: &[[f32; 2]; 4]) -> f32 {
+    SQRT_3 * (re_a * re_b + im_a * im_b) / (re_a * re_a + im_a * im_a)
 }
 
 /// The inductance, H, that gives this admittance, A/V, with the resistance R', ohm, and the analog filter, periods.
@@ -70,72 +61,66 @@ fn inductance(admittance: f32, resistance: f32, filter: f32, range: (f32, f32)) 
         let middle = 0.5 * (low + high);
         let decayed = -libm::expm1f(-PERIOD_S * resistance / libm::expf(middle));
         let to_pole = libm::hypotf(cos - (1.0 - decayed), sin);
-        if seen * decayed / (resistance * to_pole) > admittance {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        let is_low = seen * decayed / (resistance * to_pole) > admittance;
+        *(if is_low { &mut low } else { &mut high }) = middle;
     }
     libm::expf(0.5 * (low + high))
 }
 
 impl Commissioning {
-    pub(super) fn leakage(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
+    pub(super) fn leakage(&mut self, sums: &mut Collector) -> Answer {
         let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
-        let volts = CARRIER * plate.amperes * CARRIER_RAD_PER_S * self.rough()?;
-        let volts = volts.min(CARRIER_OF_BUS * self.setup.dc_link);
-        // Per bias: settle; along: rise, record; fall; across: rise, record; fall.
-        let (bias, part) = (usize::from(self.part / 7), self.part % 7);
-        let Some(&share) = BIASES.get(bias) else { return self.report_leakage(plate) };
+        let regulator = self.regulator()?;
+        let volts = CARRIER * self.plate.amperes * CARRIER_RAD_PER_S * self.rough()?;
+        let volts = volts.min(CARRIER_OF_BUS * self.plate.dc_link);
         let none = AlphaBeta::ZERO;
         let (along, across) = (AlphaBeta::new(volts, 0.0), AlphaBeta::new(0.0, volts));
-        let (record, samples, carrier) = match part {
-            0 => (Record::Nothing, periods((3.0 * levels.tau_r).min(SETTLED_S)), none),
-            1 => (Record::Nothing, RISE_PERIODS, along),
-            2 => (Record::Carrier, CARRIER_PERIODS, along),
-            3 | 6 => {
-                let seen = sums.phasors();
-                let axis = usize::from(part == 6);
-                let half = 0.5 * levels.mismatch;
-                let gain = if axis == 0 { 1.0 + half } else { 1.0 - half };
-                let (least, most) = plate.leakage();
-                let henry = inductance(
-                    admittances(&seen)[axis] / gain,
-                    levels.r_s + levels.r_r,
-                    self.setup.filter,
-                    (0.1 * least, 10.0 * most),
-                );
-                self.inductances[bias][axis] = henry;
-                if axis == 0 {
-                    let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-                    let amperes = volts * admittances(&seen)[0];
-                    let allowed =
-                        6.0 * noise / (amperes * fpu_sqrt::sqrtf(CARRIER_PERIODS as f32 / 2.0));
-                    let allowed = allowed.max(LEFT);
-                    Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
-                        .of((-allowed, allowed))
-                        .check(Meaning::Turning, Meaning::Turning)?;
-                }
-                (Record::Nothing, RISE_PERIODS, none)
+        // The parts of a bias.
+        let parts = [
+            (Record::Nothing, (3.0 * levels.tau_r).min(SETTLED_S), none),
+            (Record::Nothing, RISE_S, along),
+            (Record::Carrier, RECORDED * PERIOD_S, along),
+            (Record::Nothing, RISE_S, none),
+            (Record::Nothing, RISE_S, across),
+            (Record::Carrier, RECORDED * PERIOD_S, across),
+            (Record::Nothing, RISE_S, none),
+        ];
+        let (bias, part) = (self.state.part / parts.len(), self.state.part % parts.len());
+        let Some(&share) = BIASES.get(bias) else { return self.report_leakage() };
+        // A record has ended: along the bias, or across it.
+        if let 3 | 6 = part {
+            let axis = usize::from(part == 6);
+            let seen = sums.phasors();
+            let admittance = admittances(&seen)[axis];
+            let half = 0.5 * levels.mismatch;
+            let gain = if axis == 0 { 1.0 + half } else { 1.0 - half };
+            let (least, most) = self.plate.leakage;
+            let range = (0.1 * least, 10.0 * most);
+            self.inductances[bias][axis] =
+                inductance(admittance / gain, levels.r_s + levels.r_r, self.plate.filter, range);
+            if axis == 0 {
+                let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
+                let of_noise = 6.0 * noise / (volts * admittance * fpu_sqrt::sqrtf(RECORDED / 2.0));
+                let allowed = of_noise.max(LEFT);
+                Quantity::new("gain mismatch at 600 Hz", "", mismatch(&seen) - levels.mismatch)
+                    .up_to(allowed, Meaning::Turning)?;
             }
-            4 => (Record::Nothing, RISE_PERIODS, across),
-            _ => (Record::Carrier, CARRIER_PERIODS, across),
-        };
-        let excitation = self.current(plate, share, carrier)?;
-        Ok(self.part(sums, record, samples, excitation))
+        }
+        let (record, seconds, carrier) = parts[part];
+        let amperes = share * self.plate.amperes;
+        let excitation = Excitation::Current { amperes, regulator, carrier, binary: false };
+        self.begin(sums, (record, seconds, excitation))
     }
 
-    fn report_leakage(&mut self, plate: &Plate) -> Result<Next, Refusal> {
+    fn report_leakage(&mut self) -> Answer {
         let saliency = |[along, across]: [f32; 2]| (across - along) / (across + along);
         let [high, low] = self.inductances;
         let inductance = 0.25 * (high[0] + high[1] + low[0] + low[1]);
-        let [most, least] = BIASES.map(|share| share * plate.amperes);
+        let [most, least] = BIASES.map(|share| share * self.plate.amperes);
         let slope = (high[1] - low[1]) / (most - least);
         let fundamental = low[1] - slope * least;
         let values = [
-            Quantity::new("sigma L_s", "H", inductance)
-                .of(plate.leakage())
-                .check(Meaning::TooLarge, Meaning::TooSmall)?,
+            Quantity::new("sigma L_s", "H", inductance).checked(self.plate.leakage, SIZE)?,
             Quantity::new("saliency at half the current", "", saliency(high)),
             Quantity::new("saliency at a quarter", "", saliency(low)),
             Quantity::new("fundamental wave, no current", "H", fundamental),
@@ -143,6 +128,6 @@ impl Commissioning {
         ];
         let saliency = saliency(high);
         self.found.leakage = Some(Leakage { inductance, saliency, fundamental, slope });
-        Ok(Next::Report(Report::new(Step::Leakage, values)))
+        self.report(&values)
     }
 }

@@ -1,19 +1,13 @@
 //! Step 4: two current levels along phase a and a third, and what the [fit](super::fit) finds in them.
 
-use core::ops::ControlFlow;
-
-use super::collector::{BINS, Collector, FIRST_BINS, Record};
-use super::fit::{Fitted, Search};
-use super::found::Levels;
-use super::plate::Plate;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next};
+use super::{
+    Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
+    Record, Refusal, SIZE, Step, TAU_R, TIME,
+};
 use crate::drive::Excitation;
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::math::frames::{AlphaBeta, SQRT_3};
 
-/// Pause before the first level, s.
-const QUIET_S: f32 = 0.1;
 /// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
 /// depends on the current.
 const LEVELS: [f32; 4] = [0.8, 0.2, 0.45, 0.3];
@@ -59,172 +53,129 @@ impl Fitted {
 }
 
 impl Commissioning {
-    pub(super) fn levels(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
-        let at = |share| self.current(plate, share, AlphaBeta::ZERO);
-        let [high, low, third, fourth] = LEVELS.map(at);
-        let (high, low, third, fourth) = (high?, low?, third?, fourth?);
+    pub(super) fn levels(&mut self, sums: &mut Collector) -> Answer {
+        let regulator = self.regulator()?;
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-        let record =
-            |half, seconds: f32| Record::Bins { half, first: seconds / PERIOD_S / FIRST_BINS };
-        match self.part {
-            0 => {
-                self.found.levels = None;
-                Ok(self.part(sums, Record::Nothing, periods(QUIET_S), Excitation::Rest))
-            }
-            1 => Ok(self.part(sums, record(0, LEVEL_S), periods(LEVEL_S), high)),
-            2 => Ok(self.part(sums, record(1, LEVEL_S), periods(LEVEL_S), low)),
+        let limit = MISFIT_OF_BUS * self.plate.dc_link;
+        let limit = limit.max(MISFIT_PER_NOISE * self.rough()? * noise);
+        let part = self.state.part;
+        match part {
+            0 => self.found.levels = None,
+            // The first two levels have ended; or the third, or the fourth.
             3 => {
-                sums.begin(Record::Nothing);
-                self.search = Some(Search::new());
-                (self.part, self.until) = (4, 0);
-                Ok(Next::Wait)
-            }
-            4 => {
-                let fit = match self.search.as_mut().map(|search| search.step(sums)) {
-                    Some(ControlFlow::Continue(())) => return Ok(Next::Wait),
-                    Some(ControlFlow::Break(Some(fit))) => fit,
-                    _ => return Err(Refusal::SamplesLost),
-                };
-                self.search = None;
-                let [ends, end] = [0, 1].map(|half| sums.mean(half, STEADY).current);
-                let (da, db) = (ends.alpha - end.alpha, on_b(ends) - on_b(end));
-                let mismatch = Quantity::new("gain mismatch", "", -da / (2.0 * db) - 1.0)
-                    .of((-MISMATCH, MISMATCH))
-                    .check(Meaning::Mismatch, Meaning::Mismatch)?
-                    .value;
-                self.check_rest(plate, sums, mismatch, noise)?;
-                let limit = MISFIT_OF_BUS * self.setup.dc_link;
-                let limit = limit.max(MISFIT_PER_NOISE * self.rough()? * noise);
-                let misfit = Quantity::new("misfit", "V", fit.misfit).of((0.0, limit));
+                let Some(fit) = self.search(sums, 0.0)? else { return Ok(Next::Wait) };
+                self.state.fitted = Fitted { mismatch: self.mismatch(sums, noise)?, ..fit };
                 if fit.misfit > limit || fit.deviations[2] > LINEAR * fit.r_r {
-                    let most = misfit.of((0.0, SATURATED * limit));
-                    most.check(Meaning::Misfit, Meaning::Misfit)?;
-                    return self.saturated(plate, sums, &fit, mismatch, misfit);
+                    return self.report_saturated(sums, limit);
                 }
-                self.report_levels(plate, &fit, mismatch, misfit)?;
-                self.fitted = (fit, mismatch, Some(misfit));
-                let wait = WAIT_T * fit.tau_r;
-                Ok(self.part(sums, Record::Nothing, periods(wait), third))
+                self.level_values(limit)?;
             }
-            5 | 7 => {
-                let at = if self.part == 5 { third } else { fourth };
-                let mean = MEAN_T * self.fitted.0.tau_r;
-                Ok(self.part(sums, record(0, mean.max(QUIET_S)), periods(mean.max(QUIET_S)), at))
+            5 | 7 if self.is_confirmed(sums)? => {
+                let values = self.level_values(limit)?;
+                self.found.levels = Some(Levels::new(&self.state.fitted));
+                return self.report(&values);
             }
-            _ => {
-                let ((fit, mismatch, misfit), seen) = (self.fitted, sums.mean(0, 0));
-                let misfit = misfit.ok_or(Refusal::SamplesLost)?;
-                let resistive = fit.r_s * seen.current.alpha;
-                let allowed = THIRD.0 * resistive + THIRD.1 * self.setup.dc_link;
-                // What is left of the transient from the level before.
-                let turned = seen.periods * PERIOD_S / fit.tau_r;
-                let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
-                let [_, before, now, last] = LEVELS.map(|share| share * plate.amperes);
-                let is_third = self.part == 6;
-                let stepped = if is_third { now - before } else { last - now };
-                let bent = fit.e - fit.bend / seen.current.alpha;
-                let error = seen.voltage - bent - resistive - fit.r_r * stepped * rest;
-                if is_third && error > BENT * allowed {
-                    self.fitted.0 = fit.bent(error, plate.amperes);
-                    return Ok(self.part(
-                        sums,
-                        Record::Nothing,
-                        periods(WAIT_T * fit.tau_r),
-                        fourth,
-                    ));
-                }
-                Quantity::new("error of the last level", "V", error)
-                    .of((-allowed, allowed))
-                    .check(Meaning::Inverter, Meaning::Inverter)?;
-                let report = self.report_levels(plate, &fit, mismatch, misfit)?;
-                self.found.levels = Some(Levels::new(&fit, mismatch));
-                Ok(Next::Report(report))
-            }
+            _ => {}
         }
+        let tau_r = self.state.fitted.tau_r;
+        let (wait, mean) = (WAIT_T * tau_r, (MEAN_T * tau_r).max(QUIET_S));
+        let [high, low, third, fourth] = LEVELS.map(|share| self.along(share, regulator));
+        let parts = [
+            (Record::Nothing, QUIET_S, Excitation::Rest),
+            (Record::bins(0, LEVEL_S), LEVEL_S, high),
+            (Record::bins(1, LEVEL_S), LEVEL_S, low),
+            (Record::Nothing, wait, third),
+            (Record::bins(0, mean), mean, third),
+            (Record::Nothing, wait, fourth),
+            (Record::bins(0, mean), mean, fourth),
+        ];
+        self.begin(sums, parts[part % parts.len()])
     }
 
-    /// No current may flow across phase a, once the gains are corrected.
-    fn check_rest(
-        &self,
-        plate: &Plate,
-        sums: &Collector,
-        mismatch: f32,
-        noise: f32,
-    ) -> Result<(), Refusal> {
+    /// The gain mismatch that the first two levels show. No current may flow across phase a, once the gains are corrected.
+    fn mismatch(&self, sums: &Collector, noise: f32) -> Result<f32, Refusal> {
+        let [high, low] = [0, 1].map(|half| sums.mean(half, STEADY).current);
+        let (da, db) = (high.alpha - low.alpha, on_b(high) - on_b(low));
+        let mismatch = -da / (2.0 * db) - 1.0;
+        Quantity::new("gain mismatch", "", mismatch).up_to(MISMATCH, Meaning::Mismatch)?;
         for bin in sums.bins(0).chain(sums.bins(1)) {
             let (a, b) = (bin.current.alpha, on_b(bin.current));
             let (a, b) = (a / (1.0 + 0.5 * mismatch), b * (1.0 + 0.5 * mismatch));
             let across = (a + 2.0 * b) * (1.0 / SQRT_3);
-            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * plate.amperes;
+            let allowed = ACROSS.0 * a.abs() + ACROSS.1 * self.plate.amperes;
             let allowed = allowed + 6.0 * noise / fpu_sqrt::sqrtf(bin.periods);
             Quantity::new("current across phase a", "A", across)
-                .of((-allowed, allowed))
-                .check(Meaning::Turning, Meaning::Turning)?;
+                .up_to(allowed, Meaning::Turning)?;
         }
-        Ok(())
+        Ok(mismatch)
+    }
+
+    /// Whether the third level or the fourth confirms what the first two have shown. The third may show instead that the
+    /// voltage of the inverter depends on the current.
+    fn is_confirmed(&mut self, sums: &Collector) -> Result<bool, Refusal> {
+        let (fit, seen) = (self.state.fitted, sums.mean(0, 0));
+        let resistive = fit.r_s * seen.current.alpha;
+        let allowed = THIRD.0 * resistive + THIRD.1 * self.plate.dc_link;
+        // What is left of the transient from the level before.
+        let turned = seen.periods * PERIOD_S / fit.tau_r;
+        let rest = libm::expf(-WAIT_T) * -libm::expm1f(-turned) / turned;
+        let [_, before, now, last] = LEVELS.map(|share| share * self.plate.amperes);
+        let is_third = self.state.part == 5;
+        let stepped = if is_third { now - before } else { last - now };
+        let bent = fit.e - fit.bend / seen.current.alpha;
+        let error = seen.voltage - bent - resistive - fit.r_r * stepped * rest;
+        if is_third && error > BENT * allowed {
+            self.state.fitted = fit.bent(error, self.plate.amperes);
+            return Ok(false);
+        }
+        Quantity::new("error of the last level", "V", error).up_to(allowed, Meaning::Inverter)?;
+        Ok(true)
     }
 
     /// The main flux saturates: the ends of the levels give the resistance, the staircase is to give the rest.
-    fn saturated(
-        &mut self,
-        plate: &Plate,
-        sums: &Collector,
-        fit: &Fitted,
-        mismatch: f32,
-        misfit: Quantity,
-    ) -> Result<Next, Refusal> {
+    fn report_saturated(&mut self, sums: &Collector, limit: f32) -> Answer {
+        let fit = self.state.fitted;
+        Quantity::new("misfit", "V", fit.misfit)
+            .checked((0.0, SATURATED * limit), [Meaning::Misfit; 2])?;
         let [high, low] = [0, 1].map(|half| sums.mean(half, ENDS));
         let r_s = (high.voltage - low.voltage) / (high.current.alpha - low.current.alpha);
-        let ends = Fitted { r_s, e: low.voltage - r_s * low.current.alpha, ..*fit };
-        let levels = Levels { saturates: true, ..Levels::new(&ends, mismatch) };
+        let ends = Fitted { r_s, e: low.voltage - r_s * low.current.alpha, ..fit };
+        let levels = Levels { saturates: true, ..Levels::new(&ends) };
         let values = [
-            Quantity::new("r_s", "ohm", levels.r_s)
-                .of(plate.r_s())
-                .check(Meaning::TooLarge, Meaning::TooSmall)?,
-            self.inverter_voltage(&levels).check(Meaning::Inverter, Meaning::Inverter)?,
-            Quantity::new("gain mismatch", "", mismatch),
-            misfit,
+            Quantity::new("r_s", "ohm", levels.r_s).checked(self.plate.r_s, SIZE)?,
+            self.inverter_voltage(&levels)?,
+            Quantity::new("gain mismatch", "", levels.mismatch),
+            misfit(&fit, limit),
         ];
         self.found.levels = Some(levels);
-        Ok(Next::Report(Report::new(Step::Levels, values)))
+        self.report(&values)
     }
 
-    fn inverter_voltage(&self, levels: &Levels) -> Quantity {
-        let of_dead_time = self.setup.dead_time * self.found.dc_link.unwrap_or(0.0);
+    fn inverter_voltage(&self, levels: &Levels) -> Result<Quantity, Refusal> {
+        let of_dead_time = self.plate.dead_time * self.found.dc_link.unwrap_or(0.0);
         Quantity::new("inverter voltage", "V", levels.inverter_v)
-            .of((DEAD_TIME * of_dead_time, f32::INFINITY))
+            .checked((DEAD_TIME * of_dead_time, f32::INFINITY), [Meaning::Inverter; 2])
     }
 
-    fn report_levels(
-        &self,
-        plate: &Plate,
-        fit: &Fitted,
-        mismatch: f32,
-        misfit: Quantity,
-    ) -> Result<Report, Refusal> {
-        let levels = Levels::new(fit, mismatch);
-        let [d_r_s, d_e, d_r_r] = fit.deviations;
-        let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
-        let r_r = Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).of(plate.r_r());
-        let values = [
-            Quantity::new("r_s", "ohm", levels.r_s)
-                .within(d_r_s)
-                .of(plate.r_s())
-                .check(large, small)?,
-            r_r.check(large, small)?,
-            Quantity::new("tau_r", "s", levels.tau_r)
-                .within(fit.tau_deviation)
-                .of(Plate::TAU_R)
-                .check(small, large)?,
+    fn level_values(&self, limit: f32) -> Result<[Quantity; 7], Refusal> {
+        let fit = &self.state.fitted;
+        let (plate, levels) = (&self.plate, Levels::new(fit));
+        let ([d_r_s, d_e, d_r_r], d_tau_r) = (fit.deviations, fit.tau_deviation);
+        Ok([
+            Quantity::new("r_s", "ohm", levels.r_s).within(d_r_s).checked(plate.r_s, SIZE)?,
+            Quantity::new("R_R", "ohm", levels.r_r).within(d_r_r).checked(plate.r_r, SIZE)?,
+            Quantity::new("tau_r", "s", levels.tau_r).within(d_tau_r).checked(TAU_R, TIME)?,
             Quantity::new("L_M", "H", levels.coupled()),
-            self.inverter_voltage(&levels)
-                .within(0.75 * d_e)
-                .check(Meaning::Inverter, Meaning::Inverter)?,
-            Quantity::new("gain mismatch", "", mismatch),
-            misfit,
-        ];
-        Ok(Report::new(Step::Levels, values))
+            self.inverter_voltage(&levels)?.within(0.75 * d_e),
+            Quantity::new("gain mismatch", "", fit.mismatch),
+            misfit(fit, limit),
+        ])
     }
+}
+
+/// The misfit, beside that of a linear motor.
+fn misfit(fit: &Fitted, limit: f32) -> Quantity {
+    Quantity::new("misfit", "V", fit.misfit).allowing((0.0, limit))
 }
 
 /// Phase current b of a current vector, A.

@@ -1,14 +1,8 @@
 //! Step 7: the current loop, designed by the rule of section 3.8 and its limits for the motor that was found, and checked by
 //! a step of the current along phase a.
 
-use super::collector::{Collector, FIRST_BINS, Record};
-use super::plate::Plate;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next, Progress};
-use crate::drive::{Excitation, Regulator};
-use crate::io::{PERIOD_S, periods};
-use crate::math::frames::AlphaBeta;
-use crate::settings::Motor;
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
+use crate::drive::Regulator;
 use crate::tuning::DIRECT_SHARE;
 
 /// Currents before and after the step, as shares of the test current.
@@ -26,64 +20,40 @@ const OVERSHOOT: f32 = 0.05;
 const NOISES: f32 = 4.0;
 
 impl Commissioning {
-    pub(super) fn current_loop(
-        &mut self,
-        plate: &Plate,
-        sums: &mut Collector,
-    ) -> Result<Next, Refusal> {
-        let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
+    pub(super) fn current_loop(&mut self, sums: &mut Collector) -> Answer {
+        let motor = self.found.motor().ok_or(Refusal::Needs(Step::Leakage))?;
         let noise = self.found.noise.ok_or(Refusal::Needs(Step::Sensors))?;
-        let Some(design) = self.design else {
-            // Less flux first: while the next start has the low sides on, what is left drives a current against itself, which
-            // turns a light shaft away.
-            if self.part == 0 {
-                self.found.plants = None;
-                let low = self.current(plate, LOW, AlphaBeta::ZERO)?;
-                return Ok(self.part(sums, Record::Nothing, periods(LOW_T * motor.tau_r()), low));
-            }
-            (self.part, self.until, self.progress) = (0, 0, Progress::StopToDesign);
-            return Ok(Next::Wait);
-        };
-        let [design, _] = design.map_err(Refusal::Design)?;
-        let regulator = Regulator {
-            k_c: design.k_c as f32,
-            z_c: design.z_c as f32,
-            direct: DIRECT_SHARE,
-            filtered: true,
-        };
-        let at = |share: f32| Excitation::Current {
-            amperes: share * plate.amperes,
-            regulator,
-            carrier: AlphaBeta::ZERO,
-            binary: false,
-        };
-        let record = Record::Bins { half: 0, first: RECORD_S / PERIOD_S / FIRST_BINS };
-        match self.part {
-            0 => {
-                Ok(self.part(sums, Record::Nothing, periods(BEFORE_S + motor.tau_r()), at(STEP[0])))
-            }
-            1 => Ok(self.part(sums, record, periods(RECORD_S), at(STEP[1]))),
-            _ => {
-                let step = (STEP[1] - STEP[0]) * plate.amperes;
-                let end = sums.mean(0, SETTLED).current.alpha;
-                let highest = sums.bins(0).fold(f32::MIN, |most, bin| most.max(bin.current.alpha));
-                let overshoot = (highest - end) / step;
-                let missing = (end - STEP[1] * plate.amperes) / step;
-                let allowed = OVERSHOOT + NOISES * noise / step;
-                let values = [
-                    Quantity::new("k_c", "V/A", regulator.k_c),
-                    Quantity::new("z_c", "", regulator.z_c),
-                    Quantity::new("phase margin", "deg", design.margins.phase_margin_deg as f32),
-                    Quantity::new("crossover", "Hz", design.margins.crossover_hz as f32),
-                    Quantity::new("overshoot", "", overshoot)
-                        .of((-allowed, allowed))
-                        .check(Meaning::Loop, Meaning::Loop)?,
-                    Quantity::new("error after the step", "", missing)
-                        .of((-allowed, allowed))
-                        .check(Meaning::Loop, Meaning::Loop)?,
-                ];
-                Ok(Next::Report(Report::new(Step::CurrentLoop, values)))
-            }
+        if self.state.part == 0 {
+            self.found.plants = None;
+            // Less flux first: while the next start has the low sides on, what is left drives a current against itself,
+            // which turns a light shaft away.
+            let low = self.along(LOW, self.regulator()?);
+            return self.begin(sums, (Record::Nothing, LOW_T * motor.tau_r(), low));
         }
+        let Some([design, _]) = self.designed()? else { return Ok(Next::Wait) };
+        let (k_c, z_c) = (design.k_c as f32, design.z_c as f32);
+        let regulator = Regulator { k_c, z_c, direct: DIRECT_SHARE, filtered: true };
+        let [before, after] = STEP.map(|share| self.along(share, regulator));
+        let parts = [
+            (Record::Nothing, BEFORE_S + motor.tau_r(), before),
+            (Record::bins(0, RECORD_S), RECORD_S, after),
+        ];
+        if let Some(&part) = parts.get(self.state.part - 1) {
+            return self.begin(sums, part);
+        }
+        let step = (STEP[1] - STEP[0]) * self.plate.amperes;
+        let end = sums.mean(0, SETTLED).current.alpha;
+        let highest = sums.bins(0).fold(f32::MIN, |most, bin| most.max(bin.current.alpha));
+        let overshoot = (highest - end) / step;
+        let missing = (end - STEP[1] * self.plate.amperes) / step;
+        let allowed = OVERSHOOT + NOISES * noise / step;
+        self.report(&[
+            Quantity::new("k_c", "V/A", k_c),
+            Quantity::new("z_c", "", z_c),
+            Quantity::new("phase margin", "deg", design.margins.phase_margin_deg as f32),
+            Quantity::new("crossover", "Hz", design.margins.crossover_hz as f32),
+            Quantity::new("overshoot", "", overshoot).up_to(allowed, Meaning::Loop)?,
+            Quantity::new("error after the step", "", missing).up_to(allowed, Meaning::Loop)?,
+        ])
     }
 }

@@ -12,15 +12,14 @@
 //! [`rls`](crate::identify::rls::ud). On motors of half to twice the parameters of Table 5, k is within 6 % of that by the parameters;
 //! 1 - p is weak.
 
-use super::collector::{Collector, Record};
-use super::plant_fit::SETTLING;
-use super::plate::Plate;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next, Progress};
+use num_complex::Complex32;
+
+use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use crate::drive::Excitation;
-use crate::io::{PERIOD_S, periods};
+use crate::filter::dissertation::{LPF, LpfState};
+use crate::identify::rls::ud::{Forgetting, Ud};
+use crate::io::PERIOD_S;
 use crate::math::frames::AlphaBeta;
-use crate::settings::Motor;
 use crate::tuning::{FirstOrder, motor_plant};
 
 /// Bias along phase a, and current that a sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A, which
@@ -30,76 +29,107 @@ const STEP: f32 = 0.027;
 /// Time until the flux stands, in rotor time constants, and between the axes, s.
 const FLUX_T: f32 = 4.0;
 const BETWEEN_S: f32 = 0.2;
-/// Samples of the fit: six times the sequence.
-const FITTED: u32 = 6 * 255;
+/// Samples until filters and amplitude have settled, and time of a record, s: with six times the sequence.
+const SETTLING: u32 = 600;
+const FITTED_S: f32 = (SETTLING + 6 * 255) as f32 * PERIOD_S;
 /// Accepted k relative to that by the parameters, and accepted p.
 const GAIN: (f32, f32) = (0.8, 1.25);
 const POLE: (f32, f32) = (0.7, 0.9999);
+/// Covariance before the first sample, in the bases.
+const P0: f32 = 1e6;
+
+/// Least squares of one axis, in bases that make voltage and current about one.
+#[derive(Clone, Debug)]
+pub(super) struct PlantFit {
+    ud: Ud,
+    low_pass: LpfState,
+    /// Voltages of the last three samples, and the last current.
+    u: [f32; 3],
+    y: f32,
+    samples: u32,
+    sound: bool,
+}
+
+impl Default for PlantFit {
+    fn default() -> Self {
+        let (ud, low_pass) = (Ud::new([Complex32::ZERO; 4], P0), LpfState::default());
+        Self { ud, low_pass, u: [0.0; 3], y: 0.0, samples: 0, sound: true }
+    }
+}
+
+impl PlantFit {
+    /// Takes a sample: the voltage realised in its step, and the measured current.
+    pub fn push(&mut self, voltage: f32, current: f32) {
+        let filtered = LPF.step(&mut self.low_pass, AlphaBeta::new(voltage, current));
+        let ([u1, u2, u3], y1) = (self.u, self.y);
+        (self.u, self.y) = ([filtered.alpha, u1, u2], filtered.beta);
+        self.samples += 1;
+        if self.samples > SETTLING {
+            let x = [y1, u2, u3, 1.0].map(|x| Complex32::new(x, 0.0));
+            let y = Complex32::new(filtered.beta, 0.0);
+            self.sound &= self.ud.update(x, y, Forgetting::NONE).is_some();
+        }
+    }
+
+    /// The plant, in the bases.
+    pub fn found(&self) -> Result<FirstOrder, Refusal> {
+        let [p, b1, b2, _] = self.ud.theta.map(|x| f64::from(x.re));
+        let is_sound = self.sound && self.samples > SETTLING;
+        is_sound.then_some(FirstOrder { k: b1 + b2, p }).ok_or(Refusal::SamplesLost)
+    }
+}
+
 impl Commissioning {
-    pub(super) fn plant(&mut self, plate: &Plate, sums: &mut Collector) -> Result<Next, Refusal> {
-        let motor = self.found.motor(&Motor::default()).ok_or(Refusal::Needs(Step::Leakage))?;
+    pub(super) fn plant(&mut self, sums: &mut Collector) -> Answer {
+        let motor = self.found.motor().ok_or(Refusal::Needs(Step::Leakage))?;
         let leakage = self.found.leakage.ok_or(Refusal::Needs(Step::Leakage))?.inductance;
-        let amperes = STEP * plate.amperes;
-        let volts = amperes * leakage / PERIOD_S;
-        if let Some(designs) = self.design {
-            let designs = designs.map_err(Refusal::Design)?;
-            let circuit = motor_plant(&motor.circuit(), f64::from(PERIOD_S));
-            let expected = circuit.map_err(Refusal::Design)?;
-            let k = expected.k as f32;
-            let gain = |name, plant: &FirstOrder| {
-                Quantity::new(name, "A/V", plant.k as f32)
-                    .of((GAIN.0 * k, GAIN.1 * k))
-                    .check(Meaning::Loop, Meaning::Loop)
+        let i = STEP * self.plate.amperes;
+        let volts = i * leakage / PERIOD_S;
+        if self.state.design.is_none() {
+            let regulator = self.regulator()?;
+            match self.state.part {
+                0 => self.found.plants = None,
+                // A record has ended: along the bias, or across it.
+                part @ (2 | 4) => {
+                    let found = sums.recorded.plant.found()?;
+                    let k = found.k * f64::from(i) / f64::from(volts);
+                    self.state.plants[usize::from(part == 4)] = Some(FirstOrder { k, ..found });
+                }
+                _ => {}
+            }
+            let (amperes, bias) = (BIAS * self.plate.amperes, self.along(BIAS, regulator));
+            let axis = |across, carrier| {
+                let excitation = Excitation::Current { amperes, regulator, carrier, binary: true };
+                (Record::Plant { across, bases: (volts, i) }, FITTED_S, excitation)
             };
-            let pole = |name, plant: &FirstOrder| {
-                Quantity::new(name, "", plant.p as f32).of(POLE).check(Meaning::Loop, Meaning::Loop)
-            };
-            let margin = |name, design: usize| {
-                Quantity::new(name, "deg", designs[design].margins.phase_margin_deg as f32)
-            };
-            let [d, q] = &self.plants;
-            let values = [
-                Quantity::new("k by the parameters", "A/V", k),
-                Quantity::new("p by the parameters", "", expected.p as f32),
-                gain("k along", d)?,
-                pole("p along", d)?,
-                margin("phase margin by rule 3.8 along", 0),
-                gain("k across", q)?,
-                pole("p across", q)?,
-                margin("phase margin by rule 3.8 across", 1),
+            let parts = [
+                (Record::Nothing, FLUX_T * motor.tau_r(), bias),
+                axis(false, AlphaBeta::new(volts, 0.0)),
+                (Record::Nothing, BETWEEN_S, bias),
+                axis(true, AlphaBeta::new(0.0, volts)),
             ];
-            self.found.plants = Some(self.plants);
-            return Ok(Next::Report(Report::new(Step::Plant, values)));
-        }
-        let bias = self.current(plate, BIAS, AlphaBeta::ZERO)?;
-        let with = |wanted: AlphaBeta| match bias {
-            Excitation::Current { amperes, regulator, .. } => {
-                Excitation::Current { amperes, regulator, carrier: wanted, binary: true }
-            }
-            other => other,
-        };
-        let record = |across| Record::Plant { across, bases: (volts, amperes) };
-        let length = SETTLING + FITTED;
-        let in_volts = |plant: FirstOrder| FirstOrder {
-            k: plant.k * f64::from(amperes) / f64::from(volts),
-            ..plant
-        };
-        match self.part {
-            0 => {
-                self.found.plants = None;
-                Ok(self.part(sums, Record::Nothing, periods(FLUX_T * motor.tau_r()), bias))
-            }
-            1 => Ok(self.part(sums, record(false), length, with(AlphaBeta::new(volts, 0.0)))),
-            2 => {
-                self.plants[0] = in_volts(sums.plant().ok_or(Refusal::SamplesLost)?);
-                Ok(self.part(sums, Record::Nothing, periods(BETWEEN_S), bias))
-            }
-            3 => Ok(self.part(sums, record(true), length, with(AlphaBeta::new(0.0, volts)))),
-            _ => {
-                self.plants[1] = in_volts(sums.plant().ok_or(Refusal::SamplesLost)?);
-                (self.part, self.until, self.progress) = (0, 0, Progress::StopToDesign);
-                Ok(Next::Wait)
+            if let Some(&part) = parts.get(self.state.part) {
+                return self.begin(sums, part);
             }
         }
+        let Some(designs) = self.designed()? else { return Ok(Next::Wait) };
+        let circuit = motor_plant(&motor.circuit(), f64::from(PERIOD_S));
+        let expected = circuit.map_err(Refusal::Design)?;
+        let k = expected.k as f32;
+        let (gain, meaning) = ((GAIN.0 * k, GAIN.1 * k), [Meaning::Loop; 2]);
+        let [margin_d, margin_q] = designs.map(|design| design.margins.phase_margin_deg as f32);
+        let [Some(d), Some(q)] = self.state.plants else { return Err(Refusal::SamplesLost) };
+        let values = [
+            Quantity::new("k by the parameters", "A/V", k),
+            Quantity::new("p by the parameters", "", expected.p as f32),
+            Quantity::new("k along", "A/V", d.k as f32).checked(gain, meaning)?,
+            Quantity::new("p along", "", d.p as f32).checked(POLE, meaning)?,
+            Quantity::new("phase margin by rule 3.8 along", "deg", margin_d),
+            Quantity::new("k across", "A/V", q.k as f32).checked(gain, meaning)?,
+            Quantity::new("p across", "", q.p as f32).checked(POLE, meaning)?,
+            Quantity::new("phase margin by rule 3.8 across", "deg", margin_q),
+        ];
+        self.found.plants = Some([d, q]);
+        self.report(&values)
     }
 }

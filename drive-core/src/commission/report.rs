@@ -79,31 +79,12 @@ pub struct Report {
 /// The reason why a step is refused. The settings stay as they were.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// An entry of the nameplate that cannot belong to the others.
-    Plate {
-        /// The setting.
-        name: &'static str,
-        /// Its unit.
-        unit: &'static str,
-        /// Its value.
-        value: f32,
-        /// Smallest plausible.
-        min: f32,
-        /// Largest plausible.
-        max: f32,
-    },
+    /// An entry of the nameplate, with what is plausible beside the others.
+    Plate(Quantity),
     /// A measured value that cannot belong to a motor with this nameplate.
     Value {
-        /// The value.
-        name: &'static str,
-        /// Its unit.
-        unit: &'static str,
-        /// As measured.
-        value: f32,
-        /// Smallest allowed.
-        min: f32,
-        /// Largest allowed.
-        max: f32,
+        /// As measured, with what is allowed.
+        found: Quantity,
         /// What that means.
         meaning: Meaning,
     },
@@ -127,73 +108,59 @@ pub enum Refusal {
     SamplesLost,
 }
 
-/// What a value out of its range means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Meaning {
-    /// Larger motor than the nameplate says.
-    TooLarge,
-    /// Smaller motor than the nameplate says.
-    TooSmall,
-    /// The sensor's offset.
-    Offset,
-    /// The sensors' noise.
-    Noise,
-    /// The dc link.
-    BusTooLow,
-    /// The model of a linear motor does not fit.
-    Misfit,
-    /// Gains that differ.
-    Mismatch,
-    /// Current across the axis of the voltage.
-    Turning,
-    /// Inverter voltage that depends on the current.
-    Inverter,
-    /// Value too uncertain.
-    Uncertain,
-    /// The step response of the current loop.
-    Loop,
-    /// The speed does not follow the torque.
-    NotFree,
+macro_rules! meanings {
+    ($($(#[$doc:meta])* $name:ident => $text:literal;)+) => {
+        /// What a value out of its range means.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Meaning {
+            $($(#[$doc])* $name,)+
+        }
+
+        impl Meaning {
+            /// In words.
+            pub const fn text(self) -> &'static str {
+                match self { $(Self::$name => $text,)+ }
+            }
+        }
+    };
 }
 
-impl Meaning {
-    /// In words.
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::TooLarge => {
-                "the motor is larger than its nameplate says, or its windings are shorted"
-            }
-            Self::TooSmall => {
-                "the motor is smaller than its nameplate says, or connected in another way"
-            }
-            Self::Offset => {
-                "correct the offset in scales.current_*, and let the motor come to rest"
-            }
-            Self::Noise => "shield and ground the lines of the sensors",
-            Self::BusTooLow => "raise the dc link, or compare scales.dc_link with a voltmeter",
-            Self::Misfit => "the motor is not linear at these currents, or something has moved",
-            Self::Mismatch => {
-                "compare scales.current_a and scales.current_b with an ammeter; was the shaft at rest?"
-            }
-            Self::Turning => "the shaft turns, or the gains of the sensors differ",
-            Self::Inverter => "the voltage that the inverter loses still grows with the current",
-            Self::Uncertain => "too much noise for this motor",
-            Self::NotFree => {
-                "the shaft must be free to turn; friction, a load or a coupling hides the inertia"
-            }
-            Self::Loop => "the motor is not as it was measured",
-        }
-    }
+meanings! {
+    /// Larger motor than the nameplate says.
+    TooLarge => "the motor is larger than its nameplate says, or its windings are shorted";
+    /// Smaller motor than the nameplate says.
+    TooSmall => "the motor is smaller than its nameplate says, or connected in another way";
+    /// The sensor's offset.
+    Offset => "correct the offset in scales.current_*, and let the motor come to rest";
+    /// The sensors' noise.
+    Noise => "shield and ground the lines of the sensors";
+    /// The dc link.
+    BusTooLow => "raise the dc link, or compare scales.dc_link with a voltmeter";
+    /// The model of a linear motor does not fit.
+    Misfit => "the motor is not linear at these currents, or something has moved";
+    /// Gains that differ.
+    Mismatch => "compare scales.current_a and scales.current_b with an ammeter; was the shaft at rest?";
+    /// Current across the axis of the voltage.
+    Turning => "the shaft turns, or the gains of the sensors differ";
+    /// Inverter voltage that depends on the current.
+    Inverter => "the voltage that the inverter loses still grows with the current";
+    /// Value too uncertain.
+    Uncertain => "too much noise for this motor";
+    /// The step response of the current loop.
+    Loop => "the motor is not as it was measured";
+    /// The speed does not follow the torque.
+    NotFree => "the shaft must be free to turn; friction, a load or a coupling hides the inertia";
 }
+
+/// What a value below its range means, and one above: of a resistance or an inductance, and of a time constant.
+pub(super) const SIZE: [Meaning; 2] = [Meaning::TooLarge, Meaning::TooSmall];
+pub(super) const TIME: [Meaning; 2] = [Meaning::TooSmall, Meaning::TooLarge];
 
 impl Report {
     /// A report of a step that is sound.
-    pub(super) fn new<const N: usize>(step: Step, values: [Quantity; N]) -> Self {
-        let mut report = Self { step, values: [None; VALUES], refusal: None };
-        for (place, value) in report.values.iter_mut().zip(values) {
-            *place = Some(value);
-        }
-        report
+    pub(super) fn new(step: Step, values: &[Quantity]) -> Self {
+        let values = core::array::from_fn(|n| values.get(n).copied());
+        Self { step, values, refusal: None }
     }
 }
 
@@ -208,34 +175,39 @@ impl Quantity {
         Self { deviation, ..self }
     }
 
-    /// With the range that the nameplate lets expect.
-    pub(super) const fn of(self, allowed: (f32, f32)) -> Self {
+    /// With the range that is allowed.
+    pub(super) const fn allowing(self, allowed: (f32, f32)) -> Self {
         Self { allowed, ..self }
     }
 
-    /// Refuses a value outside what is expected, or one that is not finite.
-    pub(super) fn check(self, below: Meaning, above: Meaning) -> Result<Self, Refusal> {
-        let (min, max) = self.allowed;
-        if self.value >= min && self.value <= max {
-            return Ok(self);
-        }
-        let meaning = if self.value < min { below } else { above };
-        let Self { name, unit, value, .. } = self;
-        Err(Refusal::Value { name, unit, value, min, max, meaning })
+    /// Whether it is in that range; not if it is not a number.
+    pub(super) fn is_allowed(&self) -> bool {
+        self.value >= self.allowed.0 && self.value <= self.allowed.1
+    }
+
+    /// Refuses a value outside this range; `below` and `above` say what that means.
+    pub(super) fn checked(
+        self,
+        allowed: (f32, f32),
+        [below, above]: [Meaning; 2],
+    ) -> Result<Self, Refusal> {
+        let found = self.allowing(allowed);
+        let meaning = if found.value < allowed.0 { below } else { above };
+        if found.is_allowed() { Ok(found) } else { Err(Refusal::Value { found, meaning }) }
+    }
+
+    /// Refuses a value beyond plus or minus `most`.
+    pub(super) fn up_to(self, most: f32, meaning: Meaning) -> Result<Self, Refusal> {
+        self.checked((-most, most), [meaning; 2])
     }
 }
 
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Four digits.
-        let places = match self.value.abs() {
-            x if x >= 1000.0 => 0,
-            x if x >= 100.0 => 1,
-            x if x >= 10.0 => 2,
-            x if x >= 1.0 => 3,
-            x if x >= 0.1 => 4,
-            _ => 5,
-        };
+        let size = self.value.abs();
+        let places = [1000.0, 100.0, 10.0, 1.0, 0.1].iter().position(|least| size >= *least);
+        let places = places.unwrap_or(5);
         write!(f, "{} {:.places$}", self.name, self.value)?;
         if self.deviation > 0.0 {
             write!(f, " +-{:.places$}", self.deviation)?;
@@ -266,19 +238,16 @@ impl fmt::Display for Report {
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let phase = |number| char::from(b'a'.wrapping_add(number));
         match *self {
-            Self::Plate { name, unit, value, min, max } => {
-                write!(
-                    f,
-                    "{name} = {value} {unit}: with the rest of the nameplate {min:.4} to {max:.4} is plausible"
-                )
-            }
-            Self::Value { name, unit, value, min, max, meaning } => {
-                write!(
-                    f,
-                    "{name} = {value:.5} {unit}: allowed is {min:.5} to {max:.5}; {}",
-                    meaning.text()
-                )
+            Self::Plate(Quantity { name, unit, value, allowed: (min, max), .. }) => write!(
+                f,
+                "{name} = {value} {unit}: with the rest of the nameplate {min:.4} to {max:.4} is plausible"
+            ),
+            Self::Value { found, meaning } => {
+                let Quantity { name, unit, value, allowed: (min, max), .. } = found;
+                let why = meaning.text();
+                write!(f, "{name} = {value:.5} {unit}: allowed is {min:.5} to {max:.5}; {why}")
             }
             Self::Drive(state) => write!(f, "the drive is {state}"),
             Self::Design(error) => write!(f, "{error}"),
@@ -291,8 +260,4 @@ impl fmt::Display for Refusal {
             Self::SamplesLost => f.write_str("samples were lost; repeat it"),
         }
     }
-}
-
-fn phase(number: u8) -> &'static str {
-    ["a", "b", "c"].get(usize::from(number)).copied().unwrap_or("?")
 }

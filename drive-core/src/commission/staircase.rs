@@ -15,16 +15,11 @@
 //! r_r = R_R'/k'^2        k' = 1/sqrt(1 + L_s'/L_M')        L_l = L_s'/(1 + k')        l_m = psi_m(i_d)/i_d
 //! ```
 
-use core::ops::ControlFlow;
-
-use super::collector::{BINS, Collector, FIRST_BINS, Record};
-use super::fit::{Fitted, Search};
-use super::found::Iron;
-use super::plate::Plate;
-use super::report::{Meaning, Quantity, Refusal, Report, Step};
-use super::{Commissioning, Next};
-use crate::io::{PERIOD_S, periods};
-use crate::math::frames::AlphaBeta;
+use super::{
+    Answer, BINS, Collector, Commissioning, Fitted, Iron, Meaning, Next, Quantity, Record, Refusal,
+    SIZE, Step, TAU_R, TIME,
+};
+use crate::io::PERIOD_S;
 use crate::settings::Motor;
 
 /// Levels, as shares of the test current.
@@ -67,11 +62,6 @@ pub(super) struct Staircase {
     i_d: f32,
 }
 
-/// Time of a level, s, for the time constant of step 4.
-fn dwell(tau_r: f32) -> f32 {
-    (DWELL_T * tau_r).clamp(DWELL_S.0, DWELL_S.1)
-}
-
 impl Stair {
     fn new(sums: &Collector) -> Self {
         let end = sums.mean(0, END);
@@ -101,8 +91,7 @@ impl Staircase {
         for end in ends() {
             let allowed = LINE.0 * r_s * end.0 + LINE.1 * dc_link;
             Quantity::new("distance from the resistive line", "V", end.1 - v - r_s * (end.0 - i))
-                .of((-allowed, allowed))
-                .check(Meaning::Inverter, Meaning::Inverter)?;
+                .up_to(allowed, Meaning::Inverter)?;
         }
         let growth = |stair: &Stair| stair.areas.0 - r_s * stair.areas.1;
         let [first, second, ..] = &self.stairs;
@@ -157,98 +146,73 @@ impl Staircase {
 }
 
 impl Commissioning {
-    pub(super) fn staircase(
-        &mut self,
-        plate: &Plate,
-        sums: &mut Collector,
-    ) -> Result<Next, Refusal> {
+    pub(super) fn staircase(&mut self, sums: &mut Collector) -> Answer {
         let levels = self.found.levels.ok_or(Refusal::Needs(Step::Levels))?;
         let leakage = self.found.leakage.ok_or(Refusal::Needs(Step::Leakage))?;
-        let seconds = dwell(levels.tau_r);
-        let record = |half| Record::Bins { half, first: seconds / PERIOD_S / FIRST_BINS };
+        let seconds = (DWELL_T * levels.tau_r).clamp(DWELL_S.0, DWELL_S.1);
         let gain = 1.0 + 0.5 * levels.mismatch;
-        let part = usize::from(self.part);
-        if let Some(done) = part.checked_sub(1).and_then(|n| self.stairs.stairs.get_mut(n)) {
+        let (part, plate, stairs) = (self.state.part, &self.plate, &mut self.state.stairs);
+        if part < STEPS {
+            self.found.iron = None;
+        }
+        if let Some(done) = part.checked_sub(1).and_then(|n| stairs.stairs.get_mut(n)) {
             *done = Stair::new(sums);
         }
-        if let Some(share) = STAIRS.get(part) {
-            self.found.iron = None;
-            let next = self.current(plate, *share, AlphaBeta::ZERO)?;
-            return Ok(self.part(sums, record(0), periods(seconds), next));
-        }
         if part == STEPS {
-            self.stairs.evaluate(gain, self.setup.dc_link)?;
+            stairs.evaluate(gain, plate.dc_link)?;
             // The flux of the nameplate, or less where that takes too much current.
             let main = |(i, flux): &(f32, f32)| flux - leakage.inductance / 1.87 * i < plate.flux;
-            let below =
-                self.stairs.flux.iter().rev().find(|point| main(point)).map_or(0.0, |p| p.0);
+            let below = stairs.flux.iter().rev().find(|point| main(point)).map_or(0.0, |p| p.0);
             let [_, _, least, ..] = STAIRS;
-            self.stairs.i_d = below.clamp(least * plate.amperes, DIRECT * plate.rated);
+            stairs.i_d = below.clamp(least * plate.amperes, DIRECT * plate.rated);
         }
-        let share = |of: f32| of * self.stairs.i_d / plate.amperes;
-        match part - STEPS {
-            n @ 0..3 => {
-                // Up, settle; down; up.
-                let [high, low] = AROUND;
-                let next =
-                    self.current(plate, share(if n == 1 { low } else { high }), AlphaBeta::ZERO)?;
-                let what = if n == 0 { Record::Nothing } else { record(n - 1) };
-                Ok(self.part(sums, what, periods(seconds), next))
-            }
-            3 => {
-                sums.begin(Record::Nothing);
-                self.search = Some(Search::from_steady(sums.first_steady()));
-                (self.part, self.until) = (self.part + 1, 0);
-                Ok(Next::Wait)
-            }
-            _ => match self.search.as_mut().map(|search| search.step(sums)) {
-                Some(ControlFlow::Continue(())) => Ok(Next::Wait),
-                Some(ControlFlow::Break(Some(fit))) => self.report_staircase(plate, &fit, gain),
-                _ => Err(Refusal::SamplesLost),
-            },
+        let [high, low] = AROUND.map(|of| of * stairs.i_d / plate.amperes);
+        let half = |half| Record::bins(half, seconds);
+        // Up, settle; down; up.
+        let around = [(Record::Nothing, high), (half(0), low), (half(1), high)];
+        let mut parts = STAIRS.map(|share| (half(0), share)).into_iter().chain(around);
+        if let Some((record, share)) = parts.nth(part) {
+            let excitation = self.along(share, self.regulator()?);
+            return self.begin(sums, (record, seconds, excitation));
+        }
+        // The first half began where the second has ended.
+        let steady = sums.mean(1, BINS - 3).current.alpha;
+        match self.search(sums, steady)? {
+            None => Ok(Next::Wait),
+            Some(fit) => self.report_staircase(&fit, gain, seconds),
         }
     }
 
-    fn report_staircase(
-        &mut self,
-        plate: &Plate,
-        fit: &Fitted,
-        gain: f32,
-    ) -> Result<Next, Refusal> {
+    fn report_staircase(&mut self, fit: &Fitted, gain: f32, seconds: f32) -> Answer {
         // Along the axis, and at nearly this current: that of small changes, as the fit's.
         let [[along, _], _] = self.inductances;
-        let seconds = dwell(self.found.levels.ok_or(Refusal::Needs(Step::Levels))?.tau_r);
-        let (r_r, i_d) = (fit.r_r * gain, self.stairs.i_d);
+        let (plate, stairs) = (&self.plate, &mut self.state.stairs);
+        let (r_r, i_d) = (fit.r_r * gain, stairs.i_d);
         let k = 1.0 / fpu_sqrt::sqrtf(1.0 + along / (fit.tau_r * r_r));
         let l = along / (1.0 + k);
         let r_r = r_r / (k * k);
-        self.stairs.complete(seconds, r_r, l);
-        let points = self.stairs.flux.map(|(i, flux)| (i, flux - l * i));
-        let l_m = self.stairs.flux_at(i_d) / i_d - l;
-        let straight = points[0].1 / points[0].0;
-        let motor = Motor { r_s: self.stairs.r_s, r_r, l_ls: l, l_lr: l, l_m, ..Motor::default() };
-        let (large, small) = (Meaning::TooLarge, Meaning::TooSmall);
+        stairs.complete(seconds, r_r, l);
+        let points = stairs.flux.map(|(i, flux)| (i, flux - l * i));
+        let l_m = stairs.flux_at(i_d) / i_d - l;
+        let straight = points[0].1 / points[0].0 / l_m;
+        let motor = Motor { r_s: stairs.r_s, r_r, l_ls: l, l_lr: l, l_m, ..Motor::default() };
         let deviation = fit.deviations[2] / fit.r_r;
         Quantity::new("deviation of r_r", "", deviation)
-            .of((0.0, UNCERTAIN))
-            .check(Meaning::Uncertain, Meaning::Uncertain)?;
+            .checked((0.0, UNCERTAIN), [Meaning::Uncertain; 2])?;
         let values = [
-            Quantity::new("r_s", "ohm", motor.r_s).of(plate.r_s()).check(large, small)?,
+            Quantity::new("r_s", "ohm", motor.r_s).checked(plate.r_s, SIZE)?,
             Quantity::new("r_r", "ohm", motor.r_r).within(deviation * motor.r_r),
             Quantity::new("direct current", "A", i_d),
             Quantity::new("main flux there", "Wb", l_m * i_d),
             Quantity::new("L_m, chord", "H", l_m),
-            Quantity::new("tau_r, chord", "s", motor.tau_r())
-                .of(Plate::TAU_R)
-                .check(small, large)?,
-            Quantity::new("chord of the straight beginning over it", "", straight / l_m)
-                .of((0.95, 5.0))
-                .check(Meaning::Misfit, Meaning::Misfit)?,
+            Quantity::new("tau_r, chord", "s", motor.tau_r()).checked(TAU_R, TIME)?,
+            Quantity::new("chord of the straight beginning over it", "", straight)
+                .checked((0.95, 5.0), [Meaning::Misfit; 2])?,
         ];
         self.found.iron = Some(Iron { motor, i_d, points });
         if let Some(levels) = &mut self.found.levels {
-            (levels.r_s, levels.inverter_v) = (motor.r_s, 0.75 * self.stairs.e);
+            (levels.r_s, levels.inverter_v) = (motor.r_s, 0.75 * stairs.e);
         }
-        Ok(Next::Report(Report::new(Step::Staircase, values)))
+        self.report(&values)
     }
 }

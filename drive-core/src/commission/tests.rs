@@ -1,9 +1,7 @@
 //! The fits on a motor whose answer is computed here, in f64.
 #![allow(clippy::disallowed_methods)] // std functions are the reference here
 
-use core::ops::ControlFlow;
-
-use super::collector::{Collector, FIRST_BINS, Record};
+use super::collector::{Collector, Record};
 use super::fit::{Fitted, Search};
 use crate::io::PERIOD_S;
 use crate::math::frames::AlphaBeta;
@@ -26,7 +24,7 @@ fn levels(motor: &Motor) -> Collector {
     let mut sums = Collector::default();
     let (mut i, mut i_m, mut last) = (0.0, 0.0, None);
     for (half, level) in [2.9, 0.72].into_iter().enumerate() {
-        sums.begin(Record::Bins { half, first: 1.5 / PERIOD_S / FIRST_BINS });
+        sums.begin(Record::bins(half, 1.5));
         for _ in 0..9000 {
             let measured = i;
             // A period in parts: the current moves on a straight line, the flux as it does.
@@ -50,10 +48,10 @@ fn levels(motor: &Motor) -> Collector {
 }
 
 fn found(sums: &Collector) -> Fitted {
-    let mut search = Search::new();
+    let mut search = Search::new(0.0);
     loop {
-        if let ControlFlow::Break(fit) = search.step(sums) {
-            return fit.unwrap();
+        if let Some(fit) = search.step(sums).unwrap() {
+            return fit;
         }
     }
 }
