@@ -1,6 +1,6 @@
 //! Commissioning on the target: [`Commissioning`] in the main loop, fed by the control interrupt period by period.
 
-use drive_core::commission::{Collector, Commissioning, Next, Refusal, Report, Step};
+use drive_core::commission::{Collector, Commissioning, Next, Record, Refusal, Report, Step};
 use drive_core::{Command, Excited, Mode, Refused, Settings, Stop};
 
 use crate::rotor_tracking::Observation;
@@ -61,6 +61,7 @@ impl Session {
     /// Begins the steps from `first` to `last`. The drive must be off.
     pub fn begin(&mut self, first: Step, last: Step) {
         self.news = None;
+        self.sums.begin(Record::Nothing);
         self.commissioning.start(first, last);
     }
 

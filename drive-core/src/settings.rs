@@ -58,10 +58,14 @@ pub enum Flux {
 words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
 words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
 words!(DemodulatorKind {
+    #[cfg(feature = "printed")]
     Self::Literal => DemodulatorKind::Literal, "literal";
+    #[cfg(feature = "printed")]
     Self::Rectified => DemodulatorKind::Rectified, "rectified";
     Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
+    #[cfg(feature = "printed")]
     Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
+    #[cfg(feature = "printed")]
     Self::Envelope => DemodulatorKind::Envelope, "envelope";
 });
 words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });

@@ -95,6 +95,10 @@ fn samples_that_are_lost_while_they_count_refuse_the_step() {
     let told = play(&mut rig, &mut session, |n, _| n == 12_000);
     assert_eq!(refusal(&told), (Step::Levels, Refusal::SamplesLost));
     assert_eq!((session.found(&settings), rig.drive.state()), (None, State::Off));
+    // Begun again, it is not refused for them.
+    session.begin(Step::Nameplate, Step::Levels);
+    let told = play(&mut rig, &mut session, |_, _| false);
+    assert_eq!(told.last(), Some(&News::Ended { sound: true, step: Step::Levels }), "{told:?}");
 }
 
 #[test]

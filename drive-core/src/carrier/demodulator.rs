@@ -30,20 +30,36 @@
 //! tracker's own corrections it acts as damping, on which the printed controller (z_s = 0.90) relies: with
 //! the rotation before the band-pass, the rectified chain loses the angle with that controller.
 
+#[cfg(feature = "printed")]
+mod compared;
+#[cfg(feature = "printed")]
 mod envelope;
+#[cfg(feature = "printed")]
 mod printed;
+#[cfg(feature = "printed")]
 mod rms_impedance;
 
-pub use envelope::Envelope;
-pub use printed::{Literal, PrintedChain, Rectified};
-pub use rms_impedance::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES, RmsImpedance};
+#[cfg(feature = "printed")]
+pub use {
+    compared::Demodulator,
+    envelope::Envelope,
+    printed::{Literal, PrintedChain, Rectified},
+    rms_impedance::RmsImpedance,
+};
 
+#[cfg(not(feature = "printed"))]
+pub use absent::Demodulator;
+
+use crate::carrier::CarrierSample;
 #[cfg(doc)]
 use crate::carrier::synchronous::SynchronousState;
-use crate::carrier::{CarrierSample, DemodulatorKind};
-use crate::filter::dissertation::BPF;
-use crate::filter::sos::SosState;
-use crate::math::frames::DmQm;
+#[cfg(feature = "printed")]
+use crate::{filter::dissertation::BPF, filter::sos::SosState, math::frames::DmQm};
+
+/// Least length of the rms filters of [`RmsImpedance`], samples.
+pub const MIN_RMS_SAMPLES: u8 = 2;
+/// Greatest length of the rms filters, samples.
+pub const MAX_RMS_SAMPLES: u8 = 60;
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
 pub trait Demodulate {
@@ -51,51 +67,42 @@ pub trait Demodulate {
     fn step(&mut self, sample: &CarrierSample) -> f32;
 }
 
-/// The selected demodulator. The synchronous one is always present beside it, in the estimator.
-// The drive has a single instance, so the size of the small variants does not matter.
-#[allow(clippy::large_enum_variant)]
-#[derive(Clone, Copy, Debug)]
-pub enum Demodulator {
-    /// The chain as printed.
-    Literal(Literal),
-    /// The printed chain with a rectifier.
-    Rectified(Rectified),
-    /// Impedance difference after Ha and Sul.
-    RmsImpedance(RmsImpedance),
-    /// Envelope difference after Fritsch et al.
-    Envelope(Envelope),
-}
+/// In place of the demodulators that are compared.
+#[cfg(not(feature = "printed"))]
+mod absent {
+    use crate::carrier::{CarrierSample, DemodulatorKind};
 
-impl Demodulator {
-    /// Starts the selected demodulator at rest; `rms_samples` is the length of the rms filters of
-    /// [`RmsImpedance`]. In place, because a move of the large state takes longer than its
-    /// initialisation.
-    pub fn start(&mut self, tracking: DemodulatorKind, rms_samples: u8) {
-        use DemodulatorKind as Kind;
-        match tracking {
-            Kind::Literal | Kind::Synchronous => *self = Self::Literal(Literal::default()),
-            Kind::Rectified => *self = Self::Rectified(Rectified::default()),
-            Kind::RmsImpedance => *self = Self::RmsImpedance(RmsImpedance::new(rms_samples)),
-            Kind::Envelope => *self = Self::Envelope(Envelope::default()),
+    /// No demodulator beside the synchronous one.
+    #[derive(Clone, Copy, Debug, Default)]
+    pub struct Demodulator;
+
+    impl Demodulator {
+        /// Starts nothing.
+        pub fn start(&mut self, _: DemodulatorKind, _: u8) {}
+
+        /// Whether it rotates the output of the band-pass.
+        pub fn rotates_output(&self) -> bool {
+            false
+        }
+
+        /// No signal.
+        pub fn step(&mut self, _: &CarrierSample, _: f32) -> f32 {
+            0.0
         }
     }
 }
 
-impl Default for Demodulator {
-    fn default() -> Self {
-        Self::Literal(Literal::default())
-    }
-}
-
 /// State of the band-pass on the currents of the dm and qm channels.
+#[cfg(feature = "printed")]
 type RotatedBandPass = SosState<DmQm, 2>;
 
 /// Carrier currents of the dm and qm channels, A, filtered after the rotation as in Figure 9. In
 /// this order the filter delays the saliency but not the angle of the frame, and the speed of the
 /// frame does not appear.
+#[cfg(feature = "printed")]
 fn rotated_carrier(state: &mut RotatedBandPass, sample: &CarrierSample) -> DmQm {
     BPF.step(state, sample.current.to_dm_qm(sample.dm_axis()))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "printed"))]
 mod tests;

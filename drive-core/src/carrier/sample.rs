@@ -1,7 +1,5 @@
 //! Input and output signals of the demodulators.
 
-use core::f32::consts::FRAC_1_SQRT_2;
-
 use crate::carrier::injection::CarrierPeriod;
 use crate::math::angle::UnitVector;
 use crate::math::frames::AlphaBeta;
@@ -19,8 +17,10 @@ pub struct CarrierSample {
 
 impl CarrierSample {
     /// The dm axis `e^(j (theta - 45°))`.
+    #[cfg(feature = "printed")]
     pub(super) fn dm_axis(&self) -> UnitVector {
-        self.axis.turned_by(UnitVector { cos: FRAC_1_SQRT_2, sin: -FRAC_1_SQRT_2 })
+        const HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
+        self.axis.turned_by(UnitVector { cos: HALF, sin: -HALF })
     }
 }
 

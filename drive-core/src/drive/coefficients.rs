@@ -205,9 +205,10 @@ impl Settings {
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let carrier_v = self.carrier_v();
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
-        let (injection_turn, injection_axis) = match inj.demodulator {
-            DemodulatorKind::RmsImpedance => (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 }),
-            _ => (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 }),
+        let (injection_turn, injection_axis) = if inj.demodulator.is_along_flux() {
+            (Angle::ZERO, UnitVector { cos: 1.0, sin: 0.0 })
+        } else {
+            (Angle::QUARTER, UnitVector { cos: 0.0, sin: 1.0 })
         };
 
         let lock_monitor = self.watches_lock().then(|| {

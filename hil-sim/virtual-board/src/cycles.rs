@@ -29,10 +29,7 @@ const BLOCKS: [(&str, &str); 12] = [
     ("observer", "Coefficients>::observe_fundamental flux::observer flux::hand_over"),
     ("limits", "current::voltage_limit"),
     ("tracker", "flux::tracker"),
-    (
-        "estimator",
-        "flux::estimator carrier::synchronous carrier::demodulator flux::schedule flux::indirect",
-    ),
+    ("estimator", "flux::estimator carrier::synchronous flux::schedule flux::indirect"),
     ("current loop", "current::pi"),
     ("modulation", "current::modulation current::dead_time"),
     ("frames, filters", "math::frames filter::sos math::angle idsp::"),

@@ -15,15 +15,10 @@
 //! rms value, so the response to large steps is nonlinear; within a few degrees the delay is the sum of
 //! band-pass, rms filter, (n - 1)/2, and F3.
 
-use super::{Demodulate, RotatedBandPass, rotated_carrier};
+use super::{Demodulate, MAX_RMS_SAMPLES, MIN_RMS_SAMPLES, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
 use crate::filter::dissertation::{PP, PpState};
 use crate::filter::moving_sum::MovingSum;
-
-/// Minimum length of the rms filters, samples. A single sample may lie on a zero of the current.
-pub const MIN_RMS_SAMPLES: u8 = 2;
-/// Maximum length of the rms filters, samples.
-pub const MAX_RMS_SAMPLES: u8 = 60;
 
 /// Units per square ampere in the sums: 2^19.
 const UNITS: f32 = 524_288.0;

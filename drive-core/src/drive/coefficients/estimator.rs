@@ -39,8 +39,8 @@ impl Settings {
         let limit = 1.5 * speed_limit;
         let inj = &self.injection;
         let (p, t) = (&inj.printed, &inj.synchronous);
-        let angle_loop = match inj.demodulator {
-            DemodulatorKind::Synchronous => AngleLoop::Pll {
+        let angle_loop = if inj.demodulator == DemodulatorKind::Synchronous {
+            AngleLoop::Pll {
                 schedule: GainSchedule::new(
                     &self.reference(),
                     &self.slope(),
@@ -50,8 +50,9 @@ impl Settings {
                 pll: Pll::new(t.bandwidth_hz),
                 asymmetry: Asymmetry::default(),
                 largest_drift: 0.0,
-            },
-            _ => AngleLoop::Pii {
+            }
+        } else {
+            AngleLoop::Pii {
                 reference: match p.learned {
                     Some(table) => Reference::Learned(table),
                     None => Reference::Constant(ConstantReference {
@@ -61,7 +62,7 @@ impl Settings {
                     }),
                 },
                 tracker: Tracker::new(p.k_s, p.z_s, limit),
-            },
+            }
         };
         Estimator {
             demodulator: inj.demodulator,
