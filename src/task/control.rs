@@ -62,6 +62,9 @@ pub struct Control {
     pub observations: Producer<'static, Observation, { board::OBSERVED_PERIODS }>,
 }
 
+// It is copied at a start and by tools.
+const _: () = assert!(size_of::<Drive>() <= 4096);
+
 /// Control periods since the start, wrapping.
 pub static PERIODS: AtomicU32 = AtomicU32::new(0);
 /// Whether the drive is off or in fault: the outputs are off, and stay off until the next command.

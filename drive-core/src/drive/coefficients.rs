@@ -34,7 +34,7 @@ use crate::protect::thermal::{Body, Thermal};
 use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::supply::Relay;
-use crate::tuning::{self, CurrentLoopDesign, MotionDesign, TuningError};
+use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;
@@ -117,10 +117,6 @@ pub struct Coefficients {
     pub(crate) volts_per_hertz: Option<VoltsPerHertz>,
     /// Whether a start without encoder is refused until the drive has learned.
     pub(crate) unlearned: bool,
-    /// Result of the design of the current controllers, d and q.
-    pub designs: [CurrentLoopDesign; 2],
-    /// Result of the design of the speed and the position loop.
-    pub motion_design: MotionDesign,
 }
 
 impl Coefficients {
@@ -186,13 +182,8 @@ impl Settings {
     pub fn build(&self) -> Result<Coefficients, SettingsError> {
         self.check()?;
         let m = &self.motor;
-        let motor_plant = tuning::motor_plant(&m.circuit(), f64::from(PERIOD_S))?;
-        let (d, q) = match self.current_plant.source {
-            PlantSource::Identified => (self.identified_d(), self.identified_q()),
-            PlantSource::Motor => (motor_plant, motor_plant),
-        };
-        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
-        let designs = [design(d)?, design(q)?];
+        let motor_plant = self.motor_plant()?;
+        let designs = self.current_loops()?;
         let pi = |d: &CurrentLoopDesign| Pi { k_c: d.k_c as f32, z_c: d.z_c as f32 };
 
         let injecting =
@@ -201,7 +192,7 @@ impl Settings {
         let (i_d, current_limit) = (self.i_d(), self.current_limit_a());
         let current_lag = self.scales.current_delay_s / PERIOD_S;
         let inj = &self.injection;
-        let motion_design = self.motion_design()?;
+        let motion_design = self.motion_loops()?;
         let lag_share = if self.ignore_delays { 0.0 } else { 1.0 };
         let carrier_v = self.carrier_v();
         let injection = Injection::new(carrier_v, motor_plant, current_lag);
@@ -329,8 +320,6 @@ impl Settings {
                 i_d,
                 stop_ramp: self.stop_a_per_s() * PERIOD_S,
             },
-            designs,
-            motion_design,
         })
     }
 
@@ -349,7 +338,29 @@ impl Settings {
             .then(|| Shunts::new(s.current_c, self.inverter.top, window_s, largest_sum))
     }
 
-    fn motion_design(&self) -> Result<MotionDesign, TuningError> {
+    fn motor_plant(&self) -> Result<FirstOrder, TuningError> {
+        tuning::motor_plant(&self.motor.circuit(), f64::from(PERIOD_S))
+    }
+
+    /// The design of the current controllers, d and q, with valid settings.
+    ///
+    /// # Errors
+    /// The design rule that cannot be met.
+    pub fn current_loops(&self) -> Result<[CurrentLoopDesign; 2], TuningError> {
+        let motor_plant = self.motor_plant()?;
+        let (d, q) = match self.current_plant.source {
+            PlantSource::Identified => (self.identified_d(), self.identified_q()),
+            PlantSource::Motor => (motor_plant, motor_plant),
+        };
+        let design = |plant| tuning::design_current_loop(plant, motor_plant, f64::from(PERIOD_S));
+        Ok([design(d)?, design(q)?])
+    }
+
+    /// The design of the speed and the position loop, with valid settings.
+    ///
+    /// # Errors
+    /// The design rule that cannot be met.
+    pub fn motion_loops(&self) -> Result<MotionDesign, TuningError> {
         let m = &self.motor;
         let acceleration = m.torque_per_ampere(self.i_d()) / m.inertia / TAU;
         let tracking_hz = match self.angle_source {

@@ -156,18 +156,20 @@ impl Drive {
 
     /// Goes on to the work that the drive was started for.
     fn energise(&mut self, encoder: u32) {
-        let Phase::Prepare(Prepare { job, left, .. }) = self.phase else { return };
-        match job {
+        let Phase::Prepare(prepare) = &self.phase else { return };
+        let left = prepare.left;
+        match prepare.job {
             Job::Scalar { speed } => self.enter(Phase::Scalar(Scalar::new(speed, left))),
             Job::Excite(wanted) => self.enter(Phase::Excite(Excite::new(wanted, left))),
             Job::Field(goal) => {
+                let catches = prepare.job.catches(&self.c);
                 // Built where it stays: it is large.
                 self.enter(Phase::Field(Field::default()));
                 let (c, k, Phase::Field(field)) = (&self.c, &mut self.kept, &mut self.phase) else {
                     return;
                 };
                 field.begin(c, goal, &left);
-                if job.catches(c) {
+                if catches {
                     field.hand_over.silence();
                     field.flux = FluxPhase::Search(Search::new(left.residual));
                 } else {

@@ -340,7 +340,8 @@ fn session_table(record: &Record) -> Table {
 
 /// Phase margin, degrees, of the current loop of these settings on the true plant.
 fn margin(settings: &Settings, truth: &Circuit) -> Result<f64, Error> {
-    let [design, _] = built(settings)?.designs;
+    built(settings)?;
+    let [design, _] = settings.current_loops().map_err(Error::refused)?;
     // In this circuit the leakage lies on the stator's side, all of it.
     let circuit = EquivalentCircuit {
         r_s: truth.r_s,

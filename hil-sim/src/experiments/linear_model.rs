@@ -19,7 +19,6 @@
 
 use std::f64::consts::TAU;
 
-use drive_core::Coefficients;
 use drive_core::filter::dissertation::{LPF, LpfState};
 use drive_core::flux::schedule::GainSchedule;
 use drive_core::io::PERIOD_S;
@@ -81,7 +80,7 @@ impl LinearModel {
         settings: &Settings,
         i_q: f64,
     ) -> Result<Self, Error> {
-        let built: Coefficients = crate::config::built(settings)?;
+        crate::config::built(settings)?;
         let MachineSettings { rs: r_s, rr: r_r, lm: l_m, lls: l_ls, llr: l_lr, .. } = *machine;
         let circuit = tuning::EquivalentCircuit { r_s, r_r, l_m, l_ls, l_lr };
         let plant = tuning::motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
@@ -105,8 +104,8 @@ impl LinearModel {
             mechanics: *mechanics,
             pole_pairs,
             plant,
-            current: built.designs[1],
-            speed: built.motion_design,
+            current: settings.current_loops().map_err(Error::refused)?[1],
+            speed: settings.motion_loops().map_err(Error::refused)?,
             w_n: TAU * f64::from(settings.injection.synchronous.bandwidth_hz),
             share: here.share.into(),
             apparent_angle: f64::from(here.per_saliency * (before.reference - after.reference))

@@ -100,7 +100,8 @@ impl CurrentLoop {
         let circuit =
             EquivalentCircuit { r_s: m.r_s, r_r: m.r_r, l_m: m.l_m, l_ls: m.l_ls, l_lr: m.l_lr };
         let plant = motor_plant(&circuit, f64::from(PERIOD_S)).map_err(Error::refused)?;
-        let design = built(&config.drive)?.designs[1];
+        built(&config.drive)?;
+        let design = config.drive.current_loops().map_err(Error::refused)?[1];
         Ok(Self { design, plant, parts: [true; 4] })
     }
 
