@@ -58,14 +58,10 @@ pub enum Flux {
 words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
 words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
 words!(DemodulatorKind {
-    #[cfg(feature = "printed")]
     Self::Literal => DemodulatorKind::Literal, "literal";
-    #[cfg(feature = "printed")]
     Self::Rectified => DemodulatorKind::Rectified, "rectified";
     Self::Synchronous => DemodulatorKind::Synchronous, "synchronous";
-    #[cfg(feature = "printed")]
     Self::RmsImpedance => DemodulatorKind::RmsImpedance, "rms-impedance";
-    #[cfg(feature = "printed")]
     Self::Envelope => DemodulatorKind::Envelope, "envelope";
 });
 words!(PlantSource { Self::Identified => PlantSource::Identified, "identified"; Self::Motor => PlantSource::Motor, "motor"; });
@@ -102,6 +98,15 @@ pub enum SettingsError {
         /// Largest allowed.
         max: f32,
     },
+    /// A word for which this build has no code.
+    Absent {
+        /// Name of the setting.
+        name: &'static str,
+        /// The word.
+        word: &'static str,
+        /// The only one for which there is code.
+        only: &'static str,
+    },
     /// The design of the controllers failed.
     Tuning(TuningError),
 }
@@ -114,6 +119,9 @@ impl fmt::Display for SettingsError {
                 // NaN counts as none.
                 let beside = if min <= max { "" } else { "nothing beside other settings: " };
                 write!(f, "{name} = {value}: allowed is {beside}{min} to {max}{space}{unit}")
+            }
+            Self::Absent { name, word, only } => {
+                write!(f, "{name} = {word}: this image is built with {only} alone")
             }
             Self::Tuning(error) => write!(f, "controllers: {error}"),
         }

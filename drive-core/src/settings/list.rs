@@ -236,7 +236,7 @@ settings! {
         /// beside the current limit. The voltage is between 20 and 110 V at 311 V.
         amplitude_v: Option<f32> = None, auto("V", carrier_v: Settings::carrier_rule).beside(Settings::carrier_range).learned();
         /// demodulation of the carrier current
-        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().learned();
+        demodulator: DemodulatorKind = DemodulatorKind::Synchronous, word().only(DemodulatorKind::ONLY).learned();
         /// Settings of the chain of the dissertation.
         printed: PrintedChain = PrintedChain::DEFAULT;
         /// Settings of the synchronous demodulation.

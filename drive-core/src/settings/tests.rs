@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
-use super::entry::{Change, Entry};
-use super::value::Value;
+use super::entry::{Access, Change, Entry};
+use super::value::{Value, Words};
 use super::*;
 use crate::carrier::DemodulatorKind;
 
@@ -232,4 +232,28 @@ fn a_range_without_a_value_says_so() {
     let whole =
         "braking.low_v = 379.5: allowed is nothing beside other settings: 346.5 to 295.45 V";
     assert_eq!(text, whole);
+}
+
+/// The image is built without the demodulations of the feature `printed`; their words are refused there, and stand for the same
+/// places.
+#[test]
+fn a_word_without_code_is_refused_by_name() {
+    let demodulator = Entry::<Settings>::new(
+        "injection.demodulator",
+        "",
+        Access::Word(
+            |s| s.injection.demodulator.place(),
+            |s, place| s.injection.demodulator = DemodulatorKind::at(place),
+            DemodulatorKind::WORDS,
+        ),
+        "",
+    );
+    let mut settings = Settings::default();
+    settings.injection.demodulator = DemodulatorKind::Envelope;
+    assert_eq!(demodulator.check(&settings), Ok(()));
+    let only = demodulator.only(Some("synchronous"));
+    let error = only.check(&settings).unwrap_err().to_string();
+    let text = "injection.demodulator = envelope: this image is built with synchronous alone";
+    assert_eq!(error, text);
+    assert_eq!(only.check(&Settings::default()), Ok(()));
 }

@@ -80,15 +80,15 @@ pub trait Words: Copy + 'static {
 
 /// Implements [`Words`] for an enumeration or a `bool`.
 macro_rules! words {
-    ($type:ty { $($(#[$only:meta])? $value:pat => $make:expr, $word:literal;)+ }) => {
+    ($type:ty { $($value:pat => $make:expr, $word:literal;)+ }) => {
         impl $crate::settings::value::Words for $type {
-            const WORDS: &'static [&'static str] = &[$($(#[$only])? $word),+];
+            const WORDS: &'static [&'static str] = &[$($word),+];
             fn place(self) -> usize {
-                let word = match self { $($(#[$only])? $value => $word),+ };
+                let word = match self { $($value => $word),+ };
                 Self::WORDS.iter().position(|known| *known == word).unwrap_or(0)
             }
             fn at(place: usize) -> Self {
-                const VALUES: &[$type] = &[$($(#[$only])? $make),+];
+                const VALUES: &[$type] = &[$($make),+];
                 VALUES.get(place).copied().unwrap_or(VALUES[0])
             }
         }
