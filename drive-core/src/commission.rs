@@ -209,6 +209,7 @@ impl Commissioning {
     }
 
     /// Goes on. `drive` is what the drive says of itself, [`Drive::excited`](crate::Drive::excited).
+    #[inline(never)] // in `main` it would lie in the bank of the interrupt's code
     pub fn poll(&mut self, drive: &Excited, sums: &mut Collector) -> Next {
         let (progress, next) = match (self.progress, drive.state) {
             (Progress::Ended, _)
