@@ -55,7 +55,13 @@ impl Field {
                 | Goal::Learn
                 | Goal::Brake { .. },
                 _,
-            ) => self.goal = Goal::Release,
+            ) => {
+                // A torque that was asked for during the start has not come yet.
+                if !matches!(self.flux, FluxPhase::Ready | FluxPhase::Learn(_)) {
+                    k.references.current.q = 0.0;
+                }
+                self.goal = Goal::Release;
+            }
         }
         self.enter(k, FluxPhase::Ready);
     }

@@ -1,7 +1,7 @@
 //! Every command in every state, and the commands that once did harm where they do not belong.
 
 use core::mem::discriminant;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use super::*;
 use crate::drive::excitation::{Excitation, Regulator};
@@ -202,6 +202,48 @@ fn every_command_is_taken_or_refused_in_every_state() {
     for line in table.lines() {
         assert!(manual.contains(line), "not in docs/control-law.md: {line}\n{table}");
     }
+}
+
+/// The other table: the state behind a stop, a clear, a start and a relock, and behind a fault.
+#[test]
+fn every_event_leads_to_the_state_of_the_table() {
+    use super::Stop::{Coast, Quick, Ramp};
+    let events = [Coast, Ramp, Quick].map(Command::Stop).into_iter();
+    let events: Vec<_> = events.chain([Command::Clear, Command::Relock]).collect();
+    let mut table = BTreeMap::new();
+    for bench in rows().into_iter().flat_map(|(_, benches)| benches) {
+        let state = bench.drive.state();
+        let name = match state {
+            State::Fault(_) => "in fault".into(),
+            State::Braking => "braking to rest".into(),
+            State::BrakingByFrequency => "braking to rest by frequency".into(),
+            state => state.to_string(),
+        };
+        let mut cells: Vec<_> = events
+            .iter()
+            .map(|event| {
+                let mut after = bench.clone();
+                let _ = after.drive.command(event);
+                let now = after.drive.state();
+                if now == state { "stays".into() } else { now.to_string() }
+            })
+            .collect();
+        // A fault of the hardware.
+        let mut after = bench.clone();
+        let broken = Sample { hardware: Hardware::BREAK, ..after.motor.sample() };
+        let compare = after.drive.step(&broken);
+        let now = after.drive.state();
+        assert!(now == state || !compare.enabled, "{name}: {now}");
+        cells.push(if now == state { "stays" } else { "in fault" }.into());
+        assert_eq!(now == state, state.is_off(), "{name}: {now}");
+        let row = cells.join(" | ");
+        assert_eq!(*table.entry(name.clone()).or_insert_with(|| row.clone()), row, "{name}");
+    }
+    assert_eq!(table.len(), 17, "each state");
+    let manual = include_str!("../../../../../docs/control-law.md").replace('`', "");
+    let lines = table.iter().map(|(name, row)| format!("| {name} | {row} |"));
+    let missing: Vec<_> = lines.filter(|line| !manual.contains(line)).collect();
+    assert!(missing.is_empty(), "not in docs/control-law.md:\n{}", missing.join("\n"));
 }
 
 /// The table says where a command is taken whatever its value. Those of the last column need the encoder, a rotor time constant that

@@ -5,6 +5,23 @@ use super::*;
 /// From every mode, with and without an encoder, by either ramp: the speed follows the ramp from where it is, within what the
 /// loop knows of the load (0.3 Nm are 240 rpm/s on the inertia), without a jump of the torque current beyond that of the ramp,
 /// and the outputs go off with the shaft at rest.
+/// A torque that was asked for while the drive starts does not come with a stop.
+#[test]
+fn a_stop_before_the_run_puts_out_no_torque() {
+    for state in [State::Catching, State::Magnetising, State::Verifying] {
+        let mut bench = Bench::new(&motor_settings(AngleSource::Injection));
+        bench.drive.command(&Command::Start(Mode::Torque)).unwrap();
+        assert!(bench.run_to(state), "{state}");
+        bench.drive.command(&Command::Torque(2.0)).unwrap();
+        bench.drive.command(&Command::Stop(Stop::Coast)).unwrap();
+        for _ in 0..3 {
+            bench.step();
+            assert_eq!(bench.drive.telemetry().reference.q, 0.0, "{state}");
+        }
+        assert_eq!(bench.drive.state(), State::Off, "{state}");
+    }
+}
+
 #[test]
 fn a_stop_by_ramp_brings_the_shaft_to_rest_from_every_mode() {
     for source in [AngleSource::Encoder, AngleSource::Injection] {
