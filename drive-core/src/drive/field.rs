@@ -279,13 +279,13 @@ impl Field {
 
         // The expected carrier current is subtracted; the filter takes the rest. (Its notch is 6 Hz wide:
         // alone it would let the sidebands of a turning carrier through.)
-        let silent = !c.inject || s.hand_over.silent;
+        let silent = !c.inject || s.hand_over.is_silent();
         let carrier =
             if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
         let carrier_axis = phi.turned_by(axes.carrier);
         let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
-        let seen = if s.hand_over.silent { measured.current } else { filtered };
+        let seen = if s.hand_over.is_silent() { measured.current } else { filtered };
 
         // Current loop.
         let flux_axis = phi.turned_by(axes.seen);

@@ -28,9 +28,9 @@ impl Coefficients {
         phi: UnitVector,
     ) -> Turning {
         let Some(observer) = &self.observer else { return Turning::default() };
-        let filtered = !s.hand_over.silent;
+        let filtered = !s.hand_over.is_silent();
         let (state, weight) = (&mut s.observer, s.hand_over.weight);
-        let blind = s.hand_over.is_blind();
+        let blind = s.hand_over.advance_blanking();
         if blind {
             state.skip(current);
         } else {

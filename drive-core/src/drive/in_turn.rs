@@ -20,7 +20,7 @@
 
 use super::Kept;
 use super::field::Field;
-use super::trust::{Judged, Lock, Source, Trust};
+use super::trust::{Judged, Lock, Trust};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};
@@ -93,14 +93,9 @@ impl Coefficients {
             REFERENCE_AT => {
                 s.estimator.synchronous.average_reference(step.reference.q);
                 if self.observer.is_some() && step.trust.observes() {
-                    s.hand_over.update(step.flux_freq);
-                    match step.trust.source {
-                        Source::Nothing => s.hand_over.silence(),
-                        Source::Injection => s.hand_over.weight = 0.0,
-                        Source::Both | Source::Slip => {}
-                    }
+                    s.hand_over.update(step.flux_freq, step.trust.source);
                 }
-                let silent = s.hand_over.silent;
+                let silent = s.hand_over.is_silent();
                 self.turn(&mut s.axes, step.flux_freq, k.references.injection_axis, silent);
                 Ok(())
             }
@@ -155,7 +150,7 @@ impl Coefficients {
 
     /// Limits the currents to those that the voltage of the dc link allows.
     fn limit_voltage(&self, s: &Field, k: &mut Kept, step: &StepResults) {
-        let carrier = self.inject && !s.hand_over.silent;
+        let carrier = self.inject && !s.hand_over.is_silent();
         let taken = if carrier { s.carrier.share * self.injection.amplitude } else { 0.0 };
         let largest = self.modulator.circle(step.measured.dc_link) - taken;
         let now = Operation {
@@ -233,7 +228,7 @@ impl Coefficients {
 
     /// Fits the carrier into the voltage that the fundamental leaves.
     fn check_carrier_headroom(&self, s: &mut Field, step: &StepResults) -> Result<(), Fault> {
-        if !self.inject || s.hand_over.silent {
+        if !self.inject || s.hand_over.is_silent() {
             return Ok(());
         }
         let largest = self.modulator.circle(step.measured.dc_link);

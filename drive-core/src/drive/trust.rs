@@ -7,19 +7,7 @@ use Source::{Both, Injection, Nothing, Slip};
 
 use super::field::{Field, FluxPhase, Frame};
 use crate::drive::coefficients::Coefficients;
-
-/// Sources that turn the frame of a drive without an encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
-    /// The slip alone: the shaft is locked.
-    Slip,
-    /// Nothing, and the carrier is off.
-    Nothing,
-    /// The injection, whatever the frequency.
-    Injection,
-    /// Injection and observer, by the hand-over.
-    Both,
-}
+use crate::flux::hand_over::Source;
 
 /// How strictly the measured current is compared with that which voltage and flux explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -33,18 +33,37 @@ const QUIET: u8 = 120;
 /// Mean age of a turn that is averaged over a carrier period, samples.
 const MEAN_AGE: f32 = 0.5 * (CARRIER_SAMPLES - 1) as f32;
 
+/// Sources that may turn the frame of a drive without an encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The slip alone: the shaft is locked.
+    Slip,
+    /// Nothing, and the carrier is off.
+    Nothing,
+    /// The injection, whatever the frequency.
+    Injection,
+    /// Injection and observer, by the hand-over.
+    Both,
+}
+
+/// The carrier, for the demodulation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum CarrierState {
+    #[default]
+    On,
+    /// On, and the demodulation is filled after this many carrier periods.
+    Filling(u8),
+    Off,
+}
+
 /// State of the hand-over.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HandOver {
     /// Share of the observer in the angle, 0 to 1.
     pub weight: f32,
-    /// Whether the carrier is off.
-    pub silent: bool,
-    /// What `silent` was in the last period, and the periods for which the observer sees nothing: those after a change.
-    was_silent: bool,
+    carrier: CarrierState,
+    /// Periods for which the observer sees nothing, and one.
     blind: u8,
-    /// Carrier periods until the demodulation is filled.
-    filling: u8,
     /// Carrier periods until the noise of the sensors is judged.
     unquiet: u8,
     /// Turns of the last ten periods, their sum, and the sum of the present carrier period.
@@ -67,25 +86,54 @@ pub struct Turning {
 }
 
 impl HandOver {
-    /// Updates weight and carrier at the stator frequency `flux_freq`, electrical turns per period; once a carrier
-    /// period.
-    pub fn update(&mut self, flux_freq: f32) {
+    /// Updates weight and carrier at the stator frequency `flux_freq`, electrical turns per period, for a frame that this
+    /// `source` may turn; once a carrier period.
+    pub fn update(&mut self, flux_freq: f32, source: Source) {
         let freq = flux_freq.abs();
-        let weight = (freq - FROM) * (1.0 / (TO - FROM));
-        self.silent = freq > if self.silent { CARRIER_ON } else { CARRIER_OFF };
-        if self.silent {
-            self.filling = FILLED;
-        } else if self.filling > 0 {
-            self.filling -= 1;
-        }
-        self.weight = if self.filling > 0 || weight > 1.0 {
+        let share = (freq - FROM) * (1.0 / (TO - FROM));
+        let goes_on = if self.is_silent() { CARRIER_ON } else { CARRIER_OFF };
+        self.switch(match self.carrier {
+            _ if source == Source::Nothing || freq > goes_on => CarrierState::Off,
+            CarrierState::Off => CarrierState::Filling(FILLED - 1),
+            CarrierState::On | CarrierState::Filling(..=1) => CarrierState::On,
+            CarrierState::Filling(left) => CarrierState::Filling(left - 1),
+        });
+        let weight = if !self.demodulates() || share > 1.0 {
             1.0
-        } else if weight > 0.0 {
-            weight
+        } else if share > 0.0 {
+            share
         } else {
             0.0
         };
-        self.unquiet = if self.weight > 0.0 { QUIET } else { self.unquiet.saturating_sub(1) };
+        self.unquiet = if weight > 0.0 { QUIET } else { self.unquiet.saturating_sub(1) };
+        self.weight = match source {
+            Source::Both | Source::Slip => weight,
+            Source::Injection | Source::Nothing => 0.0,
+        };
+    }
+
+    /// Turns the carrier off, and leaves the angle to itself.
+    pub fn silence(&mut self) {
+        self.switch(CarrierState::Off);
+        self.weight = 0.0;
+    }
+
+    fn switch(&mut self, carrier: CarrierState) {
+        let was_silent = self.is_silent();
+        self.carrier = carrier;
+        if self.is_silent() != was_silent {
+            self.blind = BLIND + 1;
+        }
+    }
+
+    /// Whether the carrier is off.
+    pub fn is_silent(&self) -> bool {
+        self.carrier == CarrierState::Off
+    }
+
+    /// Whether the demodulation has the carrier, and what is judged by it may be.
+    pub fn demodulates(&self) -> bool {
+        self.carrier == CarrierState::On
     }
 
     /// Whether the noise of the sensors may be judged as the injection needs it: some 0.2 s after it has the angle alone.
@@ -93,27 +141,15 @@ impl HandOver {
         self.unquiet == 0
     }
 
-    /// Whether the observer sees nothing in this period; to be asked once a period.
-    pub fn is_blind(&mut self) -> bool {
-        self.blind =
-            if self.silent == self.was_silent { self.blind.saturating_sub(1) } else { BLIND };
-        self.was_silent = self.silent;
+    /// Begins a period; whether the observer sees nothing in it.
+    pub fn advance_blanking(&mut self) -> bool {
+        self.blind = self.blind.saturating_sub(1);
         self.blind > 0
     }
 
     /// Mean turn of the last carrier period, electrical turns per period.
     pub fn mean_turn(&self) -> f32 {
         self.sum * (1.0 / CARRIER_SAMPLES as f32)
-    }
-
-    /// Turns the carrier off, and leaves the angle to itself.
-    pub fn silence(&mut self) {
-        (self.silent, self.filling, self.weight) = (true, FILLED, 0.0);
-    }
-
-    /// Whether the demodulation has the carrier, and what is judged by it may be.
-    pub fn demodulates(&self) -> bool {
-        self.filling == 0
     }
 
     /// The turn for the tracking loop from what the observer saw in the period of this `index` in the carrier period:
@@ -128,7 +164,7 @@ impl HandOver {
             // Rounding does not accumulate.
             self.sum = core::mem::take(&mut self.fresh);
         }
-        let (turned, age) = if self.silent {
+        let (turned, age) = if self.is_silent() {
             (turned, age + 1.0)
         } else {
             (self.mean_turn(), age + 1.0 + MEAN_AGE)
@@ -148,9 +184,9 @@ mod tests {
         let mut state = HandOver::default();
         let mut blind = [0; 4];
         for (k, hertz) in [17.0, 25.0, 27.0, 23.0].into_iter().enumerate() {
-            state.update(hertz * PERIOD_S);
-            blind[k] = (0..20).filter(|_| state.is_blind()).count();
-            assert!(!state.is_blind());
+            state.update(hertz * PERIOD_S, Source::Both);
+            blind[k] = (0..20).filter(|_| state.advance_blanking()).count();
+            assert!(!state.advance_blanking());
         }
         assert_eq!(blind, [0, 0, 3, 3]);
     }

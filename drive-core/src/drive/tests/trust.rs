@@ -3,7 +3,8 @@
 use super::*;
 use crate::drive::catching::Search;
 use crate::drive::field::{FluxPhase, Frame};
-use crate::drive::trust::{Judged, Lock, Source, Trust};
+use crate::drive::trust::{Judged, Lock, Trust};
+use crate::flux::hand_over::Source;
 
 /// A row of the table, but for its name.
 fn row(trust: &Trust) -> String {
