@@ -114,6 +114,7 @@ struct References {
 // The large one is the one that matters; the others share its memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
+#[repr(u32)] // a word of its own: a state is not copied around a byte of it
 enum Phase {
     Off(Left),
     Fault(Fault, Left),
