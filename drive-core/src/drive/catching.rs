@@ -7,7 +7,7 @@ use super::field::{Field, FluxPhase};
 use crate::current::pi::ReferenceState;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
-use crate::flux::catch::{self, CatchState, Caught, Path};
+use crate::flux::catch::{self, Caught, Path};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::io::{PERIOD_S, periods};
@@ -68,20 +68,6 @@ impl Settings {
     }
 }
 
-/// State of the search for a turning shaft.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    speed: CatchState,
-    /// Flux from a run before.
-    pub residual: Option<Residual>,
-}
-
-impl Search {
-    pub fn new(residual: Option<Residual>) -> Self {
-        Self { speed: CatchState::default(), residual }
-    }
-}
-
 /// Flux of a run before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Residual {
@@ -136,7 +122,7 @@ impl Field {
         let Some(n) = k.elapsed.checked_sub(c.sequence.precharge) else {
             return Ok(Dq::ZERO);
         };
-        let drives = search.residual.is_some_and(|residual| residual.volts > LITTLE_V);
+        let drives = self.residual.is_some_and(|residual| residual.volts > LITTLE_V);
         if n == 0 && !drives {
             self.reference[0] = ReferenceState::at_rest(AT_ONCE * catching.current);
         }
@@ -144,9 +130,10 @@ impl Field {
         if n > catch::FROM {
             c.current_loop.hold(&mut self.current_loop);
         }
-        match search.speed.step(n, self.observer.change) {
+        match search.step(n, self.observer.change) {
             Caught::Searching => {}
             Caught::Standing => {
+                self.residual = None;
                 self.hand_over = HandOver::default();
                 self.hold(c, k, 0);
             }
@@ -155,6 +142,7 @@ impl Field {
                 if freq.abs() > HIGHEST {
                     return Err(Fault::NotCaught);
                 }
+                self.residual = None;
                 self.flux = FluxPhase::Build { from: k.elapsed };
                 self.estimator.turn_with(freq);
                 self.indirect = IndirectState::default();

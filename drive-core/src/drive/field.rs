@@ -1,7 +1,7 @@
 //! Current in a frame of the flux: the control law, top to bottom, and the phases in which the flux is found, built up and
 //! verified.
 
-use super::catching::{Residual, Search};
+use super::catching::Residual;
 use super::in_turn::StepResults;
 use super::{End, Kept, Left};
 use crate::carrier::CarrierSample;
@@ -13,6 +13,7 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
 use crate::filter::dissertation::{LPF, LpfState};
+use crate::flux::catch::CatchState;
 use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
@@ -62,6 +63,8 @@ pub(super) struct Field {
     pub lead: Angle,
     pub lead_axis: UnitVector,
     pub goal: Goal,
+    /// Flux of a run before, until the speed of the shaft is found.
+    pub residual: Option<Residual>,
     /// Large: it holds the state of the alternative demodulations.
     pub estimator: EstimatorState,
     /// Large while a turning shaft is looked for.
@@ -96,7 +99,7 @@ impl Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) enum FluxPhase {
     /// The frame stands, and nothing is judged: a turning shaft is looked for.
-    Search(Search),
+    Search(CatchState),
     /// The flux of a turning rotor builds up from this period on.
     Build {
         from: u32,
@@ -220,16 +223,9 @@ impl Field {
 
     /// What this run leaves to the next one.
     pub fn left(&self) -> Left {
+        // Until a speed is found nothing is known but what it was given.
         let turning = || Residual::turning(self.estimator.rotor_freq, self.observer.flux);
-        let residual = match &self.flux {
-            // A search that found no speed knows no more than it was given.
-            FluxPhase::Search(search) => search.residual.unwrap_or_else(turning),
-            FluxPhase::Build { .. }
-            | FluxPhase::Hold
-            | FluxPhase::Verify
-            | FluxPhase::Ready
-            | FluxPhase::Learn(_) => turning(),
-        };
+        let residual = self.residual.unwrap_or_else(turning);
         Left {
             resistance: self.observer.resistance,
             inverter_drop: self.inverter_drop.volts,

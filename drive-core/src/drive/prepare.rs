@@ -1,6 +1,5 @@
 //! From off to the first current: offsets, bootstraps, wiring.
 
-use super::catching::Search;
 use super::excite::Excite;
 use super::field::{Field, FluxPhase, Goal};
 use super::scalar::Scalar;
@@ -10,6 +9,7 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::excitation::Excitation;
 use crate::drive::state::{Mode, State};
 use crate::fault::Fault;
+use crate::flux::catch::CatchState;
 use crate::io::{Compare, Sample};
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
@@ -171,7 +171,8 @@ impl Drive {
                 field.begin(c, goal, &left);
                 if catches {
                     field.hand_over.silence();
-                    field.flux = FluxPhase::Search(Search::new(left.residual));
+                    field.residual = left.residual;
+                    field.flux = FluxPhase::Search(CatchState::default());
                 } else {
                     field.hold(c, k, encoder);
                 }

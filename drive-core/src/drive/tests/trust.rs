@@ -1,9 +1,9 @@
 //! The table of [`Trust`] in every phase of the flux and for every source of the angle.
 
 use super::*;
-use crate::drive::catching::Search;
 use crate::drive::field::{FluxPhase, Frame};
 use crate::drive::trust::{Judged, Lock, Trust};
+use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;
 
 /// A row of the table, but for its name.
@@ -44,7 +44,7 @@ fn what_may_be_believed_is_a_row_for_every_phase_and_frame() {
     let c = settings.build().unwrap();
     let alone = c.catching.unwrap().alone;
     let phases = [
-        (FluxPhase::Search(Search::new(None)), 5),
+        (FluxPhase::Search(CatchState::default()), 5),
         (FluxPhase::Build { from: 7 }, 7 + alone - 1),
         (FluxPhase::Build { from: 7 }, 7 + alone),
         (FluxPhase::Hold, 5),
