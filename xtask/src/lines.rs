@@ -12,9 +12,6 @@ use anyhow::{Context, Result, ensure};
 use crate::budget::{self, Room};
 use crate::sources;
 
-/// A longer file gives its reason in its head. A person reads the reason.
-const FILE_LINES: usize = 400;
-
 /// Lines of code, documentation, comments, test code, and all else in tests.
 type Counts = [usize; 5];
 
@@ -22,14 +19,10 @@ type Counts = [usize; 5];
 pub fn report() -> Result<()> {
     let rooms = budget::read()?.lines;
     let mut rows = vec![Counts::default(); rooms.len()];
-    let mut long = Vec::new();
     for path in sources::rust_files()? {
         let text = sources::read(&path)?;
         let room = room_of(&rooms, &path).with_context(|| path.display().to_string())?;
         add(&mut rows[room], count(&path, &text));
-        if text.lines().count() > FILE_LINES {
-            long.push(format!("{:>6}  {}", text.lines().count(), path.display()));
-        }
     }
     let mut all = Counts::default();
     rows.iter().for_each(|counts| add(&mut all, *counts));
@@ -47,7 +40,7 @@ pub fn report() -> Result<()> {
             over.push(format!("{name} {code} of {budget}"));
         }
     }
-    println!("\nfiles over {FILE_LINES} lines:\n{}\n", long.join("\n"));
+    println!();
     ensure!(over.is_empty(), "more lines of code than the budget: {}", over.join(", "));
     Ok(())
 }
