@@ -128,7 +128,7 @@ enum Phase {
     Field(Field),
 }
 
-/// The end of the outputs' work.
+/// Why the outputs go off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
     Stopped,
