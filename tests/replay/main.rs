@@ -54,7 +54,7 @@ macro_rules! scenes {
     };
 }
 scenes! {
-    volts_per_hertz turning_start learning commissioning stops stopped_learning faults weakening position encoder_speed
+    volts_per_hertz turning_start stopped_starts learning commissioning stops stopped_learning faults weakening position encoder_speed
 }
 
 #[test]

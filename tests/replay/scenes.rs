@@ -169,6 +169,42 @@ pub const SCENES: &[Scene] = &[
         },
     },
     Scene {
+        name: "stopped_starts",
+        keys: &[],
+        learned: true,
+        script: |bench| {
+            bench.turn_at(1200.0);
+            bench.run(0.5);
+            bench.start("start torque", State::Torque);
+            bench.run(0.2);
+            bench.order("stop");
+            bench.until_state(State::Off);
+            // In the search, then while the flux builds up, each time with flux left.
+            for seconds in [0.015, 0.4] {
+                bench.run(0.02);
+                bench.start("start torque", State::Catching);
+                bench.run(seconds);
+                bench.order("stop");
+                bench.until_state(State::Off);
+            }
+            bench.start("start torque", State::Torque);
+            bench.order("torque 1");
+            bench.run(0.3);
+            bench.order("stop");
+            bench.until_state(State::Off);
+            // At rest, while it magnetises and while it verifies.
+            bench.turn_at(0.0);
+            bench.run(1.0);
+            for state in [State::Magnetising, State::Verifying] {
+                bench.start("start torque", state);
+                bench.run(0.1);
+                bench.order("stop");
+                bench.until_state(State::Off);
+                bench.run(0.1);
+            }
+        },
+    },
+    Scene {
         name: "learning",
         keys: &[],
         learned: false,
