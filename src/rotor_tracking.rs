@@ -145,7 +145,7 @@ mod tests {
 
     fn observe(rig: &mut Rig, number: u32) -> Observation {
         rig.step();
-        Observation::new(number, &rig.drive.telemetry())
+        Observation::new(number, rig.drive.telemetry())
     }
 
     #[test]

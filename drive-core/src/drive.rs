@@ -27,21 +27,35 @@ mod trust;
 use core::mem::offset_of;
 use core::ops::Range;
 
+use crate::carrier::injection::Carrier;
+use crate::current::inverter_drop::InverterDropState;
+use crate::current::pi::{DqPiState, ReferenceState};
 use crate::current::sensing::SensingState;
 use crate::fault::Fault;
-use crate::identify::learning::Learned;
+use crate::filter::dissertation::LpfState;
+use crate::flux::catch::CatchState;
+use crate::flux::estimator::EstimatorState;
+use crate::flux::hand_over::HandOver;
+use crate::flux::indirect::IndirectState;
+use crate::flux::observer::{Induced, ObserverState};
+use crate::identify::learning::{Learned, LearningState};
 use crate::io::{Compare, Sample};
-use crate::math::angle::UnitVector;
+use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::Dq;
+use crate::motion::{MotionState, RotorCount};
+use crate::protect::lock_monitor::LockMonitorState;
+use crate::protect::noise_watch::NoiseWatchState;
+use crate::protect::plausibility::{CarrierWatch, PredictionState};
+use crate::protect::saliency_check::SaliencyCheckState;
 use crate::protect::thermal::ThermalLoads;
 use crate::supply::RelayState;
 
+use axes::Axes;
 use catching::Residual;
 pub use coefficients::Coefficients;
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::Excite;
-use field::Field;
 pub use layout::Layout;
 use limits::Limits;
 use prepare::Prepare;
@@ -126,6 +140,186 @@ enum Phase {
     Scalar(Scalar),
     /// Current in a frame of the flux.
     Field(Field),
+}
+
+/// The work that a drive was started for.
+#[derive(Clone, Copy, Debug)]
+enum Job {
+    Field(Goal),
+    Scalar {
+        /// Reference of the speed, mechanical turns/s.
+        speed: f32,
+    },
+    Excite(Excitation),
+}
+
+impl Job {
+    pub fn of_mode(mode: Mode) -> Self {
+        match mode {
+            Mode::Torque => Self::Field(Goal::Torque),
+            Mode::Speed => Self::Field(Goal::SPEED),
+            Mode::Position => Self::Field(Goal::POSITION),
+            Mode::Learning => Self::Field(Goal::Learn),
+            Mode::VoltsPerHertz => Self::Scalar { speed: 0.0 },
+            Mode::Commissioning => Self::Excite(Excitation::Rest),
+        }
+    }
+
+    pub fn mode(&self) -> Mode {
+        match self {
+            Self::Field(goal) => goal.mode(),
+            Self::Scalar { .. } => Mode::VoltsPerHertz,
+            Self::Excite(_) => Mode::Commissioning,
+        }
+    }
+
+    /// Whether its start looks for a turning shaft. A drive that learns has a locked one.
+    pub fn catches(&self, c: &Coefficients) -> bool {
+        c.catching.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
+    }
+}
+
+/// A drive that regulates the current in a frame of the flux.
+// In this order: the fields of every step lie within the 1020 bytes that a floating-point load of the core
+// reaches from one base address; otherwise every sixth instruction of a step computes an address.
+#[derive(Clone, Debug, Default)]
+#[repr(C)]
+struct Field {
+    pub frame: Frame,
+    pub low_pass: LpfState,
+    pub indirect: IndirectState,
+    pub observer: ObserverState,
+    pub hand_over: HandOver,
+    /// What flux and leakage induce, and the observer's share in the angle, by which it is fed forward.
+    pub induced: Induced,
+    pub induced_share: f32,
+    pub carrier: Carrier,
+    pub axes: Axes,
+    pub reference: [ReferenceState; 2],
+    pub current_loop: DqPiState,
+    pub rotor: RotorCount,
+    pub prediction: PredictionState,
+    pub motion: MotionState,
+    pub carrier_watch: CarrierWatch,
+    pub saliency_check: SaliencyCheckState,
+    pub lock: LockMonitorState,
+    pub noise: NoiseWatchState,
+    pub inverter_drop: InverterDropState,
+    /// Lead of the flux before the frame, as an angle and a unit vector: 0 but while the drive learns.
+    pub lead: Angle,
+    pub lead_axis: UnitVector,
+    pub goal: Goal,
+    /// Flux of a run before, until the speed of the shaft is found.
+    pub residual: Option<Residual>,
+    /// Large: it holds the state of the alternative demodulations.
+    pub estimator: EstimatorState,
+    /// Large while a turning shaft is looked for.
+    pub flux: FluxPhase,
+}
+
+/// The source of the angle of the frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Frame {
+    /// The counted angle of the rotor and the slip.
+    #[default]
+    Encoder,
+    /// The slip alone: a drive that learns has a locked shaft.
+    LockedShaft,
+    /// Injection and observer.
+    Tracked,
+}
+
+impl Frame {
+    /// Whether the flux angle is the counted rotor angle plus the slip.
+    pub fn is_counted(self) -> bool {
+        match self {
+            Self::Encoder | Self::LockedShaft => true,
+            Self::Tracked => false,
+        }
+    }
+}
+
+/// A phase of the flux.
+// See `Phase`.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, Default)]
+enum FluxPhase {
+    /// The frame stands, and nothing is judged: a turning shaft is looked for.
+    Search(CatchState),
+    /// The flux of a turning rotor builds up from this period on.
+    Build {
+        from: u32,
+    },
+    /// The frame is held along phase a until the flux stands; then the saliency is checked.
+    #[default]
+    Hold,
+    /// Tracking without torque: is it the flux that is tracked?
+    Verify,
+    Ready,
+    /// Ready, and a learning measures.
+    Learn(LearningState),
+}
+
+/// The work of the current, with its reference. That of the torque is the torque current itself.
+#[derive(Clone, Copy, Debug, Default)]
+enum Goal {
+    #[default]
+    Torque,
+    Speed {
+        /// Mechanical turns/s.
+        speed: f32,
+        /// Periods for which the speed holds where it is a jog; 0 where it is none.
+        jog: u32,
+    },
+    Position {
+        /// Mechanical turns; `None`: where the drive was started.
+        turns: Option<f32>,
+        /// Instead, to press on at this speed, mechanical turns/s, with at most this torque current, A.
+        press: Option<(f32, f32)>,
+    },
+    Learn,
+    /// To rest.
+    Brake {
+        quick: bool,
+    },
+    /// To no torque, and off.
+    Release,
+}
+
+impl Goal {
+    /// Whether torque, speed or position is regulated as asked for.
+    pub fn regulates(&self) -> bool {
+        match self {
+            Self::Torque | Self::Speed { .. } | Self::Position { .. } => true,
+            Self::Learn | Self::Brake { .. } | Self::Release => false,
+        }
+    }
+
+    /// The mode that has this goal; of a drive that stops none is asked for.
+    pub fn mode(&self) -> Mode {
+        match self {
+            Self::Torque | Self::Brake { .. } | Self::Release => Mode::Torque,
+            Self::Speed { .. } => Mode::Speed,
+            Self::Position { .. } => Mode::Position,
+            Self::Learn => Mode::Learning,
+        }
+    }
+
+    /// Speed 0.
+    pub const SPEED: Self = Self::Speed { speed: 0.0, jog: 0 };
+    /// The position where the drive is started.
+    pub const POSITION: Self = Self::Position { turns: None, press: None };
+
+    /// Whether its references are finite numbers.
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Speed { speed, .. } => speed.is_finite(),
+            Self::Position { turns, press } => {
+                (turns.unwrap_or(0.0) + press.map_or(0.0, |(speed, _)| speed)).is_finite()
+            }
+            Self::Torque | Self::Learn | Self::Brake { .. } | Self::Release => true,
+        }
+    }
 }
 
 /// Why the outputs go off.

@@ -10,6 +10,7 @@ mod hardware;
 mod list;
 mod motor;
 mod ntc;
+mod numbers;
 pub mod rules;
 pub mod table;
 #[cfg(test)]
@@ -23,7 +24,11 @@ use crate::carrier::DemodulatorKind;
 use crate::tuning::TuningError;
 
 pub use hardware::{CurrentSensors, Line};
-pub use list::*;
+pub use list::{
+    BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Motor,
+    Nameplate, Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings,
+    SpeedSettings, SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
+};
 pub use ntc::HeatSink;
 
 /// The source of the flux angle.

@@ -3,8 +3,8 @@
 //! Sample `k` of the current is paired with the mean of the voltages of the steps `k-2` and `k-1`: that of step `k-1` acts
 //! from `k` on, that of `k-2` ended at `k`.
 
-use super::inertia::Motion;
-use super::plant::PlantFit;
+use super::motion::Motion;
+use super::plant_fit::PlantFit;
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
 use crate::io::PERIOD_S;
 use crate::math::frames::{Abc, AlphaBeta};

@@ -12,12 +12,9 @@
 //! [`rls`](crate::identify::rls::ud). On motors of half to twice the parameters of Table 5, k is within 6 % of that by the parameters;
 //! 1 - p is weak.
 
-use num_complex::Complex32;
-
+use super::plant_fit::SETTLING;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
 use crate::drive::Excitation;
-use crate::filter::dissertation::{LPF, LpfState};
-use crate::identify::rls::ud::{Forgetting, Ud};
 use crate::io::PERIOD_S;
 use crate::math::frames::AlphaBeta;
 use crate::tuning::{FirstOrder, motor_plant};
@@ -29,56 +26,11 @@ const STEP: f32 = 0.027;
 /// Time until the flux stands, in rotor time constants, and between the axes, s.
 const FLUX_T: f32 = 4.0;
 const BETWEEN_S: f32 = 0.2;
-/// Samples until filters and amplitude have settled, and time of a record, s: with six times the sequence.
-const SETTLING: u32 = 600;
+/// Time of a record, s: with six times the sequence.
 const FITTED_S: f32 = (SETTLING + 6 * 255) as f32 * PERIOD_S;
 /// Accepted k relative to that by the parameters, and accepted p.
 const GAIN: (f32, f32) = (0.8, 1.25);
 const POLE: (f32, f32) = (0.7, 0.9999);
-/// Covariance before the first sample, in the bases.
-const P0: f32 = 1e6;
-
-/// Least squares of one axis, in bases that make voltage and current about one.
-#[derive(Clone, Debug)]
-pub(super) struct PlantFit {
-    ud: Ud,
-    low_pass: LpfState,
-    /// Voltages of the last three samples, and the last current.
-    u: [f32; 3],
-    y: f32,
-    samples: u32,
-    sound: bool,
-}
-
-impl Default for PlantFit {
-    fn default() -> Self {
-        let (ud, low_pass) = (Ud::new([Complex32::ZERO; 4], P0), LpfState::default());
-        Self { ud, low_pass, u: [0.0; 3], y: 0.0, samples: 0, sound: true }
-    }
-}
-
-impl PlantFit {
-    /// Takes a sample: the voltage realised in its step, and the measured current.
-    pub fn push(&mut self, voltage: f32, current: f32) {
-        let filtered = LPF.step(&mut self.low_pass, AlphaBeta::new(voltage, current));
-        let ([u1, u2, u3], y1) = (self.u, self.y);
-        (self.u, self.y) = ([filtered.alpha, u1, u2], filtered.beta);
-        self.samples += 1;
-        if self.samples > SETTLING {
-            let x = [y1, u2, u3, 1.0].map(|x| Complex32::new(x, 0.0));
-            let y = Complex32::new(filtered.beta, 0.0);
-            self.sound &= self.ud.update(x, y, Forgetting::NONE).is_some();
-        }
-    }
-
-    /// The plant, in the bases.
-    pub fn found(&self) -> Result<FirstOrder, Refusal> {
-        let [p, b1, b2, _] = self.ud.theta.map(|x| f64::from(x.re));
-        let is_sound = self.sound && self.samples > SETTLING;
-        is_sound.then_some(FirstOrder { k: b1 + b2, p }).ok_or(Refusal::SamplesLost)
-    }
-}
-
 impl Commissioning {
     pub(super) fn plant(&mut self, sums: &mut Collector) -> Answer {
         let motor = self.found.motor().ok_or(Refusal::Needs(Step::Leakage))?;

@@ -2,71 +2,28 @@
 
 use core::f32::consts::TAU;
 
-use super::Kept;
-use super::field::{Field, FluxPhase};
+use super::{Field, FluxPhase, Kept};
 use crate::current::pi::ReferenceState;
 use crate::drive::coefficients::Coefficients;
+use crate::drive::coefficients::catching::WITH_FLUX;
 use crate::fault::Fault;
-use crate::flux::catch::{self, Caught, Path};
+use crate::flux::catch::{self, Caught};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::io::{PERIOD_S, periods};
+use crate::io::PERIOD_S;
 use crate::math::frames::Dq;
 use crate::math::within;
-use crate::settings::Settings;
 
-/// Current that the rotor is looked for with, as a share of the current limit.
-const SHARE: f32 = 0.714;
-/// Share of it that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
+/// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.
 const AT_ONCE: f32 = 0.5;
-/// Share of that current that is enough where flux was left: the flux drives a current of its own.
-const WITH_FLUX: f32 = 0.4;
 /// Voltage of flux that was left which drives no current to speak of, V.
 const LITTLE_V: f32 = 1.0;
-/// Share of the current that trips up to which both together may come.
-const UP_TO: f32 = 0.7;
 /// Current per missing magnetising current.
 const FORCED: f32 = 10.0;
-/// Time in which the flux of a turning rotor builds up, and until then the injection alone corrects the angle, s.
-const BUILT_S: f32 = 0.35;
-const ALONE_S: f32 = 0.2;
 /// Highest frequency of a rotor that is caught, electrical turns per period: 2700 rpm of four poles, with the error of the
 /// search. Above it the voltage of the rotor drowns in the noise of the sensors.
 const HIGHEST: f32 = 91.0 * PERIOD_S;
-/// Rotor time constants after which no flux is left in a motor that was switched off.
-const FLUX_GONE_T: f32 = 4.0;
-
-/// Coefficients of a start on a turning shaft, control periods and A.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Catching {
-    pub current: f32,
-    pub alone: u32,
-    pub built: u32,
-    pub flux_gone: u32,
-    pub path: Path,
-    /// Largest voltage of flux that was left, V, and its decay per period.
-    left_v: f32,
-    decay: f32,
-}
-
-impl Settings {
-    /// The start on a turning shaft, where the observer can follow it.
-    pub(crate) fn catching(&self, k_c: [f32; 2]) -> Option<Catching> {
-        let (tau_r, i_d) = (self.motor.tau_r(), self.i_d());
-        let current = f32::max(SHARE * self.current_limit_a(), i_d);
-        let path = Path::new(&self.motor, 0.5 * (k_c[0] + k_c[1]));
-        (self.uses_observer() && self.sequence.catch).then(|| Catching {
-            current,
-            alone: periods(ALONE_S),
-            built: periods(BUILT_S),
-            flux_gone: periods(FLUX_GONE_T * tau_r),
-            path,
-            left_v: path.resistance * (UP_TO * self.trip_a() - WITH_FLUX * current),
-            decay: PERIOD_S / tau_r,
-        })
-    }
-}
 
 /// Flux of a run before.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,6 @@
 //! The coefficients of the control step, and their design from settings.
 
+pub(super) mod catching;
 mod estimator;
 #[cfg(test)]
 mod tests;
@@ -16,7 +17,6 @@ use crate::current::sensing::Sensing;
 use crate::current::shunts::Shunts;
 use crate::current::voltage_limit::VoltageLimit;
 use crate::dc_link::DcLink;
-use crate::drive::catching::Catching;
 use crate::filter::dissertation::lpf_lag_samples;
 use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
@@ -35,6 +35,7 @@ use crate::protect::wiring_check::{WiringCheck, WiringSettings};
 use crate::settings::{AngleSource, CurrentSensors, PlantSource, Settings, SettingsError};
 use crate::supply::Relay;
 use crate::tuning::{self, CurrentLoopDesign, FirstOrder, MotionDesign, TuningError};
+use catching::Catching;
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.
 const VERIFY_S: f32 = 0.3;

@@ -1,9 +1,8 @@
 //! The commands: accepted, limited or refused, depending on the state.
 
-use super::field::{Field, FluxPhase, Frame, Goal};
-use super::prepare::{Job, Prepare};
+use super::prepare::Prepare;
 use super::scalar::Scalar;
-use super::{Drive, Phase};
+use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
 
 use crate::drive::allowed::allowed;
 use crate::drive::command::{Accepted, Command, Refused};

@@ -3,8 +3,7 @@
 //! The current along phase a is regulated by one controller, with an optional carrier; the voltage across it is the
 //! carrier alone, without control. The dead time is not compensated: the commissioning measures it.
 
-use super::prepare::{Job, pulse};
-use super::{Drive, Kept, Left, Phase};
+use super::{Drive, Job, Kept, Left, Phase};
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
 use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
 use crate::current::sensing::Measured;
@@ -86,7 +85,7 @@ impl Excite {
         match self.wanted {
             Excitation::Pulses(pulses) => {
                 return Ok(
-                    match pulse(c, &WiringCheck::new(&pulses), &mut self.pulses, measured)? {
+                    match c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)? {
                         Some(compare) => compare,
                         None => {
                             self.trains = self.trains.wrapping_add(1);

@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::field::Field;
+use super::Field;
 use super::in_turn::StepResults;
 use super::trust::Trust;
 use crate::drive::coefficients::Coefficients;

@@ -18,9 +18,8 @@
 //! in a row each. The reference current is taken in sample 5 ([`REFERENCE_AT`]), where it is as old as the
 //! averages of sample 9.
 
-use super::Kept;
-use super::field::Field;
 use super::trust::{Judged, Lock, Trust};
+use super::{Field, Kept};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};

@@ -1,7 +1,6 @@
 //! Learning with the shaft locked, as a state of the drive.
 
-use super::field::{Field, FluxPhase};
-use super::{Drive, End, Kept, Phase};
+use super::{Drive, End, Field, FluxPhase, Kept, Phase};
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};

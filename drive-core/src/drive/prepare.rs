@@ -1,19 +1,17 @@
 //! From off to the first current: offsets, bootstraps, wiring.
 
 use super::excite::Excite;
-use super::field::{Field, FluxPhase, Goal};
 use super::scalar::Scalar;
-use super::{Drive, Kept, Left, Phase, References, Telemetry};
+use super::{Drive, Field, FluxPhase, Goal, Job, Kept, Left, Phase, References, Telemetry};
 use crate::current::sensing::Measured;
 use crate::drive::coefficients::Coefficients;
-use crate::drive::excitation::Excitation;
-use crate::drive::state::{Mode, State};
+use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::catch::CatchState;
 use crate::io::{Compare, Sample};
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
-use crate::protect::wiring_check::{WiringAction, WiringCheck, WiringCheckState};
+use crate::protect::wiring_check::WiringCheckState;
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
 const LOW_SIDES_ON_FROM: u32 = 4;
@@ -36,43 +34,6 @@ pub(super) enum Preparation {
     Wiring(WiringCheckState),
 }
 
-/// The work that a drive was started for.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Job {
-    Field(Goal),
-    Scalar {
-        /// Reference of the speed, mechanical turns/s.
-        speed: f32,
-    },
-    Excite(Excitation),
-}
-
-impl Job {
-    pub fn of_mode(mode: Mode) -> Self {
-        match mode {
-            Mode::Torque => Self::Field(Goal::Torque),
-            Mode::Speed => Self::Field(Goal::SPEED),
-            Mode::Position => Self::Field(Goal::POSITION),
-            Mode::Learning => Self::Field(Goal::Learn),
-            Mode::VoltsPerHertz => Self::Scalar { speed: 0.0 },
-            Mode::Commissioning => Self::Excite(Excitation::Rest),
-        }
-    }
-
-    pub fn mode(&self) -> Mode {
-        match self {
-            Self::Field(goal) => goal.mode(),
-            Self::Scalar { .. } => Mode::VoltsPerHertz,
-            Self::Excite(_) => Mode::Commissioning,
-        }
-    }
-
-    /// Whether its start looks for a turning shaft. A drive that learns has a locked one.
-    pub fn catches(&self, c: &Coefficients) -> bool {
-        c.catching.is_some() && matches!(self, Self::Field(goal) if goal.regulates())
-    }
-}
-
 impl Prepare {
     pub fn state(&self) -> State {
         match self.step {
@@ -81,26 +42,6 @@ impl Prepare {
             Preparation::Wiring(_) => State::CheckingWiring,
         }
     }
-}
-
-/// A period of a pulse train, short voltages without control; `None` after its end.
-///
-/// # Errors
-/// [`Fault`] of a wiring that drives too much current.
-pub(super) fn pulse(
-    c: &Coefficients,
-    pulses: &WiringCheck,
-    state: &mut WiringCheckState,
-    measured: &Measured,
-) -> Result<Option<Compare>, Fault> {
-    Ok(match pulses.step(state, measured.phases)? {
-        WiringAction::Apply { voltage, current } => {
-            let signs = c.dead_time.signs(current.to_abc());
-            let compensation = c.dead_time.voltage(signs, measured.dc_link, 0.0);
-            Some(Compare::on(c.modulator.step(voltage, compensation, measured.dc_link).compare))
-        }
-        WiringAction::Ended => None,
-    })
 }
 
 impl Drive {
@@ -142,7 +83,7 @@ impl Drive {
                     }
                 }
             }
-            Preparation::Wiring(pulses) => match pulse(c, &c.wiring, pulses, measured)? {
+            Preparation::Wiring(pulses) => match c.pulse(&c.wiring, pulses, measured)? {
                 Some(compare) => return Ok(compare),
                 None => {
                     c.wiring.judge(&pulses.answers())?;

@@ -4,7 +4,8 @@ use super::Kept;
 use crate::current::sensing::{Measured, SensingState};
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
-use crate::io::{Hardware, Sample};
+use crate::io::{Compare, Hardware, Sample};
+use crate::protect::wiring_check::{WiringAction, WiringCheck, WiringCheckState};
 
 impl Coefficients {
     /// Checks a sample, with the outputs on or about to be.
@@ -38,6 +39,30 @@ impl Coefficients {
         } else {
             Ok(())
         }
+    }
+}
+
+impl Coefficients {
+    /// A period of a pulse train, short voltages without control; `None` after its end.
+    ///
+    /// # Errors
+    /// [`Fault`] of a wiring that drives too much current.
+    pub(super) fn pulse(
+        &self,
+        pulses: &WiringCheck,
+        state: &mut WiringCheckState,
+        measured: &Measured,
+    ) -> Result<Option<Compare>, Fault> {
+        Ok(match pulses.step(state, measured.phases)? {
+            WiringAction::Apply { voltage, current } => {
+                let signs = self.dead_time.signs(current.to_abc());
+                let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
+                Some(Compare::on(
+                    self.modulator.step(voltage, compensation, measured.dc_link).compare,
+                ))
+            }
+            WiringAction::Ended => None,
+        })
     }
 }
 

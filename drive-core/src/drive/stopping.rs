@@ -1,7 +1,6 @@
 //! The ways to stop.
 
-use super::field::{Field, FluxPhase, Goal};
-use super::{Drive, End, Kept, Phase};
+use super::{Drive, End, Field, FluxPhase, Goal, Kept, Phase};
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::Stop;
 

@@ -6,8 +6,6 @@ mod motor;
 mod protections;
 mod trust;
 
-use super::field::Goal;
-use super::prepare::Job;
 use super::*;
 use crate::filter::dissertation::LPF;
 use crate::math::frames::{Abc, AlphaBeta};

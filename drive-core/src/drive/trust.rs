@@ -5,7 +5,7 @@ use Judged::{No, Strictly, Tolerantly};
 use Lock::{Baseline, Off, OwnBaseline, Watch};
 use Source::{Both, Injection, Nothing, Slip};
 
-use super::field::{Field, FluxPhase, Frame};
+use super::{Field, FluxPhase, Frame};
 use crate::drive::coefficients::Coefficients;
 use crate::flux::hand_over::Source;
 

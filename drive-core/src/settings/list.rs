@@ -7,10 +7,11 @@
 //! A rule is a number that was tried on the dissertation's motor and board, in proportion to the quantity that it depends on;
 //! see [`rules`](super::rules).
 
+use core::f32::consts::SQRT_2;
+
 use super::declare::{rule, settings};
 use super::entry::{Access, Change, Entry, entry};
-use super::rules::dc_link::{LOW_OF_TRIP, MARGIN};
-use super::rules::{RATED_A, WITHIN, either_sign, or_rule};
+use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::table::{CarrierTable, ReferenceTable};
 use super::value::Words;
 use super::{AngleSource, CurrentSensors, Flux, Line, PlantSource};
@@ -18,6 +19,8 @@ use crate::carrier::DemodulatorKind;
 use crate::carrier::demodulator::{MAX_RMS_SAMPLES, MIN_RMS_SAMPLES};
 use crate::io::PERIOD_S;
 
+/// Rated current of the dissertation's motor, A peak (Table 3, star).
+pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
 settings! {
     /// The motor: T-equivalent circuit per phase (Figure 21), star, SI units. Defaults: Table 5; the inertia is assumed.
     Motor "motor." [motor] {

@@ -35,16 +35,14 @@ pub mod dc_link;
 
 use core::f32::consts::{SQRT_2, TAU};
 
+use super::list::RATED_A;
+use super::numbers::{WITHIN, either_sign};
 use super::table::{CarrierTable, ReferenceTable, SlopeTable};
-use super::{
-    AngleSource, CurrentSensors, Flux, IdentifiedPlant, Inverter, Line, Motor, Nameplate, Settings,
-};
+use super::{AngleSource, CurrentSensors, Flux, IdentifiedPlant, Inverter, Line, Motor, Settings};
 use crate::carrier::DemodulatorKind;
 use crate::io::{CONVERTER_CODES, PERIOD_S};
 use crate::tuning::{FirstOrder, motor_plant};
 
-/// Rated current of the dissertation's motor, A peak (Table 3, star).
-pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
 /// Carrier current per direct current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
 /// Carrier current at most, as a share of the room between the current limit and the trip: the rest is for noise and
@@ -52,25 +50,8 @@ const CARRIER_OF_I_D: f32 = 0.368_07;
 const CARRIER_OF_ROOM: f32 = 0.75;
 /// Peak of the phase voltage per voltage between lines, rms: the root of 2/3.
 pub(crate) const PEAK_OF_PHASE: f32 = 0.816_496_6;
-/// Rules end this far within the limits of the power stage and of other settings, since they round to four digits.
-pub(super) const WITHIN: f32 = 0.998;
 /// Frequency of the carrier, Hz.
 pub(crate) const CARRIER_HZ: f32 = 600.0;
-
-/// The value that was set or, if none was, that of the rule, rounded to four digits.
-pub(super) fn or_rule(s: &Settings, set: Option<f32>, rule: fn(&Settings) -> f32) -> f32 {
-    set.unwrap_or_else(|| {
-        let value = f64::from(rule(s));
-        // Zero has no first digit.
-        let last = libm::pow(10.0, libm::floor(libm::log10(value.abs().max(1e-30))) - 3.0);
-        (libm::round(value / last) * last) as f32
-    })
-}
-
-/// The range of a value that has either sign, but is not zero.
-pub(super) fn either_sign(value: f32, min: f32, max: f32) -> (f32, f32) {
-    if value < 0.0 { (-max, -min) } else { (min, max) }
-}
 
 /// Quantities that the rules are in proportion to.
 impl Settings {

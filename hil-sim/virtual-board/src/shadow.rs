@@ -174,7 +174,7 @@ impl Shadow {
         if self.drive.tracks_rotor()
             && let Some(tracking) = &mut self.tracking
         {
-            let seen = Observation::new(self.compared as u32, &self.drive.telemetry());
+            let seen = Observation::new(self.compared as u32, self.drive.telemetry());
             self.tau_r = tracking.take(&seen).or(self.tau_r);
         }
         Ok(())

@@ -22,7 +22,7 @@ fn found_on_a_motor(settings: &Settings) -> Session {
     for n in 0.. {
         rig.step();
         if rig.drive.excites() {
-            session.take(&Observation::new(n, &rig.drive.telemetry()));
+            session.take(&Observation::new(n, rig.drive.telemetry()));
         }
         if let Some(Action::Command(command)) = session.poll(&rig.drive.excited()) {
             rig.drive.command(&command).unwrap();

@@ -1,7 +1,6 @@
 //! The table of [`Trust`] in every phase of the flux and for every source of the angle.
 
 use super::*;
-use crate::drive::field::{FluxPhase, Frame};
 use crate::drive::trust::{Judged, Lock, Trust};
 use crate::flux::catch::CatchState;
 use crate::flux::hand_over::Source;

@@ -1,9 +1,9 @@
 //! The rules for the voltages of the dc link.
 
-use super::WITHIN;
 use crate::dc_link::{ChopperSettings, DcLinkSettings};
 use crate::io::{CONVERTER_CODES, periods};
 use crate::settings::Settings;
+use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
 use crate::supply::Relay;
 
 /// Highest dc link above which a drive trips, in relation to the highest in operation.
@@ -18,11 +18,6 @@ const STEADY_V: f32 = 5.0;
 
 /// Largest dc link without generating torque, in relation to the voltage that trips.
 const HIGH_OF_TRIP: f32 = 0.975;
-/// Least dc link without motoring torque, likewise.
-pub(in crate::settings) const LOW_OF_TRIP: f32 = 1.15;
-/// `braking.high_v` and `.low_v` stay this far from their neighbours.
-pub(in crate::settings) const MARGIN: f32 = 0.05;
-
 impl Settings {
     /// Highest dc link that the power stage stands in operation, V.
     pub fn highest_dc_link_v(&self) -> f32 {
