@@ -100,7 +100,7 @@ pub enum Next {
     Done,
 }
 
-/// What a step asks for next.
+/// The next request of a step.
 type Answer = Result<Next, Refusal>;
 
 /// A part of a step: what is recorded, for how many seconds, and the excitation.
@@ -134,15 +134,15 @@ struct StepState {
     search: Option<Search>,
     /// The current loop along and across, once it is designed.
     design: Option<Result<[CurrentLoopDesign; 2], TuningError>>,
-    /// Of the wiring: volt-seconds of the present train of pulses, V s, and trains before it.
+    /// Wiring: volt-seconds of the present train of pulses, V s, and trains before it.
     volt_seconds: f32,
     trains: u32,
-    /// Of the levels: what the first two have shown.
+    /// Levels: the fit to the first two.
     fitted: Fitted,
     stairs: Staircase,
     /// The plants along and across that the current loop is to be designed for.
     plants: [Option<FirstOrder>; 2],
-    /// Of the inertia: torque current, A, and whether it is that of the measurement.
+    /// Inertia: torque current, A, and whether it is that of the measurement.
     amperes: f32,
     measures: bool,
 }

@@ -75,7 +75,7 @@ pub struct Collector {
     bins: [[Bin; BINS]; 2],
 }
 
-/// What a record has collected since it began.
+/// Contents of a record since it began.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Recorded {
     record: Record,

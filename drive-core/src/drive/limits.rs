@@ -28,7 +28,6 @@ impl Limits {
     }
 
     /// The torque current within the limits, A.
-    #[inline(always)]
     pub fn hold(&mut self, i_q: f32) -> f32 {
         let (held, why) = self.now.hold(i_q);
         self.why = why;
