@@ -10,19 +10,20 @@
 use std::hint::black_box;
 
 use drive_core::identify::rls::{Rls, RlsSettings};
-use drive_core::{AlphaBeta, Command, Drive, Mode, Sample};
+use drive_core::{AlphaBeta, Command, Drive, Measured, Mode};
 use gungraun::{library_benchmark, library_benchmark_group, main};
 use hil_sim::Config;
 use hil_sim::rig::Rig;
 
-/// A drive that regulates 1.5 A without a sensor, and the next sample.
-fn regulating() -> (Drive, Sample) {
+/// A drive that regulates 1.5 A without a sensor, and its next input.
+fn regulating() -> (Drive, Measured) {
     let mut rig = Rig::from_config(&Config::default(), 1).expect("the default rig");
     rig.start(Mode::Torque).expect("a start");
     rig.command(&Command::Torque(1.5)).expect("a reference");
     rig.run(0.5, |_| {});
     let sample = rig.plant.sample();
-    (rig.drive, sample)
+    let measured = rig.drive.front_end().measure(&mut rig.front_end, &sample);
+    (rig.drive, measured)
 }
 
 /// Voltage and current of a sample: what they are makes no difference to the count.
@@ -44,8 +45,8 @@ fn estimating() -> (Rls, AlphaBeta, AlphaBeta) {
 }
 
 #[library_benchmark(setup = regulating)]
-fn drive_step((mut drive, sample): (Drive, Sample)) -> Drive {
-    black_box(drive.step(black_box(&sample)));
+fn drive_step((mut drive, measured): (Drive, Measured)) -> Drive {
+    black_box(drive.step(black_box(&measured)));
     drive
 }
 

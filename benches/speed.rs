@@ -6,7 +6,7 @@
 //! simulation runs.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use drive_core::{Command, Mode, Sample};
+use drive_core::{Command, Measured, Mode};
 use hil_sim::Config;
 use hil_sim::rig::Rig;
 use std::hint::black_box;
@@ -29,19 +29,21 @@ fn speed(c: &mut Criterion) {
         // A second of recorded samples, replayed from the state in which the recording began.
         let mut recorder = rig(changes);
         let begin = recorder.drive.clone();
-        let samples: Vec<Sample> = (0..6000)
+        let inputs: Vec<Measured> = (0..6000)
             .map(|_| {
                 let sample = recorder.plant.sample();
+                let mut front_end = recorder.front_end;
+                let measured = recorder.drive.front_end().measure(&mut front_end, &sample);
                 recorder.step_with(&sample);
-                sample
+                measured
             })
             .collect();
         c.bench_function(&format!("Drive::step, {name}, 6000 periods"), |b| {
             b.iter_batched_ref(
                 || begin.clone(),
                 |drive| {
-                    for sample in &samples {
-                        black_box(drive.step(black_box(sample)));
+                    for measured in &inputs {
+                        black_box(drive.step(black_box(measured)));
                     }
                 },
                 criterion::BatchSize::SmallInput,

@@ -4,7 +4,7 @@
 mod common;
 
 use common::config;
-use drive_core::{Command, Compare, Drive, Fault, Mode, Sample, State};
+use drive_core::{Command, Compare, Drive, Fault, FrontEndState, Mode, Sample, State};
 use hil_sim::config::plant_settings;
 use hil_sim::plant::{Channel, CurrentFault, Plant};
 
@@ -33,7 +33,7 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
     }
     drive.command(&Command::CheckWiring).unwrap();
     drive.command(&Command::Start(Mode::Torque)).unwrap();
-    let mut pending = Compare::OFF;
+    let (mut pending, mut front_end) = (Compare::OFF, FrontEndState::default());
     let mut peak = 0.0_f64;
     for _ in 0..6000 {
         let mut sample = plant.sample();
@@ -51,7 +51,9 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
             }
             _ => {}
         }
-        let compare = drive.step(&sample);
+        let measured = drive.front_end().measure(&mut front_end, &sample);
+        let output = drive.step(&measured);
+        let compare = drive.front_end().put_out(&mut front_end, &output);
         if !compare.enabled {
             pending = Compare::OFF;
         }

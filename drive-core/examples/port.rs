@@ -1,7 +1,7 @@
 //! The drive on another chip.
 //!
 //! A port brings four things: a board (what the timer, the converters and the encoder do), settings with the scales of
-//! its sensors, an interrupt that calls [`Drive::step`] and [`Drive::after_step`] 6000 times a second, and a task that gives
+//! its sensors, an interrupt that calls the front end and [`Drive::step`] 6000 times a second, and a task that gives
 //! commands. Here the board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
 //! one producer and one consumer, such as `heapless::spsc::Queue`.
 //!
@@ -12,7 +12,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use drive_core::identify::learning::Learned;
 use drive_core::settings::{Line, Ntc, Scales, Settings};
-use drive_core::{Accepted, Command, Compare, Drive, Hardware, Mode, Refused, Sample};
+use drive_core::{
+    Accepted, Command, Compare, Drive, FrontEndState, Hardware, Mode, Refused, Sample,
+};
 
 /// Hardware access of the interrupt.
 trait Board {
@@ -84,6 +86,7 @@ fn settings() -> Settings {
 struct Interrupt<B> {
     board: B,
     drive: Drive,
+    front_end: FrontEndState,
     commands: Receiver<Command>,
     answers: SyncSender<Result<Accepted, Refused>>,
 }
@@ -92,12 +95,10 @@ impl<B: Board> Interrupt<B> {
     /// Called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
         let sample = self.board.sample();
-        let compare = self.drive.step(&sample);
-        self.board.output(&compare);
-        // The compare values are out. The thermal limits and the precharge relay come after them; without this call a hot drive
-        // does not lower its current.
-        let relay = self.drive.after_step(&sample);
-        self.board.dc_link(self.drive.brake_duty(), relay);
+        let measured = self.drive.front_end().measure(&mut self.front_end, &sample);
+        let output = self.drive.step(&measured);
+        self.board.output(&self.drive.front_end().put_out(&mut self.front_end, &output));
+        self.board.dc_link(output.chopper, output.relay);
         // The rest of the period belongs to commands.
         if let Ok(command) = self.commands.try_recv() {
             let _ = self.answers.try_send(self.drive.command(&command));
@@ -126,7 +127,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (order, commands) = sync_channel(1);
     let (answers, answer) = sync_channel(1);
     let drive = Drive::new(coefficients);
-    let mut interrupt = Interrupt { board: Idle, drive, commands, answers };
+    let front_end = FrontEndState::default();
+    let mut interrupt = Interrupt { board: Idle, drive, front_end, commands, answers };
 
     // The task: one command, one answer.
     order.send(Command::Start(Mode::Torque))?;
@@ -175,7 +177,8 @@ mod tests {
         settings.supply.relay_s = 0.1;
         let drive = Drive::new(settings.build().unwrap());
         let (commands, answers) = (sync_channel(1).1, sync_channel(1).0);
-        let mut interrupt = Interrupt { board: Watched(false), drive, commands, answers };
+        let (board, front_end) = (Watched(false), FrontEndState::default());
+        let mut interrupt = Interrupt { board, drive, front_end, commands, answers };
         let mut closed = |periods: u32| {
             (0..periods).for_each(|_| interrupt.on_period());
             interrupt.board.0

@@ -1,9 +1,7 @@
-//! The current loop and the inverter: current sensing, PI control, dead-time compensation, modulation.
+//! The current loop and the inverter: PI control, dead-time compensation, modulation.
 
 pub mod dead_time;
 pub mod inverter_drop;
 pub mod modulation;
 pub mod pi;
-pub mod sensing;
-pub mod shunts;
 pub mod voltage_limit;

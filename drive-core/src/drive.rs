@@ -30,7 +30,6 @@ use core::ops::Range;
 use crate::carrier::injection::Carrier;
 use crate::current::inverter_drop::InverterDropState;
 use crate::current::pi::{DqPiState, ReferenceState};
-use crate::current::sensing::SensingState;
 use crate::fault::Fault;
 use crate::filter::dissertation::LpfState;
 use crate::flux::catch::CatchState;
@@ -38,8 +37,9 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::flux::observer::{Induced, ObserverState};
+use crate::front_end::FrontEnd;
 use crate::identify::learning::{Learned, LearningState};
-use crate::io::{Compare, Sample};
+use crate::io::{Measured, Output};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::Dq;
 use crate::motion::{MotionState, RotorCount};
@@ -67,15 +67,18 @@ pub use telemetry::{Room, Telemetry};
 ///
 /// ```
 /// use drive_core::settings::{AngleSource, Settings};
-/// use drive_core::{Command, Drive, Mode, Sample, State};
+/// use drive_core::{Command, Drive, FrontEndState, Mode, Sample, State};
 ///
 /// // Without an encoder it would have to learn its motor first.
 /// let settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };
 /// let mut drive = Drive::new(settings.build()?);
+/// let mut front_end = FrontEndState::default();
 /// drive.command(&Command::Start(Mode::Torque))?;
-/// // Codes of zero current and 311 V.
+/// // One period, with codes of zero current, 311 V and 25 °C.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };
-/// let compare = drive.step(&sample);
+/// let measured = drive.front_end().measure(&mut front_end, &sample);
+/// let output = drive.step(&measured);
+/// let compare = drive.front_end().put_out(&mut front_end, &output);
 /// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
 /// assert_eq!(drive.state(), State::Calibrating);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -96,7 +99,8 @@ pub struct Drive {
 struct Kept {
     /// Control periods spent in this state.
     elapsed: u32,
-    sensing: SensingState,
+    /// Offsets of the current sensors that the last start has measured, A.
+    offsets: [f32; 3],
     /// Of the last step with the outputs on.
     seen: Telemetry,
     rotor_count: u32,
@@ -399,43 +403,50 @@ impl Drive {
         }
     }
 
-    /// One PWM period: from the sample of instant `k T` to the compare values of the period that
-    /// begins at `(k + 1) T`.
+    /// Coefficients of the front end.
+    pub fn front_end(&self) -> &FrontEnd {
+        &self.c.front_end
+    }
+
+    /// One PWM period: from that which was measured at instant `k T` to the duties of the period that begins at `(k + 1) T`.
     ///
-    /// [`Self::after_step`] completes the period once the outputs are set.
-    ///
-    /// Never panics. Whatever is wrong with the sample or with the state becomes a latched fault,
+    /// Never panics. Whatever is wrong with the input or with the state becomes a latched fault,
     /// with the outputs off in the same step.
     #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
-    pub fn step(&mut self, sample: &Sample) -> Compare {
+    pub fn step(&mut self, measured: &Measured) -> Output {
         let result = match &mut self.phase {
-            Phase::Field(field) => field.step(&self.c, &mut self.kept, sample),
-            Phase::Off(_) | Phase::Fault(..) => Ok(Compare::OFF),
+            Phase::Field(field) => field.step(&self.c, &mut self.kept, measured).map(Output::on),
+            Phase::Off(_) | Phase::Fault(..) => Ok(Output::default()),
             Phase::Prepare(_) | Phase::Excite(_) | Phase::Scalar(_) => {
-                self.step_without_flux(sample)
+                self.step_without_flux(measured)
             }
         };
         self.kept.elapsed = self.kept.elapsed.wrapping_add(1);
-        let result = result.and_then(|compare| self.watch_load().map(|()| compare));
-        let compare = result.unwrap_or_else(|end| {
+        let result = result.and_then(|output| self.watch_load(measured).map(|()| output));
+        let mut output = result.unwrap_or_else(|end| {
             self.end(end);
-            Compare::OFF
+            Output::default()
         });
-        self.c.sensing.applied(&mut self.kept.sensing, &compare);
-        compare
+        if self.is_energised() {
+            output.chopper = self.kept.limits.now.chopper;
+        }
+        if let Some(relay) = &self.c.relay {
+            relay.step(&mut self.kept.relay, measured.dc_link);
+            output.relay = self.kept.relay.closed;
+        }
+        output
     }
 
     /// A step without current control in a frame of the flux.
     #[cold]
-    fn step_without_flux(&mut self, sample: &Sample) -> Result<Compare, End> {
+    fn step_without_flux(&mut self, measured: &Measured) -> Result<Output, End> {
         let (c, k) = (&self.c, &mut self.kept);
-        let measured = c.sensing.step(&mut k.sensing, sample);
-        c.protect(&k.sensing, sample, &measured)?;
+        c.protect(measured)?;
         match &mut self.phase {
-            Phase::Prepare(_) => Ok(self.prepare(sample, &measured)?),
-            Phase::Excite(excite) => Ok(excite.step(c, k, &measured)?),
-            Phase::Scalar(scalar) => scalar.step(c, k, &measured),
-            Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(Compare::OFF),
+            Phase::Prepare(_) => Ok(self.prepare(measured)?),
+            Phase::Excite(excite) => Ok(Output::on(excite.step(c, k, measured)?)),
+            Phase::Scalar(scalar) => scalar.step(c, k, measured).map(Output::on),
+            Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(Output::default()),
         }
     }
 

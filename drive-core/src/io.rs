@@ -1,16 +1,20 @@
-//! Input and output of the control step: [`Sample`] and [`Compare`].
+//! Input and output of the control step: [`Measured`] and [`Output`]; and of the [front end](crate::front_end) around it, in
+//! converter codes and timer counts: [`Sample`] and [`Compare`].
 //!
 //! # The delay convention
 //!
 //! One PWM period lasts `T` = 1/6000 s. It begins and ends with all low sides on (vector O_000),
 //! and at that instant, `t = k T`, the currents are sampled. [`Drive::step`](crate::Drive::step)
-//! turns the sample of instant `k` into the compare values of the period from `(k + 1) T` to
+//! turns the sample of instant `k` into the duties of the period from `(k + 1) T` to
 //! `(k + 2) T`: the timer preloads them and takes them over at the next period boundary. So
 //!
 //! * a voltage takes effect one period after the sample it was computed from, and
 //! * its mean acts at `(k + 1.5) T`.
 
 use bitflags::bitflags;
+
+use crate::fault::Fault;
+use crate::math::frames::{Abc, AlphaBeta};
 
 /// Period of the control, s: 6 kHz. Filters and carrier are made for this rate alone.
 pub const PERIOD_S: f32 = 1.0 / 6000.0;
@@ -23,9 +27,56 @@ pub(crate) fn periods(seconds: f32) -> u32 {
     libm::roundf(seconds / PERIOD_S) as u32
 }
 
-/// The readings of converters and encoder at the instant `k T` of one PWM period.
-///
-/// Plain register values: scaling is the drive's work, so that there is one place for it.
+/// Input of a control step: the quantities at the instant `k T` of one PWM period, in SI units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Currents into the motor, A, without the offsets of their sensors; c is -(a + b).
+    pub phases: Abc,
+    /// Current c by a sensor of its own, A; `phases.c` where there is none. Only the measurement of the offsets uses it.
+    pub third: f32,
+    /// Dc-link voltage, V.
+    pub dc_link: f32,
+    /// Share of the current that the heat sink bears, 0 to 1.
+    pub heat_sink: f32,
+    /// Position counter of the quadrature encoder, four counts a line, wrapping, upwards when the
+    /// rotor turns from phase a towards phase b.
+    pub encoder: u32,
+    /// Events since the last step.
+    pub hardware: Hardware,
+    /// A sensor that cannot be believed. No fault while the outputs are off.
+    pub fault: Option<Fault>,
+}
+
+impl Measured {
+    /// The current in the stator frame, A peak.
+    pub fn current(&self) -> AlphaBeta {
+        AlphaBeta::from_two_phases(self.phases.a, self.phases.b)
+    }
+}
+
+/// Output of a control step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output {
+    /// Duties of the high sides of a, b, c, 0 to 1, for the period from `(k + 1) T` to `(k + 2) T`. `None`: all six switches
+    /// go off at once, without waiting for the period to end.
+    pub duties: Option<[f32; 3]>,
+    /// Duty of the brake chopper in that period, 0 to 1.
+    pub chopper: f32,
+    /// Whether the precharge relay is to be closed; always `false` where the settings have none.
+    pub relay: bool,
+    /// Offsets of the current sensors a, b, c, A, in the step that has measured them: to be taken off from the next sample on,
+    /// until the outputs have been on and are off again.
+    pub offsets: Option<[f32; 3]>,
+}
+
+impl Output {
+    /// Outputs on with these duties.
+    pub(crate) fn on(duties: [f32; 3]) -> Self {
+        Self { duties: Some(duties), ..Self::default() }
+    }
+}
+
+/// The readings of converters and encoder at the instant `k T` of one PWM period: plain register values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Converter code of the current into phase a.
@@ -90,9 +141,7 @@ impl Compare {
     pub const OFF: Self = Self { a: 0, b: 0, c: 0, enabled: false };
     /// All low sides on: zero voltage, and the bootstrap capacitors charge.
     pub const LOW_SIDES_ON: Self = Self { a: 0, b: 0, c: 0, enabled: true };
-
-    /// Outputs on, with the compare values of a, b, c.
-    pub const fn on([a, b, c]: [u16; 3]) -> Self {
-        Self { a, b, c, enabled: true }
-    }
 }
+
+/// Duties with all low sides on.
+pub(crate) const LOW_SIDES_ON: [f32; 3] = [0.0; 3];

@@ -2,7 +2,8 @@
 //! speed, by a 600 Hz voltage injected on the quadrature axis.
 //!
 //! The whole drive is one type, [`Drive`], and the whole control one function, [`Drive::step`]:
-//! converter codes go in as a [`Sample`], timer values come out as a [`Compare`]. The same code runs
+//! currents and voltages go in as [`Measured`], duties come out as an [`Output`]. A [`FrontEnd`] around it converts codes of
+//! converters and counts of a timer. The same code runs
 //! in the control interrupt of the firmware and against the simulated motor on a host, and gives the
 //! same bits on both: angles are integers, sine and cosine come from one integer table, the step calls no
 //! transcendental function (its square roots are those of libm, in software on both), and no
@@ -11,14 +12,15 @@
 //! Inside, one direction only:
 //!
 //! ```text
-//! sensing -> frames -> filters -> flux angle -> current loop -> injection -> dead time -> modulation
+//! front end -> frames -> filters -> flux angle -> current loop -> injection -> dead time -> modulation -> front end
 //! ```
 //!
 //! | room | contents |
 //! |---|---|
-//! | [`io`], [`fault`] | sample and compare values; the numbered faults |
+//! | [`io`], [`fault`] | input and output of a step; the numbered faults |
+//! | [`front_end`] | converter codes to SI units, duties to timer counts |
 //! | [`math`], [`filter`] | angles and frames; second-order sections |
-//! | [`current`] | sensing, PI, modulation, dead time and drop of the inverter |
+//! | [`current`] | PI, modulation, dead time and drop of the inverter |
 //! | [`carrier`] | the injected voltage and the demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
 //! | [`motion`] | speed and position loop |
@@ -54,6 +56,7 @@ mod drive;
 pub mod fault;
 pub mod filter;
 pub mod flux;
+pub mod front_end;
 pub mod homing;
 pub mod identify;
 pub mod io;
@@ -70,7 +73,8 @@ pub use drive::{
     Room, Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
-pub use io::{Compare, Hardware, Sample};
+pub use front_end::{FrontEnd, FrontEndState};
+pub use io::{Compare, Hardware, Measured, Output, Sample};
 pub use math::angle::{Angle, UnitVector};
 pub use math::frames::{Abc, AlphaBeta, DmQm, Dq};
 pub use settings::Settings;

@@ -2,6 +2,7 @@
 
 pub mod lock_monitor;
 pub mod noise_watch;
+pub mod offsets;
 pub mod plausibility;
 pub mod saliency_check;
 pub mod thermal;

@@ -4,16 +4,14 @@
 //! that voltage. Steady is a voltage within [`Relay`]'s band of the one with which the time began: behind a resistor R
 //! and a capacitor C the link approaches its end E as `E - v = (E - v_0) exp(-t/RC)`, so that at most
 //! `band / (exp(t/RC) - 1)` is missing where it closes.
-//!
-//! Converter codes are compared, so that a step takes no conversion.
 
 /// Coefficients of the relay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relay {
-    /// Code at which it opens.
-    least: u16,
-    /// Largest distance of a steady link, codes.
-    band: u16,
+    /// Voltage below which it opens, V.
+    least_v: f32,
+    /// Largest distance of a steady link, V.
+    band_v: f32,
     /// Control periods of a steady link until it closes.
     settle: u32,
 }
@@ -21,27 +19,29 @@ pub struct Relay {
 /// State of the relay. It is kept over stops and starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RelayState {
-    /// Code with which the steady time began, and its control periods so far.
-    from: u16,
+    /// Voltage with which the steady time began, V, and its control periods so far.
+    from_v: f32,
     steady: u32,
     /// Whether it is closed.
     pub closed: bool,
 }
 
 impl Relay {
-    /// A relay that closes `settle` control periods after the link has become steady within `band`, and opens below
-    /// `least`, both converter codes.
-    pub fn new(least: u16, band: u16, settle: u32) -> Self {
-        Self { least, band, settle }
+    /// A relay that closes `settle` control periods after the link has become steady within `band_v`, and opens below
+    /// `least_v`, both V.
+    pub fn new(least_v: f32, band_v: f32, settle: u32) -> Self {
+        Self { least_v, band_v, settle }
     }
 
-    /// One control period with the code of the dc link.
-    pub fn step(&self, state: &mut RelayState, code: u16) {
-        if code < self.least {
+    /// One control period with the voltage of the dc link, V.
+    pub fn step(&self, state: &mut RelayState, dc_link: f32) {
+        // False for NaN.
+        let charged = dc_link >= self.least_v;
+        if !charged {
             *state = RelayState::default();
         } else if state.closed {
-        } else if code.abs_diff(state.from) > self.band {
-            (state.from, state.steady) = (code, 0);
+        } else if (dc_link - state.from_v).abs() > self.band_v {
+            (state.from_v, state.steady) = (dc_link, 0);
         } else {
             state.steady += 1;
             state.closed = state.steady >= self.settle;
@@ -55,29 +55,23 @@ mod tests {
     use super::*;
     use crate::io::PERIOD_S;
 
-    /// Volts of a code.
-    const GAIN: f32 = 0.11;
     const END_V: f32 = 311.0;
-
-    fn code(v: f32) -> u16 {
-        (v / GAIN) as u16
-    }
 
     /// Link through R C from 0: closed when it is steady, within what the head of this file states, and not at once.
     #[test]
     fn it_closes_near_the_end_of_charging_whatever_the_resistor() {
         for tau_s in [0.05_f32, 0.5, 2.0] {
-            let relay = Relay::new(code(200.0), code(5.0) - code(0.0), 3000);
+            let relay = Relay::new(200.0, 5.0, 3000);
             let mut state = RelayState::default();
             let (mut v, mut n) = (0.0_f32, 0);
             while !state.closed {
                 v += (END_V - v) * PERIOD_S / tau_s;
-                relay.step(&mut state, code(v));
+                relay.step(&mut state, v);
                 n += 1;
                 assert!(n < 1_000_000, "never closed with {tau_s} s");
             }
-            // Two codes for the rounding of both voltages.
-            let missing = 5.0 / ((0.5 / tau_s).exp() - 1.0) + 2.0 * GAIN;
+            // And 10 mV for the rounding of the voltage.
+            let missing = 5.0 / ((0.5 / tau_s).exp() - 1.0) + 0.01;
             assert!(END_V - v <= missing, "{tau_s} s: {v} V, {missing} V may be missing");
             assert!(n > 3000, "{tau_s} s: after {n} periods");
         }
@@ -85,10 +79,10 @@ mod tests {
 
     #[test]
     fn it_opens_at_once_below_the_least_and_closes_anew() {
-        let relay = Relay::new(code(200.0), code(5.0) - code(0.0), 10);
+        let relay = Relay::new(200.0, 5.0, 10);
         let mut state = RelayState::default();
         let steps = |state: &mut RelayState, v: f32, n: u32| {
-            (0..n).for_each(|_| relay.step(state, code(v)));
+            (0..n).for_each(|_| relay.step(state, v));
             state.closed
         };
         assert!(!steps(&mut state, 311.0, 10) && steps(&mut state, 311.0, 1));
@@ -98,6 +92,6 @@ mod tests {
         assert!(!steps(&mut state, 311.0, 10) && steps(&mut state, 311.0, 1));
         // Steady, but too low.
         state = RelayState::default();
-        assert!(!steps(&mut state, 199.0, 1000));
+        assert!(!steps(&mut state, 199.0, 1000) && !steps(&mut state, f32::NAN, 1000));
     }
 }

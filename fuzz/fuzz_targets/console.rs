@@ -5,7 +5,7 @@
 use std::sync::{LazyLock, OnceLock};
 
 use drive_core::identify::learning::{Learned, Verdict};
-use drive_core::{Drive, Sample, State};
+use drive_core::{Drive, Measured, State};
 use induction_drive::console::Console;
 use induction_drive::console::announce::ANNOUNCEMENTS;
 use induction_drive::console::grammar::{COMMANDS, LEVELS};
@@ -45,7 +45,7 @@ fuzz_target!(|bytes: &[u8]| {
             0xfc => now_ms = now_ms.wrapping_add(u32::MAX / 2),
             0xfd => port.room += 300,
             0xfe => {
-                drive.drive.step(&Sample { current_a: 2022, current_b: 2015, ..Sample::default() });
+                drive.drive.step(&Measured { dc_link: 311.0, ..Measured::default() });
             }
             0xff => console.poll(&mut port, &mut drive, now_ms),
             _ => port.sent.push_back(byte),

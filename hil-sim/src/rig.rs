@@ -6,7 +6,9 @@ use drive_core::carrier::DemodulatorKind;
 use drive_core::identify::learning::Learned;
 use drive_core::io::PERIOD_S;
 use drive_core::settings::AngleSource;
-use drive_core::{Accepted, Command, Compare, Drive, Mode, Sample, Settings, State, Stop};
+use drive_core::{
+    Accepted, Command, Compare, Drive, FrontEndState, Mode, Sample, Settings, State, Stop,
+};
 
 use crate::config::{self, Config, built, plant_settings};
 use crate::error::Error;
@@ -27,6 +29,8 @@ pub struct Rig {
     pub plant: Plant,
     /// The drive under test.
     pub drive: Drive,
+    /// State of its front end.
+    pub front_end: FrontEndState,
     /// Compare values on their way: computed in the last period, in force in this one.
     pending: Compare,
     periods: u64,
@@ -93,7 +97,8 @@ impl Rig {
 
     /// A drive that is off, connected to a motor at rest, both made already.
     pub fn of(plant: Plant, drive: Drive) -> Self {
-        Self { plant, drive, pending: Compare::OFF, periods: 0, learning_s: 0.0 }
+        let front_end = FrontEndState::default();
+        Self { plant, drive, front_end, pending: Compare::OFF, periods: 0, learning_s: 0.0 }
     }
 
     /// The bench that the configuration describes. With `prepare.learn` a drive that tracks the saliency has learned
@@ -180,13 +185,15 @@ impl Rig {
     /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
     #[inline]
     pub fn step_with(&mut self, sample: &Sample) {
-        let compare = self.drive.step(sample);
+        let measured = self.drive.front_end().measure(&mut self.front_end, sample);
+        let output = self.drive.step(&measured);
+        let compare = self.drive.front_end().put_out(&mut self.front_end, &output);
         if !compare.enabled {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;
         }
-        self.plant.set_chopper(self.drive.brake_duty().into());
-        self.plant.set_relay(self.drive.after_step(sample));
+        self.plant.set_chopper(output.chopper.into());
+        self.plant.set_relay(output.relay);
         self.plant.advance(&self.pending, f64::from(PERIOD_S));
         self.pending = compare;
         self.periods += 1;

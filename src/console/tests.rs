@@ -21,8 +21,17 @@ use doubles::{FakeDrive, FakePort, found};
 use drive_core::identify::learning::Verdict;
 use drive_core::identify::online::NoEstimate;
 use drive_core::io::PERIOD_S;
-use drive_core::{Command, Drive, Fault, Hardware, Mode, Sample, State, Stop};
+use drive_core::{
+    Command, Compare, Drive, Fault, FrontEndState, Hardware, Measured, Mode, Sample, State, Stop,
+};
 use proptest::prelude::*;
+
+/// A whole period of a drive with its front end.
+fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
+    let measured = drive.front_end().measure(front_end, sample);
+    let output = drive.step(&measured);
+    drive.front_end().put_out(front_end, &output)
+}
 
 struct Talk {
     console: Console,
@@ -147,8 +156,9 @@ fn the_first_start_after_the_defaults_checks_the_wiring_until_it_was_right_once(
         heat_sink: 1309,
         ..Sample::default()
     };
+    let mut front_end = FrontEndState::default();
     while !matches!(talk.drive.drive.state(), State::Fault(_)) {
-        talk.drive.drive.step(&sample);
+        step(&mut talk.drive.drive, &mut front_end, &sample);
     }
     assert_eq!(talk.drive.drive.state(), State::Fault(Fault::WiringNoCurrent));
     assert!(talk.ask("get wiring_checked").starts_with("wiring_checked = no (one of: no yes)"));
@@ -170,10 +180,10 @@ fn a_motor_that_is_wired_as_it_should_be_is_checked_once() {
     talk.drive.drive = Drive::new(settings.build().unwrap());
     let mut plant = hil_sim::plant::Plant::new(&Default::default(), 1).unwrap();
     assert_eq!(talk.ask("start"), "ok: the wiring is checked first");
-    let mut pending = drive_core::Compare::OFF;
+    let (mut pending, mut front_end) = (Compare::OFF, FrontEndState::default());
     while talk.drive.drive.state() != State::Magnetising {
         assert!(talk.drive.drive.state() != State::Off, "{}", talk.drive.drive.state());
-        let compare = talk.drive.drive.step(&plant.sample());
+        let compare = step(&mut talk.drive.drive, &mut front_end, &plant.sample());
         pending.enabled &= compare.enabled;
         plant.advance(&pending, f64::from(PERIOD_S));
         pending = compare;

@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use cortex_m::asm;
 use cortex_m::peripheral::{DWT, NVIC};
 use drive_core::identify::learning::Learned;
-use drive_core::{Command, Drive, Hardware, Sample, State};
+use drive_core::{Command, Drive, FrontEndState, Hardware, Sample, State};
 use heapless::spsc::Producer;
 use stm32g4xx_hal::pac::Interrupt;
 use stm32g4xx_hal::stm32::interrupt;
@@ -88,6 +88,7 @@ impl Control {
         }
         let running = Running {
             control: self,
+            front_end: FrontEndState::default(),
             periods: 0,
             worst_cycles: [0; 2],
             worst_latency: 0,
@@ -140,6 +141,7 @@ static RUNNING: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 struct Running {
     control: Control,
+    front_end: FrontEndState,
     periods: u32,
     /// Of periods without a command, and with one.
     worst_cycles: [u32; 2],
@@ -245,7 +247,9 @@ impl Running {
             hardware,
         };
 
-        pwm.apply(drive.step(&sample));
+        let measured = drive.front_end().measure(&mut self.front_end, &sample);
+        let output = drive.step(&measured);
+        pwm.apply(drive.front_end().put_out(&mut self.front_end, &output));
 
         // The timer was at its top again before all compare values were written.
         self.late = Hardware::empty();
@@ -263,8 +267,7 @@ impl Running {
             MISSED.store(true, Ordering::Relaxed);
         }
 
-        let relay = drive.after_step(&sample);
-        dc_link.set(drive.brake_duty(), relay);
+        dc_link.set(output.chopper, output.relay);
 
         // Between two steps: a command acts from the next step on.
         // There is room for the answer: the main loop takes the last one before it sends a command.

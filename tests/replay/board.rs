@@ -10,7 +10,7 @@
 
 use std::fs;
 
-use drive_core::{Command, Compare, Drive, Sample};
+use drive_core::{Command, Compare, Drive, FrontEndState, Sample};
 use induction_drive::console::grammar::{self, Request};
 use induction_drive::settings::FirmwareSettings;
 
@@ -26,18 +26,22 @@ fn replay(name: &str) -> (Vec<u64>, usize) {
     // The board that was recorded had not learned.
     settings.drive.injection.synchronous.allow_unlearned = true;
     let mut drive = Drive::new(settings.build().unwrap());
+    let mut front_end = FrontEndState::default();
 
     let mut compares = Vec::new();
     for (n, bytes) in samples.chunks_exact(12).enumerate() {
         let code = |at| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let compare = drive.step(&Sample {
+        let sample = Sample {
             current_a: code(0),
             current_b: code(2),
             dc_link: code(4),
             heat_sink: code(6),
             encoder: u32::from_le_bytes(bytes[8..].try_into().unwrap()),
             ..Sample::default()
-        });
+        };
+        let measured = drive.front_end().measure(&mut front_end, &sample);
+        let output = drive.step(&measured);
+        let compare = drive.front_end().put_out(&mut front_end, &output);
         compares.push(compare);
         if let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
             order(&mut drive, &mut settings, line);

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use drive_core::commission::{Collector, Commissioning, Next, Step};
-use drive_core::{Command, Compare, Drive, Mode, Sample, Settings, Stop, Telemetry};
+use drive_core::{
+    Command, Compare, Drive, FrontEndState, Mode, Output, Sample, Settings, Stop, Telemetry,
+};
 use induction_drive::console::grammar::{self, Request};
 
 use crate::scenes::Scene;
@@ -53,10 +55,10 @@ impl fmt::Display for Hashes {
 }
 
 impl Hashes {
-    fn push(&mut self, compare: &Compare, relay: bool, drive: &Drive) {
+    fn push(&mut self, compare: &Compare, output: &Output, drive: &Drive) {
         self.outputs.compare(compare);
-        self.outputs.push(&[u8::from(relay)]);
-        self.outputs.numbers(&[drive.brake_duty()]);
+        self.outputs.push(&[u8::from(output.relay)]);
+        self.outputs.numbers(&[output.chopper]);
         let t = drive.telemetry();
         let Telemetry { reference, current, voltage, realised, .. } = t;
         let b = &mut self.beliefs;
@@ -171,7 +173,7 @@ impl Player {
 
 /// Gives a drive with the settings of the scene these samples and orders; the drive, and the hashes of each block.
 pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Hashes>) {
-    let mut drive = scene.drive();
+    let (mut drive, mut front_end) = (scene.drive(), FrontEndState::default());
     let mut player = Player::new(&scene.config().drive);
     let mut orders = orders.lines().map(|line| line.split_once(' ').unwrap()).peekable();
     let mut hashes = Vec::new();
@@ -179,12 +181,13 @@ pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Ha
         while let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
             player.order(&mut drive, line);
         }
-        let compare = drive.step(sample);
-        let relay = drive.after_step(sample);
+        let measured = drive.front_end().measure(&mut front_end, sample);
+        let output = drive.step(&measured);
+        let compare = drive.front_end().put_out(&mut front_end, &output);
         if n.is_multiple_of(BLOCK) {
             hashes.push(Hashes::default());
         }
-        hashes.last_mut().unwrap().push(&compare, relay, &drive);
+        hashes.last_mut().unwrap().push(&compare, &output, &drive);
         player.end_period(&mut drive);
     }
     assert_eq!(orders.next(), None, "an order that was not reached");

@@ -17,10 +17,10 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 ///
 /// let modulator = Modulator::new(14_167, 2.2e-6, false);
 /// // Zero voltage: all legs at half the dc link.
-/// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).compare, [7084; 3]);
+/// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).duties, [7083.5; 3]);
 /// // 400 V along phase a: limited to the corner of the hexagon, 2/3 of the dc link.
 /// let out = modulator.step(AlphaBeta::new(400.0, 0.0), Abc::ZERO, 311.0);
-/// assert_eq!(out.compare, [14_167, 0, 0]);
+/// assert_eq!(out.duties, [14_167.0, 0.0, 0.0]);
 /// assert!(out.limited && (out.realised.alpha - 207.33).abs() < 0.01);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +47,8 @@ struct Readable {
 /// Result of the modulation for one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulated {
-    /// Compare values of phases a, b, c, 0 to `top`; see [`Compare`](crate::Compare).
-    pub compare: [u16; 3],
+    /// Duties of phases a, b, c, 0 to `top`; see [`Output`](crate::Output).
+    pub duties: [f32; 3],
     /// Realised mean voltage at the motor, V peak: the reference, limited to the hexagon, with dropped or
     /// extended pulses accounted for. Rounding to counts (11 mV at 311 V) is excluded: anti-windup with it
     /// would stall a controller on increments below half a count.
@@ -131,7 +131,7 @@ impl Modulator {
         } else {
             wanted
         };
-        Modulated { compare: [rounded(a), rounded(b), rounded(c)], realised, limited }
+        Modulated { duties: [a, b, c], realised, limited }
     }
 
     /// Rounds a too short pulse of either switch to no pulse or to the shortest one, whichever is nearer.
@@ -145,12 +145,6 @@ impl Modulator {
             count
         }
     }
-}
-
-/// Rounds a count from 0 to `top` to the nearest integer; 0 for NaN.
-fn rounded(count: f32) -> u16 {
-    // The cast to u32 is one instruction of the core, the saturating cast to u16 twelve.
-    (count + 0.5) as u32 as u16
 }
 
 /// The second highest component.
@@ -185,6 +179,11 @@ mod tests {
         AlphaBeta::new((length * angle.cos()) as f32, (length * angle.sin()) as f32)
     }
 
+    /// Compare values of the timer.
+    fn counts(modulated: &Modulated) -> [u16; 3] {
+        modulated.duties.map(|duty| duty.round() as u16)
+    }
+
     /// Mean voltage that the compare values put out, V peak.
     fn mean(compare: [u16; 3]) -> AlphaBeta {
         let [a, b, c] = compare.map(|c| f32::from(c) / f32::from(TOP) * V_DC);
@@ -209,7 +208,7 @@ mod tests {
         for degrees in 0..360 {
             let angle = (f64::from(degrees) + 0.5).to_radians();
             for length in [1.0, 50.0, 120.0, 170.0] {
-                let ours = modulator().step(polar(length, angle), Abc::ZERO, V_DC).compare;
+                let ours = counts(&modulator().step(polar(length, angle), Abc::ZERO, V_DC));
                 for (count, duty) in ours.iter().zip(table_2(length, angle)) {
                     let difference = f64::from(*count) - duty * f64::from(TOP);
                     assert!(difference.abs() < 0.6, "{length} V at {degrees}: {difference}");
@@ -226,8 +225,8 @@ mod tests {
         for degrees in 0..360 {
             let w = polar(400.0, f64::from(degrees).to_radians());
             let out = m.step(w, Abc::new(dt, -dt, dt), V_DC);
-            assert!(out.compare.iter().all(|&c| c <= TOP));
-            let put_out = mean(out.compare) - Abc::new(dt, -dt, dt).to_alpha_beta();
+            assert!(counts(&out).iter().all(|&c| c <= TOP));
+            let put_out = mean(counts(&out)) - Abc::new(dt, -dt, dt).to_alpha_beta();
             let error = put_out - out.realised;
             assert!(error.length_squared() < (2.0 * COUNT_V as f32).powi(2));
         }
@@ -246,9 +245,9 @@ mod tests {
                 for share in [0.3, 0.9, 0.999, 1.2, 3.0] {
                     let wanted = polar(share * f64::from(plain.circle(V_DC)), angle);
                     let out = m.step(wanted, Abc::ZERO, V_DC);
-                    let readable = out.compare.iter().filter(|&&c| c <= READABLE).count();
-                    assert!(readable >= 2, "{share} at {angle}: {:?}", out.compare);
-                    let error = mean(out.compare) - out.realised;
+                    let readable = counts(&out).iter().filter(|&&c| c <= READABLE).count();
+                    assert!(readable >= 2, "{share} at {angle}: {:?}", counts(&out));
+                    let error = mean(counts(&out)) - out.realised;
                     assert!(error.length_squared().sqrt() < 2.0 * COUNT_V as f32);
                     if share < 1.0 {
                         // A pulse that is too short is dropped or extended with shunts as without.
@@ -264,7 +263,7 @@ mod tests {
     #[test]
     fn not_a_number_does_not_panic() {
         let out = modulator().step(AlphaBeta::new(f32::NAN, 1.0), Abc::ZERO, V_DC);
-        assert!(out.compare.iter().all(|&c| c <= TOP));
+        assert!(counts(&out).iter().all(|&c| c <= TOP));
         let _ = modulator().step(AlphaBeta::ZERO, Abc::ZERO, 0.0);
     }
 
@@ -273,7 +272,7 @@ mod tests {
         fn realised_is_what_the_counts_put_out(length in 0f64..500.0, angle in 0f64..std::f64::consts::TAU) {
             let wanted = polar(length, angle);
             let out = modulator().step(wanted, Abc::ZERO, V_DC);
-            let error = mean(out.compare) - out.realised;
+            let error = mean(counts(&out)) - out.realised;
             prop_assert!(f64::from(error.length_squared()).sqrt() < COUNT_V, "{error:?}");
         }
 
@@ -299,7 +298,7 @@ mod tests {
         #[test]
         fn no_pulse_is_shorter_than_dead_time_and_a_microsecond(length in 0f64..2000.0, angle in 0f64..std::f64::consts::TAU) {
             let shortest = (3.2e-6 * 6000.0 * f64::from(TOP)).floor() as u16;
-            for c in modulator().step(polar(length, angle), Abc::ZERO, V_DC).compare {
+            for c in counts(&modulator().step(polar(length, angle), Abc::ZERO, V_DC)) {
                 prop_assert!(c == 0 || c == TOP || (shortest..=TOP - shortest).contains(&c), "{c}");
             }
         }

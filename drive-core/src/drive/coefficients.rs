@@ -13,8 +13,6 @@ use crate::current::dead_time::DeadTime;
 use crate::current::inverter_drop::InverterDrop;
 use crate::current::modulation::Modulator;
 use crate::current::pi::{DqPi, Pi, ReferenceFilter};
-use crate::current::sensing::Sensing;
-use crate::current::shunts::Shunts;
 use crate::current::voltage_limit::VoltageLimit;
 use crate::dc_link::DcLink;
 use crate::filter::dissertation::lpf_lag_samples;
@@ -22,12 +20,15 @@ use crate::flux::estimator::Estimator;
 use crate::flux::indirect::Indirect;
 use crate::flux::observer::{Leakage, Observer};
 use crate::flux::volts_per_hertz::VoltsPerHertz;
+use crate::front_end::FrontEnd;
+use crate::front_end::shunts::Shunts;
 use crate::identify::learning::Learning;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::{Angle, UnitVector};
 use crate::motion::{self, Motion, Ramps};
 use crate::protect::lock_monitor::{LockMonitor, LockMonitorSettings};
 use crate::protect::noise_watch::NoiseWatch;
+use crate::protect::offsets::OffsetCheck;
 use crate::protect::plausibility::Prediction;
 use crate::protect::saliency_check::SaliencyCheck;
 use crate::protect::thermal::{Body, Thermal};
@@ -67,7 +68,7 @@ const LARGEST_TEST_V: f32 = 60.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Coefficients {
-    pub(crate) sensing: Sensing,
+    pub(crate) front_end: FrontEnd,
     pub(crate) protection: Protection,
     pub(crate) source: AngleSource,
     /// Inject a carrier at all.
@@ -106,6 +107,7 @@ pub struct Coefficients {
     pub(crate) injection_axis: UnitVector,
     /// The check of a sensorless start, if it is wanted.
     pub(crate) saliency_check: Option<SaliencyCheck>,
+    pub(crate) offsets: OffsetCheck,
     pub(crate) wiring: WiringCheck,
     /// Largest test voltage of an axis, V.
     pub(crate) largest_test_v: f32,
@@ -123,7 +125,7 @@ pub struct Coefficients {
 impl Coefficients {
     /// Whether the coefficients are still finite numbers; a flipped bit may have changed that.
     pub(crate) fn is_finite(&self) -> bool {
-        let (s, l) = (&self.sensing, &self.current_loop);
+        let (s, l) = (&self.front_end, &self.current_loop);
         let sum = s.current_a.gain
             + s.current_a.offset
             + s.current_b.gain
@@ -216,15 +218,18 @@ impl Settings {
             )
         });
         Ok(Coefficients {
-            sensing: Sensing {
+            front_end: FrontEnd {
                 current_a: self.scales.current_a,
                 current_b: self.scales.current_b,
                 shunts: self.shunts(),
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
                 heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
-                calibration_samples: periods(self.sequence.calibrate_s) as u16,
-                largest_offset: self.share_of_range(LARGEST_OFFSET_A),
+            },
+            offsets: OffsetCheck {
+                samples: periods(self.sequence.calibrate_s) as u16,
+                largest: self.share_of_range(LARGEST_OFFSET_A),
+                shunts: self.scales.sensors == CurrentSensors::LowSide,
             },
             source: self.angle_source,
             track_rotor: self.track_rotor,
@@ -241,10 +246,8 @@ impl Settings {
             injection_axis,
             lock_monitor,
             saliency_check: self.saliency_check(),
-            noise_watch: (self.angle_source == AngleSource::Injection).then(|| {
-                let gains = [self.scales.current_a.gain, self.scales.current_b.gain];
-                NoiseWatch::new(t.flux_saliency, injection.current_amplitude, gains)
-            }),
+            noise_watch: (self.angle_source == AngleSource::Injection)
+                .then(|| NoiseWatch::new(t.flux_saliency, injection.current_amplitude)),
             wiring: WiringCheck::new(&WiringSettings {
                 sigma_ls: m.sigma_l_s(),
                 expected_a: self.share_of_rated(WIRING_A),

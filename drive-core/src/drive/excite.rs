@@ -6,14 +6,13 @@
 use super::{Drive, Job, Kept, Left, Phase};
 use crate::carrier::injection::{CARRIER_COS, CARRIER_SAMPLES};
 use crate::current::pi::{Pi, PiState, ReferenceFilter, ReferenceState};
-use crate::current::sensing::Measured;
 use crate::drive::coefficients::Coefficients;
 use crate::drive::command::{Accepted, Refused};
 use crate::drive::excitation::{Excitation, Excited, Regulator};
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::filter::dissertation::{LPF, LpfState};
-use crate::io::Compare;
+use crate::io::{LOW_SIDES_ON, Measured};
 use crate::math::frames::{Abc, AlphaBeta, Dq};
 use crate::math::limited;
 use crate::protect::wiring_check::{WiringCheck, WiringCheckState};
@@ -79,34 +78,35 @@ impl Excite {
         c: &Coefficients,
         k: &mut Kept,
         measured: &Measured,
-    ) -> Result<Compare, Fault> {
+    ) -> Result<[f32; 3], Fault> {
+        let current = measured.current();
         let mut realised = AlphaBeta::ZERO;
-        let mut compare = Compare::LOW_SIDES_ON;
+        let mut duties = LOW_SIDES_ON;
         match self.wanted {
             Excitation::Pulses(pulses) => {
                 return Ok(
                     match c.pulse(&WiringCheck::new(&pulses), &mut self.pulses, measured)? {
-                        Some(compare) => compare,
+                        Some(duties) => duties,
                         None => {
                             self.trains = self.trains.wrapping_add(1);
                             (self.control, self.wanted) = (Control::default(), Excitation::Rest);
                             k.elapsed = 0;
-                            Compare::LOW_SIDES_ON
+                            LOW_SIDES_ON
                         }
                     },
                 );
             }
             Excitation::Rest => {
-                LPF.step(&mut self.low_pass, measured.current);
+                LPF.step(&mut self.low_pass, current);
             }
             Excitation::Current { amperes, regulator, carrier, binary } => {
                 let s = &mut self.control;
                 let Regulator { k_c, z_c, direct, filtered } = regulator;
                 let filter = ReferenceFilter { one_minus_p: 1.0 - z_c, direct };
                 let reference = filter.step(&mut s.reference, amperes);
-                let behind = LPF.step(&mut self.low_pass, measured.current);
-                let current = if filtered { behind } else { measured.current };
-                let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - current.alpha);
+                let behind = LPF.step(&mut self.low_pass, current);
+                let seen = if filtered { behind } else { current };
+                let along = Pi { k_c, z_c }.step(&mut s.regulator, reference - seen.alpha);
                 let largest = (carrier.alpha.abs() + carrier.beta.abs() + 1.0) * (1.0 / RAMP);
                 s.carrier.alpha += limited(carrier.alpha - s.carrier.alpha, largest);
                 s.carrier.beta += limited(carrier.beta - s.carrier.beta, largest);
@@ -122,15 +122,15 @@ impl Excite {
                     s.regulator.back_calculate(modulated.realised.alpha - wanted.alpha);
                 }
                 realised = modulated.realised;
-                compare = Compare::on(modulated.compare);
+                duties = modulated.duties;
             }
         }
         let seen = &mut k.seen;
-        (seen.measured, seen.realised) = (measured.current, realised);
+        (seen.measured, seen.realised) = (current, realised);
         seen.dc_link = measured.dc_link;
         // For the thermal loads.
-        seen.current = Dq::new(measured.current.alpha, measured.current.beta);
-        Ok(compare)
+        seen.current = Dq::new(current.alpha, current.beta);
+        Ok(duties)
     }
 }
 
@@ -149,7 +149,7 @@ impl Drive {
         Excited {
             state: self.state(),
             starts: self.kept.starts,
-            offsets: self.c.sensing.offsets(&self.kept.sensing),
+            offsets: [self.kept.offsets[0], self.kept.offsets[1]],
             trains,
             answers,
         }

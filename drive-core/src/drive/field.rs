@@ -12,7 +12,7 @@ use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::filter::dissertation::LPF;
 use crate::identify::learning::LearningState;
-use crate::io::{Compare, PERIOD_S, Sample};
+use crate::io::{Measured, PERIOD_S};
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::limited;
 use crate::motion;
@@ -88,13 +88,13 @@ impl Field {
         &mut self,
         c: &Coefficients,
         k: &mut Kept,
-        sample: &Sample,
-    ) -> Result<Compare, End> {
-        let measured = c.sensing.step(&mut k.sensing, sample);
-        c.protect(&k.sensing, sample, &measured)?;
+        measured: &Measured,
+    ) -> Result<[f32; 3], End> {
+        c.protect(measured)?;
         if self.frame == Frame::Encoder {
-            k.rotor_count = sample.encoder;
+            k.rotor_count = measured.encoder;
         }
+        let measured_current = measured.current();
         let wanted = self.wanted(c, k)?;
         let trust = self.trust(c, k.elapsed);
         let counted = self.frame.is_counted();
@@ -109,7 +109,7 @@ impl Field {
         // Flux angle at the sample.
         let flux = if counted {
             // While it learns, the shaft is locked, and the flux may lead the frame.
-            let count = if s.frame == Frame::Encoder { sample.encoder } else { 0 };
+            let count = if s.frame == Frame::Encoder { measured.encoder } else { 0 };
             let flux = c.indirect.angle(&mut s.indirect, count).map_err(|_| Fault::Encoder)?;
             flux.less(s.lead)
         } else {
@@ -125,9 +125,9 @@ impl Field {
         let carrier =
             if silent { CarrierPeriod::default() } else { s.carrier.at(&c.injection, index) };
         let carrier_axis = phi.turned_by(axes.carrier);
-        let rest = measured.current - AlphaBeta::along(carrier_axis, carrier.sampled);
+        let rest = measured_current - AlphaBeta::along(carrier_axis, carrier.sampled);
         let filtered = LPF.step(&mut s.low_pass, rest);
-        let seen = if s.hand_over.is_silent() { measured.current } else { filtered };
+        let seen = if s.hand_over.is_silent() { measured_current } else { filtered };
 
         // Current loop.
         let flux_axis = phi.turned_by(axes.seen);
@@ -146,7 +146,7 @@ impl Field {
         let signs = c.dead_time.signs(expected.to_abc());
         let compensation = c.dead_time.voltage(signs, measured.dc_link, s.inverter_drop.volts);
         let modulated = c.modulator.step(total, compensation, measured.dc_link);
-        (k.seen.measured, k.seen.realised) = (measured.current, modulated.realised);
+        (k.seen.measured, k.seen.realised) = (measured_current, modulated.realised);
         k.seen.dc_link = measured.dc_link;
         if modulated.limited {
             s.current_loop.back_calculate((modulated.realised - total).to_dq(applied));
@@ -167,7 +167,7 @@ impl Field {
 
         // Angles for the next sample.
         if c.demodulate {
-            let sample = CarrierSample { current: measured.current, axis: carrier_axis, carrier };
+            let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
             c.estimator.observe(&mut s.estimator, &sample, flux.freq);
         }
         let flux_current = if counted { current.seen_from(s.lead_axis) } else { reference };
@@ -199,10 +199,10 @@ impl Field {
         }
 
         // Checks and slow tasks, one a sample.
-        s.prediction.collect(measured.current, modulated.realised);
+        s.prediction.collect(measured_current, modulated.realised);
         let results = StepResults {
-            sample,
-            measured: &measured,
+            measured,
+            current: measured_current,
             flux_current,
             reference,
             voltage,
@@ -213,7 +213,7 @@ impl Field {
             trust,
         };
         c.in_turn(s, k, index, &results)?;
-        Ok(Compare::on(modulated.compare))
+        Ok(modulated.duties)
     }
 
     /// Shows the state of the demodulation, the checks and the position.

@@ -21,21 +21,21 @@
 use super::trust::{Judged, Lock, Trust};
 use super::{Field, Kept};
 use crate::carrier::synchronous::REFERENCE_AT;
-use crate::current::sensing::Measured;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};
 use crate::dc_link::Limiting;
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
-use crate::io::Sample;
+use crate::io::Measured;
 use crate::math::angle::UnitVector;
-use crate::math::frames::Dq;
+use crate::math::frames::{AlphaBeta, Dq};
 use crate::protect::plausibility::{Known, RotorFlux};
 use crate::settings::AngleSource;
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
 pub(super) struct StepResults<'a> {
-    pub sample: &'a Sample,
     pub measured: &'a Measured,
+    /// The measured current in the stator frame, A.
+    pub current: AlphaBeta,
     /// Current that makes flux and slip, A.
     pub flux_current: Dq,
     /// Filtered reference of the current, A.
@@ -72,17 +72,17 @@ impl Coefficients {
                 if self.source == AngleSource::Injection {
                     k.rotor_count = s.count_by_flux();
                 }
-                self.watch_noise(s, 0, step.sample)
+                self.watch_noise(s, 0, step.measured)
             }
             1 => {
                 let acceleration = self.freq_per_speed * s.motion.acceleration;
                 self.estimator.update_correction(&mut s.estimator, acceleration);
                 s.prediction.latch_voltage();
-                self.watch_noise(s, 1, step.sample)
+                self.watch_noise(s, 1, step.measured)
             }
             2 => {
                 self.predict(s, step);
-                self.watch_noise(s, 2, step.sample)
+                self.watch_noise(s, 2, step.measured)
             }
             3 => {
                 self.check_carrier_headroom(s, step)?;
@@ -106,27 +106,27 @@ impl Coefficients {
             7 => {
                 self.limit_torque(k, step);
                 self.predict(s, step);
-                self.watch_noise(s, 3, step.sample)
+                self.watch_noise(s, 3, step.measured)
             }
             8 => {
                 if step.rotor_freq.abs() > self.protection.rotor_freq {
                     return Err(Fault::OverSpeed);
                 }
                 self.judge(s, step)?;
-                self.watch_noise(s, 4, step.sample)
+                self.watch_noise(s, 4, step.measured)
             }
             _ => {
                 s.estimator.synchronous.average();
                 self.limit_voltage(s, k, step);
-                self.watch_noise(s, 5, step.sample)
+                self.watch_noise(s, 5, step.measured)
             }
         }
     }
 
     /// Takes one of the six looks at the noise of the current sensors.
-    fn watch_noise(&self, s: &mut Field, look: usize, sample: &Sample) -> Result<(), Fault> {
+    fn watch_noise(&self, s: &mut Field, look: usize, measured: &Measured) -> Result<(), Fault> {
         match &self.noise_watch {
-            Some(watch) => watch.step(&mut s.noise, look, sample, s.hand_over.is_quiet()),
+            Some(watch) => watch.step(&mut s.noise, look, measured, s.hand_over.is_quiet()),
             None => Ok(()),
         }
     }
@@ -185,7 +185,7 @@ impl Coefficients {
         let tracked = self.observer.is_some() && trust.observes();
         let building = trust.current != Judged::Strictly;
         let known = Known { deviation: s.observer.resistance, tracked, building };
-        let judged = self.prediction.judge(&mut s.prediction, step.measured.current, known);
+        let judged = self.prediction.judge(&mut s.prediction, step.current, known);
         if trust.current == Judged::No {
             s.prediction.forget();
             return Ok(());

@@ -119,7 +119,7 @@ impl Coefficients {
             monitor.take(learned);
         }
         if learned.gain_mismatch.accepted {
-            self.sensing.correct_mismatch(learned.gain_mismatch.value);
+            self.front_end.correct_mismatch(learned.gain_mismatch.value);
         }
         if learned.slope.is_some() {
             self.saliency_check = self.saliency_check.and_then(|check| check.of_learned(learned));

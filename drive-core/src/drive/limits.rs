@@ -1,10 +1,11 @@
 //! The chain of limits of the torque current, with the reason of the one that acts.
 
-use super::{Drive, End, Kept, Phase};
+use super::{Drive, End, Phase};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
 use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
-use crate::io::Sample;
+use crate::io::Measured;
+use crate::protect::thermal::ThermalLoads;
 
 /// Limits of the torque current. What the brake resistor has taken outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,6 +26,20 @@ impl Limits {
         let voltage = c.voltage_limit.start();
         *self = Self { dc_link: self.dc_link, voltage, ..Self::default() };
         self.now.i_q = (-voltage.most.q, voltage.most.q);
+    }
+
+    /// Finds the torque current that heat sink, motor and inverter do not bear; `heat_sink` is the share of the current that
+    /// the first bears, `i_d` the direct current, A.
+    pub fn heat(&mut self, c: &Coefficients, thermal: &ThermalLoads, heat_sink: f32, i_d: f32) {
+        let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
+        let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
+        (self.too_hot_for, self.too_hot) = if share < 1.0 {
+            let largest = c.protection.i_q;
+            let square = share * largest * largest - i_d * i_d;
+            (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
+        } else {
+            (0.0, Limiting::No)
+        };
     }
 
     /// The torque current within the limits, A.
@@ -50,44 +65,27 @@ impl Limits {
 }
 
 impl Drive {
-    /// Work that can wait until the outputs are set; once a control period, in every state, with the sample of that step. It
-    /// finds the current that heat sink, motor and inverter bear, completes the telemetry, and switches the precharge relay. Returns whether the relay is closed:
-    /// always `false` where the settings have none.
-    pub fn after_step(&mut self, sample: &Sample) -> bool {
-        let (c, k) = (&self.c, &mut self.kept);
-        if let Phase::Field(field) = &self.phase {
-            field.show(c, k);
-        }
-        let Kept { limits, thermal, references, relay, .. } = k;
-        let share = c.sensing.heat_sink.share(sample.heat_sink);
-        let (heat_sink, loads) = ((share * share, Limiting::HeatSink), thermal.share());
-        let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
-        (limits.too_hot_for, limits.too_hot) = if share < 1.0 {
-            let (largest, i_d) = (c.protection.i_q, references.current.d);
-            let square = share * largest * largest - i_d * i_d;
-            (largest - if square > 0.0 { fpu_sqrt::sqrtf(square) } else { 0.0 }, why)
-        } else {
-            (0.0, Limiting::No)
-        };
-        let Some(switch) = &c.relay else { return false };
-        switch.step(relay, sample.dc_link);
-        relay.closed
-    }
-
     /// Whether the dc link is charged: a relay that there is has closed.
     pub(super) fn is_charged(&self) -> bool {
         self.c.relay.is_none() || self.kept.relay.closed
     }
 
-    /// Adds the current of the last periods to the thermal loads, in every state.
-    pub(super) fn watch_load(&mut self) -> Result<(), End> {
-        if !self.kept.elapsed.is_multiple_of(THERMAL_EVERY) {
+    /// Adds the current of the last periods to the thermal loads, and finds the current that heat sink, motor and inverter
+    /// bear; in every state.
+    pub(super) fn watch_load(&mut self, measured: &Measured) -> Result<(), End> {
+        let k = &mut self.kept;
+        if let Phase::Field(field) = &self.phase {
+            field.show(&self.c, k);
+        }
+        if !k.elapsed.is_multiple_of(THERMAL_EVERY) {
+            k.limits.heat(&self.c, &k.thermal, measured.heat_sink, k.references.current.d);
             return Ok(());
         }
         let on = self.is_energised();
         let k = &mut self.kept;
         let square = if on { k.seen.current.length_squared() } else { 0.0 };
         let borne = self.c.thermal.step(&mut k.thermal, square);
+        k.limits.heat(&self.c, &k.thermal, measured.heat_sink, k.references.current.d);
         // Off it cools, and is not judged.
         if on {
             Ok(borne?)
@@ -95,11 +93,6 @@ impl Drive {
             self.c.dc_link.rest(&mut k.limits.dc_link, THERMAL_EVERY);
             Ok(())
         }
-    }
-
-    /// Duty of the brake chopper, 0 to 1, for the period of the compare values.
-    pub fn brake_duty(&self) -> f32 {
-        if self.is_energised() { self.kept.limits.now.chopper } else { 0.0 }
     }
 
     /// Why the torque is smaller than asked for.

@@ -3,14 +3,14 @@
 use super::excite::Excite;
 use super::scalar::Scalar;
 use super::{Drive, Field, FluxPhase, Goal, Job, Kept, Left, Phase, References, Telemetry};
-use crate::current::sensing::Measured;
 use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::catch::CatchState;
-use crate::io::{Compare, Sample};
+use crate::io::{LOW_SIDES_ON, Measured, Output};
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
+use crate::protect::offsets::OffsetCheckState;
 use crate::protect::wiring_check::WiringCheckState;
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
@@ -27,9 +27,9 @@ pub(super) struct Prepare {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Preparation {
     /// Outputs off, offsets being measured.
-    Offsets,
-    /// Low sides on, to charge the bootstrap capacitors.
-    LowSides,
+    Offsets(OffsetCheckState),
+    /// Low sides on, to charge the bootstrap capacitors; shunts are measured again.
+    LowSides(OffsetCheckState),
     /// Pulses check the wiring.
     Wiring(WiringCheckState),
 }
@@ -37,8 +37,8 @@ pub(super) enum Preparation {
 impl Prepare {
     pub fn state(&self) -> State {
         match self.step {
-            Preparation::Offsets => State::Calibrating,
-            Preparation::LowSides => State::Precharge,
+            Preparation::Offsets(_) => State::Calibrating,
+            Preparation::LowSides(_) => State::Precharge,
             Preparation::Wiring(_) => State::CheckingWiring,
         }
     }
@@ -47,31 +47,30 @@ impl Prepare {
 impl Drive {
     /// A step of the preparation.
     #[cold]
-    pub(super) fn prepare(
-        &mut self,
-        sample: &Sample,
-        measured: &Measured,
-    ) -> Result<Compare, Fault> {
+    pub(super) fn prepare(&mut self, measured: &Measured) -> Result<Output, Fault> {
         let (c, k) = (&self.c, &mut self.kept);
-        let Phase::Prepare(prepare) = &mut self.phase else { return Ok(Compare::OFF) };
+        let Phase::Prepare(prepare) = &mut self.phase else { return Ok(Output::default()) };
         match &mut prepare.step {
-            Preparation::Offsets => {
+            Preparation::Offsets(state) => {
                 let residual = prepare.left.residual;
                 let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
-                if !waits && c.sensing.calibrate(&mut k.sensing, sample)?.is_some() {
+                let offsets = if waits { None } else { c.offsets.step(state, measured)? };
+                if let Some(offsets) = offsets {
+                    k.offsets = offsets;
                     // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
                     if residual.is_some() && !k.wiring_unchecked {
-                        self.energise(sample.encoder);
+                        self.energise(measured.encoder);
                     } else {
-                        (prepare.step, k.elapsed) = (Preparation::LowSides, 0);
+                        prepare.step = Preparation::LowSides(OffsetCheckState::default());
+                        k.elapsed = 0;
                     }
                 }
-                return Ok(Compare::OFF);
+                return Ok(Output { offsets, ..Output::default() });
             }
-            Preparation::LowSides => {
+            Preparation::LowSides(state) => {
                 // The first samples still see the bridge off.
                 if k.elapsed >= LOW_SIDES_ON_FROM {
-                    c.sensing.calibrate_again(&mut k.sensing, sample)?;
+                    c.offsets.step_again(state, measured)?;
                 }
                 if k.elapsed >= c.sequence.precharge {
                     // The boost of V/f and the pulses of the commissioning check the wiring themselves.
@@ -79,20 +78,20 @@ impl Drive {
                         prepare.step = Preparation::Wiring(WiringCheckState::default());
                         k.elapsed = 0;
                     } else {
-                        self.energise(sample.encoder);
+                        self.energise(measured.encoder);
                     }
                 }
             }
             Preparation::Wiring(pulses) => match c.pulse(&c.wiring, pulses, measured)? {
-                Some(compare) => return Ok(compare),
+                Some(duties) => return Ok(Output::on(duties)),
                 None => {
                     c.wiring.judge(&pulses.answers())?;
                     k.wiring_unchecked = false;
-                    self.energise(sample.encoder);
+                    self.energise(measured.encoder);
                 }
             },
         }
-        Ok(Compare::LOW_SIDES_ON)
+        Ok(Output::on(LOW_SIDES_ON))
     }
 
     /// Goes on to the work that the drive was started for.
@@ -138,7 +137,11 @@ impl Drive {
         if matches!(job, Job::Field(Goal::Learn)) {
             k.learned = None;
         }
-        self.enter(Phase::Prepare(Prepare { step: Preparation::Offsets, job, left }));
+        self.enter(Phase::Prepare(Prepare {
+            step: Preparation::Offsets(OffsetCheckState::default()),
+            job,
+            left,
+        }));
     }
 }
 
@@ -146,7 +149,7 @@ impl Kept {
     /// Makes everything fresh that does not outlive a run.
     fn start(&mut self, c: &Coefficients, i_d: f32, inverter_drop: f32) {
         self.starts = self.starts.wrapping_add(1);
-        c.sensing.start(&mut self.sensing);
+        self.offsets = [0.0; 3];
         self.seen = Telemetry { inverter_drop, ..Telemetry::still() };
         self.rotor_count = 0;
         self.limits.start(c);

@@ -1,10 +1,9 @@
 //! The checks of every step: the sample before it is used, and the state when a result is not finite.
 
 use super::Kept;
-use crate::current::sensing::{Measured, SensingState};
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
-use crate::io::{Compare, Hardware, Sample};
+use crate::io::{Hardware, Measured};
 use crate::protect::wiring_check::{WiringAction, WiringCheck, WiringCheckState};
 
 impl Coefficients {
@@ -12,19 +11,16 @@ impl Coefficients {
     ///
     /// # Errors
     /// The first fault that it shows.
-    pub(super) fn protect(
-        &self,
-        sensing: &SensingState,
-        sample: &Sample,
-        measured: &Measured,
-    ) -> Result<(), Fault> {
+    pub(super) fn protect(&self, measured: &Measured) -> Result<(), Fault> {
         let unused =
             if self.dc_link.has_chopper() { Hardware::empty() } else { Hardware::CHOPPER_OFF };
-        let events = sample.hardware - unused;
+        let events = measured.hardware - unused;
         if !events.is_empty() {
             return Err(of_hardware(events));
         }
-        self.sensing.check(sensing, sample)?;
+        if let Some(fault) = measured.fault {
+            return Err(fault);
+        }
         let (limits, phases) = (&self.protection, &measured.phases);
         if phases.a.abs() > limits.trip_a {
             Err(Fault::OverCurrentA)
@@ -52,14 +48,12 @@ impl Coefficients {
         pulses: &WiringCheck,
         state: &mut WiringCheckState,
         measured: &Measured,
-    ) -> Result<Option<Compare>, Fault> {
+    ) -> Result<Option<[f32; 3]>, Fault> {
         Ok(match pulses.step(state, measured.phases)? {
             WiringAction::Apply { voltage, current } => {
                 let signs = self.dead_time.signs(current.to_abc());
                 let compensation = self.dead_time.voltage(signs, measured.dc_link, 0.0);
-                Some(Compare::on(
-                    self.modulator.step(voltage, compensation, measured.dc_link).compare,
-                ))
+                Some(self.modulator.step(voltage, compensation, measured.dc_link).duties)
             }
             WiringAction::Ended => None,
         })
@@ -100,7 +94,7 @@ fn of_hardware(events: Hardware) -> Fault {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::frames::{Abc, AlphaBeta};
+    use crate::math::frames::Abc;
     use crate::settings::Settings;
 
     #[test]
@@ -109,15 +103,9 @@ mod tests {
         let coefficients = settings.build().unwrap();
         let (trip_a, dc_over_v, dc_under_v) =
             (settings.trip_a(), settings.dc_over_v(), settings.dc_under_v());
-        let sample =
-            Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
         let check = |a: f32, b: f32, dc_link: f32| {
-            let (phases, current) = (Abc::new(a, b, -(a + b)), AlphaBeta::ZERO);
-            coefficients.protect(
-                &SensingState::default(),
-                &sample,
-                &Measured { phases, current, dc_link },
-            )
+            let phases = Abc::new(a, b, -(a + b));
+            coefficients.protect(&Measured { phases, dc_link, ..Measured::default() })
         };
         let (more, half) = (1.001 * trip_a, 0.5 * trip_a);
         for sign in [1.0, -1.0] {
@@ -131,10 +119,8 @@ mod tests {
         }
         // An event that has no name is a fault, too.
         let hardware = Hardware::from_bits_retain(1 << 7);
-        let measured =
-            Measured { phases: Abc::new(0.0, 0.0, 0.0), current: AlphaBeta::ZERO, dc_link: 311.0 };
-        let unknown = Sample { hardware, ..sample };
-        let found = coefficients.protect(&SensingState::default(), &unknown, &measured);
+        let unknown = Measured { hardware, dc_link: 311.0, ..Measured::default() };
+        let found = coefficients.protect(&unknown);
         assert_eq!(found, Err(Fault::ConverterOverrun));
         assert_eq!(check(0.0, 0.0, dc_over_v), Ok(()));
         assert_eq!(check(0.0, 0.0, dc_over_v + 0.1), Err(Fault::DcLinkOverVoltage));

@@ -3,7 +3,6 @@
 use core::f32::consts::TAU;
 
 use super::{End, Kept, Left, Telemetry};
-use crate::current::sensing::Measured;
 use crate::dc_link::{DIVIDER, Limiting};
 use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
@@ -11,7 +10,7 @@ use crate::fault::Fault;
 use crate::flux::volts_per_hertz::{
     Demand, VoltsPerHertz, VoltsPerHertzSettings, VoltsPerHertzState,
 };
-use crate::io::{Compare, PERIOD_S};
+use crate::io::{Measured, PERIOD_S};
 use crate::settings::Settings;
 use crate::settings::rules::PEAK_OF_PHASE;
 
@@ -81,8 +80,8 @@ impl Scalar {
         c: &Coefficients,
         k: &mut Kept,
         measured: &Measured,
-    ) -> Result<Compare, End> {
-        let s = &mut self.turning;
+    ) -> Result<[f32; 3], End> {
+        let (s, current) = (&mut self.turning, measured.current());
         let Some(turning) = &c.volts_per_hertz else { return Err(End::Stopped) };
         let rotor_freq = s.rotor_freq();
         let stops = self.stop.is_some();
@@ -100,7 +99,7 @@ impl Scalar {
         let largest_v = c.modulator.circle(measured.dc_link);
         let quick = self.stop == Some(true);
         let demand = Demand { freq, quick, i_q: k.limits.now.i_q, largest_v };
-        let turned = turning.step(s, measured.current, &demand)?;
+        let turned = turning.step(s, current, &demand)?;
         if !(turned.voltage.d + turned.voltage.q + s.freq).is_finite() {
             return Err(k
                 .not_finite(c, self.speed.is_finite())
@@ -123,11 +122,11 @@ impl Scalar {
             rotor_freq: s.rotor_freq(),
             current: turned.current,
             voltage: turned.voltage,
-            measured: measured.current,
+            measured: current,
             realised: modulated.realised,
             dc_link: measured.dc_link,
             ..k.seen
         };
-        Ok(Compare::on(modulated.compare))
+        Ok(modulated.duties)
     }
 }

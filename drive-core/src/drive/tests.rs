@@ -12,7 +12,8 @@ use crate::math::frames::{Abc, AlphaBeta};
 use crate::settings::AngleSource;
 
 use crate::carrier::DemodulatorKind;
-use crate::io::Hardware;
+use crate::front_end::FrontEndState;
+use crate::io::{Compare, Hardware, Sample};
 use crate::math::angle::{Angle, UnitVector};
 use crate::settings::Line;
 use crate::settings::{IdentifiedPlant, Settings};
@@ -27,6 +28,13 @@ const MODES: [Mode; 6] = [
     Mode::Commissioning,
 ];
 
+/// A whole period of a drive with its front end.
+fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
+    let measured = drive.front_end().measure(front_end, sample);
+    let output = drive.step(&measured);
+    drive.front_end().put_out(front_end, &output)
+}
+
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.
 struct Load {
     current: AlphaBeta,
@@ -34,11 +42,13 @@ struct Load {
     v_dc: f32,
     /// The only direction in which a current can flow when a phase is open.
     only: Option<UnitVector>,
+    front_end: FrontEndState,
 }
 
 impl Load {
     fn new() -> Self {
-        Self { current: AlphaBeta::ZERO, pending: Compare::OFF, v_dc: 311.0, only: None }
+        let (pending, front_end) = (Compare::OFF, FrontEndState::default());
+        Self { current: AlphaBeta::ZERO, pending, v_dc: 311.0, only: None, front_end }
     }
 
     fn sample(&self) -> Sample {
@@ -51,6 +61,15 @@ impl Load {
             dc_link: (self.v_dc / 0.11) as u16,
             ..Sample::default()
         }
+    }
+
+    /// A period of the drive, without one of the load.
+    fn step(&mut self, drive: &mut Drive) -> Compare {
+        self.step_with(drive, &self.sample())
+    }
+
+    fn step_with(&mut self, drive: &mut Drive, sample: &Sample) -> Compare {
+        step(drive, &mut self.front_end, sample)
     }
 
     fn advance(&mut self, compare: Compare) {
@@ -93,17 +112,14 @@ fn run_to(drive: &mut Drive, load: &mut Load, state: State) -> bool {
         if drive.state() == state {
             return true;
         }
-        let compare = drive.step(&load.sample());
-        load.advance(compare);
+        period(drive, load);
     }
     false
 }
 
-/// A whole control period.
+/// A period of drive and load.
 fn period(drive: &mut Drive, load: &mut Load) {
-    let sample = load.sample();
-    let compare = drive.step(&sample);
-    drive.after_step(&sample);
+    let compare = load.step(drive);
     load.advance(compare);
 }
 
@@ -133,7 +149,7 @@ fn speed(drive: &Drive) -> Option<f32> {
 #[test]
 fn start_goes_through_its_states_and_stop_ramps_to_off() {
     let (mut drive, mut load) = (drive(), Load::new());
-    assert_eq!(drive.step(&load.sample()), Compare::OFF);
+    assert_eq!(load.step(&mut drive), Compare::OFF);
     drive.command(&Command::Start(Mode::Torque)).unwrap();
 
     let mut seen = vec![];
@@ -142,7 +158,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
         if seen.last() != Some(&drive.state()) {
             seen.push(drive.state());
         }
-        let compare = drive.step(&load.sample());
+        let compare = load.step(&mut drive);
         match drive.state() {
             State::Calibrating => assert_eq!(compare, Compare::OFF),
             State::Precharge => low_sides += u32::from(compare == Compare::LOW_SIDES_ON),
@@ -158,7 +174,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
     for (i_q, expected) in [(2.0, 2.0), (-1.0, -1.0)] {
         drive.command(&Command::Torque(i_q)).unwrap();
         for _ in 0..1200 {
-            let compare = drive.step(&load.sample());
+            let compare = load.step(&mut drive);
             load.advance(compare);
         }
         let t = drive.telemetry();
@@ -168,7 +184,7 @@ fn start_goes_through_its_states_and_stop_ramps_to_off() {
     drive.command(&Command::Stop(Stop::Coast)).unwrap();
     let before = drive.telemetry().reference.q;
     assert!(run_to(&mut drive, &mut load, State::Off));
-    assert_eq!(drive.step(&load.sample()), Compare::OFF);
+    assert_eq!(load.step(&mut drive), Compare::OFF);
     // Ramped, not dropped: 1 A at 30 A/s.
     assert!(before < -0.9);
 }
@@ -196,7 +212,7 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
     type Break = fn(&mut Drive);
     let cases: [(Break, Fault); 6] = [
         (|d| d.c.current_loop.d.k_c = f32::NAN, Fault::NonFiniteSettings),
-        (|d| d.c.sensing.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
+        (|d| d.c.front_end.current_a.gain = f32::NAN, Fault::NonFiniteSettings),
         (|d| d.kept.references.current.q = f32::NAN, Fault::NonFiniteCommand),
         (|d| field(d).current_loop.back_calculate(Dq::new(f32::NAN, 0.0)), Fault::NonFiniteState),
         (|d| field(d).estimator.rotor_freq = f32::NAN, Fault::NonFiniteState),
@@ -219,10 +235,10 @@ fn what_is_not_finite_is_named_and_leaves_nothing_behind() {
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
         break_it(&mut drive);
-        let mut compare = drive.step(&load.sample());
+        let mut compare = load.step(&mut drive);
         if number == 2 {
             // A reference is behind its filter, which gives it out in the next step.
-            compare = drive.step(&load.sample());
+            compare = load.step(&mut drive);
         }
         assert_eq!((compare, drive.state()), (Compare::OFF, State::Fault(fault)), "case {number}");
         drive.command(&Command::Clear).unwrap();
@@ -382,7 +398,7 @@ proptest! {
         s.sequence.calibrate_s = 0.001;
         s.sequence.magnetise_s = Some(0.001);
         let mut drive = Drive::new(s.build().unwrap());
-        let quiet = Load::new().sample();
+        let (quiet, mut front_end) = (Load::new().sample(), FrontEndState::default());
         for (n, (sample, command, value)) in samples.into_iter().enumerate() {
             let _ = drive.command(&match command {
                 0 => Command::Start(Mode::Torque),
@@ -395,7 +411,8 @@ proptest! {
                 _ => Command::Clear,
             });
             // Mostly quiet samples, so that it gets somewhere.
-            let compare = drive.step(if n % 40 == 39 { &sample } else { &quiet });
+            let sample = if n % 40 == 39 { &sample } else { &quiet };
+            let compare = step(&mut drive, &mut front_end, sample);
             prop_assert!(compare.a <= 14_167 && compare.b <= 14_167 && compare.c <= 14_167);
             if matches!(drive.state(), State::Off | State::Fault(_)) {
                 prop_assert!(!compare.enabled);

@@ -37,7 +37,7 @@
 //! 15° at 3000 rpm, 360 mA by 20° at 1800 and by 39° at 900 (1.4 A of direct current, found without this limit).
 
 use crate::fault::Fault;
-use crate::io::Sample;
+use crate::io::Measured;
 
 /// Allowed noise relative to the carrier current caused by the saliency.
 const ALLOWED: f32 = 1.1;
@@ -55,8 +55,8 @@ const LOOKS: usize = 3;
 /// Coefficients of the watch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseWatch {
-    /// Reciprocal of the allowed mean square of `d` where it is quiet, channels a and b, in squared converter codes.
-    per_allowed: [f32; 2],
+    /// Reciprocal of the allowed mean square of `d` where it is quiet, 1/A^2.
+    per_allowed: f32,
 }
 
 /// State of the watch.
@@ -68,23 +68,19 @@ pub struct NoiseWatchState {
 /// State of one sensor's watch.
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
-    /// Partial sum of `h`, codes.
-    difference: i32,
-    /// `h` of the last two carrier periods, codes.
-    last: [i32; 2],
+    /// Partial sum of `h`, A.
+    difference: f32,
+    /// `h` of the last two carrier periods, A.
+    last: [f32; 2],
     /// Mean square of `d` relative to the allowed one: what was little at speed is little where it is quiet.
     level: f32,
 }
 
 impl NoiseWatch {
-    /// Watch for a flux-fixed saliency, a carrier current of `carrier_a`, A peak, and the `gains` of
-    /// channels a and b, A per code.
-    pub fn new(flux_saliency: f32, carrier_a: f32, gains: [f32; 2]) -> Self {
-        let square = |gain: f32| {
-            let codes = ALLOWED * flux_saliency * carrier_a / gain;
-            1.0 / (WEIGHTS * codes * codes)
-        };
-        Self { per_allowed: gains.map(square) }
+    /// Watch for a flux-fixed saliency and a carrier current of `carrier_a`, A peak.
+    pub fn new(flux_saliency: f32, carrier_a: f32) -> Self {
+        let allowed = ALLOWED * flux_saliency * carrier_a;
+        Self { per_allowed: 1.0 / (WEIGHTS * allowed * allowed) }
     }
 
     /// Processes a sample, number `look` of six per carrier period: 0 to 2 are three consecutive samples
@@ -96,22 +92,22 @@ impl NoiseWatch {
         &self,
         state: &mut NoiseWatchState,
         look: usize,
-        sample: &Sample,
+        measured: &Measured,
         quiet: bool,
     ) -> Result<(), Fault> {
         let [a, b] = &mut state.channels;
-        let (channel, code, per_allowed, fault, look) = if look < LOOKS {
-            (a, sample.current_a, self.per_allowed[0], Fault::SensorNoisyA, look)
+        let phases = &measured.phases;
+        let (channel, current, fault, look) = if look < LOOKS {
+            (a, phases.a, Fault::SensorNoisyA, look)
         } else {
-            (b, sample.current_b, self.per_allowed[1], Fault::SensorNoisyB, look - LOOKS)
+            (b, phases.b, Fault::SensorNoisyB, look - LOOKS)
         };
-        let code = i32::from(code);
         match look {
-            0 => channel.difference = code,
-            1 => channel.difference = channel.difference.wrapping_sub(2 * code),
+            0 => channel.difference = current,
+            1 => channel.difference -= 2.0 * current,
             _ => {
-                channel.difference = channel.difference.wrapping_add(code);
-                fault.unless(channel.is_still(per_allowed, quiet))?;
+                channel.difference += current;
+                fault.unless(channel.is_still(self.per_allowed, quiet))?;
             }
         }
         Ok(())
@@ -121,9 +117,8 @@ impl NoiseWatch {
 impl Channel {
     /// Updates the mean square; returns whether it is within the allowed one.
     fn is_still(&mut self, per_allowed: f32, quiet: bool) -> bool {
-        // Wrapping guards against a flipped bit; sixteen codes fit.
         let [one, two] = self.last;
-        let d = self.difference.wrapping_sub(one.wrapping_mul(2)).wrapping_add(two) as f32;
+        let d = self.difference - 2.0 * one + two;
         self.last = [self.difference, one];
         let square =
             d * d * if quiet { per_allowed } else { per_allowed * (1.0 / (AT_SPEED * AT_SPEED)) };
@@ -137,6 +132,7 @@ impl Channel {
 mod tests {
     #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
     use super::*;
+    use crate::math::frames::Abc;
     use core::f64::consts::TAU;
 
     /// A per code.
@@ -144,14 +140,13 @@ mod tests {
 
     /// 9.1 mA: 10 mA are allowed.
     fn watch() -> NoiseWatch {
-        NoiseWatch::new(-0.035, 0.26, [GAIN; 2])
+        NoiseWatch::new(-0.035, 0.26)
     }
 
-    /// Codes of two currents, A.
-    fn sample(currents: [f64; 2]) -> Sample {
-        let [current_a, current_b] =
-            currents.map(|i| (2048.0 + i / f64::from(GAIN)).round() as u16);
-        Sample { current_a, current_b, ..Sample::default() }
+    /// Two currents, A, behind a converter.
+    fn sample(currents: [f64; 2]) -> Measured {
+        let [a, b] = currents.map(|i| (i / f64::from(GAIN)).round() as f32 * GAIN);
+        Measured { phases: Abc::new(a, b, -(a + b)), ..Measured::default() }
     }
 
     /// Sample `n` of ten in a carrier period, three of each half looked at.
@@ -159,12 +154,12 @@ mod tests {
         watch: &NoiseWatch,
         state: &mut NoiseWatchState,
         n: usize,
-        sample: &Sample,
+        measured: &Measured,
         quiet: bool,
     ) -> Result<(), Fault> {
         match n % 10 {
-            at @ 0..3 => watch.step(state, at, sample, quiet),
-            at @ 7..10 => watch.step(state, at - 4, sample, quiet),
+            at @ 0..3 => watch.step(state, at, measured, quiet),
+            at @ 7..10 => watch.step(state, at - 4, measured, quiet),
             _ => Ok(()),
         }
     }

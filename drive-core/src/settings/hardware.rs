@@ -40,7 +40,12 @@ impl Line {
 
     /// Value at a code.
     pub fn at(self, code: u16) -> f32 {
-        self.gain * f32::from(code) + self.offset
+        self.without(0.0, code)
+    }
+
+    /// Value at a code, less the `offset` of the sensor.
+    pub fn without(self, offset: f32, code: u16) -> f32 {
+        self.gain * f32::from(code) + (self.offset - offset)
     }
 }
 

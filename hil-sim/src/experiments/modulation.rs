@@ -50,7 +50,7 @@ struct Inverter {
 impl Inverter {
     fn compare(&self, wanted: AlphaBeta) -> [f64; 3] {
         let modulated = self.modulator.step(wanted, Abc::ZERO, self.vdc as f32);
-        modulated.compare.map(f64::from)
+        modulated.duties.map(|duty| f64::from(duty).round())
     }
 
     /// Mean voltage at the motor for these compare values, V.

@@ -23,7 +23,7 @@ use crate::pair::Pair;
 
 /// Blocks, and parts of the paths of the functions that belong to them, separated by spaces; the first match counts.
 const BLOCKS: [(&str, &str); 12] = [
-    ("sensing", "current::sensing chip::adc chip::encoder"),
+    ("sensing", "drive_core::front_end chip::adc chip::encoder"),
     ("protection", "Coefficients>::protect protect::plausibility protect::lock_monitor"),
     ("injection", "carrier::injection protect::saliency_check"),
     ("observer", "Coefficients>::observe_fundamental flux::observer flux::hand_over"),

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Result, bail};
-use drive_core::{Command, Drive, Mode, Settings, State};
+use drive_core::{Command, Drive, FrontEndState, Mode, Output, Settings, State};
 
 use crate::board::{Options, Period, confirmed};
 use induction_drive::console::grammar::{self, Request};
@@ -16,6 +16,9 @@ use induction_drive::settings::staging::Staging;
 pub struct Shadow {
     /// The drive.
     pub drive: Drive,
+    front_end: FrontEndState,
+    /// Output of its last step.
+    pub output: Output,
     settings: Staging,
     /// Dead time that the timer makes since its start, s.
     dead_time_s: f32,
@@ -41,7 +44,17 @@ impl Shadow {
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
         let settings = Staging::new(settings);
-        Ok(Self { drive, settings, dead_time_s, orders, tracking, tau_r: None, compared: 0 })
+        Ok(Self {
+            drive,
+            front_end: FrontEndState::default(),
+            output: Output::default(),
+            settings,
+            dead_time_s,
+            orders,
+            tracking,
+            tau_r: None,
+            compared: 0,
+        })
     }
 
     /// Its settings, with the dead time that the timer makes.
@@ -124,6 +137,7 @@ impl Shadow {
     pub fn restart(&mut self, settings: FirmwareSettings) -> Result<()> {
         self.settings = Staging::new(settings);
         self.drive = Drive::new(settings.build_for(self.dead_time_s)?);
+        self.front_end = FrontEndState::default();
         self.orders.clear();
         Ok(())
     }
@@ -139,8 +153,9 @@ impl Shadow {
     /// The compare values differ.
     pub fn follow(&mut self, period: &Period) -> Result<()> {
         let learning = self.drive.state() == State::Learning;
-        let compare = self.drive.step(&period.sample);
-        self.drive.after_step(&period.sample);
+        let measured = self.drive.front_end().measure(&mut self.front_end, &period.sample);
+        self.output = self.drive.step(&measured);
+        let compare = self.drive.front_end().put_out(&mut self.front_end, &self.output);
         if learning
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()

@@ -65,7 +65,7 @@ fn braking_from_speed_into_the_resistor_stays_below_the_trip() -> Result<()> {
         pair.run(1, |_, _| {})?;
         let (v, duty) = (pair.board.plant.dc_link(), pair.board.chip().chopper_duty());
         // The timer's pulse is what the core of the drive asks for, to half a tick.
-        let asked = f64::from(pair.shadow.drive.brake_duty());
+        let asked = f64::from(pair.shadow.output.chopper);
         assert!((duty - asked).abs() < 1e-3, "{duty} at the pin, {asked} asked for");
         (highest, most) = (highest.max(v), most.max(duty));
         burnt += duty * v * v / OHM / 6000.0;

@@ -96,7 +96,7 @@ fn a_fault_in_any_state_is_told_in_words_within_a_fifth_of_a_second() {
                 talk.poll();
             }
             talk.port.received.clear();
-            talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+            talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
             assert_eq!(talk.drive.drive.state(), State::Fault(Fault::Break));
             let (seconds, line) = until_line(&mut talk, "fault 20: ");
             assert!(seconds < LATEST_S, "{state}, {printing:?}: {seconds} s");
@@ -118,7 +118,7 @@ fn an_announcement_comes_between_the_lines_of_a_list() {
     for _ in 0..10 {
         talk.poll();
     }
-    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     let lines = talk.say("");
     assert_eq!(lines.len(), keys::COUNT + 2);
     let fault = lines.iter().position(|line| line.starts_with("fault ")).unwrap();

@@ -290,8 +290,8 @@ fn faults_are_listed_and_cleared() {
     both.talk.now_ms = 12_345;
     both.write(0x2000, 18);
     // Pulled by the power stage.
-    let sample = Sample { hardware: Hardware::BREAK, ..both.talk.drive.sample };
-    both.talk.drive.drive.step(&sample);
+    let pulled = Measured { hardware: Hardware::BREAK, ..Measured::default() };
+    both.talk.drive.drive.step(&pulled);
     let State::Fault(fault) = both.talk.drive.drive.state() else { panic!() };
     let code = u16::from(fault.code());
     assert_eq!((both.read(0x2100), both.read(0x603f)), (code, 0xff00 | code));

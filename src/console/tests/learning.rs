@@ -123,7 +123,9 @@ fn after_a_refused_learning_the_result_before_holds() {
             }
             "stopped" => assert_eq!(talk.ask("stop"), "ok"),
             _ => {
-                talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+                talk.drive
+                    .drive
+                    .step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
                 talk.say("clear\n");
             }
         }

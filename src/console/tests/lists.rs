@@ -137,7 +137,7 @@ fn describe_prints_each_setting_as_json() {
 fn a_latched_fault_is_shown_with_causes_and_cure_and_cleared() {
     let mut talk = Talk::new();
     assert_eq!(talk.ask("start"), "ok");
-    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     talk.say("");
     let fault = Fault::Break;
     let text = talk.say("faults\n");

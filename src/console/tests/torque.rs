@@ -73,11 +73,14 @@ fn a_drive_that_is_off_has_the_torque_of_a_shaft_at_rest_and_a_fault_has_none() 
     // A heat sink between derating and trip.
     let warm = (0..4096).find(|code| (84.0..86.0).contains(&settings.scales.ntc.celsius(*code)));
     let sample = Sample { heat_sink: warm.unwrap(), ..talk.drive.sample };
-    talk.drive.drive.after_step(&sample);
+    let mut front_end = FrontEndState::default();
+    for _ in 0..100 {
+        step(&mut talk.drive.drive, &mut front_end, &sample);
+    }
     let (less, _) = promised(&talk.ask("status"));
     assert!(less[1] < nm[1] && less[1] >= 0.0, "{less:?} of {nm:?}");
     talk.drive.drive.command(&Command::Start(Mode::Torque)).unwrap();
-    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..sample });
+    talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     let status = talk.ask("status");
     assert!(status.contains("; fault; ") && !status.contains("torque now"), "{status}");
 }

@@ -21,7 +21,7 @@ fn typed_characters_come_back_if_asked_for() {
     }
     // An announcement comes on a line of its own, and what was typed so far behind it.
     talk.drive.drive.command(&Command::Start(Mode::Torque)).unwrap();
-    talk.drive.drive.step(&Sample { hardware: Hardware::BREAK, ..Sample::default() });
+    talk.drive.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     talk.poll();
     talk.poll();
     let said = std::mem::take(&mut talk.port.received);

@@ -17,7 +17,7 @@ fn exciting(command: &Command) -> (Drive, Load) {
     assert_eq!(drive.command(command), Ok(Accepted::AsGiven));
     let mut states = vec![drive.state()];
     for _ in 0..2000 {
-        load.advance(drive.step(&load.sample()));
+        period(&mut drive, &mut load);
         if states.last() != Some(&drive.state()) {
             states.push(drive.state());
         }
@@ -31,7 +31,7 @@ fn exciting(command: &Command) -> (Drive, Load) {
 
 fn run(drive: &mut Drive, load: &mut Load, periods: u32, mut seen: impl FnMut(&Drive)) {
     for _ in 0..periods {
-        load.advance(drive.step(&load.sample()));
+        period(drive, load);
         seen(drive);
     }
 }
@@ -66,7 +66,7 @@ fn a_stop_is_at_once_and_references_are_refused() {
     assert_eq!(started, Err(Refused::State(State::Exciting)));
     drive.command(&Command::Stop(Stop::Coast)).unwrap();
     assert_eq!(drive.state(), State::Off);
-    assert!(!drive.step(&load.sample()).enabled);
+    assert!(!load.step(&mut drive).enabled);
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn what_trips_a_drive_trips_an_excitation() {
         run(&mut drive, &mut load, 100, |_| {});
         let mut sample = load.sample();
         spoil(&mut sample);
-        assert_eq!(drive.step(&sample), Compare::OFF);
+        assert_eq!(load.step_with(&mut drive, &sample), Compare::OFF);
         assert_eq!(drive.state(), State::Fault(fault));
         assert_eq!(drive.command(&current(1.0, AlphaBeta::ZERO)), Err(Refused::Fault(fault)));
     }

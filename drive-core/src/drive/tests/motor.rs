@@ -122,11 +122,13 @@ fn motor_settings(source: AngleSource) -> Settings {
 struct Bench {
     drive: Drive,
     motor: Motor,
+    front_end: FrontEndState,
 }
 
 impl Bench {
     fn new(settings: &Settings) -> Self {
-        Self { drive: Drive::new(settings.build().unwrap()), motor: Motor::new(settings) }
+        let drive = Drive::new(settings.build().unwrap());
+        Self { drive, motor: Motor::new(settings), front_end: FrontEndState::default() }
     }
 
     fn started(settings: &Settings, mode: Mode) -> Self {
@@ -138,8 +140,7 @@ impl Bench {
 
     fn step(&mut self) {
         let sample = self.motor.sample();
-        let compare = self.drive.step(&sample);
-        self.drive.after_step(&sample);
+        let compare = step(&mut self.drive, &mut self.front_end, &sample);
         self.motor.advance(compare);
     }
 

@@ -27,10 +27,10 @@ fn every_protection_switches_off_in_the_same_step() {
         let (mut drive, mut load) = running();
         let mut sample = load.sample();
         change(&mut sample);
-        assert_eq!(drive.step(&sample), Compare::OFF, "{fault}");
+        assert_eq!(load.step_with(&mut drive, &sample), Compare::OFF, "{fault}");
         assert_eq!(drive.state(), State::Fault(fault));
         // It stays latched, names itself, and a clear and a start bring the drive back.
-        assert_eq!(drive.step(&load.sample()), Compare::OFF);
+        assert_eq!(load.step(&mut drive), Compare::OFF);
         assert_eq!(drive.command(&Command::Start(Mode::Torque)), Err(Refused::Fault(fault)));
         drive.command(&Command::Clear).unwrap();
         load = Load::new();
@@ -47,7 +47,8 @@ fn a_chopper_that_is_off_is_a_fault_where_there_is_a_resistor() {
         let (mut drive, mut load) = (Drive::new(settings.build().unwrap()), Load::new());
         drive.command(&Command::Start(Mode::Torque)).unwrap();
         assert!(run_to(&mut drive, &mut load, State::Torque));
-        let compare = drive.step(&Sample { hardware: Hardware::CHOPPER_OFF, ..load.sample() });
+        let sample = Sample { hardware: Hardware::CHOPPER_OFF, ..load.sample() };
+        let compare = load.step_with(&mut drive, &sample);
         assert_eq!(compare.enabled, ohm == 0.0);
         let fault = State::Fault(Fault::ChopperOff);
         assert_eq!(drive.state(), if ohm > 0.0 { fault } else { State::Torque });
@@ -68,7 +69,7 @@ fn over_speed_trips() {
         sample.encoder = sample.encoder.wrapping_add(70);
         let now = load.sample();
         sample = Sample { encoder: sample.encoder, ..now };
-        let compare = drive.step(&sample);
+        let compare = load.step_with(&mut drive, &sample);
         load.advance(compare);
     }
     assert_eq!(drive.state(), State::Fault(Fault::OverSpeed));
@@ -82,7 +83,7 @@ fn a_stuck_current_sensor_is_found_before_the_current_runs_away() {
     let mut largest = 0.0_f32;
     for _ in 0..3000 {
         let sample = Sample { current_a: stuck.current_a, ..load.sample() };
-        let compare = drive.step(&sample);
+        let compare = load.step_with(&mut drive, &sample);
         load.advance(compare);
         largest = largest.max(load.current.length_squared());
         if matches!(drive.state(), State::Fault(_)) {
@@ -114,7 +115,7 @@ fn a_silent_channel_is_found_by_its_carrier() {
             } else if channel == 1 && periods > 100 {
                 sample.current_b = zero.current_b;
             }
-            let compare = drive.step(&sample);
+            let compare = load.step_with(&mut drive, &sample);
             load.advance(compare);
             periods += 1;
         }
@@ -196,8 +197,7 @@ fn a_hot_heat_sink_takes_torque_current_before_it_trips() {
         for _ in 0..1200 {
             let heat_sink = Settings::default().scales.ntc.code(celsius);
             let sample = Sample { heat_sink, ..load.sample() };
-            let compare = drive.step(&sample);
-            drive.after_step(&sample);
+            let compare = load.step_with(drive, &sample);
             load.advance(compare);
         }
         (drive.telemetry().current.q, drive.limiting())

@@ -1,7 +1,7 @@
 //! The rules for the voltages of the dc link.
 
 use crate::dc_link::{ChopperSettings, DcLinkSettings};
-use crate::io::{CONVERTER_CODES, periods};
+use crate::io::periods;
 use crate::settings::Settings;
 use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
 use crate::supply::Relay;
@@ -67,10 +67,8 @@ impl Settings {
     /// The precharge relay, which opens where the drive trips.
     pub(crate) fn relay(&self) -> Option<Relay> {
         let (least_v, band_v) = (self.dc_under_v(), self.share_of_dc_link(STEADY_V));
-        let (line, time) = (self.scales.dc_link, periods(self.supply.relay_s));
-        // The casts saturate.
-        let least = (((least_v - line.offset) / line.gain) as u16).min(CONVERTER_CODES);
-        (time > 0).then(|| Relay::new(least, (band_v / line.gain) as u16, time))
+        let time = periods(self.supply.relay_s);
+        (time > 0).then(|| Relay::new(least_v, band_v, time))
     }
 
     /// The limits by the dc link. The chopper conducts from 3 % below the voltage without generating torque on, and

@@ -117,8 +117,7 @@ fn rows() -> Vec<(&'static str, Vec<Bench>)> {
         bench
     };
     let mut fault = running(Mode::Torque);
-    let broken = Sample { hardware: Hardware::BREAK, ..fault.motor.sample() };
-    fault.drive.step(&broken);
+    fault.drive.step(&Measured { hardware: Hardware::BREAK, ..Measured::default() });
     let mut torque = running(Mode::Torque);
     torque.drive.command(&Command::Torque(1.0)).unwrap();
     torque.run(0.1);
@@ -230,10 +229,10 @@ fn every_event_leads_to_the_state_of_the_table() {
             .collect();
         // A fault of the hardware.
         let mut after = bench.clone();
-        let broken = Sample { hardware: Hardware::BREAK, ..after.motor.sample() };
-        let compare = after.drive.step(&broken);
+        let broken = Measured { hardware: Hardware::BREAK, ..Measured::default() };
+        let output = after.drive.step(&broken);
         let now = after.drive.state();
-        assert!(now == state || !compare.enabled, "{name}: {now}");
+        assert!(now == state || output.duties.is_none(), "{name}: {now}");
         cells.push(if now == state { "stays" } else { "in fault" }.into());
         assert_eq!(now == state, state.is_off(), "{name}: {now}");
         let row = cells.join(" | ");

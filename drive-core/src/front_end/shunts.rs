@@ -3,7 +3,7 @@
 //! A shunt sees the current of its phase only while the low side of that leg is on. The currents are sampled in the middle
 //! of that time, at the top of the counter. A leg whose low side is on for less than the [window](Shunts::new) cannot be
 //! read; its current then is minus the sum of the others. The modulator leaves at most one leg so
-//! ([`Modulator::readable`](super::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
+//! ([`Modulator::readable`](crate::current::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
 
 use crate::io::{Compare, PERIOD_S};
 use crate::settings::Line;
@@ -96,10 +96,8 @@ mod tests {
             let mut high = [7000; 3];
             high[hidden] = 14_000;
             let [a, b, c] = high;
-            for output in [
-                [Compare::on([a, b, c]), Compare::LOW_SIDES_ON],
-                [Compare::LOW_SIDES_ON, Compare::on([a, b, c])],
-            ] {
+            let (low, high) = (Compare::default(), Compare { a, b, c, enabled: true });
+            for output in [[high, low], [low, high]] {
                 let mut state = ShuntState::default();
                 output.iter().for_each(|compare| state.applied(compare));
                 assert_eq!(shunts.choose(&mut state, read), (3.0, -1.0), "leg {hidden}");

@@ -1,0 +1,186 @@
+//! Front end of the drive: converter codes to SI units (section 3.2, Eq. 3.5), and duties to timer counts.
+//!
+//! ```text
+//! Sample -> FrontEnd::measure -> Measured -> Drive::step -> Output -> FrontEnd::put_out -> Compare
+//! ```
+//!
+//! Its coefficients are part of those of the drive ([`Drive::front_end`](crate::Drive::front_end)); its state lies beside the drive.
+
+pub(crate) mod shunts;
+
+use crate::fault::Fault;
+use crate::io::{Compare, Measured, Output, Sample};
+use crate::math::frames::Abc;
+use crate::settings::{HeatSink, Line};
+use shunts::{ShuntState, Shunts};
+
+/// Coefficients of the front end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrontEnd {
+    /// Calibration of current a, A.
+    pub(crate) current_a: Line,
+    /// Calibration of current b, A.
+    pub(crate) current_b: Line,
+    /// The third current, with three shunts below the low sides.
+    pub(crate) shunts: Option<Shunts>,
+    /// Calibration of the dc-link voltage, V.
+    pub(crate) dc_link: Line,
+    /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
+    pub(crate) full_scale: u16,
+    /// Checks of the heat sink.
+    pub(crate) heat_sink: HeatSink,
+}
+
+/// State of the front end. The default is that with the outputs off: no offset is known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrontEndState {
+    /// Offsets of the sensors a, b and c, A.
+    offsets: [f32; 3],
+    shunts: ShuntState,
+}
+
+impl FrontEnd {
+    /// Corrects a gain `mismatch` = (gain of a) / (gain of b) - 1, half on each channel.
+    pub(crate) fn correct_mismatch(&mut self, mismatch: f32) {
+        self.current_a = self.current_a.scaled(1.0 - 0.5 * mismatch);
+        self.current_b = self.current_b.scaled(1.0 + 0.5 * mismatch);
+    }
+
+    /// Converts codes to SI units, subtracts the offsets, and checks the codes against their limits and, with three shunts, the
+    /// sum of the currents.
+    pub fn measure(&self, state: &mut FrontEndState, sample: &Sample) -> Measured {
+        let [offset_a, offset_b, offset_c] = state.offsets;
+        let mut a = self.current_a.without(offset_a, sample.current_a);
+        let mut b = self.current_b.without(offset_b, sample.current_b);
+        let mut third = None;
+        if let Some(shunts) = &self.shunts {
+            let c = shunts.current_c.without(offset_c, sample.current_c);
+            third = Some(c);
+            (a, b) = shunts.choose(&mut state.shunts, [a, b, c]);
+        }
+        let c = -(a + b);
+        Measured {
+            phases: Abc { a, b, c },
+            third: third.unwrap_or(c),
+            dc_link: self.dc_link.at(sample.dc_link),
+            heat_sink: self.heat_sink.share(sample.heat_sink),
+            encoder: sample.encoder,
+            hardware: sample.hardware,
+            fault: self.check(state, sample),
+        }
+    }
+
+    /// Converts the output of a step to timer counts, and takes its offsets.
+    pub fn put_out(&self, state: &mut FrontEndState, output: &Output) -> Compare {
+        let Some([a, b, c]) = output.duties else {
+            let offsets = output.offsets.unwrap_or_default();
+            *state = FrontEndState { offsets, shunts: ShuntState::default() };
+            return Compare::OFF;
+        };
+        let compare = Compare { a: rounded(a), b: rounded(b), c: rounded(c), enabled: true };
+        if self.shunts.is_some() {
+            state.shunts.applied(&compare);
+        }
+        compare
+    }
+
+    /// The sensor that cannot be believed.
+    fn check(&self, state: &FrontEndState, sample: &Sample) -> Option<Fault> {
+        let saturated = |code: u16| code == 0 || code >= self.full_scale;
+        let (least, most) = self.heat_sink.window;
+        match &self.shunts {
+            _ if saturated(sample.current_a) => Some(Fault::SensorSaturatedA),
+            _ if saturated(sample.current_b) => Some(Fault::SensorSaturatedB),
+            _ if sample.heat_sink < least || sample.heat_sink > most => {
+                Some(self.heat_sink.fault(sample.heat_sink))
+            }
+            Some(_) if saturated(sample.current_c) => Some(Fault::SensorSaturatedC),
+            Some(shunts) if !shunts.sums_to_zero(&state.shunts) => Some(Fault::CurrentSum),
+            _ => None,
+        }
+    }
+}
+
+/// Rounds a count from 0 to `top` to the nearest integer; 0 for NaN.
+fn rounded(count: f32) -> u16 {
+    // The cast to u32 is one instruction of the core, the saturating cast to u16 twelve.
+    (count + 0.5) as u32 as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Ntc;
+
+    fn front_end() -> FrontEnd {
+        FrontEnd {
+            current_a: Line::CHANNEL_A,
+            current_b: Line::CHANNEL_B,
+            shunts: None,
+            dc_link: Line { gain: 0.11, offset: 0.0 },
+            full_scale: 4095,
+            heat_sink: Ntc::default().checks(70.0, 85.0),
+        }
+    }
+
+    #[test]
+    fn table_4_gives_the_currents_that_were_set() {
+        // Codes of Table 4; Eq. 3.5 leaves residuals up to 8.7 mA (A) and 10.2 mA (B).
+        let table = [
+            (-3.0, 666, 671),
+            (-2.0, 1117, 1118),
+            (-1.0, 1567, 1566),
+            (0.0, 2024, 2016),
+            (1.0, 2478, 2463),
+            (2.0, 2927, 2916),
+            (3.0, 3375, 3356),
+        ];
+        for (amperes, current_a, current_b) in table {
+            let sample = Sample { current_a, current_b, ..Sample::default() };
+            let m = front_end().measure(&mut FrontEndState::default(), &sample);
+            assert!((m.phases.a - amperes).abs() < 0.0088, "{}", m.phases.a);
+            assert!((m.phases.b - amperes).abs() < 0.0103, "{}", m.phases.b);
+            assert_eq!(m.phases.c, -(m.phases.a + m.phases.b));
+        }
+    }
+
+    #[test]
+    fn offsets_are_taken_off_until_the_outputs_are_off_again() {
+        let (front_end, mut state) = (front_end(), FrontEndState::default());
+        let sample = Sample { current_a: 2060, current_b: 1990, ..Sample::default() };
+        let at_rest = front_end.measure(&mut state, &sample).phases;
+        assert!(at_rest.a.abs() > 0.05);
+        let offsets = Some([at_rest.a, at_rest.b, at_rest.c]);
+        let on = Output { duties: Some([7000.0; 3]), ..Output::default() };
+        let off = Output::default();
+        for (output, known) in [(Output { offsets, ..off }, true), (on, true), (off, false)] {
+            front_end.put_out(&mut state, &output);
+            let phases = front_end.measure(&mut state, &sample).phases;
+            assert_eq!(phases.a.abs() < 1e-6 && phases.b.abs() < 1e-6, known, "{output:?}");
+        }
+    }
+
+    #[test]
+    fn both_ends_of_the_range_are_saturated() {
+        let sample =
+            Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
+        let found =
+            |sample: &Sample| front_end().measure(&mut FrontEndState::default(), sample).fault;
+        let (cold, hot) = front_end().heat_sink.window;
+        let cases = [
+            (Sample { current_a: 0, ..sample }, Some(Fault::SensorSaturatedA)),
+            (Sample { current_a: 1, ..sample }, None),
+            (Sample { current_b: 4095, ..sample }, Some(Fault::SensorSaturatedB)),
+            (Sample { current_b: 4094, ..sample }, None),
+            (Sample { heat_sink: cold - 1, ..sample }, Some(Fault::ThermistorOpen)),
+            (Sample { heat_sink: cold, ..sample }, None),
+            (Sample { heat_sink: hot + 1, ..sample }, Some(Fault::OverTemperature)),
+            (Sample { heat_sink: hot, ..sample }, None),
+            (sample, None),
+            (Sample { heat_sink: 4095, ..sample }, Some(Fault::ThermistorShorted)),
+        ];
+        for (sample, fault) in cases {
+            assert_eq!(found(&sample), fault, "{sample:?}");
+        }
+    }
+}
