@@ -93,6 +93,7 @@ impl Field {
         c.protect(measured)?;
         if self.frame == Frame::Encoder {
             k.rotor_count = measured.encoder;
+            k.seen.turns = c.motion.turns(&self.motion, k.rotor_count);
         }
         let measured_current = measured.current();
         let wanted = self.wanted(c, k)?;
@@ -169,6 +170,7 @@ impl Field {
         if c.demodulate {
             let sample = CarrierSample { current: measured_current, axis: carrier_axis, carrier };
             c.estimator.observe(&mut s.estimator, &sample, flux.freq);
+            k.seen.delta_i = s.estimator.delta_i;
         }
         let flux_current = if counted { current.seen_from(s.lead_axis) } else { reference };
         let rotor_freq = if counted {
@@ -219,7 +221,6 @@ impl Field {
     /// Shows the state of the demodulation, the checks and the position.
     pub fn show(&self, c: &Coefficients, k: &mut Kept) {
         let (saliency, seen) = (self.estimator.saliency(), &mut k.seen);
-        seen.delta_i = self.estimator.delta_i;
         seen.saliency = saliency.q;
         seen.carrier_squared = saliency.carrier_squared;
         seen.carrier_share = self.carrier.share;

@@ -3,7 +3,7 @@
 //!
 //! | sample | task | needs before it |
 //! |---|---|---|
-//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux | averages (9) |
+//! | 0 | saliency from the averages; magnetising current; count of the rotor by the flux; telemetry | averages (9) |
 //! | 1 | correction of the tracked angle by the saliency; voltages for the prediction at 3 | saliency (0) |
 //! | 2 | rotor voltage for the prediction at 3 | magnetising current (0) |
 //! | 3 | room for the carrier; judgement of the prediction | voltages (1), rotor voltage (2) |
@@ -72,6 +72,7 @@ impl Coefficients {
                 if self.source == AngleSource::Injection {
                     k.rotor_count = s.count_by_flux();
                 }
+                s.show(self, k);
                 self.watch_noise(s, 0, step.measured)
             }
             1 => {

@@ -7,6 +7,9 @@ use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
 use crate::io::Measured;
 use crate::protect::thermal::ThermalLoads;
 
+/// Control period of those between two steps of the thermal loads in which the limits by heat are found.
+const HEAT_AT: u32 = THERMAL_EVERY / 2;
+
 /// Limits of the torque current. What the brake resistor has taken outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Limits {
@@ -24,7 +27,7 @@ pub(super) struct Limits {
 impl Limits {
     pub fn start(&mut self, c: &Coefficients) {
         let voltage = c.voltage_limit.start();
-        *self = Self { dc_link: self.dc_link, voltage, ..Self::default() };
+        *self = Self { voltage, now: DcLinkLimits::default(), why: Limiting::No, ..*self };
         self.now.i_q = (-voltage.most.q, voltage.most.q);
     }
 
@@ -74,18 +77,19 @@ impl Drive {
     /// bear; in every state.
     pub(super) fn watch_load(&mut self, measured: &Measured) -> Result<(), End> {
         let k = &mut self.kept;
-        if let Phase::Field(field) = &self.phase {
-            field.show(&self.c, k);
-        }
-        if !k.elapsed.is_multiple_of(THERMAL_EVERY) {
-            k.limits.heat(&self.c, &k.thermal, measured.heat_sink, k.references.current.d);
-            return Ok(());
+        match k.elapsed % THERMAL_EVERY {
+            0 => {}
+            HEAT_AT => {
+                let i_d = k.references.current.d;
+                k.limits.heat(&self.c, &k.thermal, measured.heat_sink, i_d);
+                return Ok(());
+            }
+            _ => return Ok(()),
         }
         let on = self.is_energised();
         let k = &mut self.kept;
         let square = if on { k.seen.current.length_squared() } else { 0.0 };
         let borne = self.c.thermal.step(&mut k.thermal, square);
-        k.limits.heat(&self.c, &k.thermal, measured.heat_sink, k.references.current.d);
         // Off it cools, and is not judged.
         if on {
             Ok(borne?)
