@@ -22,7 +22,7 @@ fn regulating() -> (Drive, Measured) {
     rig.command(&Command::Torque(1.5)).expect("a reference");
     rig.run(0.5, |_| {});
     let sample = rig.plant.sample();
-    let measured = rig.drive.front_end().measure(&mut rig.front_end, &sample);
+    let measured = rig.drive.front_end().measure(&mut rig.front_end, &sample, rig.drive.offsets());
     (rig.drive, measured)
 }
 

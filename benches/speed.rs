@@ -33,7 +33,8 @@ fn speed(c: &mut Criterion) {
             .map(|_| {
                 let sample = recorder.plant.sample();
                 let mut front_end = recorder.front_end;
-                let measured = recorder.drive.front_end().measure(&mut front_end, &sample);
+                let drive = &recorder.drive;
+                let measured = drive.front_end().measure(&mut front_end, &sample, drive.offsets());
                 recorder.step_with(&sample);
                 measured
             })

@@ -51,9 +51,7 @@ fn check(wiring: Wiring, changes: &[&str], seed: u64) -> (State, f64) {
             }
             _ => {}
         }
-        let measured = drive.front_end().measure(&mut front_end, &sample);
-        let output = drive.step(&measured);
-        let compare = drive.front_end().put_out(&mut front_end, &output);
+        let (compare, _) = drive.period(&mut front_end, &sample);
         if !compare.enabled {
             pending = Compare::OFF;
         }

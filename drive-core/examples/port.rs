@@ -1,7 +1,7 @@
 //! The drive on another chip.
 //!
 //! A port brings four things: a board (what the timer, the converters and the encoder do), settings with the scales of
-//! its sensors, an interrupt that calls the front end and [`Drive::step`] 6000 times a second, and a task that gives
+//! its sensors, an interrupt that calls [`Drive::period`] 6000 times a second, and a task that gives
 //! commands. Here the board is a host that reads zero currents; on a chip, its functions access registers, and the channel is a queue for
 //! one producer and one consumer, such as `heapless::spsc::Queue`.
 //!
@@ -95,9 +95,8 @@ impl<B: Board> Interrupt<B> {
     /// Called once a PWM period, at the highest priority.
     fn on_period(&mut self) {
         let sample = self.board.sample();
-        let measured = self.drive.front_end().measure(&mut self.front_end, &sample);
-        let output = self.drive.step(&measured);
-        self.board.output(&self.drive.front_end().put_out(&mut self.front_end, &output));
+        let (compare, output) = self.drive.period(&mut self.front_end, &sample);
+        self.board.output(&compare);
         self.board.dc_link(output.chopper, output.relay);
         // The rest of the period belongs to commands.
         if let Ok(command) = self.commands.try_recv() {

@@ -37,9 +37,9 @@ use crate::flux::estimator::EstimatorState;
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
 use crate::flux::observer::{Induced, ObserverState};
-use crate::front_end::FrontEnd;
+use crate::front_end::{FrontEnd, FrontEndState};
 use crate::identify::learning::{Learned, LearningState};
-use crate::io::{Measured, Output};
+use crate::io::{Compare, Measured, Output, Sample};
 use crate::math::angle::{Angle, UnitVector};
 use crate::math::frames::Dq;
 use crate::motion::{MotionState, RotorCount};
@@ -76,9 +76,7 @@ pub use telemetry::{Room, Telemetry};
 /// drive.command(&Command::Start(Mode::Torque))?;
 /// // One period, with codes of zero current, 311 V and 25 °C.
 /// let sample = Sample { current_a: 2022, current_b: 2015, dc_link: 2827, heat_sink: 1309, ..Sample::default() };
-/// let measured = drive.front_end().measure(&mut front_end, &sample);
-/// let output = drive.step(&measured);
-/// let compare = drive.front_end().put_out(&mut front_end, &output);
+/// let (compare, _) = drive.period(&mut front_end, &sample);
 /// assert!(!compare.enabled); // the offsets are calibrated first, with the outputs off
 /// assert_eq!(drive.state(), State::Calibrating);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -99,7 +97,7 @@ pub struct Drive {
 struct Kept {
     /// Control periods spent in this state.
     elapsed: u32,
-    /// Offsets of the current sensors that the last start has measured, A.
+    /// Offsets of the current sensors a, b and c that the last start has measured, A.
     offsets: [f32; 3],
     /// Of the last step with the outputs on.
     seen: Telemetry,
@@ -408,45 +406,56 @@ impl Drive {
         &self.c.front_end
     }
 
+    /// Offsets of the current sensors a, b and c, A, which the present or the last start has measured: 0 until then.
+    pub fn offsets(&self) -> [f32; 3] {
+        self.kept.offsets
+    }
+
+    /// One PWM period between converters and timer: front end, [`step`](Self::step), front end.
+    #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
+    pub fn period(&mut self, front_end: &mut FrontEndState, sample: &Sample) -> (Compare, Output) {
+        let measured = self.c.front_end.measure(front_end, sample, self.kept.offsets);
+        let output = self.step(&measured);
+        (self.c.front_end.put_out(front_end, &output), output)
+    }
+
     /// One PWM period: from that which was measured at instant `k T` to the duties of the period that begins at `(k + 1) T`.
     ///
     /// Never panics. Whatever is wrong with the input or with the state becomes a latched fault,
     /// with the outputs off in the same step.
-    #[inline(never)] // in the firmware's crate it would be compiled for size: 350 cycles more in the median
     pub fn step(&mut self, measured: &Measured) -> Output {
         let result = match &mut self.phase {
-            Phase::Field(field) => field.step(&self.c, &mut self.kept, measured).map(Output::on),
-            Phase::Off(_) | Phase::Fault(..) => Ok(Output::default()),
-            Phase::Prepare(_) | Phase::Excite(_) | Phase::Scalar(_) => {
-                self.step_without_flux(measured)
-            }
+            Phase::Off(_) | Phase::Fault(..) => Ok(None),
+            phase => match (self.c.protect(measured), phase) {
+                (Err(fault), _) => Err(End::Fault(fault)),
+                (Ok(()), Phase::Field(field)) => {
+                    field.step(&self.c, &mut self.kept, measured).map(Some)
+                }
+                (Ok(()), _) => self.step_without_flux(measured),
+            },
         };
         self.kept.elapsed = self.kept.elapsed.wrapping_add(1);
-        let result = result.and_then(|output| self.watch_load(measured).map(|()| output));
-        let mut output = result.unwrap_or_else(|end| {
+        let result = result.and_then(|duties| self.watch_load(measured).map(|()| duties));
+        let duties = result.unwrap_or_else(|end| {
             self.end(end);
-            Output::default()
+            None
         });
-        if self.is_energised() {
-            output.chopper = self.kept.limits.now.chopper;
-        }
         if let Some(relay) = &self.c.relay {
             relay.step(&mut self.kept.relay, measured.dc_link);
-            output.relay = self.kept.relay.closed;
         }
-        output
+        let chopper = if self.is_energised() { self.kept.limits.now.chopper } else { 0.0 };
+        Output { duties, chopper, relay: self.kept.relay.closed }
     }
 
     /// A step without current control in a frame of the flux.
     #[cold]
-    fn step_without_flux(&mut self, measured: &Measured) -> Result<Output, End> {
+    fn step_without_flux(&mut self, measured: &Measured) -> Result<Option<[f32; 3]>, End> {
         let (c, k) = (&self.c, &mut self.kept);
-        c.protect(measured)?;
         match &mut self.phase {
             Phase::Prepare(_) => Ok(self.prepare(measured)?),
-            Phase::Excite(excite) => Ok(Output::on(excite.step(c, k, measured)?)),
-            Phase::Scalar(scalar) => scalar.step(c, k, measured).map(Output::on),
-            Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(Output::default()),
+            Phase::Excite(excite) => Ok(Some(excite.step(c, k, measured)?)),
+            Phase::Scalar(scalar) => scalar.step(c, k, measured).map(Some),
+            Phase::Off(_) | Phase::Fault(..) | Phase::Field(_) => Ok(None),
         }
     }
 

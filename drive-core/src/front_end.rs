@@ -4,7 +4,8 @@
 //! Sample -> FrontEnd::measure -> Measured -> Drive::step -> Output -> FrontEnd::put_out -> Compare
 //! ```
 //!
-//! Its coefficients are part of those of the drive ([`Drive::front_end`](crate::Drive::front_end)); its state lies beside the drive.
+//! [`Drive::period`](crate::Drive::period) is the three together. The coefficients of the front end are part of those of the drive
+//! ([`Drive::front_end`](crate::Drive::front_end)), which also knows the offsets; its state lies beside the drive.
 
 pub(crate) mod shunts;
 
@@ -27,15 +28,15 @@ pub struct FrontEnd {
     pub(crate) dc_link: Line,
     /// Largest code of a current channel. At this code, or at 0, the channel is saturated.
     pub(crate) full_scale: u16,
+    /// Compare value at which a high side is on throughout.
+    pub(crate) top: f32,
     /// Checks of the heat sink.
     pub(crate) heat_sink: HeatSink,
 }
 
-/// State of the front end. The default is that with the outputs off: no offset is known.
+/// State of the front end. The default is that with the outputs off.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrontEndState {
-    /// Offsets of the sensors a, b and c, A.
-    offsets: [f32; 3],
     shunts: ShuntState,
 }
 
@@ -46,10 +47,14 @@ impl FrontEnd {
         self.current_b = self.current_b.scaled(1.0 + 0.5 * mismatch);
     }
 
-    /// Converts codes to SI units, subtracts the offsets, and checks the codes against their limits and, with three shunts, the
+    /// Converts codes to SI units, subtracts the `offsets` of the current sensors a, b and c, A, and checks the codes against their limits and, with three shunts, the
     /// sum of the currents.
-    pub fn measure(&self, state: &mut FrontEndState, sample: &Sample) -> Measured {
-        let [offset_a, offset_b, offset_c] = state.offsets;
+    pub fn measure(
+        &self,
+        state: &mut FrontEndState,
+        sample: &Sample,
+        [offset_a, offset_b, offset_c]: [f32; 3],
+    ) -> Measured {
         let mut a = self.current_a.without(offset_a, sample.current_a);
         let mut b = self.current_b.without(offset_b, sample.current_b);
         let mut third = None;
@@ -70,18 +75,17 @@ impl FrontEnd {
         }
     }
 
-    /// Converts the output of a step to timer counts, and takes its offsets.
+    /// Converts the output of a step to timer counts.
     pub fn put_out(&self, state: &mut FrontEndState, output: &Output) -> Compare {
-        let Some([a, b, c]) = output.duties else {
-            let offsets = output.offsets.unwrap_or_default();
-            *state = FrontEndState { offsets, shunts: ShuntState::default() };
+        let Some(duties) = output.duties else {
+            *state = FrontEndState::default();
             return Compare::OFF;
         };
-        let compare = Compare { a: rounded(a), b: rounded(b), c: rounded(c), enabled: true };
         if self.shunts.is_some() {
-            state.shunts.applied(&compare);
+            state.shunts.applied(duties);
         }
-        compare
+        let [a, b, c] = duties.map(|duty| rounded(duty * self.top));
+        Compare { a, b, c, enabled: true }
     }
 
     /// The sensor that cannot be believed.
@@ -119,8 +123,13 @@ mod tests {
             shunts: None,
             dc_link: Line { gain: 0.11, offset: 0.0 },
             full_scale: 4095,
+            top: 14_167.0,
             heat_sink: Ntc::default().checks(70.0, 85.0),
         }
+    }
+
+    fn measured(sample: &Sample, offsets: [f32; 3]) -> Measured {
+        front_end().measure(&mut FrontEndState::default(), sample, offsets)
     }
 
     #[test]
@@ -137,7 +146,7 @@ mod tests {
         ];
         for (amperes, current_a, current_b) in table {
             let sample = Sample { current_a, current_b, ..Sample::default() };
-            let m = front_end().measure(&mut FrontEndState::default(), &sample);
+            let m = measured(&sample, [0.0; 3]);
             assert!((m.phases.a - amperes).abs() < 0.0088, "{}", m.phases.a);
             assert!((m.phases.b - amperes).abs() < 0.0103, "{}", m.phases.b);
             assert_eq!(m.phases.c, -(m.phases.a + m.phases.b));
@@ -145,27 +154,19 @@ mod tests {
     }
 
     #[test]
-    fn offsets_are_taken_off_until_the_outputs_are_off_again() {
-        let (front_end, mut state) = (front_end(), FrontEndState::default());
+    fn offsets_are_taken_off() {
         let sample = Sample { current_a: 2060, current_b: 1990, ..Sample::default() };
-        let at_rest = front_end.measure(&mut state, &sample).phases;
+        let at_rest = measured(&sample, [0.0; 3]).phases;
         assert!(at_rest.a.abs() > 0.05);
-        let offsets = Some([at_rest.a, at_rest.b, at_rest.c]);
-        let on = Output { duties: Some([7000.0; 3]), ..Output::default() };
-        let off = Output::default();
-        for (output, known) in [(Output { offsets, ..off }, true), (on, true), (off, false)] {
-            front_end.put_out(&mut state, &output);
-            let phases = front_end.measure(&mut state, &sample).phases;
-            assert_eq!(phases.a.abs() < 1e-6 && phases.b.abs() < 1e-6, known, "{output:?}");
-        }
+        let phases = measured(&sample, [at_rest.a, at_rest.b, 0.0]).phases;
+        assert!(phases.a.abs() < 1e-6 && phases.b.abs() < 1e-6);
     }
 
     #[test]
     fn both_ends_of_the_range_are_saturated() {
         let sample =
             Sample { current_a: 2000, current_b: 2000, heat_sink: 1309, ..Sample::default() };
-        let found =
-            |sample: &Sample| front_end().measure(&mut FrontEndState::default(), sample).fault;
+        let found = |sample: &Sample| measured(sample, [0.0; 3]).fault;
         let (cold, hot) = front_end().heat_sink.window;
         let cases = [
             (Sample { current_a: 0, ..sample }, Some(Fault::SensorSaturatedA)),

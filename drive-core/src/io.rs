@@ -36,7 +36,7 @@ pub struct Measured {
     pub third: f32,
     /// Dc-link voltage, V.
     pub dc_link: f32,
-    /// Share of the current that the heat sink bears, 0 to 1.
+    /// Share of the current that the heat sink bears; 1 or more for all of it, 0 or less for none.
     pub heat_sink: f32,
     /// Position counter of the quadrature encoder, four counts a line, wrapping, upwards when the
     /// rotor turns from phase a towards phase b.
@@ -64,16 +64,6 @@ pub struct Output {
     pub chopper: f32,
     /// Whether the precharge relay is to be closed; always `false` where the settings have none.
     pub relay: bool,
-    /// Offsets of the current sensors a, b, c, A, in the step that has measured them: to be taken off from the next sample on,
-    /// until the outputs have been on and are off again.
-    pub offsets: Option<[f32; 3]>,
-}
-
-impl Output {
-    /// Outputs on with these duties.
-    pub(crate) fn on(duties: [f32; 3]) -> Self {
-        Self { duties: Some(duties), ..Self::default() }
-    }
 }
 
 /// The readings of converters and encoder at the instant `k T` of one PWM period: plain register values.

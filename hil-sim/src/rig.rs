@@ -185,9 +185,7 @@ impl Rig {
     /// interrupt of the firmware does with a drive, and the only place that does it: every experiment runs its drive here.
     #[inline]
     pub fn step_with(&mut self, sample: &Sample) {
-        let measured = self.drive.front_end().measure(&mut self.front_end, sample);
-        let output = self.drive.step(&measured);
-        let compare = self.drive.front_end().put_out(&mut self.front_end, &output);
+        let (compare, output) = self.drive.period(&mut self.front_end, sample);
         if !compare.enabled {
             // Off is off at once, not at the end of the period.
             self.pending = Compare::OFF;

@@ -1,4 +1,4 @@
-//! The control interrupt: samples in, [`Drive::step`], compare values out, 6000 times a second.
+//! The control interrupt: samples in, [`Drive::period`], compare values out, 6000 times a second.
 //!
 //! It starts when both converters have finished, [`board::SAMPLES_READY_TICKS`] (2.3 us) after the
 //! counter of TIM1 was at its top, and must have written the compare values before the next top, one period
@@ -247,9 +247,8 @@ impl Running {
             hardware,
         };
 
-        let measured = drive.front_end().measure(&mut self.front_end, &sample);
-        let output = drive.step(&measured);
-        pwm.apply(drive.front_end().put_out(&mut self.front_end, &output));
+        let (compare, output) = drive.period(&mut self.front_end, &sample);
+        pwm.apply(compare);
 
         // The timer was at its top again before all compare values were written.
         self.late = Hardware::empty();

@@ -181,9 +181,7 @@ pub fn replay(scene: &Scene, samples: &[Sample], orders: &str) -> (Drive, Vec<Ha
         while let Some((_, line)) = orders.next_if(|(number, _)| number.parse() == Ok(n)) {
             player.order(&mut drive, line);
         }
-        let measured = drive.front_end().measure(&mut front_end, sample);
-        let output = drive.step(&measured);
-        let compare = drive.front_end().put_out(&mut front_end, &output);
+        let (compare, output) = drive.period(&mut front_end, sample);
         if n.is_multiple_of(BLOCK) {
             hashes.push(Hashes::default());
         }

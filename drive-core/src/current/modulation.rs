@@ -15,31 +15,29 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 /// ```
 /// use drive_core::{Abc, AlphaBeta, current::modulation::Modulator};
 ///
-/// let modulator = Modulator::new(14_167, 2.2e-6, false);
+/// let modulator = Modulator::new(2.2e-6, false);
 /// // Zero voltage: all legs at half the dc link.
-/// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).duties, [7083.5; 3]);
+/// assert_eq!(modulator.step(AlphaBeta::ZERO, Abc::ZERO, 311.0).duties, [0.5; 3]);
 /// // 400 V along phase a: limited to the corner of the hexagon, 2/3 of the dc link.
 /// let out = modulator.step(AlphaBeta::new(400.0, 0.0), Abc::ZERO, 311.0);
-/// assert_eq!(out.duties, [14_167.0, 0.0, 0.0]);
+/// assert_eq!(out.duties, [1.0, 0.0, 0.0]);
 /// assert!(out.limited && (out.realised.alpha - 207.33).abs() < 0.01);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulator {
-    /// Compare value at which the high side is on throughout.
-    top: f32,
-    /// Shortest pulse, counts.
+    /// Shortest pulse, share of the period.
     shortest: f32,
     /// Share of the dc link that the dead-time compensation leaves.
     usable: f32,
-    /// With shunts below the low sides: largest compare value at which a leg can be read.
+    /// With shunts below the low sides.
     readable: Option<Readable>,
 }
 
 /// The limit that keeps two of three legs readable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Readable {
-    /// Compare value.
-    top: f32,
+    /// Largest duty at which a leg can be read.
+    duty: f32,
     /// Share of the dc link between the second highest leg and the lowest, without the compensation.
     share: f32,
 }
@@ -47,42 +45,39 @@ struct Readable {
 /// Result of the modulation for one period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulated {
-    /// Duties of phases a, b, c, 0 to `top`; see [`Output`](crate::Output).
+    /// Duties of phases a, b, c, 0 to 1; see [`Output`](crate::Output).
     pub duties: [f32; 3],
     /// Realised mean voltage at the motor, V peak: the reference, limited to the hexagon, with dropped or
-    /// extended pulses accounted for. Rounding to counts (11 mV at 311 V) is excluded: anti-windup with it
-    /// would stall a controller on increments below half a count.
+    /// extended pulses accounted for. Rounding to timer counts (11 mV at 311 V) is excluded: anti-windup with
+    /// it would stall a controller on increments below half a count.
     pub realised: AlphaBeta,
     /// Whether `realised` differs from the reference.
     pub limited: bool,
 }
 
 impl Modulator {
-    /// Modulator for a timer that counts to `top` and a dead time in s.
+    /// Modulator for a dead time in s.
     ///
     /// `compensated`: whether a dead-time compensation is added; it needs twice its amplitude of the dc
     /// link.
-    pub fn new(top: u16, dead_time_s: f32, compensated: bool) -> Self {
+    pub fn new(dead_time_s: f32, compensated: bool) -> Self {
         let ratio = dead_time_s / PERIOD_S;
         Self {
-            top: f32::from(top),
-            shortest: (ratio + SHORTEST_EFFECTIVE_PULSE_S / PERIOD_S) * f32::from(top),
+            shortest: ratio + SHORTEST_EFFECTIVE_PULSE_S / PERIOD_S,
             usable: if compensated { 1.0 - 2.0 * ratio } else { 1.0 },
             readable: None,
         }
     }
 
-    /// The same with shunts below the low sides, which can be read up to the compare value `readable`.
+    /// The same with shunts below the low sides, which can be read up to the duty `readable`.
     ///
     /// The second highest leg then stays at or below it, so two of the three currents can always be read. All legs are moved
     /// down together where needed, which changes no voltage between phases. The circle inside the hexagon, the whole range
     /// of linear modulation, needs 93.3 % of the period for the second highest leg: nothing is lost from there on. With less
     /// the corners of the hexagon are cut.
-    pub fn readable(mut self, readable: Option<u16>) -> Self {
-        self.readable = readable.map(|count| {
-            let top = f32::from(count);
-            Readable { top, share: top / self.top - (1.0 - self.usable) }
-        });
+    pub fn readable(mut self, readable: Option<f32>) -> Self {
+        let share = |duty| duty - (1.0 - self.usable);
+        self.readable = readable.map(|duty| Readable { duty, share: share(duty) });
         self
     }
 
@@ -92,7 +87,7 @@ impl Modulator {
         self.usable * v_dc * (1.0 / SQRT_3)
     }
 
-    /// Compare values for a mean voltage `wanted`, V peak, plus the dead-time `compensation`, V per phase,
+    /// Duties for a mean voltage `wanted`, V peak, plus the dead-time `compensation`, V per phase,
     /// at a dc link of `v_dc` > 0, V. The power stage loses the compensation again.
     ///
     /// A voltage outside the hexagon is shortened; its angle is kept.
@@ -114,20 +109,20 @@ impl Modulator {
         // Centre the lowest and the highest leg on half the dc link.
         let leg = motor + compensation;
         let (low, high) = extremes(leg);
-        let per_volt = self.top / v_dc;
-        let mut centre = 0.5 * (self.top - (low + high) * per_volt);
+        let per_volt = 1.0 / v_dc;
+        let mut centre = 0.5 * (1.0 - (low + high) * per_volt);
         if let Some(readable) = self.readable {
-            let highest = readable.top - second(leg) * per_volt;
+            let highest = readable.duty - second(leg) * per_volt;
             if centre > highest {
                 centre = highest;
             }
         }
         let ideal = [leg.a, leg.b, leg.c].map(|volts| centre + volts * per_volt);
-        let [a, b, c] = ideal.map(|count| self.drop_or_extend(count));
+        let [a, b, c] = ideal.map(|duty| self.drop_or_extend(duty));
         // NaN differs from itself and so counts as limited.
         let limited = shortened || [a, b, c] != ideal;
         let realised = if limited {
-            (Abc::new(a, b, c) * (v_dc / self.top) - compensation).to_alpha_beta()
+            (Abc::new(a, b, c) * v_dc - compensation).to_alpha_beta()
         } else {
             wanted
         };
@@ -135,14 +130,14 @@ impl Modulator {
     }
 
     /// Rounds a too short pulse of either switch to no pulse or to the shortest one, whichever is nearer.
-    fn drop_or_extend(&self, count: f32) -> f32 {
-        let from_top = self.top - count;
-        if count < self.shortest {
-            if count < 0.5 * self.shortest { 0.0 } else { self.shortest }
-        } else if from_top < self.shortest {
-            if from_top < 0.5 * self.shortest { self.top } else { self.top - self.shortest }
+    fn drop_or_extend(&self, duty: f32) -> f32 {
+        let rest = 1.0 - duty;
+        if duty < self.shortest {
+            if duty < 0.5 * self.shortest { 0.0 } else { self.shortest }
+        } else if rest < self.shortest {
+            if rest < 0.5 * self.shortest { 1.0 } else { 1.0 - self.shortest }
         } else {
-            count
+            duty
         }
     }
 }
@@ -172,7 +167,7 @@ mod tests {
     const COUNT_V: f64 = 311.0 / 14_167.0;
 
     fn modulator() -> Modulator {
-        Modulator::new(TOP, 2.2e-6, false)
+        Modulator::new(2.2e-6, false)
     }
 
     fn polar(length: f64, angle: f64) -> AlphaBeta {
@@ -181,7 +176,7 @@ mod tests {
 
     /// Compare values of the timer.
     fn counts(modulated: &Modulated) -> [u16; 3] {
-        modulated.duties.map(|duty| duty.round() as u16)
+        modulated.duties.map(|duty| (duty * f32::from(TOP)).round() as u16)
     }
 
     /// Mean voltage that the compare values put out, V peak.
@@ -220,7 +215,7 @@ mod tests {
     #[test]
     fn compensation_does_not_cost_the_wanted_voltage() {
         // With the part for the compensation kept free, the compensated legs never saturate.
-        let m = Modulator::new(TOP, 2.2e-6, true);
+        let m = Modulator::new(2.2e-6, true);
         let dt = V_DC * 2.2e-6 / PERIOD_S;
         for degrees in 0..360 {
             let w = polar(400.0, f64::from(degrees).to_radians());
@@ -233,26 +228,26 @@ mod tests {
     }
 
     /// 94 % of the period can be read.
-    const READABLE: u16 = 13_316;
+    const READABLE: f32 = 0.94;
 
     #[test]
     fn with_shunts_two_legs_are_always_readable_and_the_circle_is_kept() {
         for compensated in [false, true] {
-            let plain = Modulator::new(TOP, 2.2e-6, compensated);
+            let plain = Modulator::new(2.2e-6, compensated);
             let m = plain.readable(Some(READABLE));
             for degrees in 0..720 {
                 let angle = f64::from(degrees).to_radians() / 2.0;
                 for share in [0.3, 0.9, 0.999, 1.2, 3.0] {
                     let wanted = polar(share * f64::from(plain.circle(V_DC)), angle);
                     let out = m.step(wanted, Abc::ZERO, V_DC);
-                    let readable = counts(&out).iter().filter(|&&c| c <= READABLE).count();
-                    assert!(readable >= 2, "{share} at {angle}: {:?}", counts(&out));
+                    let readable = out.duties.iter().filter(|&&d| d <= READABLE + 1e-6).count();
+                    assert!(readable >= 2, "{share} at {angle}: {:?}", out.duties);
                     let error = mean(counts(&out)) - out.realised;
                     assert!(error.length_squared().sqrt() < 2.0 * COUNT_V as f32);
                     if share < 1.0 {
                         // A pulse that is too short is dropped or extended with shunts as without.
                         let lost = (out.realised - wanted).length_squared().sqrt();
-                        let shortest = m.shortest / f32::from(TOP) * V_DC;
+                        let shortest = m.shortest * V_DC;
                         assert!(lost <= 0.7 * shortest, "{share} at {angle}: {lost} V");
                     }
                 }
@@ -307,13 +302,18 @@ mod tests {
     /// A pulse of either switch is left out below half the shortest, and lengthened from there.
     #[test]
     fn short_pulses_are_dropped_or_lengthened() {
-        let modulator = Modulator { top: 1000.0, shortest: 40.0, ..modulator() };
-        for (count, expected) in
-            [(0.0, 0.0), (19.9, 0.0), (20.1, 40.0), (39.9, 40.0), (40.1, 40.1), (500.0, 500.0)]
-        {
-            assert_eq!(modulator.drop_or_extend(count), expected, "{count}");
-            let other = modulator.drop_or_extend(1000.0 - count);
-            assert!((other - (1000.0 - expected)).abs() < 1e-3, "{count}");
+        let modulator = Modulator { shortest: 0.04, ..modulator() };
+        for (duty, expected) in [
+            (0.0, 0.0),
+            (0.0199, 0.0),
+            (0.0201, 0.04),
+            (0.0399, 0.04),
+            (0.0401, 0.0401),
+            (0.5, 0.5),
+        ] {
+            assert_eq!(modulator.drop_or_extend(duty), expected, "{duty}");
+            let other = modulator.drop_or_extend(1.0 - duty);
+            assert!((other - (1.0 - expected)).abs() < 1e-6, "{duty}");
         }
     }
 

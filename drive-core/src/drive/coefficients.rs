@@ -224,6 +224,7 @@ impl Settings {
                 shunts: self.shunts(),
                 dc_link: self.scales.dc_link,
                 full_scale: self.scales.full_scale,
+                top: f32::from(self.inverter.top),
                 heat_sink: self.scales.ntc.checks(self.derate_c(), self.limits.heat_sink_c),
             },
             offsets: OffsetCheck {
@@ -268,12 +269,8 @@ impl Settings {
             ],
             current_lag,
             lag_share,
-            modulator: Modulator::new(
-                self.inverter.top,
-                self.inverter.dead_time_s,
-                self.inverter.compensate,
-            )
-            .readable(self.shunts().map(|shunts| shunts.readable)),
+            modulator: Modulator::new(self.inverter.dead_time_s, self.inverter.compensate)
+                .readable(self.shunts().map(|shunts| shunts.readable)),
             dead_time: if self.inverter.compensate {
                 DeadTime::new(self.inverter.dead_time_s, self.full_compensation_a())
             } else {
@@ -339,7 +336,7 @@ impl Settings {
         let window_s = self.inverter.dead_time_s + s.shunt_settle_s + SHUNT_SAMPLING_S;
         let largest_sum = self.share_of_range(LARGEST_SUM_A);
         (s.sensors == CurrentSensors::LowSide)
-            .then(|| Shunts::new(s.current_c, self.inverter.top, window_s, largest_sum))
+            .then(|| Shunts::new(s.current_c, window_s, largest_sum))
     }
 
     fn motor_plant(&self) -> Result<FirstOrder, TuningError> {

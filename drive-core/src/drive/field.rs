@@ -90,7 +90,6 @@ impl Field {
         k: &mut Kept,
         measured: &Measured,
     ) -> Result<[f32; 3], End> {
-        c.protect(measured)?;
         if self.frame == Frame::Encoder {
             k.rotor_count = measured.encoder;
             k.seen.turns = c.motion.turns(&self.motion, k.rotor_count);

@@ -34,6 +34,7 @@ impl Limits {
     /// Finds the torque current that heat sink, motor and inverter do not bear; `heat_sink` is the share of the current that
     /// the first bears, `i_d` the direct current, A.
     pub fn heat(&mut self, c: &Coefficients, thermal: &ThermalLoads, heat_sink: f32, i_d: f32) {
+        let heat_sink = heat_sink.clamp(0.0, 1.0);
         let (heat_sink, loads) = ((heat_sink * heat_sink, Limiting::HeatSink), thermal.share());
         let (share, why) = if loads.0 < heat_sink.0 { loads } else { heat_sink };
         (self.too_hot_for, self.too_hot) = if share < 1.0 {

@@ -7,7 +7,7 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::flux::catch::CatchState;
-use crate::io::{LOW_SIDES_ON, Measured, Output};
+use crate::io::{LOW_SIDES_ON, Measured};
 use crate::math::angle::UnitVector;
 use crate::math::frames::Dq;
 use crate::protect::offsets::OffsetCheckState;
@@ -47,15 +47,14 @@ impl Prepare {
 impl Drive {
     /// A step of the preparation.
     #[cold]
-    pub(super) fn prepare(&mut self, measured: &Measured) -> Result<Output, Fault> {
+    pub(super) fn prepare(&mut self, measured: &Measured) -> Result<Option<[f32; 3]>, Fault> {
         let (c, k) = (&self.c, &mut self.kept);
-        let Phase::Prepare(prepare) = &mut self.phase else { return Ok(Output::default()) };
+        let Phase::Prepare(prepare) = &mut self.phase else { return Ok(None) };
         match &mut prepare.step {
             Preparation::Offsets(state) => {
                 let residual = prepare.left.residual;
                 let waits = residual.is_some_and(|residual| residual.waits(c, k.elapsed));
-                let offsets = if waits { None } else { c.offsets.step(state, measured)? };
-                if let Some(offsets) = offsets {
+                if !waits && let Some(offsets) = c.offsets.step(state, measured)? {
                     k.offsets = offsets;
                     // Flux from a run before would meet a short circuit. With a wiring that nobody has checked there was no run.
                     if residual.is_some() && !k.wiring_unchecked {
@@ -65,7 +64,7 @@ impl Drive {
                         k.elapsed = 0;
                     }
                 }
-                return Ok(Output { offsets, ..Output::default() });
+                return Ok(None);
             }
             Preparation::LowSides(state) => {
                 // The first samples still see the bridge off.
@@ -83,7 +82,7 @@ impl Drive {
                 }
             }
             Preparation::Wiring(pulses) => match c.pulse(&c.wiring, pulses, measured)? {
-                Some(duties) => return Ok(Output::on(duties)),
+                Some(duties) => return Ok(Some(duties)),
                 None => {
                     c.wiring.judge(&pulses.answers())?;
                     k.wiring_unchecked = false;
@@ -91,7 +90,7 @@ impl Drive {
                 }
             },
         }
-        Ok(Output::on(LOW_SIDES_ON))
+        Ok(Some(LOW_SIDES_ON))
     }
 
     /// Goes on to the work that the drive was started for.

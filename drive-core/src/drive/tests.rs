@@ -30,9 +30,7 @@ const MODES: [Mode; 6] = [
 
 /// A whole period of a drive with its front end.
 fn step(drive: &mut Drive, front_end: &mut FrontEndState, sample: &Sample) -> Compare {
-    let measured = drive.front_end().measure(front_end, sample);
-    let output = drive.step(&measured);
-    drive.front_end().put_out(front_end, &output)
+    drive.period(front_end, sample).0
 }
 
 /// Three windings of 6.2 ohm and 51.5 mH: what the motor is to the current loop.

@@ -5,7 +5,7 @@
 //! read; its current then is minus the sum of the others. The modulator leaves at most one leg so
 //! ([`Modulator::readable`](crate::current::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
 
-use crate::io::{Compare, PERIOD_S};
+use crate::io::PERIOD_S;
 use crate::settings::Line;
 
 /// Time constant of the mean of the sum, samples.
@@ -16,8 +16,8 @@ const MEAN_SAMPLES: f32 = 16.0;
 pub struct Shunts {
     /// Calibration of current c, A.
     pub current_c: Line,
-    /// Largest compare value at which a leg can be read.
-    pub readable: u16,
+    /// Largest duty at which a leg can be read.
+    pub readable: f32,
     /// Largest mean of the sum of the three currents, A.
     pub largest_sum: f32,
 }
@@ -25,19 +25,18 @@ pub struct Shunts {
 /// State of the choice.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ShuntState {
-    /// Compare values of the period before the next sample, and of the period after it.
-    before: [u16; 3],
-    after: [u16; 3],
+    /// Duties of the period before the next sample, and of the period after it.
+    before: [f32; 3],
+    after: [f32; 3],
     /// Mean of the sum while all three are read, A.
     sum: f32,
 }
 
 impl Shunts {
-    /// For a timer that counts to `top`. A leg can be read if its low side is on for at least `window_s`, s, before and after
-    /// the sample: dead time, settling of the amplifier, and sampling.
-    pub fn new(current_c: Line, top: u16, window_s: f32, largest_sum: f32) -> Self {
-        let share = 1.0 - 2.0 * window_s / PERIOD_S;
-        Self { current_c, readable: (share * f32::from(top)) as u16, largest_sum }
+    /// A leg can be read if its low side is on for at least `window_s`, s, before and after the sample: dead time, settling of the
+    /// amplifier, and sampling.
+    pub fn new(current_c: Line, window_s: f32, largest_sum: f32) -> Self {
+        Self { current_c, readable: 1.0 - 2.0 * window_s / PERIOD_S, largest_sum }
     }
 
     /// The currents of phases a and b, A, from three readings, A; a reading that cannot be used is replaced.
@@ -64,9 +63,9 @@ impl Shunts {
 
 impl ShuntState {
     /// Notes the output of a step, which takes effect with the period after the next sample.
-    pub fn applied(&mut self, compare: &Compare) {
+    pub fn applied(&mut self, duties: [f32; 3]) {
         self.before = self.after;
-        self.after = [compare.a, compare.b, compare.c];
+        self.after = duties;
     }
 }
 
@@ -77,13 +76,13 @@ mod tests {
     const LINE: Line = Line { gain: -0.01, offset: 20.0 };
 
     fn shunts() -> Shunts {
-        Shunts::new(LINE, 14_167, 5e-6, 0.5)
+        Shunts::new(LINE, 5e-6, 0.5)
     }
 
     #[test]
     fn the_window_is_the_share_of_the_period_around_the_sample() {
         // 10 us of 166.7 us: 94 %.
-        assert_eq!(shunts().readable, 13_316);
+        assert!((shunts().readable - 0.94).abs() < 1e-6);
     }
 
     #[test]
@@ -93,13 +92,11 @@ mod tests {
         for hidden in 0..3 {
             let mut read = true_currents;
             read[hidden] = 0.0;
-            let mut high = [7000; 3];
-            high[hidden] = 14_000;
-            let [a, b, c] = high;
-            let (low, high) = (Compare::default(), Compare { a, b, c, enabled: true });
+            let (low, mut high) = ([0.0; 3], [0.5; 3]);
+            high[hidden] = 0.99;
             for output in [[high, low], [low, high]] {
                 let mut state = ShuntState::default();
-                output.iter().for_each(|compare| state.applied(compare));
+                output.iter().for_each(|duties| state.applied(*duties));
                 assert_eq!(shunts.choose(&mut state, read), (3.0, -1.0), "leg {hidden}");
                 assert!(shunts.sums_to_zero(&state), "a hidden leg is not part of the sum");
             }

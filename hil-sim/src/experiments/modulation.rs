@@ -50,7 +50,7 @@ struct Inverter {
 impl Inverter {
     fn compare(&self, wanted: AlphaBeta) -> [f64; 3] {
         let modulated = self.modulator.step(wanted, Abc::ZERO, self.vdc as f32);
-        modulated.duties.map(|duty| f64::from(duty).round())
+        modulated.duties.map(|duty| (f64::from(duty) * self.top).round())
     }
 
     /// Mean voltage at the motor for these compare values, V.
@@ -71,7 +71,7 @@ fn vector(volts: f64, angle: f64) -> AlphaBeta {
 fn run(context: &Context<'_>) -> Result<Outcome, Error> {
     let settings = settings::Inverter::default();
     let inverter = Inverter {
-        modulator: Modulator::new(settings.top, settings.dead_time_s, false),
+        modulator: Modulator::new(settings.dead_time_s, false),
         top: f64::from(settings.top),
         vdc: context.config.inverter.dc_link_v,
     };

@@ -44,15 +44,17 @@ impl Shadow {
         let drive = Drive::new(settings.build_for(dead_time_s)?);
         let (orders, tracking) = (VecDeque::new(), Tracking::new(&settings.drive));
         let settings = Staging::new(settings);
+        let (front_end, output) = Default::default();
+        let tau_r = None;
         Ok(Self {
             drive,
-            front_end: FrontEndState::default(),
-            output: Output::default(),
+            front_end,
+            output,
             settings,
             dead_time_s,
             orders,
             tracking,
-            tau_r: None,
+            tau_r,
             compared: 0,
         })
     }
@@ -153,9 +155,8 @@ impl Shadow {
     /// The compare values differ.
     pub fn follow(&mut self, period: &Period) -> Result<()> {
         let learning = self.drive.state() == State::Learning;
-        let measured = self.drive.front_end().measure(&mut self.front_end, &period.sample);
-        self.output = self.drive.step(&measured);
-        let compare = self.drive.front_end().put_out(&mut self.front_end, &self.output);
+        let compare;
+        (compare, self.output) = self.drive.period(&mut self.front_end, &period.sample);
         if learning
             && self.drive.state() != State::Learning
             && let Some(found) = self.drive.learned()

@@ -34,7 +34,8 @@ fn the_right_set_up_is_off_unless_it_is_on() -> Result<()> {
         script.outputs(true)?;
         script.wait(PERIOD)?;
         let gates = script.board.gates().clone();
-        assert_eq!(gates.compare(), Compare::on([3000, 7000, 11_000]), "{}", stage.name);
+        let expected = Compare { a: 3000, b: 7000, c: 11_000, enabled: true };
+        assert_eq!(gates.compare(), expected, "{}", stage.name);
         assert_eq!(gates.dead_time, 376);
         for (leg, compare) in gates.legs.iter().zip([3000, 7000, 11_000]) {
             assert_eq!([on(leg, 0), on(leg, 1)], [2 * compare - 376, 2 * (TOP - compare) - 376]);

@@ -144,7 +144,7 @@ impl Bridge {
     /// long as one leg's switches do not alternate, all are off.
     pub fn compare(&self) -> Compare {
         match [0, 1, 2].map(|leg| self.legs[leg].compare) {
-            [Some(a), Some(b), Some(c)] => Compare::on([a, b, c]),
+            [Some(a), Some(b), Some(c)] => Compare { a, b, c, enabled: true },
             _ => Compare::OFF,
         }
     }
