@@ -1,9 +1,17 @@
 //! The current loop and the inverter: current sensing, PI control, dead-time compensation, modulation.
 
-pub mod dead_time;
-pub mod inverter_drop;
-pub mod modulation;
-pub mod pi;
-pub mod sensing;
-pub mod shunts;
-pub mod voltage_limit;
+pub(crate) mod dead_time;
+pub(crate) mod inverter_drop;
+pub(crate) mod modulation;
+pub(crate) mod pi;
+pub(crate) mod sensing;
+pub(crate) mod shunts;
+pub(crate) mod voltage_limit;
+
+pub use dead_time::DeadTime;
+pub use inverter_drop::InverterDrop;
+pub use modulation::Modulator;
+pub use pi::{DqPi, Pi, PiState, ReferenceFilter};
+pub use sensing::Sensing;
+pub use shunts::Shunts;
+pub use voltage_limit::VoltageLimit;

@@ -52,7 +52,7 @@ use crate::supply::RelayState;
 
 use axes::Axes;
 use catching::Residual;
-pub use coefficients::Coefficients;
+pub use coefficients::{Catching, Coefficients, Protection, SequenceSteps};
 pub use command::{Accepted, Command, Refused, Stop};
 pub use excitation::{Excitation, Excited, Regulator};
 use excite::Excite;
@@ -66,8 +66,8 @@ pub use telemetry::{Room, Telemetry};
 /// The drive: coefficients, the phase that it is in, and that which outlives a phase.
 ///
 /// ```
-/// use drive_core::settings::{AngleSource, Settings};
-/// use drive_core::{Command, Drive, Mode, Sample, State};
+/// use induction_drive_core::{AngleSource, Command, Drive, Mode, Sample, State};
+/// use induction_drive_settings::Settings;
 ///
 /// // Without an encoder it would have to learn its motor first.
 /// let settings = Settings { angle_source: AngleSource::Encoder, ..Settings::default() };

@@ -47,33 +47,49 @@
 #![cfg_attr(not(test), no_std)]
 
 pub mod carrier;
-pub mod commission;
 pub mod current;
-pub mod dc_link;
+mod dc_link;
 mod drive;
-pub mod fault;
+mod fault;
 pub mod filter;
 pub mod flux;
 pub mod homing;
-pub mod identify;
+mod identify;
 pub mod io;
 pub mod learned;
+mod line;
 pub mod math;
-pub mod motion;
+mod motion;
+mod motor;
 pub mod protect;
-pub mod settings;
-pub mod supply;
-pub mod tuning;
+mod supply;
+pub mod table;
 
+pub use dc_link::{ChopperSettings, DcLink, DcLinkSettings, Limiting};
 pub use drive::{
-    Accepted, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode, Refused, Regulator,
-    Room, Stage, State, Stop, Telemetry,
+    Accepted, Catching, Coefficients, Command, Drive, Excitation, Excited, Layout, Mode,
+    Protection, Refused, Regulator, Room, SequenceSteps, Stage, State, Stop, Telemetry,
 };
 pub use fault::Fault;
+pub use flux::AngleSource;
+pub use identify::learning::Learning;
 pub use io::{Compare, Hardware, Sample};
+pub use line::Line;
 pub use math::angle::{Angle, UnitVector};
-pub use math::frames::{Abc, AlphaBeta, DmQm, Dq};
-pub use settings::Settings;
+pub use math::frames::{Abc, AlphaBeta, DmQm, Dq, SQRT_3};
+pub use motion::{Motion, MotionGains, Ramps};
+pub use motor::{FirstOrder, Motor};
+pub use supply::Relay;
+
+/// The settings and the design, compiled into the unit tests: as a dependency they would bring a second instance of this crate.
+#[cfg(test)]
+#[path = "../settings/src/settings/mod.rs"]
+pub mod settings;
+#[cfg(test)]
+#[path = "../settings/src/tuning/mod.rs"]
+pub mod tuning;
+#[cfg(test)]
+extern crate self as drive_core;
 
 /// The examples of the documents.
 #[cfg(doctest)]

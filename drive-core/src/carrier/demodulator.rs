@@ -43,7 +43,7 @@ mod rms_impedance;
 pub use {
     compared::Demodulator,
     envelope::Envelope,
-    printed::{Literal, PrintedChain, Rectified},
+    printed::{Literal, Rectified},
     rms_impedance::RmsImpedance,
 };
 
@@ -55,11 +55,6 @@ use crate::carrier::CarrierSample;
 use crate::carrier::synchronous::SynchronousState;
 #[cfg(feature = "printed")]
 use crate::{filter::dissertation::BPF, filter::sos::SosState, math::frames::DmQm};
-
-/// Least length of the rms filters of [`RmsImpedance`], samples.
-pub const MIN_RMS_SAMPLES: u8 = 2;
-/// Greatest length of the rms filters, samples.
-pub const MAX_RMS_SAMPLES: u8 = 60;
 
 /// A demodulator with its state; at rest after [`Default`] or `new`.
 pub trait Demodulate {

@@ -7,7 +7,7 @@
 use crate::fault::Fault;
 use crate::io::PERIOD_S;
 use crate::math::frames::Dq;
-use crate::tuning::FirstOrder;
+use crate::motor::FirstOrder;
 use num_complex::Complex64;
 
 /// Samples per period of the carrier.

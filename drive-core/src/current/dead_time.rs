@@ -11,7 +11,7 @@ use crate::math::frames::Abc;
 /// Coefficients of the compensation.
 ///
 /// ```
-/// use drive_core::{Abc, current::dead_time::DeadTime};
+/// use induction_drive_core::{Abc, current::DeadTime};
 ///
 /// // Dead time 2.2 us, full compensation from 30 mA on; 311 V dc link, no further drop.
 /// let dead_time = DeadTime::new(2.2e-6, 0.03);

@@ -16,7 +16,7 @@
 
 use crate::io::periods;
 use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::motor::Motor;
 
 /// Forcing current relative to the final direct current.
 const FORCED: f32 = 1.5;

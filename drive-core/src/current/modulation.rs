@@ -13,7 +13,7 @@ const SHORTEST_EFFECTIVE_PULSE_S: f32 = 1e-6;
 /// Coefficients of the modulator.
 ///
 /// ```
-/// use drive_core::{Abc, AlphaBeta, current::modulation::Modulator};
+/// use induction_drive_core::{Abc, AlphaBeta, current::Modulator};
 ///
 /// let modulator = Modulator::new(14_167, 2.2e-6, false);
 /// // Zero voltage: all legs at half the dc link.

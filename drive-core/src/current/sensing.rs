@@ -3,8 +3,9 @@
 use super::shunts::{ShuntState, Shunts};
 use crate::fault::Fault;
 use crate::io::{Compare, Sample};
+use crate::line::Line;
 use crate::math::frames::{Abc, AlphaBeta};
-use crate::settings::{HeatSink, Line};
+use crate::protect::heat_sink::HeatSink;
 
 /// Samples of the second calibration: the time with the low sides on holds them.
 const SAMPLES_AGAIN: u16 = 32;

@@ -6,7 +6,7 @@
 //! ([`Modulator::readable`](super::modulation::Modulator::readable)). While all three can be read, their sum must be zero.
 
 use crate::io::{Compare, PERIOD_S};
-use crate::settings::Line;
+use crate::line::Line;
 
 /// Time constant of the mean of the sum, samples.
 const MEAN_SAMPLES: f32 = 16.0;

@@ -23,7 +23,7 @@ use core::f32::consts::TAU;
 use crate::carrier::injection::CARRIER_SAMPLES;
 use crate::io::PERIOD_S;
 use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::motor::Motor;
 
 /// Share of the voltage that is used: the rest is for the current controllers.
 const USED: f32 = 0.92;

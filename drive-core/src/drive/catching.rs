@@ -4,8 +4,8 @@ use core::f32::consts::TAU;
 
 use super::{Field, FluxPhase, Kept};
 use crate::current::pi::ReferenceState;
+use crate::drive::coefficients::Catching;
 use crate::drive::coefficients::Coefficients;
-use crate::drive::coefficients::catching::WITH_FLUX;
 use crate::fault::Fault;
 use crate::flux::catch::{self, Caught};
 use crate::flux::hand_over::HandOver;
@@ -83,7 +83,7 @@ impl Field {
         if n == 0 && !drives {
             self.reference[0] = ReferenceState::at_rest(AT_ONCE * catching.current);
         }
-        let d = if drives { WITH_FLUX * catching.current } else { catching.current };
+        let d = if drives { Catching::WITH_FLUX * catching.current } else { catching.current };
         if n > catch::FROM {
             c.current_loop.hold(&mut self.current_loop);
         }

@@ -7,10 +7,10 @@ use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
 use crate::drive::allowed::allowed;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::Mode;
+use crate::flux::AngleSource;
 use crate::math::angle::Angle;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
-use crate::settings::AngleSource;
 
 /// Periods for which a jog goes on: 0.5 s.
 const JOG: u32 = 3000;

@@ -11,13 +11,13 @@ use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
 use crate::fault::Fault;
 use crate::filter::dissertation::LPF;
+use crate::flux::AngleSource;
 use crate::identify::learning::LearningState;
 use crate::io::{Compare, PERIOD_S, Sample};
 use crate::math::frames::{AlphaBeta, Dq};
 use crate::math::limited;
 use crate::motion;
 use crate::protect::saliency_check::{SaliencyCheck, SaliencyCheckAction};
-use crate::settings::AngleSource;
 
 /// Electrical speed up to which the shaft counts as standing, turns per period: 1 Hz, 30 rpm of four poles.
 const STANDING_FREQ: f32 = PERIOD_S;

@@ -3,11 +3,10 @@
 use super::{Drive, End, Field, FluxPhase, Kept, Phase};
 use crate::drive::coefficients::Coefficients;
 use crate::fault::Fault;
+use crate::flux::AngleSource;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
-use crate::learned::{Tracked, TrackedLimit};
 use crate::math::angle::Angle;
 use crate::math::limited;
-use crate::settings::{AngleSource, Settings};
 
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.
@@ -84,24 +83,6 @@ impl Field {
             LearningAction::Done => return Err(End::Measured),
         }
         Ok(k.references.current.q)
-    }
-}
-
-impl Learned {
-    /// Range of torque that a drive with these settings tracks with this result; `None` if it is not accepted, or has no slope.
-    pub fn tracked(&self, settings: &Settings) -> Option<Tracked> {
-        self.slope.filter(|_| self.verdict.is_accepted())?;
-        let (i_d, motor) = (settings.i_d(), &settings.motor);
-        let last = self.reference.grid().current(self.points);
-        let lost = self.limit_a < last;
-        let i_q = self.limit_a.min(settings.i_q_limit_a());
-        Some(Tracked {
-            i_q,
-            torque: i_q * motor.torque_per_ampere(i_d),
-            i_d,
-            flux: i_d * motor.l_m,
-            limit: if lost { TrackedLimit::Slope } else { TrackedLimit::Current },
-        })
     }
 }
 

@@ -3,8 +3,9 @@
 use super::{Drive, End, Kept, Phase};
 use crate::current::voltage_limit::VoltageLimitState;
 use crate::dc_link::{DcLinkLimits, DcLinkState, Limiting};
-use crate::drive::coefficients::{Coefficients, THERMAL_EVERY};
+use crate::drive::coefficients::Coefficients;
 use crate::io::Sample;
+use crate::protect::thermal::Thermal;
 
 /// Limits of the torque current. What the brake resistor has taken outlives a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -81,7 +82,7 @@ impl Drive {
 
     /// Adds the current of the last periods to the thermal loads, in every state.
     pub(super) fn watch_load(&mut self) -> Result<(), End> {
-        if !self.kept.elapsed.is_multiple_of(THERMAL_EVERY) {
+        if !self.kept.elapsed.is_multiple_of(Thermal::EVERY) {
             return Ok(());
         }
         let on = self.is_energised();
@@ -92,7 +93,7 @@ impl Drive {
         if on {
             Ok(borne?)
         } else {
-            self.c.dc_link.rest(&mut k.limits.dc_link, THERMAL_EVERY);
+            self.c.dc_link.rest(&mut k.limits.dc_link, Thermal::EVERY);
             Ok(())
         }
     }

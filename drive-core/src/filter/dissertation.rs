@@ -65,8 +65,10 @@ pub const PP: Sos<2> = Sos::from_f64(&[
 /// State of [`LPF`] on a current vector.
 pub type LpfState = SosState<AlphaBeta, 4>;
 /// State of [`BPF`] on a current vector.
+#[cfg(feature = "printed")]
 pub type BpfState = SosState<AlphaBeta, 2>;
 /// State of [`PP`] on the current difference.
+#[cfg(feature = "printed")]
 pub type PpState = SosState<f32, 2>;
 
 const LPF_LAG: f32 = 1.530_412;

@@ -25,7 +25,7 @@ use num_complex::Complex64;
 /// (a zero pair on the unit circle) then needs one multiplication less.
 ///
 /// ```
-/// use drive_core::{AlphaBeta, filter::sos::{Sos, SosState}};
+/// use induction_drive_core::{AlphaBeta, filter::{Sos, SosState}};
 ///
 /// // y[k] = 0.5 x[k] + 0.5 y[k-1] on a vector.
 /// let low_pass = Sos::<1>::from_f64(&[[0.5, 0.0, 0.0, -0.5, 0.0]]);

@@ -18,7 +18,7 @@ use core::f32::consts::TAU;
 use crate::io::PERIOD_S;
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
-use crate::settings::Motor;
+use crate::motor::Motor;
 
 /// Control periods that are averaged.
 const AVERAGED: u8 = 4;

@@ -15,7 +15,7 @@ use crate::flux::schedule::GainSchedule;
 use crate::flux::tracker::{Pll, PllCorrection, Tracker, TrackerState};
 use crate::learned::Learned;
 use crate::math::angle::{Angle, UnitVector};
-use crate::settings::table::ReferenceTable;
+use crate::table::ReferenceTable;
 
 /// Reference `ref_delta_i` over i_q (section 3.3): odd, linear up to the current `from`, constant beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]

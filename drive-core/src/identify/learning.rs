@@ -40,10 +40,10 @@ use crate::carrier::asymmetry::Asymmetry;
 use crate::io::{PERIOD_S, periods};
 use crate::math::angle::Angle;
 use crate::math::frames::Dq;
-use crate::settings::Motor;
-use crate::settings::table::{Grid, POINTS};
+use crate::motor::Motor;
+use crate::table::{Grid, POINTS};
 
-pub use crate::learned::{Fitted, LEAST_SLOPE, Learned, Verdict};
+pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;
 use points::{AVERAGE_S, LEFT, Point, SETTLE_T};
 

@@ -15,8 +15,8 @@ use crate::fault::Fault;
 use crate::io::PERIOD_S;
 use crate::math::angle::UnitVector;
 use crate::math::frames::{AlphaBeta, Dq, SQRT_3};
-use crate::settings::Motor;
-use crate::tuning::FirstOrder;
+use crate::motor::FirstOrder;
+use crate::motor::Motor;
 
 /// Share of the expected carrier amplitude below which a channel counts as silent.
 const SILENT: f32 = 0.25;

@@ -74,6 +74,9 @@ impl ThermalLoads {
 }
 
 impl Thermal {
+    /// Control periods between two steps.
+    pub const EVERY: u32 = 60;
+
     /// Advances by a period with the `square` of the current vector, A^2.
     ///
     /// # Errors

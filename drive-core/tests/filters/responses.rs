@@ -2,9 +2,9 @@
 
 use core::f64::consts::PI;
 
-use drive_core::filter::dissertation::{BPF, LPF, LPF_AS_PRINTED, PP, lpf_lag_samples};
-use drive_core::filter::section::{Section, response};
-use drive_core::filter::sos::{Sos, SosState};
+use induction_drive_core::filter::{
+    BPF, LPF, LPF_AS_PRINTED, PP, Section, Sos, SosState, lpf_lag_samples, response,
+};
 use num_complex::Complex64;
 
 use super::db;

@@ -1,6 +1,7 @@
 //! Step of the current loop on the identified plant.
 
-use drive_core::tuning::FirstOrder;
+use drive_core::FirstOrder;
+use drive_settings::tuning;
 
 use super::{Context, Experiment};
 use crate::error::Error;
@@ -62,7 +63,7 @@ fn run(_: &Context<'_>) -> Result<Outcome, Error> {
         "Figures 26, 27",
     );
     for (name, key, plant) in plants {
-        let poles = plant.closed_loop_poles(K_C, Z_C).map_or("-".to_owned(), |poles| {
+        let poles = tuning::closed_loop_poles(plant, K_C, Z_C).map_or("-".to_owned(), |poles| {
             let mut real: Vec<f64> = poles.iter().map(|p| p.re).collect();
             real.sort_by(f64::total_cmp);
             if poles.iter().all(|p| p.im.abs() < 1e-9) {

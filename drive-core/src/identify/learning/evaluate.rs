@@ -8,7 +8,7 @@ use crate::learned::{
 };
 use crate::math::angle::UnitVector;
 use crate::protect::saliency_check::SaliencyCheck;
-use crate::settings::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
+use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Limit of the asymmetry that a gain mismatch does not explain, for a mismatch to be corrected as one: absolute part, and
 /// share of the mismatch.

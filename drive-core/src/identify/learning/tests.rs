@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods)] // std trigonometry is the reference here
 use super::*;
 use crate::carrier::asymmetry::Asymmetry;
-use crate::settings::table::{ReferenceTable, SlopeTable};
+use crate::table::{ReferenceTable, SlopeTable};
 use core::f64::consts::TAU as TURN;
 
 /// Carrier current at no torque current, A.

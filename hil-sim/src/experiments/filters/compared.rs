@@ -1,7 +1,6 @@
 //! The filters, each in the forms that are compared.
 
-use drive_core::filter::dissertation::{BPF, LPF_AS_PRINTED, PP};
-use drive_core::filter::sos::{Sos, SosState};
+use drive_core::filter::{BPF, LPF_AS_PRINTED, PP, Sos, SosState};
 use num_complex::Complex64;
 
 use super::direct;

@@ -1,6 +1,7 @@
 //! Where the printed numbers do not follow from the printed parameters.
 
-use drive_core::tuning::{EquivalentCircuit, FirstOrder, IntegratorLag};
+use drive_core::FirstOrder;
+use drive_settings::tuning::{EquivalentCircuit, IntegratorLag};
 
 use super::PERIOD_S;
 use crate::experiments::bode::{RATE, largest_pole};
