@@ -466,6 +466,7 @@ impl Drive {
     }
 
     /// That which a run leaves to the next one.
+    #[cold]
     fn left(&self) -> Left {
         match &self.phase {
             Phase::Off(left) | Phase::Fault(_, left) => *left,

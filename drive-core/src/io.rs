@@ -19,6 +19,7 @@ pub const PERIOD_S: f32 = 1.0 / 6000.0;
 pub const CONVERTER_CODES: u16 = 4095;
 
 /// Whole control periods in a time in s, rounded. Not for the control step.
+#[cold]
 pub fn periods(seconds: f32) -> u32 {
     libm::roundf(seconds / PERIOD_S) as u32
 }

@@ -77,6 +77,7 @@ pub struct FirstOrder {
 
 impl FirstOrder {
     /// G(e^(j omega_t)).
+    #[cold]
     pub fn response(&self, omega_t: f64) -> Complex64 {
         Complex64::new(self.k, 0.0) / (Complex64::cis(omega_t) - Complex64::new(self.p, 0.0))
     }

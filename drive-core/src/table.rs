@@ -226,6 +226,7 @@ impl SlopeTable {
     }
 
     /// The inverses, rad, at most `most` times that without torque current.
+    #[cold]
     pub(crate) fn inverses(&self, most: f32) -> [f32; POINTS] {
         let first = self.at_rest();
         self.values.map(|k| {

@@ -23,7 +23,7 @@ impl Drive {
     ///
     /// # Errors
     /// The reason of the refusal; nothing has changed then.
-    // Not inlined: it stays in the flash.
+    #[cold]
     #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
@@ -175,6 +175,7 @@ impl Drive {
     }
 
     /// Lets the position loop begin anew where the shaft is, without torque.
+    #[cold]
     fn rest_here(&mut self) {
         if let Phase::Field(field) = &mut self.phase {
             let count = self.kept.rotor_count;
@@ -185,6 +186,7 @@ impl Drive {
         }
     }
 
+    #[cold]
     pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
         match &job {
             _ if !self.is_charged() => return Err(Refused::NotCharged),

@@ -88,6 +88,7 @@ impl Field {
 
 impl Coefficients {
     /// Replaces settings by an accepted result of a learning.
+    #[cold]
     pub fn take(&mut self, learned: &Learned) {
         if !learned.verdict.is_accepted() {
             return;

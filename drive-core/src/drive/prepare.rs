@@ -96,6 +96,7 @@ impl Drive {
     }
 
     /// Goes on to the work that the drive was started for.
+    #[cold]
     fn energise(&mut self, encoder: u32) {
         let Phase::Prepare(prepare) = &self.phase else { return };
         let left = prepare.left;

@@ -81,6 +81,7 @@ pub fn group_delay(sections: &[Section], omega_t: f64) -> f64 {
 }
 
 /// c0 + c1 x + c2 x².
+#[cold]
 fn polynomial([c0, c1, c2]: [f64; 3], x: Complex64) -> Complex64 {
     Complex64::new(c0, 0.0) + x * (Complex64::new(c1, 0.0) + x * Complex64::new(c2, 0.0))
 }

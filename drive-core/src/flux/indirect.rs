@@ -112,6 +112,7 @@ impl Indirect {
     ///
     /// # Errors
     /// The smallest and the largest allowed value, s, when `tau_r` is outside [`TAU_R_LIMITS`].
+    #[cold]
     pub fn track_tau_r(&mut self, tau_r: f32) -> Result<f32, [f32; 2]> {
         let limits = TAU_R_LIMITS.map(|factor| factor * PERIOD_S / self.nominal_rate);
         if !(limits[0]..=limits[1]).contains(&tau_r) {

@@ -269,6 +269,7 @@ impl Learning {
     }
 
     /// Evaluates the sums of a completed point. False when the shaft moved.
+    #[cold]
     fn finish(&self, state: &mut LearningState, point: Point) -> bool {
         let s = state.sums;
         state.sums = Sums::default();

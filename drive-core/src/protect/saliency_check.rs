@@ -77,6 +77,7 @@ fn seen_share(window: f32, tau_r: f32) -> f32 {
 
 impl SaliencyCheck {
     /// Check for a flux-fixed saliency (with its sign) and the rotor time constant `tau_r`, s.
+    #[cold]
     pub fn new(flux_saliency: f32, tau_r: f32) -> Self {
         let window = (AVERAGE_T * tau_r).clamp(AVERAGE_S.0, AVERAGE_S.1);
         let (average, seen_share) = (periods(window), seen_share(window, tau_r));

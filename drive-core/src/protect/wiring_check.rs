@@ -163,6 +163,7 @@ impl WiringCheck {
     /// # Errors
     /// [`Fault::WiringNoCurrent`], [`Fault::WiringExchanged`], [`Fault::WiringPolarityA`] or
     /// [`Fault::WiringPolarityB`].
+    #[cold]
     pub fn judge(&self, answers: &[[f32; 2]; 3]) -> Result<(), Fault> {
         let [a, b, c] = *answers;
         let least = LEAST_SHARE * self.expected;
