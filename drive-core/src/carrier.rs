@@ -9,9 +9,8 @@ mod sample;
 pub(crate) mod synchronous;
 
 pub use asymmetry::Asymmetry;
-pub use demodulator::Demodulate;
 #[cfg(feature = "printed")]
-pub use demodulator::{Literal, Rectified};
+pub use demodulator::{Demodulate, Literal, Rectified};
 pub use injection::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN, CarrierPeriod, Injection};
 pub use kind::DemodulatorKind;
 pub use sample::CarrierSample;

@@ -377,7 +377,7 @@ impl Drive {
         }
     }
 
-    /// Whether [`online`](crate::identify::online) is to be given what the last step saw.
+    /// Whether `online` is to be given what the last step saw.
     pub fn tracks_rotor(&self) -> bool {
         self.c.track_rotor && matches!(&self.phase, Phase::Field(field) if field.regulates())
     }

@@ -7,5 +7,5 @@ pub(crate) mod section;
 pub(crate) mod sos;
 
 pub use dissertation::{BPF, LPF, LPF_AS_PRINTED, LpfState, PP, lpf_lag_samples};
-pub use section::{Section, group_delay, response};
+pub use section::{Section, response};
 pub use sos::{Signal, Sos, SosState};

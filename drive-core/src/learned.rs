@@ -1,8 +1,8 @@
-//! The result of a [learning](crate::identify::learning): what it found, and whether the motor can be tracked with it.
+//! The result of a learning: what it found, and whether the motor can be tracked with it.
 
 use core::fmt;
 
-use crate::carrier::asymmetry::Asymmetry;
+use crate::carrier::Asymmetry;
 use crate::table::{CarrierTable, POINTS, ReferenceTable, SlopeTable};
 
 /// Largest accepted spread of the even part of the reference. Noise gives 0.001.
@@ -16,7 +16,7 @@ pub(crate) const LARGEST_ASYMMETRY: f32 = 0.1;
 pub(crate) const CURRENT_SALIENCY: (f32, f32) = (0.075, 0.35);
 /// Least magnitude of the slope without torque current, 1/rad, with negative and with positive sign: at 5 mA of sensor noise
 /// 5° rms.
-pub const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
+pub(crate) const LEAST_SLOPE: [f32; 2] = [0.02, 0.035];
 /// Up to this multiple of it the tracking is weak.
 const WEAK: f32 = 1.5;
 /// Largest accepted part of the signal that repeats four times in a turn, relative to the slope without torque current: 8.6°.
@@ -44,6 +44,7 @@ impl Fitted {
 
 /// Whether, and how well, the motor can be tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Verdict {
     /// Accepted.
     Sound,

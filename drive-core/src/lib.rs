@@ -16,24 +16,22 @@
 //!
 //! | room | contents |
 //! |---|---|
-//! | [`io`], [`fault`] | sample and compare values; the numbered faults |
-//! | [`math`], [`filter`] | angles and frames; second-order sections |
+//! | the root | [`Drive`], its [`Coefficients`], states and commands; samples, faults, motor, scales; speed loop, dc link, relay |
+//! | [`io`] | sample and compare values |
+//! | [`math`], [`filter`] | vectors and frames; second-order sections |
 //! | [`current`] | sensing, PI, modulation, dead time and drop of the inverter |
 //! | [`carrier`] | the injected voltage and the demodulation of its current |
 //! | [`flux`] | the angle of the rotor flux, from the encoder or from the saliency |
-//! | [`motion`] | speed and position loop |
-//! | [`dc_link`] | limits of the torque current by the dc link, chopper |
-//! | [`supply`] | precharge relay |
 //! | [`protect`] | checks of sensors, wiring, saliency and lock |
-//! | [`learned`] | what a learning has found |
+//! | [`learned`], [`table`] | the result of a learning with locked shaft, and its tables |
 //! | [`homing`] | finding a stop of the shaft |
-//! | [`commission`] | from the nameplate to the parameters of the motor |
-//! | [`identify`] | learning of the tracking reference; rotor time constant while running |
-//! | [`settings`], [`tuning`] | settings in SI units; design of the controllers |
-//! | `drive` | [`Drive`], its [`Coefficients`], states and commands |
 //!
-//! Each block is a small pair of coefficients (made from settings in SI units, outside the
-//! interrupt) and state, with one step function. Equation, table, figure and section numbers are
+//! The coefficients come from outside: the crate `induction-drive-settings` designs them from settings in SI units.
+//! `induction-drive-commission` finds the parameters of the motor, `induction-drive-rotor-id` its rotor time constant while it
+//! runs.
+//!
+//! Each block is a small pair of coefficients, which are public, and state, which the drive alone has, with one step function.
+//! Equation, table, figure and section numbers are
 //! those of R. A. N. Barroso, "Controle de torque sensorless de um motor de indução com injeção de
 //! sinal de alta frequência no eixo de quadratura", UFC, 2017.
 //!
@@ -73,10 +71,10 @@ pub use drive::{
 pub use fault::Fault;
 pub use flux::AngleSource;
 pub use identify::learning::Learning;
-pub use io::{Compare, Hardware, Sample};
+pub use io::{CONVERTER_CODES, Compare, Hardware, PERIOD_S, Sample, periods};
 pub use line::Line;
 pub use math::angle::{Angle, UnitVector};
-pub use math::frames::{Abc, AlphaBeta, DmQm, Dq, SQRT_3};
+pub use math::frames::{Abc, AlphaBeta, Dq, SQRT_3};
 pub use motion::{Motion, MotionGains, Ramps};
 pub use motor::{FirstOrder, Motor};
 pub use supply::Relay;

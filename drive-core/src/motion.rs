@@ -28,8 +28,8 @@ pub mod ramp;
 #[cfg(test)]
 mod tests;
 
-use crate::current::pi::{Pi, PiState};
-use crate::math::angle::Angle;
+use crate::Angle;
+use crate::current::{Pi, PiState};
 use crate::math::{limited, within};
 
 use ramp::{Ramp, RampState};
@@ -223,7 +223,7 @@ impl Motion {
     }
 
     /// Returns the quadrature current, A, for the goal at the position `count`; called in every control
-    /// period. The current changes every [`DIVIDER`] periods.
+    /// period. The current changes every `DIVIDER` periods.
     ///
     /// The computation is spread over three periods: speed, speed reference, current.
     ///

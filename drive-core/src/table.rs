@@ -144,6 +144,7 @@ impl Default for CarrierTable {
 
 /// Why a table was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum TableError {
     /// Fewer than two points.
     TooShort,

@@ -19,10 +19,7 @@ const ELSEWHERE: [(&str, &str); 30] = [
     ("cargo test", "`cargo xtask test` runs all tests"),
     ("cargo clippy", "`cargo xtask test` runs it"),
     ("cargo fmt", "`cargo xtask test` checks the format"),
-    (
-        "cargo run -p induction-drive-core --example",
-        "compiled by `cargo xtask test`; run by a person",
-    ),
+    ("cargo run -p induction-drive-core", "compiled by `cargo xtask test`; run by a person"),
     ("cargo sim board", "`cargo xtask board` plays sessions with the image"),
     ("cargo sim console", "needs a port; its protocol is tested"),
     ("cargo live", "serves a page until it is ended; `cargo xtask pages` drives it"),

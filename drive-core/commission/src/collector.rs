@@ -6,8 +6,7 @@
 use super::motion::Motion;
 use super::plant_fit::PlantFit;
 use drive_core::carrier::{CARRIER_COS, CARRIER_SAMPLES, CARRIER_SIN};
-use drive_core::io::PERIOD_S;
-use drive_core::{Abc, AlphaBeta};
+use drive_core::{Abc, AlphaBeta, PERIOD_S};
 
 /// Bins of a record.
 pub const BINS: usize = 57;

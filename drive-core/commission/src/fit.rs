@@ -11,7 +11,7 @@
 
 use super::collector::{Bin, Collector};
 use super::report::Refusal;
-use drive_core::io::PERIOD_S;
+use drive_core::PERIOD_S;
 
 /// Bins that begin earlier in a half are left out, because the current still moves fast and a saliency changes the
 /// inductance meanwhile: a share of the rotor time constant, from 12 ms to 60 ms.

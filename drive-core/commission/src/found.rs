@@ -1,8 +1,7 @@
 //! What the steps have found, and the settings that follow from it.
 
 use super::fit::Fitted;
-use drive_core::io::PERIOD_S;
-use drive_core::{FirstOrder, Motor};
+use drive_core::{FirstOrder, Motor, PERIOD_S};
 use drive_settings::{CurrentPlant, Flux, IdentifiedPlant, PlantSource, Settings};
 
 /// What the steps have found; `None` for a step that has not been done or was refused.

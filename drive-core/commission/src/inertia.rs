@@ -12,8 +12,7 @@
 
 use super::motion::Slope;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record};
-use drive_core::io::periods;
-use drive_core::{Excited, State};
+use drive_core::{Excited, State, periods};
 
 /// Duration of a quarter, s, and the quarters of the measurement: three times + - - +.
 const QUARTER_S: f32 = 0.8;

@@ -18,8 +18,7 @@ use super::{
     Answer, Collector, Commissioning, Leakage, Meaning, Quantity, Record, Refusal, SIZE, Step,
 };
 use drive_core::carrier::CARRIER_SAMPLES;
-use drive_core::io::PERIOD_S;
-use drive_core::{AlphaBeta, Excitation, SQRT_3};
+use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
 use drive_settings::rules::CARRIER_HZ;
 
 /// Bisections of the inductance.

@@ -4,8 +4,7 @@ use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Levels, Meaning, Next, QUIET_S, Quantity,
     Record, Refusal, SIZE, Step, TAU_R, TIME,
 };
-use drive_core::io::PERIOD_S;
-use drive_core::{AlphaBeta, Excitation, SQRT_3};
+use drive_core::{AlphaBeta, Excitation, PERIOD_S, SQRT_3};
 
 /// Current levels, as shares of the test current, and time of the first two, s. The last is for an inverter whose voltage
 /// depends on the current.

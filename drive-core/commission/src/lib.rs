@@ -61,8 +61,7 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-use drive_core::io::{PERIOD_S, periods};
-use drive_core::{AlphaBeta, Excitation, Excited, FirstOrder, Regulator, State};
+use drive_core::{AlphaBeta, Excitation, Excited, FirstOrder, PERIOD_S, Regulator, State, periods};
 use drive_settings::Settings;
 use drive_settings::tuning::{CurrentLoopDesign, TuningError, design_current_loop, motor_plant};
 use drive_settings::value::Words as _;
@@ -83,6 +82,8 @@ const GAIN_RAD_PER_S: f32 = 500.0;
 const ZERO_RAD_PER_S: f32 = 167.0;
 
 /// The next action that the commissioning asks for.
+///
+/// Exhaustive on purpose: every action has to be carried out.
 // A report is passed once a step.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, PartialEq)]

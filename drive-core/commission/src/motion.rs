@@ -2,7 +2,7 @@
 
 use core::mem::replace;
 
-use drive_core::io::PERIOD_S;
+use drive_core::PERIOD_S;
 use drive_core::math::limited;
 
 /// Control periods from one pair of values to the next: 10 ms. The speed is a mean over as long, and smoothed over 5 ms: it

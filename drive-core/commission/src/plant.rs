@@ -14,8 +14,7 @@
 
 use super::plant_fit::SETTLING;
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, Step};
-use drive_core::io::PERIOD_S;
-use drive_core::{AlphaBeta, Excitation, FirstOrder};
+use drive_core::{AlphaBeta, Excitation, FirstOrder, PERIOD_S};
 use drive_settings::tuning::motor_plant;
 
 /// Bias along phase a, and current that a sample of the voltage makes, as shares of the test current: 97 mA of 3.6 A, which

@@ -3,8 +3,7 @@
 use core::f32::consts::{SQRT_2, TAU};
 
 use super::report::Quantity;
-use drive_core::SQRT_3;
-use drive_core::io::PERIOD_S;
+use drive_core::{PERIOD_S, SQRT_3};
 use drive_settings::Settings;
 
 /// Plausible share of the shaft's power in the apparent power: efficiency times power factor.

@@ -9,6 +9,7 @@ use drive_settings::words;
 
 /// A step of the commissioning, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Step {
     /// The nameplate: is it plausible, and what follows from it.
     Nameplate,
@@ -67,6 +68,7 @@ pub const VALUES: usize = 8;
 
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// The step.
     pub step: Step,
@@ -78,6 +80,7 @@ pub struct Report {
 
 /// The reason why a step is refused. The settings stay as they were.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Refusal {
     /// An entry of the nameplate, with what is plausible beside the others.
     Plate(Quantity),

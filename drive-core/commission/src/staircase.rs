@@ -19,8 +19,7 @@ use super::{
     Answer, BINS, Collector, Commissioning, Fitted, Iron, Meaning, Next, Quantity, Record, Refusal,
     SIZE, Step, TAU_R, TIME,
 };
-use drive_core::Motor;
-use drive_core::io::PERIOD_S;
+use drive_core::{Motor, PERIOD_S};
 
 /// Levels, as shares of the test current.
 const STAIRS: [f32; STEPS] = [0.06, 0.13, 0.22, 0.33, 0.46, 0.62, 0.8];

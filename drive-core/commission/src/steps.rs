@@ -1,9 +1,8 @@
 //! Steps 2 and 3: the sensors without current, and the pulses of the wiring check.
 
 use super::{Answer, Collector, Commissioning, Meaning, Next, Quantity, Record, Refusal, SIZE};
-use drive_core::io::PERIOD_S;
 use drive_core::protect::{WiringCheck, WiringSettings};
-use drive_core::{Excitation, Excited};
+use drive_core::{Excitation, Excited, PERIOD_S};
 
 /// Time of the sums without current, and of the pause before the pulses and before the levels, s.
 pub(super) const QUIET_S: f32 = 0.1;

@@ -3,8 +3,7 @@
 
 use super::collector::{Collector, Record};
 use super::fit::{Fitted, Search};
-use drive_core::AlphaBeta;
-use drive_core::io::PERIOD_S;
+use drive_core::{AlphaBeta, PERIOD_S};
 
 const T: f64 = PERIOD_S as f64;
 

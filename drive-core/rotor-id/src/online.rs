@@ -41,9 +41,8 @@ use core::fmt;
 use crate::rls::filter::Filter;
 use crate::rls::{Rls, RlsError, RlsSettings};
 use drive_core::flux::TAU_R_LIMITS;
-use drive_core::io::PERIOD_S;
 use drive_core::math::within;
-use drive_core::{AlphaBeta, Dq};
+use drive_core::{AlphaBeta, Dq, PERIOD_S};
 use drive_settings::Settings;
 use fit::{Machine, Unknowns};
 use num_complex::Complex32;
@@ -96,6 +95,7 @@ pub enum SpeedInput {
 
 /// Estimate of the rotor parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RotorEstimate {
     /// Rotor time constant, s.
     pub tau_r: f32,
@@ -109,6 +109,7 @@ pub struct RotorEstimate {
 
 /// Reason why there is no estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum NoEstimate {
     /// The memory is not full yet since the start, or since samples were missing.
     Settling,

@@ -67,6 +67,7 @@ impl RlsSettings {
 
 /// A setting out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RlsError {
     /// `lambda` is outside 0.9 to 1.
     Lambda,

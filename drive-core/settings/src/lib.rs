@@ -23,9 +23,6 @@ pub mod tuning;
 
 pub use settings::*;
 
-/// The examples of the documents.
 #[cfg(doctest)]
-mod documents {
-    #[doc = include_str!("../README.md")]
-    struct Readme;
-}
+#[doc = include_str!("../README.md")]
+struct Readme;

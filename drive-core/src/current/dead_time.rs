@@ -5,8 +5,7 @@
 //! (4.1 V at 311 V and 2.2 us). The compensation adds the same voltage in advance. Near zero current, where
 //! the sign is uncertain, it passes through zero linearly.
 
-use crate::io::PERIOD_S;
-use crate::math::frames::Abc;
+use crate::{Abc, PERIOD_S};
 
 /// Coefficients of the compensation.
 ///
@@ -60,7 +59,7 @@ impl DeadTime {
     }
 
     /// Voltage to add, V per phase, for a dc link of `v_dc`, V. `drop` is the voltage lost beyond the dead
-    /// time, V (see [`crate::current::inverter_drop`]).
+    /// time, V (see `crate::current::inverter_drop`).
     pub fn voltage(&self, signs: Signs, v_dc: f32, drop: f32) -> Abc {
         signs.0 * ((self.ratio * v_dc + drop) * (1.0 / ONE))
     }

@@ -20,7 +20,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::math::frames::Dq;
+use crate::Dq;
 
 /// Coefficients of a PI controller, Eq. 3.35.
 ///

@@ -1,11 +1,8 @@
 //! Conversion of ADC codes to amperes and volts (section 3.2, Eq. 3.5), and offset calibration.
 
 use super::shunts::{ShuntState, Shunts};
-use crate::fault::Fault;
-use crate::io::{Compare, Sample};
-use crate::line::Line;
-use crate::math::frames::{Abc, AlphaBeta};
-use crate::protect::heat_sink::HeatSink;
+use crate::protect::HeatSink;
+use crate::{Abc, AlphaBeta, Compare, Fault, Line, Sample};
 
 /// Samples of the second calibration: the time with the low sides on holds them.
 const SAMPLES_AGAIN: u16 = 32;
@@ -74,7 +71,7 @@ impl Sensing {
         }
     }
 
-    /// Notes the output of a step; see [`ShuntState::applied`].
+    /// Notes the output of a step; see `ShuntState::applied`.
     pub fn applied(&self, state: &mut SensingState, compare: &Compare) {
         if self.shunts.is_some() {
             state.shunts.applied(compare);

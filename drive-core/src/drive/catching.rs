@@ -4,15 +4,11 @@ use core::f32::consts::TAU;
 
 use super::{Field, FluxPhase, Kept};
 use crate::current::pi::ReferenceState;
-use crate::drive::coefficients::Catching;
-use crate::drive::coefficients::Coefficients;
-use crate::fault::Fault;
 use crate::flux::catch::{self, Caught};
 use crate::flux::hand_over::HandOver;
 use crate::flux::indirect::IndirectState;
-use crate::io::PERIOD_S;
-use crate::math::frames::Dq;
 use crate::math::within;
+use crate::{Catching, Coefficients, Dq, Fault, PERIOD_S};
 
 /// Share of the current of the search that does not wait for the reference filter: the faster the current comes, the larger the flux that turns with the
 /// rotor.

@@ -3,30 +3,13 @@
 #[cfg(test)]
 mod tests;
 
-use crate::carrier::injection::Injection;
-use crate::current::dead_time::DeadTime;
-use crate::current::inverter_drop::InverterDrop;
-use crate::current::modulation::Modulator;
-use crate::current::pi::{DqPi, ReferenceFilter};
-use crate::current::sensing::Sensing;
-use crate::current::voltage_limit::VoltageLimit;
-use crate::dc_link::DcLink;
-use crate::flux::AngleSource;
-use crate::flux::catch::Path;
-use crate::flux::estimator::Estimator;
-use crate::flux::indirect::Indirect;
-use crate::flux::observer::Observer;
-use crate::flux::volts_per_hertz::VoltsPerHertz;
-use crate::identify::learning::Learning;
-use crate::math::angle::{Angle, UnitVector};
-use crate::motion::Motion;
-use crate::protect::lock_monitor::LockMonitor;
-use crate::protect::noise_watch::NoiseWatch;
-use crate::protect::plausibility::Prediction;
-use crate::protect::saliency_check::SaliencyCheck;
-use crate::protect::thermal::Thermal;
-use crate::protect::wiring_check::WiringCheck;
-use crate::supply::Relay;
+use crate::carrier::Injection;
+use crate::current::{
+    DeadTime, DqPi, InverterDrop, Modulator, ReferenceFilter, Sensing, VoltageLimit,
+};
+use crate::flux::{Estimator, Indirect, Observer, Path, VoltsPerHertz};
+use crate::protect::{LockMonitor, NoiseWatch, Prediction, SaliencyCheck, Thermal, WiringCheck};
+use crate::{Angle, AngleSource, DcLink, Learning, Motion, Relay, UnitVector};
 
 /// The coefficients of the control step, designed outside the interrupt.
 // In this order: the fields of every step come first and lie together; see the state of the drive.

@@ -7,10 +7,9 @@ use super::{Drive, Field, FluxPhase, Frame, Goal, Job, Phase};
 use crate::drive::allowed::allowed;
 use crate::drive::command::{Accepted, Command, Refused};
 use crate::drive::state::Mode;
-use crate::flux::AngleSource;
-use crate::math::angle::Angle;
 use crate::math::limited;
 use crate::protect::lock_monitor::LockMonitorState;
+use crate::{Angle, AngleSource};
 
 /// Periods for which a jog goes on: 0.5 s.
 const JOG: u32 = 3000;
@@ -23,7 +22,7 @@ impl Drive {
     ///
     /// # Errors
     /// The reason of the refusal; nothing has changed then.
-    #[cold]
+    // Not inlined: it stays in the flash.
     #[inline(never)]
     pub fn command(&mut self, command: &Command) -> Result<Accepted, Refused> {
         allowed(command, self.state(), self.mode())?;
@@ -175,7 +174,6 @@ impl Drive {
     }
 
     /// Lets the position loop begin anew where the shaft is, without torque.
-    #[cold]
     fn rest_here(&mut self) {
         if let Phase::Field(field) = &mut self.phase {
             let count = self.kept.rotor_count;
@@ -186,7 +184,6 @@ impl Drive {
         }
     }
 
-    #[cold]
     pub(super) fn start(&mut self, job: Job) -> Result<Accepted, Refused> {
         match &job {
             _ if !self.is_charged() => return Err(Refused::NotCharged),

@@ -23,14 +23,8 @@ use super::{Field, Kept};
 use crate::carrier::synchronous::REFERENCE_AT;
 use crate::current::sensing::Measured;
 use crate::current::voltage_limit::{Operation, VoltageLimitState};
-use crate::dc_link::Limiting;
-use crate::drive::coefficients::Coefficients;
-use crate::fault::Fault;
-use crate::flux::AngleSource;
-use crate::io::Sample;
-use crate::math::angle::UnitVector;
-use crate::math::frames::Dq;
 use crate::protect::plausibility::{Known, RotorFlux};
+use crate::{AngleSource, Coefficients, Dq, Fault, Limiting, Sample, UnitVector};
 
 /// Results of the step that the tasks use, beside the state. Frequencies in electrical turns per period.
 pub(super) struct StepResults<'a> {

@@ -1,12 +1,9 @@
 //! Learning with the shaft locked, as a state of the drive.
 
 use super::{Drive, End, Field, FluxPhase, Kept, Phase};
-use crate::drive::coefficients::Coefficients;
-use crate::fault::Fault;
-use crate::flux::AngleSource;
 use crate::identify::learning::{Learned, LearningAction, LearningSample, Operate, Start, Verdict};
-use crate::math::angle::Angle;
 use crate::math::limited;
+use crate::{Angle, AngleSource, Coefficients, Fault};
 
 impl Drive {
     /// Result of the last learning, used or not; none before the first has ended.

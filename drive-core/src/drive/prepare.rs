@@ -4,14 +4,10 @@ use super::excite::Excite;
 use super::scalar::Scalar;
 use super::{Drive, Field, FluxPhase, Goal, Job, Kept, Left, Phase, References, Telemetry};
 use crate::current::sensing::Measured;
-use crate::drive::coefficients::Coefficients;
 use crate::drive::state::State;
-use crate::fault::Fault;
 use crate::flux::catch::CatchState;
-use crate::io::{Compare, Sample};
-use crate::math::angle::UnitVector;
-use crate::math::frames::Dq;
 use crate::protect::wiring_check::WiringCheckState;
+use crate::{Coefficients, Compare, Dq, Fault, Sample, UnitVector};
 
 /// Periods from the order to switch the low sides on until a sample sees them on, with margin.
 const LOW_SIDES_ON_FROM: u32 = 4;

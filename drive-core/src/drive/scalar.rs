@@ -2,12 +2,10 @@
 
 use super::{End, Kept, Left, Telemetry};
 use crate::current::sensing::Measured;
-use crate::dc_link::{DIVIDER, Limiting};
-use crate::drive::coefficients::Coefficients;
+use crate::dc_link::DIVIDER;
 use crate::drive::state::State;
-use crate::fault::Fault;
 use crate::flux::volts_per_hertz::{Demand, VoltsPerHertzState};
-use crate::io::{Compare, PERIOD_S};
+use crate::{Coefficients, Compare, Fault, Limiting, PERIOD_S};
 
 /// Frequency below which a motor that stops is switched off, turns per period.
 const STANDS: f32 = 0.2 * PERIOD_S;

@@ -21,8 +21,8 @@
 //! | [`BPF`] | 0.01000 | -0.49 dB, -3.9° | 0.80 | 8.83 | 500 Hz to 700 Hz |
 //! | [`PP`] | 0.94406 | -75.8 dB | 24.46 | - | below 100 Hz |
 
+use crate::AlphaBeta;
 use crate::filter::sos::{Sos, SosState};
-use crate::math::frames::AlphaBeta;
 
 /// "LPF" as printed (Table 7): an 8th-order band stop around the injected 600 Hz.
 ///

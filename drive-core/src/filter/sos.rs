@@ -15,7 +15,7 @@
 
 use core::ops::{Add, Mul, Sub};
 
-use crate::filter::section::{Section, group_delay, response};
+use crate::filter::section::{Section, response};
 use num_complex::Complex64;
 
 /// Coefficients of a cascade of `N` sections.
@@ -87,11 +87,6 @@ impl<const N: usize> Sos<N> {
     /// [`response`] of this filter.
     pub fn response(&self, omega_t: f64) -> Complex64 {
         response(&self.sections, omega_t)
-    }
-
-    /// [`group_delay`] of this filter.
-    pub fn group_delay(&self, omega_t: f64) -> f64 {
-        group_delay(&self.sections, omega_t)
     }
 }
 

@@ -6,10 +6,8 @@
 
 use core::f32::consts::TAU;
 
-use crate::carrier::injection::CARRIER_SAMPLES;
-use crate::io::PERIOD_S;
-use crate::math::angle::Angle;
-use crate::motor::Motor;
+use crate::carrier::CARRIER_SAMPLES;
+use crate::{Angle, Motor, PERIOD_S};
 
 /// Coefficients of the encoder and the slip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +105,7 @@ impl Indirect {
         }
     }
 
-    /// Moves the rotor time constant towards `tau_r`, s, by at most [`TAU_R_STEP`] of the settings' rate,
+    /// Moves the rotor time constant towards `tau_r`, s, by at most `TAU_R_STEP` of the settings' rate,
     /// and returns the one now in use, s. Not for the control step: it divides.
     ///
     /// # Errors
@@ -134,7 +132,7 @@ impl Indirect {
     /// Flux angle at the present sample from the encoder `count`.
     ///
     /// # Errors
-    /// [`ImplausibleEncoder`] when the counter moved further than the rotor can turn in a period, or stopped
+    /// `ImplausibleEncoder` when the counter moved further than the rotor can turn in a period, or stopped
     /// abruptly while the rotor was fast: cable or supply interrupted.
     pub fn angle(
         &self,

@@ -8,9 +8,8 @@
 use core::f32::consts::TAU;
 
 use super::hand_over::Turning;
-use crate::io::PERIOD_S;
-use crate::math::angle::Angle;
 use crate::math::limited;
+use crate::{Angle, PERIOD_S};
 
 /// Third pole of the flux-tracking loop relative to its natural frequency, where the other two poles lie.
 pub const THIRD_POLE: f64 = 0.2;

@@ -36,12 +36,9 @@ mod tests;
 
 use core::f32::consts::{PI, TAU};
 
-use crate::carrier::asymmetry::Asymmetry;
-use crate::io::{PERIOD_S, periods};
-use crate::math::angle::Angle;
-use crate::math::frames::Dq;
-use crate::motor::Motor;
+use crate::carrier::Asymmetry;
 use crate::table::{Grid, POINTS};
+use crate::{Angle, Dq, Motor, PERIOD_S, periods};
 
 pub use crate::learned::{Fitted, Learned, Verdict};
 pub use evaluate::Start;

@@ -1,6 +1,6 @@
 //! Checks of the temperature of the heat sink.
 
-use crate::fault::Fault;
+use crate::Fault;
 
 /// Checks of the heat sink, in codes.
 #[derive(Clone, Copy, Debug, PartialEq)]

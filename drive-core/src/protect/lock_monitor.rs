@@ -34,9 +34,9 @@
 //! `|C|_ref` is the carrier current measured during magnetisation, when the direction of the flux is known,
 //! times a learned even function of i_q.
 
+use crate::Fault;
 use crate::carrier::Saliency;
 use crate::carrier::injection::CARRIER_S;
-use crate::fault::Fault;
 use crate::learned::Learned;
 use crate::table::{CarrierTable, Grid, POINTS, SlopeTable, between};
 

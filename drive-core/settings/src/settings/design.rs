@@ -14,14 +14,13 @@ use drive_core::current::{
 };
 use drive_core::filter::lpf_lag_samples;
 use drive_core::flux::{Indirect, Leakage, Observer};
-use drive_core::io::{PERIOD_S, periods};
 use drive_core::protect::{
     Body, LockMonitor, LockMonitorSettings, NoiseWatch, Prediction, SaliencyCheck, Thermal,
     WiringCheck, WiringSettings,
 };
 use drive_core::{
-    Angle, AngleSource, Coefficients, DcLink, FirstOrder, Learning, Motion, Protection, Ramps,
-    SequenceSteps, UnitVector,
+    Angle, AngleSource, Coefficients, DcLink, FirstOrder, Learning, Motion, PERIOD_S, Protection,
+    Ramps, SequenceSteps, UnitVector, periods,
 };
 
 /// Time for which the lock is verified, s: the tracking loop settles in a third of it.

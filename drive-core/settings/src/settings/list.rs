@@ -15,9 +15,8 @@ use super::numbers::{LOW_OF_TRIP, MARGIN, WITHIN, either_sign, or_rule};
 use super::value::Words;
 use super::{CurrentSensors, Flux, ONLY_DEMODULATOR, PlantSource};
 use drive_core::carrier::DemodulatorKind;
-use drive_core::io::PERIOD_S;
 use drive_core::table::{CarrierTable, ReferenceTable};
-use drive_core::{AngleSource, Line, Motor};
+use drive_core::{AngleSource, Line, Motor, PERIOD_S};
 
 /// Rated current of the dissertation's motor, A peak (Table 3, star).
 pub(super) const RATED_A: f32 = Nameplate::DEFAULT.current_a * SQRT_2;
@@ -203,7 +202,7 @@ settings! {
         ignore_delays: bool = false, word().learned();
         /// whether the rotor time constant is tracked while running
         ///
-        /// The drive takes the one that [`online`](rotor_id::online) finds.
+        /// The drive takes the one that `online` finds.
         track_rotor: bool = false, word();
         /// The injection.
         injection: InjectionSettings = InjectionSettings::DEFAULT;
@@ -292,11 +291,11 @@ settings! {
         reference: Option<ReferenceTable> = None;
         /// whether a start checks the saliency of the motor
         ///
-        /// See [`saliency_check`](drive_core::protect::saliency_check). Without the check a start assumes it, and a shaft at standstill.
+        /// See `saliency_check`. Without the check a start assumes it, and a shaft at standstill.
         check: bool = true, word();
         /// whether the lock is verified and watched
         ///
-        /// See [`lock_monitor`](drive_core::protect::lock_monitor).
+        /// See `lock_monitor`.
         monitor: bool = true, word();
         /// Carrier current over the torque current, learned with the shaft locked, for the monitor; unset: guessed.
         carrier: Option<CarrierTable> = None;
@@ -315,7 +314,7 @@ settings! {
         ];
     }
 
-    /// The observer that takes the angle over from the injection at speed; see [`drive_core::flux::observer`].
+    /// The observer that takes the angle over from the injection at speed; see `drive_core::flux::observer`.
     ObserverSettings "observer." [observer] {
         /// whether the voltage of the motor gives the angle at speed, where the injection ends
         ///
@@ -418,7 +417,7 @@ settings! {
         phase_margin_deg: f32 = 60.0, number("deg").from_to(45.0, 70.0);
     }
 
-    /// Limits of the torque by the voltage of the dc link, and the brake resistor; see [`drive_core::dc_link`]. Unset values follow
+    /// Limits of the torque by the voltage of the dc link, and the brake resistor; see `drive_core::dc_link`. Unset values follow
     /// [`rules`](super::rules). By default there is no brake resistor; where one is fitted, its energy and power stand on it.
     BrakingSettings "braking." [braking] {
         /// dc link without generating torque
@@ -441,11 +440,11 @@ settings! {
     SupplySettings "supply." [supply] {
         /// time that the dc link must be steady before the precharge relay closes; 0 without one
         ///
-        /// See [`drive_core::supply`].
+        /// See `drive_core::supply`.
         relay_s: f32 = 0.0, number("s").from_to(0.0, 60.0);
     }
 
-    /// The mode for a motor that nobody has identified; see [`drive_core::flux::volts_per_hertz`]. Unset values follow
+    /// The mode for a motor that nobody has identified; see `drive_core::flux::volts_per_hertz`. Unset values follow
     /// [`rules`](super::rules).
     VoltsPerHertzMode "vf." [vf] {
         /// voltage between lines, rms, per frequency, of a motor that nobody has identified

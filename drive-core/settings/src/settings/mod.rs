@@ -7,9 +7,7 @@
 mod declare;
 mod design;
 pub mod entry;
-mod hardware;
 mod list;
-mod motor;
 mod ntc;
 mod numbers;
 pub mod rules;
@@ -23,13 +21,21 @@ use crate::tuning::TuningError;
 use drive_core::AngleSource;
 use drive_core::carrier::DemodulatorKind;
 
-pub use hardware::CurrentSensors;
 pub use list::{
     BrakingSettings, CurrentPlant, IdentifiedPlant, InjectionSettings, Inverter, Limits, Nameplate,
     Ntc, ObserverSettings, PrintedChain, SETTINGS, Scales, Sequence, Settings, SpeedSettings,
     SupplySettings, SynchronousTracking, VoltsPerHertzMode, find,
 };
 pub use tracked::{Tracked, TrackedLimit};
+
+/// Sensors of the phase currents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CurrentSensors {
+    /// Two, in the lines a and b.
+    InLine,
+    /// Three shunts below the low sides.
+    LowSide,
+}
 
 /// The plant that the current controllers are designed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +57,7 @@ pub enum Flux {
     High,
 }
 
+words!(CurrentSensors { Self::InLine => CurrentSensors::InLine, "in-line"; Self::LowSide => CurrentSensors::LowSide, "low-side"; });
 words!(Flux { Self::Low => Flux::Low, "low"; Self::High => Flux::High, "high"; });
 words!(AngleSource { Self::Encoder => AngleSource::Encoder, "encoder"; Self::Injection => AngleSource::Injection, "injection"; });
 words!(DemodulatorKind {
@@ -83,6 +90,8 @@ impl Settings {
 }
 
 /// The reason why settings were refused.
+///
+/// Exhaustive on purpose: who translates a reason has to translate a new one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingsError {
     /// A value outside its range.

@@ -3,7 +3,7 @@
 use micromath::F32;
 
 use super::Ntc;
-use drive_core::io::CONVERTER_CODES;
+use drive_core::CONVERTER_CODES;
 use drive_core::protect::HeatSink;
 
 /// 25 °C, K.

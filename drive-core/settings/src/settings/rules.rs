@@ -37,12 +37,11 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use super::list::RATED_A;
 use super::numbers::{WITHIN, either_sign};
-use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Settings};
+use super::{CurrentSensors, Flux, IdentifiedPlant, Inverter, Nameplate, Settings};
 use crate::tuning::motor_plant;
 use drive_core::carrier::DemodulatorKind;
-use drive_core::io::{CONVERTER_CODES, PERIOD_S};
 use drive_core::table::{CarrierTable, ReferenceTable, SlopeTable};
-use drive_core::{AngleSource, FirstOrder, Line, Motor};
+use drive_core::{AngleSource, CONVERTER_CODES, FirstOrder, Line, Motor, PERIOD_S, SQRT_3};
 
 /// Carrier current per direct current.
 const CARRIER_OF_I_D: f32 = 0.368_07;
@@ -130,6 +129,13 @@ impl Settings {
     /// Whether the observer takes the angle over from the injection at speed.
     pub(crate) fn uses_observer(&self) -> bool {
         self.tracks_synchronously() && self.observer.enabled
+    }
+}
+
+impl Nameplate {
+    /// Base impedance of a phase, ohm.
+    pub fn base_impedance(&self) -> f32 {
+        self.voltage_v / (SQRT_3 * self.current_a)
     }
 }
 

@@ -7,6 +7,7 @@ use drive_core::learned::Learned;
 
 /// Range of torque that a drive tracks with a [result](Learned).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tracked {
     /// Largest torque current, A, and torque, Nm; both signs.
     pub i_q: f32,

@@ -5,6 +5,8 @@ use core::fmt;
 use lexical_parse_float::FromLexical as _;
 
 /// A value of a setting.
+///
+/// Exhaustive on purpose: every kind of value has to be stored and shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// A finite number.

@@ -55,15 +55,6 @@ pub const MAX_MS: f64 = 2.2;
 /// part of the plant.
 pub const DELAY: f64 = 1.0;
 
-/// Integrating plant k/((z - 1)(z - p)), for example position over torque current (Eq. 4.1), any units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntegratorLag {
-    /// Gain k, output unit per input unit.
-    pub k: f64,
-    /// Pole p, in (0, 1).
-    pub p: f64,
-}
-
 /// T-equivalent circuit of the motor per phase (Table 5), in ohm and H.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EquivalentCircuit {
@@ -80,14 +71,9 @@ pub struct EquivalentCircuit {
 }
 
 impl From<Motor> for EquivalentCircuit {
-    fn from(motor: Motor) -> Self {
-        Self {
-            r_s: motor.r_s.into(),
-            r_r: motor.r_r.into(),
-            l_m: motor.l_m.into(),
-            l_ls: motor.l_ls.into(),
-            l_lr: motor.l_lr.into(),
-        }
+    fn from(Motor { r_s, r_r, l_m, l_ls, l_lr, .. }: Motor) -> Self {
+        let [r_s, r_r, l_m, l_ls, l_lr] = [r_s, r_r, l_m, l_ls, l_lr].map(f64::from);
+        Self { r_s, r_r, l_m, l_ls, l_lr }
     }
 }
 
@@ -126,6 +112,7 @@ pub struct CurrentLoopDesign {
 
 /// Reason why a controller could not be designed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum TuningError {
     /// A value is NaN or not strictly between its bounds.
     OutOfRange {
@@ -183,28 +170,6 @@ fn check_period(period_s: f64) -> Result<(), TuningError> {
 fn check_plant(k: f64, p: f64) -> Result<(), TuningError> {
     check("gain k of the plant", k, 0.0, 1e9)?;
     check("pole p of the plant", p, 0.0, 1.0)
-}
-
-/// Poles of `plant` under k_c (z - z_c)/(z - 1), with nothing else in the loop.
-pub fn closed_loop_poles(plant: FirstOrder, k_c: f64, z_c: f64) -> Option<[Complex64; 2]> {
-    // (z - 1)(z - p) + k_c k (z - z_c)
-    let gain = k_c * plant.k;
-    roots([gain - 1.0 - plant.p, plant.p - gain * z_c])
-}
-
-impl IntegratorLag {
-    /// G(e^(j omega_t)).
-    pub fn response(&self, omega_t: f64) -> Complex64 {
-        let z = Complex64::cis(omega_t);
-        Complex64::new(self.k, 0.0) / ((z - Complex64::ONE) * (z - Complex64::new(self.p, 0.0)))
-    }
-
-    /// Poles of this plant under k_c (z - z_c)/(z - 1), with nothing else in the loop.
-    pub fn closed_loop_poles(&self, k_c: f64, z_c: f64) -> Option<[Complex64; 3]> {
-        // (z - 1)^2 (z - p) + k_c k (z - z_c)
-        let gain = k_c * self.k;
-        roots([-2.0 - self.p, 1.0 + 2.0 * self.p + gain, -self.p - gain * z_c])
-    }
 }
 
 /// Current response of the motor, A/V, computed from its equivalent circuit: Eq. 3.14 with a zero-order

@@ -19,7 +19,8 @@ use crate::carrier::DemodulatorKind;
 
 use super::{Demodulate, RotatedBandPass, rotated_carrier};
 use crate::carrier::CarrierSample;
-use crate::filter::dissertation::{PP, PpState};
+use crate::filter::PP;
+use crate::filter::dissertation::PpState;
 use crate::filter::moving_sum::MovingSum;
 
 /// Units per square ampere in the sums: 2^19.

@@ -1,9 +1,8 @@
 //! The coefficients of a start on a turning shaft.
 
 use crate::settings::Settings;
-use drive_core::Catching;
 use drive_core::flux::Path;
-use drive_core::io::{PERIOD_S, periods};
+use drive_core::{Catching, PERIOD_S, periods};
 
 /// Current that the rotor is looked for with, as a share of the current limit.
 const SHARE: f32 = 0.714;

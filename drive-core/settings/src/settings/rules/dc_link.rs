@@ -2,8 +2,7 @@
 
 use crate::settings::Settings;
 use crate::settings::numbers::{LOW_OF_TRIP, MARGIN, WITHIN};
-use drive_core::io::{CONVERTER_CODES, periods};
-use drive_core::{ChopperSettings, DcLinkSettings, Relay};
+use drive_core::{CONVERTER_CODES, ChopperSettings, DcLinkSettings, Relay, periods};
 
 /// Highest dc link above which a drive trips, in relation to the highest in operation.
 pub const OVER_OF_HIGHEST: f32 = 1.05;
